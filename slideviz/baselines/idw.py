@@ -20,7 +20,7 @@ from numba import prange
 from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf import compiled
-from slideviz.rbf.compiled import BLOCK, OPTIONS, TARGETS_PER_TASK, half_chord
+from slideviz.rbf.compiled import BLOCK, OPTIONS, TARGETS_PER_TASK, one_minus_cos
 from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.evaluate import CHUNK, Basis, Tick, no_tick, padded_rows
 from slideviz.rbf.methods import within
@@ -223,7 +223,7 @@ def _squares(x, c, start, count, half, q):  # type: ignore[no-untyped-def]
     r, sine, cosine, z = x[0], x[1], x[2], x[3]
     for j in range(count):
         dr, dz = r - c0[j], z - c3[j]
-        chord = 2.0 * r * c0[j] * half_chord(half * (sine * c2[j] - cosine * c1[j]))
+        chord = 2.0 * r * c0[j] * one_minus_cos(half * (sine * c2[j] - cosine * c1[j]))
         q[j] = max(dr * dr + chord + dz * dz, TINY)
 
 

@@ -97,7 +97,7 @@ def assemble(
                 )
             done += len(part.nodes[rows])
             tick(done / total)
-    _hold(indptr, indices, data, conditions.free)
+    _fill_held_diagonal(indptr, indices, data, conditions.free)
     matrix = bsr_array((data, indices, indptr), shape=(count * d, count * d))
     return matrix, right.ravel()
 
@@ -130,7 +130,9 @@ def _pattern(parts: list[ShapeBlock], place: IntArray, count: int) -> tuple[np.n
     return pattern.indptr, pattern.indices
 
 
-def _hold(indptr: np.ndarray, indices: np.ndarray, data: FloatArray, free: FloatArray) -> None:
+def _fill_held_diagonal(
+    indptr: np.ndarray, indices: np.ndarray, data: FloatArray, free: FloatArray
+) -> None:
     """Add stiffness in the directions in which blocks of unknowns may not move, in place."""
     held = np.eye(free.shape[1]) - free
     rows = np.flatnonzero(np.any(held != 0, axis=(1, 2)))

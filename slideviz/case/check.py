@@ -23,7 +23,7 @@ from slideviz.case.model import (
     named,
 )
 from slideviz.case.motion_text import read_motions, write_motions
-from slideviz.case.reduction_keys import no_tolerance
+from slideviz.case.reduction_keys import why_no_tolerance
 from slideviz.case.words import nearest
 from slideviz.errors import CaseError, Note
 from slideviz.terms import ROLES, SLIDES
@@ -274,7 +274,7 @@ def idle_settings(case: Case) -> tuple[str, ...]:
     found += [
         f"{key.name} is without effect: DATA_REDUCTION= AUTO finds the tolerance, YES takes it"
         for key in KEYS.values()
-        if key.unless is no_tolerance
+        if key.unless is why_no_tolerance
         and case.reduction is not None
         and case.reduction.auto
         and key.get(case) != key.get(usual)

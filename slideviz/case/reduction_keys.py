@@ -11,22 +11,22 @@ from slideviz.case.values import YES_NO, Kind, one_of, real, whole
 from slideviz.terms import DATA_REDUCTIONS, LEVEL_CRITERIA, SELECTIONS, DataReduction
 
 
-def no_reduction(case: Case) -> str:
+def why_no_reduction(case: Case) -> str:
     """Return why settings of data reduction do nothing in a case."""
     off = "" if case.reduction is not None else "data reduction is off"
     return other_method(case, "rbf") or off
 
 
-def no_tolerance(case: Case) -> str:
+def why_no_tolerance(case: Case) -> str:
     """Return why a given tolerance of data reduction does nothing in a case."""
     auto = case.reduction is not None and case.reduction.auto
-    return no_reduction(case) or ("it is automatic" if auto else "")
+    return why_no_reduction(case) or ("it is automatic" if auto else "")
 
 
-def no_levels(case: Case) -> str:
+def why_no_levels(case: Case) -> str:
     """Return why settings of the levels of data reduction do nothing in a case."""
     levels = case.reduction is not None and case.reduction.multilevel
-    return no_reduction(case) or ("" if levels else "there are no levels")
+    return why_no_reduction(case) or ("" if levels else "there are no levels")
 
 
 def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Key:
@@ -39,7 +39,7 @@ def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Ke
 
     usual = getattr(Reduction(), field)
     default = NO_DEFAULT if usual is None else kind.write(usual)
-    window = {"unless": no_reduction, **window}
+    window = {"unless": why_no_reduction, **window}
 
     def get(case: Case) -> Any:
         given = case.reduction
@@ -47,7 +47,7 @@ def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Ke
             return None
         value = getattr(given, field)
         # Without effect, it is said only where somebody gave one.
-        idle = given.auto and window["unless"] is no_tolerance and value == usual
+        idle = given.auto and window["unless"] is why_no_tolerance and value == usual
         return None if idle else value
 
     return Key(name, REDUCTION, kind, meaning, put, get, default, field=field, **window)
@@ -101,7 +101,7 @@ REDUCTION_ROWS = (
         tip="The largest error at the boundary that the control nodes may leave to the "
         "correction, in the mesh's length unit.",
         said="",
-        unless=no_tolerance,
+        unless=why_no_tolerance,
     ),
     greedy(
         "DATA_RED_RELATIVE",
@@ -110,7 +110,7 @@ REDUCTION_ROWS = (
         "The tolerance as a part of the mesh's largest extent, instead of DATA_RED_TOLERANCE.",
         label="a relative tolerance of a case file,",
         said="",
-        unless=no_tolerance,
+        unless=why_no_tolerance,
     ),
     greedy(
         "MULTILEVEL",
@@ -129,7 +129,7 @@ REDUCTION_ROWS = (
         "criterion",
         "What ends a level: its number of nodes, or the fall of its error.",
         said="levels by {}",
-        unless=no_levels,
+        unless=why_no_levels,
     ),
     greedy(
         "LVL_TOL_CRIT",
@@ -137,7 +137,7 @@ REDUCTION_ROWS = (
         "level_tolerance",
         "Fall of the error that ends a level.",
         said="a level ends at {}",
-        unless=no_levels,
+        unless=why_no_levels,
     ),
     greedy(
         "LVL_SIZE",
@@ -147,7 +147,7 @@ REDUCTION_ROWS = (
         label="A level ends at",
         form="more",
         tip="Number of control nodes of a level, or the part of its error at which it ends.",
-        unless=no_levels,
+        unless=why_no_levels,
     ),
     Key(
         "DOUBLE_EDGE",

@@ -124,7 +124,7 @@ def measured(
     )
 
 
-class Rating:
+class QualityCollector:
     """The quality of all cells, block by block; it is kept in files, which end with ``stack``.
 
     Attributes

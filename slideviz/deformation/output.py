@@ -19,7 +19,7 @@ import numpy as np
 
 from slideviz.deformation.both_ways import facing, require_right
 from slideviz.deformation.given_mesh import Given, text_blocks
-from slideviz.deformation.measuring import MeasuredBlock, PointFiles, Rating, measured
+from slideviz.deformation.measuring import MeasuredBlock, PointFiles, QualityCollector, measured
 from slideviz.deformation.rest import Rest
 from slideviz.deformation.text_of_binary import text_of_binary
 from slideviz.errors import MeshError
@@ -81,7 +81,7 @@ class Output:
             )
         self._partial = stack.enter_context(made)
         self._is_ready = self._is_right = False
-        self._rating: Rating | None = None
+        self._rating: QualityCollector | None = None
 
     def _opened(self) -> Partial:
         """Return the file of the points that is changed, when it is there.
@@ -140,12 +140,12 @@ class Output:
                     partial.note([*partial.sums, checksum])
                 tick(end / total)
 
-    def rating(self, listed: int) -> Rating:
+    def rating(self, listed: int) -> QualityCollector:
         """Return the quality of all cells; of inverted ones ``listed`` are kept."""
         partial, count = self._opened(), self._place.cells.count
         metric = self._metric
         if self._rating is None:
-            self._rating = Rating(self._stack, self._path.parent, count, metric)
+            self._rating = QualityCollector(self._stack, self._path.parent, count, metric)
         self._rating.inverted.clear()
         given = self._mesh_file, self._zone, partial.path, metric, listed
         with self._watch.phase("quality") as tick, self._ranks.sharing(measuring, *given) as do:

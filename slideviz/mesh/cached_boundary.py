@@ -9,7 +9,7 @@ import numpy as np
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.fans import find_pieces
 from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
-from slideviz.mesh.topology import FEATURE_ANGLE_DEG, Boundary, find_boundary
+from slideviz.mesh.topology import DEFAULT_FEATURE_ANGLE_DEG, Boundary, find_boundary
 
 _MOST_PARTS = 64
 """With more than this the surface is rough, and its edges say nothing."""
@@ -64,7 +64,7 @@ def smooth_parts(mesh: Mesh, facets: Cells) -> tuple[Marker, ...]:
         return ()
     whole = Mesh(mesh.points, mesh.cells, (Marker("boundary", facets),), name=mesh.name)
     boundary = find_boundary(whole)
-    piece = find_pieces(boundary, mesh.points, FEATURE_ANGLE_DEG)
+    piece = find_pieces(boundary, mesh.points, DEFAULT_FEATURE_ANGLE_DEG)
     if piece.max() >= _MOST_PARTS:
         piece = find_pieces(boundary, mesh.points, 180.0)
     if piece.max() >= _MOST_PARTS or piece.max() == 0:

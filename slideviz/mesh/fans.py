@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray, frozen_array
 from slideviz.mesh.topology import (
-    FEATURE_ANGLE_DEG,
+    DEFAULT_FEATURE_ANGLE_DEG,
     TINY,
     Boundary,
     corner_vectors,
@@ -45,7 +45,7 @@ class Fans:
 
 
 def smooth_joints(
-    boundary: Boundary, points: FloatArray, feature_angle_deg: float = FEATURE_ANGLE_DEG
+    boundary: Boundary, points: FloatArray, feature_angle_deg: float = DEFAULT_FEATURE_ANGLE_DEG
 ) -> NDArray[np.bool_]:
     """Tell for each joint whether its facets are of one marker and turn by less than the angle.
 
@@ -63,7 +63,7 @@ def smooth_joints(
 
 
 def find_fans(
-    boundary: Boundary, points: FloatArray, feature_angle_deg: float = FEATURE_ANGLE_DEG
+    boundary: Boundary, points: FloatArray, feature_angle_deg: float = DEFAULT_FEATURE_ANGLE_DEG
 ) -> Fans:
     """Return the fans of smoothly joined facets around every boundary node."""
     count, width = boundary.facets.shape
@@ -146,7 +146,7 @@ def _add_normals(coords, facets, x, share, normal, facet, node, fan, total):  # 
 
 
 def find_pieces(
-    boundary: Boundary, points: FloatArray, feature_angle_deg: float = FEATURE_ANGLE_DEG
+    boundary: Boundary, points: FloatArray, feature_angle_deg: float = DEFAULT_FEATURE_ANGLE_DEG
 ) -> IntArray:
     """Return the piece that each facet belongs to, (f,): smooth parts of one marker."""
     smooth = smooth_joints(boundary, points, feature_angle_deg)

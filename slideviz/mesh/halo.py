@@ -72,7 +72,7 @@ class Halo:
         out[self.receivers] = np.where(moved == 0, start, start + moved)
         return out
 
-    def of_nodes(self, count: int) -> NDArray[np.bool_]:
+    def outer_mask(self, count: int) -> NDArray[np.bool_]:
         """Return a mask (count,) of the nodes that lie beyond the sides of the domain."""
         mask = np.zeros(count, bool)
         mask[self.outer] = True
@@ -175,7 +175,7 @@ def without_halo(mesh: Mesh) -> tuple[Mesh, IntArray | None]:
     halo = mesh.halo
     if halo is None:
         return mesh, None
-    beyond = halo.of_nodes(len(mesh.points))
+    beyond = halo.outer_mask(len(mesh.points))
     markers = tuple(
         Marker(marker.name, marker.cells.take(~_touching(marker.cells, beyond)))
         for marker in mesh.markers

@@ -30,7 +30,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality_derivative import QualityDerivative, derivative_of
 from slideviz.mesh.threads import in_parts
-from slideviz.mesh.validity import decide
+from slideviz.mesh.validity import decide_unproven
 from slideviz.terms import Metric
 
 if TYPE_CHECKING:
@@ -247,7 +247,7 @@ def _of_cells(
     measure(vtk, points, nodes, table, signs, alpha, spread, status)
     open_ = np.flatnonzero(status == UNPROVEN)
     if len(open_):
-        status[open_] = decide(vtk, points[nodes[open_]].T, signs[open_])
+        status[open_] = decide_unproven(vtk, points[nodes[open_]].T, signs[open_])
     good = status != INVERTED
     with np.errstate(all="ignore"):
         size = np.where(good, _ratio(total(alpha), sums), 0.0)

@@ -17,9 +17,9 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, sorted_nodes
 from slideviz.mesh.threads import in_parts
-from slideviz.mesh.unique_rows import row_groups, sorted_rows
+from slideviz.mesh.unique_rows import row_groups, sorted_in_rows
 
-FEATURE_ANGLE_DEG = 40.0
+DEFAULT_FEATURE_ANGLE_DEG = 40.0
 TINY = float(np.finfo(float).tiny)
 
 
@@ -127,7 +127,7 @@ def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
             keep = near[:, local].all(axis=1)
             sides.append(_padded(table[keep][:, local], facets.shape[1]))
             cells.append(ids[some[keep]])
-    table = sorted_rows(np.concatenate([facets, *sides]))
+    table = sorted_in_rows(np.concatenate([facets, *sides]))
     # A padded triangle (a, b, c, c) and a quadrilateral differ after sorting only if the
     # repeated node is the same one on both sides: make it the largest.
     if mesh.dim == 3:

@@ -46,7 +46,7 @@ _HALVES = np.array(
 )
 
 
-def decide(vtk: int, at: FloatArray, signs: NDArray[np.int8]) -> Status:
+def decide_unproven(vtk: int, at: FloatArray, signs: NDArray[np.int8]) -> Status:
     """Return the status (m,) of cells whose corners are positive, but not all coefficients.
 
     Parameters

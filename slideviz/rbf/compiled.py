@@ -64,7 +64,7 @@ def _wendland_c2(squared, scale):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", **OPTIONS)
-def half_chord(g):  # type: ignore[no-untyped-def]
+def one_minus_cos(g):  # type: ignore[no-untyped-def]
     """Return 1 - cos g without cancellation, for |g| <= 2."""
     t = g * g
     p = _K8 * t + _K7
@@ -116,7 +116,7 @@ def sum_rotational(x, c, w, half, scale, out):  # type: ignore[no-untyped-def]
         s0, s1, s2 = 0.0, 0.0, 0.0
         for j in range(c.shape[1]):
             dr, dz = r - c0[j], z - c3[j]
-            chord = 2.0 * r * c0[j] * half_chord(half * (sine * c2[j] - cosine * c1[j]))
+            chord = 2.0 * r * c0[j] * one_minus_cos(half * (sine * c2[j] - cosine * c1[j]))
             p = _wendland_c2(dr * dr + chord + dz * dz, scale)
             s0 += w0[j] * p
             s1 += w1[j] * p
@@ -187,7 +187,7 @@ def distances(x, c, start, count, half, scale, q):  # type: ignore[no-untyped-de
     if half > 0.0:
         for j in range(count):
             d0, d3 = x0 - c0[j], x3 - c3[j]
-            chord = 2.0 * x0 * c0[j] * half_chord(half * (x1 * c2[j] - x2 * c1[j]))
+            chord = 2.0 * x0 * c0[j] * one_minus_cos(half * (x1 * c2[j] - x2 * c1[j]))
             q[j] = np.sqrt(d0 * d0 + chord + d3 * d3) * scale
     else:
         for j in range(count):

@@ -34,7 +34,7 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows
 from slideviz.rbf.exact import row_names
 from slideviz.rbf.kernels import PLAIN
-from slideviz.rbf.level import Candidates, Level
+from slideviz.rbf.level import Candidates, GreedyLevel
 from slideviz.rbf.problem import Cycle, Interpolant, Levels, Problem, Watch
 from slideviz.rbf.selection import LevelLimit, pool
 from slideviz.rbf.solve import enough_threads
@@ -86,14 +86,14 @@ class GreedyFit:
         none = np.empty(0, np.int64)
         rows = ConstraintRows(none, None, np.empty((0, d)))
         self._among = Candidates(rows, none, none, none, np.empty(0))
-        self._level = Level(problem, self._among, self.found)
+        self._level = GreedyLevel(problem, self._among, self.found)
         self._known = problem.beginning()
         self._given, self._used = problem.stages[done:], list[int]()
         self._one_level = self._settings.level == "none"
 
     def _new_level(self) -> None:
         """Begin a level, for what those before left."""
-        self._level = Level(self._problem, self._among, self.found)
+        self._level = GreedyLevel(self._problem, self._among, self.found)
 
     def add(self, rows: ConstraintRows) -> None:
         """Meet these constraints too, and select until all errors are below the tolerance."""

@@ -116,7 +116,7 @@ class GrowingFactor:
         return solve_lower(self.lower, self.half, transposed=True)
 
 
-class Level:
+class GreedyLevel:
     """An interpolant of rows that are chosen one block after the other.
 
     Attributes

@@ -197,7 +197,7 @@ class System:
         if not len(self.factor.dropped):
             return self.factor
         if "whole" not in self._kept:
-            self._kept["whole"] = bordered(self.basis, self.place, self.factor)
+            self._kept["whole"] = with_dropped_rows(self.basis, self.place, self.factor)
         whole: Factor = self._kept["whole"]
         return whole
 
@@ -208,7 +208,9 @@ class System:
         return residuals
 
 
-def bordered(basis: Basis, place: tuple[FloatArray, FloatArray | None], factor: Factor) -> Factor:
+def with_dropped_rows(
+    basis: Basis, place: tuple[FloatArray, FloatArray | None], factor: Factor
+) -> Factor:
     """Return a factor with the rows that another left out, whose pivots are a little too large."""
     kept, dropped = factor.kept, factor.dropped
     features, normals = place

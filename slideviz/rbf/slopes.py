@@ -18,7 +18,7 @@ from numba import prange
 from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf import compiled
-from slideviz.rbf.compiled import A2, BLOCK, OPTIONS, TARGETS_PER_TASK, distances, half_chord
+from slideviz.rbf.compiled import A2, BLOCK, OPTIONS, TARGETS_PER_TASK, distances, one_minus_cos
 from slideviz.rbf.evaluate import Basis, padded_rows
 from slideviz.rbf.kernels import KERNELS, SHAPE
 
@@ -106,7 +106,7 @@ def _reverse(x, c, wx, wc, half, scale, kind, power, out):  # type: ignore[no-un
                     if half > 0.0:
                         g = half * (x1 * c[2, j] - x2 * c[1, j])
                         turn = x0 * c[0, j] * _sine(g) * half
-                        s0 += p * (x0 - c[0, j] + c[0, j] * half_chord(g))
+                        s0 += p * (x0 - c[0, j] + c[0, j] * one_minus_cos(g))
                         s1 += p * turn * c[2, j]
                         s2 -= p * turn * c[1, j]
                     else:
@@ -138,7 +138,7 @@ def _forward(x, c, w, dx, dc, half, scale, kind, power, out):  # type: ignore[no
                     change = (x3 - c[3, j]) * (d3 - dc[3, j]) + (x0 - c[0, j]) * (d0 - dc[0, j])
                     if half > 0.0:
                         g = half * (x1 * c[2, j] - x2 * c[1, j])
-                        change += (d0 * c[0, j] + x0 * dc[0, j]) * half_chord(g)
+                        change += (d0 * c[0, j] + x0 * dc[0, j]) * one_minus_cos(g)
                         turn = d1 * c[2, j] + x1 * dc[2, j] - d2 * c[1, j] - x2 * dc[1, j]
                         change += x0 * c[0, j] * _sine(g) * half * turn
                     else:

@@ -87,7 +87,7 @@ def _root(a, al):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _half_chord(g, gl):  # type: ignore[no-untyped-def]
-    """Return 1 - cos g by the terms of ``compiled.half_chord``."""
+    """Return 1 - cos g by the terms of ``compiled.one_minus_cos``."""
     t, tl = _times(g, gl, g, gl)
     p, pl = _K[8], 0.0
     for k in range(7, -1, -1):

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from slideviz.mesh.unique_rows import row_groups, sorted_rows
+from slideviz.mesh.unique_rows import row_groups, sorted_in_rows
 
 TABLES = hnp.arrays(
     np.int64,
@@ -21,7 +21,7 @@ def test_equal_rows_share_the_number_that_numpy_gives_them(table):
 
 @given(TABLES)
 def test_rows_are_sorted_as_numpy_sorts_them(table):
-    np.testing.assert_array_equal(sorted_rows(table), np.sort(table, axis=1))
+    np.testing.assert_array_equal(sorted_in_rows(table), np.sort(table, axis=1))
 
 
 @pytest.mark.parametrize("shape", [(0, 4), (0, 0)])

@@ -23,7 +23,6 @@ from slideviz.design.frozen.operations import difference_from, each_of, points
 from slideviz.design.frozen.tape import (
     Array,
     Variable,
-    apply,
     dot,
     function,
     gather,
@@ -32,6 +31,7 @@ from slideviz.design.frozen.tape import (
     length,
     multiply,
     put,
+    recorded,
     solution,
     take,
     transform,
@@ -155,7 +155,7 @@ class Equilibrium:
         """Return the forces (..., n, d) of a Cartesian displacement."""
         forces, u = self._forces, value(moved)
         each = partial(each_of, forces.of)
-        return apply(
+        return recorded(
             each(u),
             (moved, each, each),
             (

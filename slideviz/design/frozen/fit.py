@@ -163,7 +163,7 @@ class FrozenFit:
             self.doubt = np.maximum(self.doubt, solve.doubt)
         if any(isinstance(x, Variable) for x in (rows.right, rows.normals, self._features)):
             data = join(rows.right, np.zeros((extra, m))) if extra else rows.right
-            met = partial(self._met, rows, extra=extra)
+            met = partial(self._system_times, rows, extra=extra)
             if isinstance(solve, LeastSquares):
                 found = solve.solution(met, data, value(found))
             else:
@@ -179,7 +179,7 @@ class FrozenFit:
         nodes, place = _firsts(rows.nodes)
         return Sum(nodes, gather(multiply(rows.normals, own), place, len(nodes)), tail)
 
-    def _met(self, rows: TapedRows, found: FloatArray, *, extra: int) -> Array:
+    def _system_times(self, rows: TapedRows, found: FloatArray, *, extra: int) -> Array:
         """Return the product of the system with ``found``, which is constant, where it changes."""
         count, m = len(rows.nodes), found.shape[-1]
         if not (isinstance(self._features, Variable) or isinstance(rows.normals, Variable)):

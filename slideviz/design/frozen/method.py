@@ -26,7 +26,7 @@ from slideviz.design.frozen.tape import (
 )
 from slideviz.mesh.model import FloatArray, IntArray, largest_coordinate
 from slideviz.rbf.constraint_rows import AGREE, refuse
-from slideviz.rbf.primitives import primitives
+from slideviz.rbf.projection_matrices import projection_matrices
 
 if TYPE_CHECKING:
     from slideviz.design.frozen.step import FrozenStep, StepState
@@ -151,7 +151,9 @@ class Method(ABC):
             rows = np.flatnonzero(label == index)
             found, which = tracks.tracks[index].nearest(at[rows])
             anchor[rows] = found
-            matrix[rows] = primitives(tracks.tracks[index].simplices(which), at[rows], found)
+            matrix[rows] = projection_matrices(
+                tracks.tracks[index].simplices(which), at[rows], found
+            )
         return anchor, matrix
 
     def _ties(self, nodes: IntArray) -> tuple[IntArray, IntArray, FloatArray]:

@@ -11,7 +11,6 @@ from slideviz.design.frozen.tape import (
     Array,
     Variable,
     add,
-    apply,
     cross,
     dot,
     function,
@@ -21,6 +20,7 @@ from slideviz.design.frozen.tape import (
     length,
     multiply,
     put,
+    recorded,
     take,
     transform,
     unit,
@@ -106,7 +106,7 @@ def _mapped(matrix: FloatArray, x: Array, d: int) -> Array:
     def back(g: FloatArray) -> FloatArray:
         return (g.reshape(*g.shape[:-2], -1) @ matrix).reshape(*g.shape[:-2], len(v), d)
 
-    return apply(there(v), (x, there, back))
+    return recorded(there(v), (x, there, back))
 
 
 def _fan_normals(setup: Setup, coords: Array) -> Array:
@@ -173,4 +173,4 @@ def _leading(rows: Array) -> Array:
         change = change + np.swapaxes(change, -1, -2)
         return np.einsum("...de,ke->...kd", change, a)
 
-    return apply(lead, (rows, there, back))
+    return recorded(lead, (rows, there, back))

@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.baselines.idw import weighted_means
 from slideviz.design.frozen.loops import place
-from slideviz.design.frozen.tape import Array, Linear, Link, Variable, apply, value
+from slideviz.design.frozen.tape import Array, Linear, Link, Variable, recorded, value
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.threads import in_parts
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
@@ -39,7 +39,7 @@ def features(frame: Frame, coords: Array) -> Array:
     if not isinstance(coords, Variable):
         return out
     slopes = features_slopes(frame, x)
-    return apply(
+    return recorded(
         out,
         (
             coords,
@@ -58,7 +58,7 @@ def columns(x: Array, nodes: IntArray) -> Array:
         np.add.at(out, (..., nodes), g)  # type: ignore[arg-type]
         return out
 
-    return apply(v[..., nodes], (x, lambda t: t[..., nodes], back))
+    return recorded(v[..., nodes], (x, lambda t: t[..., nodes], back))
 
 
 def points(frame: Frame, coords: Array) -> Array:
@@ -85,7 +85,7 @@ def difference(frame: Frame, start: FloatArray, vectors: Array) -> Array:
     full = np.broadcast_to(start, v.shape)
     out = frame.difference(flat(full), flat(v)).reshape(v.shape)
     if not frame.cylindrical:
-        return apply(out, (vectors, lambda t: t, lambda g: g))
+        return recorded(out, (vectors, lambda t: t, lambda g: g))
     return _turned(vectors, out, lambda: coords_slopes(frame, start + v))
 
 
@@ -98,7 +98,7 @@ def difference_from(frame: Frame, start: Array, vectors: Array) -> Array:
     if not any(isinstance(part, Variable) for part in (start, vectors)):
         return out
     here, there = coords_slopes(frame, x), coords_slopes(frame, x + v)
-    return apply(out, _by_rows(start, there - here), _by_rows(vectors, there))
+    return recorded(out, _by_rows(start, there - here), _by_rows(vectors, there))
 
 
 def _by_rows(x: Array, slopes: FloatArray) -> Link:
@@ -114,7 +114,7 @@ def _turned(x: Array, out: FloatArray, slopes_of: Callable[[], FloatArray]) -> A
     """Return the outcome of a map of rows with derivatives (n, e, d)."""
     if not isinstance(x, Variable):
         return out
-    return apply(out, _by_rows(x, slopes_of()))
+    return recorded(out, _by_rows(x, slopes_of()))
 
 
 def radial_sum(
@@ -136,7 +136,7 @@ def radial_sum(
     def turned(g: FloatArray) -> FloatArray:
         return many(basis, c, x, g)
 
-    return apply(
+    return recorded(
         many(basis, x, c, w, room),
         (
             targets,
@@ -202,7 +202,7 @@ def terms(basis: Basis, x: Array) -> Array:
         slopes[:, 3, 1], slopes[:, 3, 2] = 2.0 * v[2], 2.0 * v[1]
     else:
         slopes[:, range(1, k + 1), range(k)] = 1.0
-    return apply(
+    return recorded(
         out,
         (
             x,
@@ -257,7 +257,7 @@ def weighted_mean(
     def back(g: FloatArray) -> FloatArray:
         return own[:, None] * sum_powers(basis, c, x, g / total, power)
 
-    return apply(
+    return recorded(
         out,
         (
             targets,

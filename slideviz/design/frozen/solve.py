@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from slideviz.design.frozen.tape import Array, apply, value
+from slideviz.design.frozen.tape import Array, recorded, value
 from slideviz.errors import ConditionWarning, DeformError
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.refine import TRUSTED, System
@@ -132,7 +132,7 @@ class LeastSquares:
         def minus(t: FloatArray) -> FloatArray:
             return -self(t)
 
-        return apply(
+        return recorded(
             found,
             (met(found) - data, minus, minus),
             (met(rest), twice, twice),

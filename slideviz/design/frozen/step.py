@@ -26,9 +26,9 @@ from slideviz.design.frozen.operations import coords as coords_of
 from slideviz.design.frozen.operations import points
 from slideviz.design.frozen.tape import (
     Array,
-    apply,
     multiply,
     put,
+    recorded,
     take,
     transform,
     value,
@@ -191,7 +191,7 @@ def _shifted(start: Array, by: Array, *, own: bool = False) -> Array:
     """
     x, u = value(start), value(by)
     out = shift(x, u if own else u.copy())
-    return apply(out, (start, lambda t: t, lambda g: g), (by, lambda t: t, lambda g: g))
+    return recorded(out, (start, lambda t: t, lambda g: g), (by, lambda t: t, lambda g: g))
 
 
 def _at_rest(at: Array, moved: Array, start: FloatArray, before: FloatArray) -> Array:

@@ -53,7 +53,7 @@ class Variable:
         return add(other, -self)
 
     def __neg__(self) -> Array:
-        return apply(-self.value, (self, np.negative, np.negative))
+        return recorded(-self.value, (self, np.negative, np.negative))
 
     def __mul__(self, other: Array | float) -> Array:
         return multiply(self, np.asarray(other, np.float64))
@@ -105,7 +105,7 @@ def value(x: Array) -> FloatArray:
     return x.value if isinstance(x, Variable) else x
 
 
-def apply(result: FloatArray, *links: Link) -> Array:
+def recorded(result: FloatArray, *links: Link) -> Array:
     """Return the outcome of an operation; it is recorded where it depends on a variable."""
     used = [link for link in links if isinstance(link[0], Variable)]
     return used[0][0].tape.variable(result, used) if used else result
@@ -128,7 +128,7 @@ def _fitted(adjoint: FloatArray, like: FloatArray) -> FloatArray:
 def add(a: Array, b: Array) -> Array:
     """Return a + b."""
     x, y = value(a), value(b)
-    return apply(
+    return recorded(
         x + y,
         (a, lambda t: _stretched(t, y), lambda g: _fitted(g, x)),
         (b, lambda t: _stretched(t, x), lambda g: _fitted(g, y)),
@@ -138,7 +138,7 @@ def add(a: Array, b: Array) -> Array:
 def multiply(a: Array, b: Array) -> Array:
     """Return a * b, element by element; one of them may have a single column."""
     x, y = value(a), value(b)
-    return apply(
+    return recorded(
         x * y,
         (a, lambda t: t * y, lambda g: _fitted(g * y, x)),
         (b, lambda t: t * x, lambda g: _fitted(g * x, y)),
@@ -147,7 +147,7 @@ def multiply(a: Array, b: Array) -> Array:
 
 def function(x: Array, result: FloatArray, slope: FloatArray) -> Array:
     """Return a function of each element, given its values and its derivatives."""
-    return apply(result, (x, lambda t: t * slope, lambda g: g * slope))
+    return recorded(result, (x, lambda t: t * slope, lambda g: g * slope))
 
 
 def inverse(x: Array) -> Array:
@@ -163,7 +163,7 @@ def dot(a: Array, b: Array) -> Array:
     def along(u: FloatArray, v: FloatArray) -> FloatArray:
         return np.einsum("...d,...d->...", u, v)[..., None]
 
-    return apply(
+    return recorded(
         along(x, y),
         (a, lambda t: along(t, y), lambda g: g * y),
         (b, lambda t: along(x, t), lambda g: g * x),
@@ -175,7 +175,7 @@ def length(x: Array) -> Array:
     v = value(x)
     size = np.linalg.norm(v, axis=-1, keepdims=True)
     unit = v / np.where(size > 0, size, 1.0)
-    return apply(
+    return recorded(
         size,
         (x, lambda t: (t * unit).sum(axis=-1, keepdims=True), lambda g: g * unit),
     )
@@ -191,13 +191,13 @@ def unit(x: Array) -> Array:
     def across(t: FloatArray) -> FloatArray:
         return (t - (t * e).sum(axis=-1, keepdims=True) * e) * scale
 
-    return apply(v / np.where(size > 0, size, 1.0), (x, across, across))
+    return recorded(v / np.where(size > 0, size, 1.0), (x, across, across))
 
 
 def cross(a: Array, b: Array) -> Array:
     """Return the vector product of each row of a with that of b, (..., n, 3)."""
     x, y = value(a), value(b)
-    return apply(
+    return recorded(
         np.cross(x, y),
         (a, lambda t: np.cross(t, y), lambda g: np.cross(y, g)),
         (b, lambda t: np.cross(x, t), lambda g: np.cross(g, x)),
@@ -208,7 +208,7 @@ def transform(matrices: FloatArray, x: Array) -> Array:
     """Return ``matrices`` (n, e, d) or (e, d) times each row of x (..., n, d)."""
     there = "...ed,...d->...e"
     back = "...ed,...e->...d"
-    return apply(
+    return recorded(
         np.einsum(there, matrices, value(x)),
         (
             x,
@@ -221,7 +221,7 @@ def transform(matrices: FloatArray, x: Array) -> Array:
 def product(a: Array, b: Array) -> Array:
     """Return the matrix product of a (n, q) and b (..., q, c)."""
     x, y = value(a), value(b)
-    return apply(
+    return recorded(
         x @ y,
         (a, lambda t: t @ y, lambda g: g @ np.swapaxes(y, -1, -2)),
         (b, lambda t: x @ t, lambda g: np.swapaxes(x, -1, -2) @ g),
@@ -231,7 +231,7 @@ def product(a: Array, b: Array) -> Array:
 def reshape(x: Array, rows: int, columns: int) -> Array:
     """Return the entries, row by row, as (..., rows, columns)."""
     n, c = value(x).shape[-2:]
-    return apply(
+    return recorded(
         value(x).reshape(*value(x).shape[:-2], rows, columns),
         (
             x,
@@ -247,7 +247,7 @@ def transpose(x: Array) -> Array:
     def turned(t: FloatArray) -> FloatArray:
         return np.swapaxes(t, -1, -2)
 
-    return apply(turned(value(x)), (x, turned, turned))
+    return recorded(turned(value(x)), (x, turned, turned))
 
 
 def sums(values: FloatArray, rows: IntArray, count: int) -> FloatArray:
@@ -261,13 +261,13 @@ def take(x: Array, rows: IntArray) -> Array:
     """Return some rows of x (..., n, c), as often as they are named: (..., m, c)."""
     v = value(x)
     n = v.shape[-2]
-    return apply(v[..., rows, :], (x, lambda t: t[..., rows, :], lambda g: sums(g, rows, n)))
+    return recorded(v[..., rows, :], (x, lambda t: t[..., rows, :], lambda g: sums(g, rows, n)))
 
 
 def gather(x: Array, rows: IntArray, count: int) -> Array:
     """Return the sums (..., count, c) of the rows of x that belong to each row."""
     v = value(x)
-    return apply(
+    return recorded(
         sums(v, rows, count), (x, lambda t: sums(t, rows, count), lambda g: g[..., rows, :])
     )
 
@@ -282,7 +282,7 @@ def mixed(matrix: csr_array, x: Array) -> Array:
         found = (a @ wide).reshape(a.shape[0], count, c)
         return np.moveaxis(found, 1, 0).reshape(*t.shape[:-2], a.shape[0], c)
 
-    return apply(
+    return recorded(
         times(matrix, value(x)), (x, partial(times, matrix), lambda g: times(matrix.T.tocsr(), g))
     )
 
@@ -312,7 +312,7 @@ def put(x: Array, rows: IntArray, new: Array, *, own: bool = False) -> Array:
         placed[..., rows, :] = t
         return placed
 
-    return apply(out, (x, without, without), (new, alone, lambda g: g[..., rows, :]))
+    return recorded(out, (x, without, without), (new, alone, lambda g: g[..., rows, :]))
 
 
 def join(*parts: Array) -> Array:
@@ -335,7 +335,7 @@ def join(*parts: Array) -> Array:
 
         links.append((part, alone, cut))
     full = [np.broadcast_to(v, (*ahead, *v.shape[-2:])) for v in values]
-    return apply(np.concatenate(full, axis=-2), *links)
+    return recorded(np.concatenate(full, axis=-2), *links)
 
 
 def solution(
@@ -353,4 +353,4 @@ def solution(
         The matrix's inverse, and the same for the reverse pass, where that has another accuracy.
     """
     back = adjoint or solve
-    return apply(found, (residual, lambda t: -solve(t), lambda g: -back(g)))
+    return recorded(found, (residual, lambda t: -solve(t), lambda g: -back(g)))

@@ -7,11 +7,11 @@ from itertools import pairwise
 
 from slideviz.mesh.check import printable
 from slideviz.mesh.io.source import Source
-from slideviz.mesh.io.su2.halo import find_halo
 from slideviz.mesh.io.su2.lines import Rows, number_of
 from slideviz.mesh.io.su2.numbers import parse_cells, parse_points
 from slideviz.mesh.io.su2.scan import Progress, scan
 from slideviz.mesh.io.su2.sections import boxes_elsewhere, find_bounds, find_sections
+from slideviz.mesh.io.su2.send_receive import find_halo
 from slideviz.mesh.io.su2.zone import find_zone
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh, Origin
 

@@ -20,7 +20,7 @@ ROUNDING = 1e-9
 """The same as a part of the size of the facet."""
 
 
-def primitives(corners: FloatArray, x: FloatArray, closest: FloatArray) -> FloatArray:
+def projection_matrices(corners: FloatArray, x: FloatArray, closest: FloatArray) -> FloatArray:
     """Return the projections P (m, d, d) of the primitives that closest points are on.
 
     Parameters

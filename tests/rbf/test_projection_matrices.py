@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from slideviz.rbf.closest import ClosestPoints
-from slideviz.rbf.primitives import primitives
+from slideviz.rbf.projection_matrices import projection_matrices
 
 TRIANGLE = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
 SEGMENT = np.array([[[0.0, 0], [2, 0]]])
@@ -13,7 +13,7 @@ SEGMENT = np.array([[[0.0, 0], [2, 0]]])
 def found(corners, x):
     x = np.array([x], float)
     closest, which = ClosestPoints(corners).nearest(x)
-    return primitives(corners[which], x, closest)[0]
+    return projection_matrices(corners[which], x, closest)[0]
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_near_a_closest_point_the_map_is_affine():
     track = ClosestPoints(corners)
     x = rng.random((200, 3)) * 2 - 0.5
     closest, which = track.nearest(x)
-    matrix = primitives(corners[which], x, closest)
+    matrix = projection_matrices(corners[which], x, closest)
     t = 1e-7 * rng.standard_normal(x.shape)
     moved = track.query(x + t)
     np.testing.assert_allclose(moved - closest, np.einsum("mij,mj->mi", matrix, t), atol=1e-13)
