@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import FloatArray, Mesh
     from slideviz.mesh.periodic import Pair
     from slideviz.mesh.quality import Quality
-    from slideviz.plots.section_picture import Shown
+    from slideviz.plots.section_picture import SectionInRun
     from slideviz.sections.model import Section
 
 CUT_HELP = "cut them (default in 3D); in 2D: the curve of their numbers along the line"
@@ -114,8 +114,8 @@ def section(arguments: argparse.Namespace) -> int:
     from slideviz.plots.around import surroundings
     from slideviz.plots.section_paint import paint
     from slideviz.plots.section_picture import (
+        SectionInRun,
         SectionStyle,
-        Shown,
         require_picture_name,
         section_picture,
     )
@@ -135,7 +135,9 @@ def section(arguments: argparse.Namespace) -> int:
     cutter = Cutter.of(mesh)
     pieces = show_passages(cutter, mesh.points, chosen, scene.matrices)
     note = "" if scene.base is not None or painted.label == "skew" else NONE
-    shown = Shown(pieces, painted, surroundings(cutter, mesh.points, scene.matrices), note=note)
+    shown = SectionInRun(
+        pieces, painted, surroundings(cutter, mesh.points, scene.matrices), note=note
+    )
     if not shown.drawn:
         why = chosen.shape.miss(chosen, scene.outer)
         raise CaseError(f"{mesh.name}: the {chosen.describe(mesh.dim)} {why}")
@@ -180,7 +182,7 @@ def _streamed(arguments: argparse.Namespace, case: Case | None) -> _Scene:
     return _Scene(near, before, found, chosen, matrices, mesh.points, seen.reference)
 
 
-def _report(arguments: argparse.Namespace, scene: _Scene, shown: Shown) -> int:
+def _report(arguments: argparse.Namespace, scene: _Scene, shown: SectionInRun) -> int:
     """Write or print the numbers of the cut, and return the exit code."""
     from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.report import save_json

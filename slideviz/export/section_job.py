@@ -12,8 +12,8 @@ from slideviz.export.titles import pair_names
 from slideviz.plots.around import surroundings
 from slideviz.plots.section_paint import paint
 from slideviz.plots.section_picture import (
+    SectionInRun,
     SectionStyle,
-    Shown,
     require_picture_name,
     section_picture,
 )
@@ -101,7 +101,7 @@ def save_section(
     return path
 
 
-def _shown(session: Session, name: str, section: Section) -> Shown:
+def _shown(session: Session, name: str, section: Section) -> SectionInRun:
     """Return the cuts of a section in a view with a name."""
     frame = session.frame
     assert frame is not None
@@ -115,7 +115,7 @@ def _shown(session: Session, name: str, section: Section) -> Shown:
     cutter, points = Cutter.of(frame.mesh), frame.mesh.points
     only = _choice(session, section)
     at = session.view.frame
-    return Shown(
+    return SectionInRun(
         show_passages(cutter, points, section, every, only),
         painted,
         surroundings(cutter, points, every),

@@ -64,7 +64,7 @@ class Autosave(QObject):
         self._lock: QLockFile | None = None
         self._written: tuple[object, ...] = ()
         self._asked: tuple[object, ...] = ()
-        self._replaces: list[Found] = []
+        self._replaces: list[LeftSession] = []
         self._runner = JobRunner(self)
         self._runner.finished.connect(self._done)
         self._runner.failed.connect(self._failed)
@@ -81,7 +81,7 @@ class Autosave(QObject):
             case = keep_view(session, self._camera())
             self._runner.start(self._write, case)
 
-    def replace(self, found: Found) -> None:
+    def replace(self, found: LeftSession) -> None:
         """Remove the session of an earlier start once this one, restored from it, is written."""
         self._replaces.append(found)
         self._written = ()
@@ -128,7 +128,7 @@ def _key(session: Session) -> tuple[object, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class LeftSession:
     """The session of a program that did not end properly.
 
     Attributes
@@ -159,7 +159,7 @@ class Found:
         self.lock.unlock()
 
 
-def find_sessions(folder: Path) -> tuple[list[Found], list[str]]:
+def find_sessions(folder: Path) -> tuple[list[LeftSession], list[str]]:
     """Return the sessions that no window holds, newest first, and sentences about unreadable ones.
 
     Those that cannot be read are renamed to ``….broken``, with a sentence each.
@@ -173,7 +173,7 @@ def find_sessions(folder: Path) -> tuple[list[Found], list[str]]:
             case = Case.read(path)
             if case.mesh_file is None:
                 raise SlidevizError(f"{path.name}: it names no mesh")
-            found.append(Found(path, case, _source(path), lock))
+            found.append(LeftSession(path, case, _source(path), lock))
         except (SlidevizError, OSError) as problem:
             problems.append(_put_aside(path, str(problem).splitlines()[0]))
             lock.unlock()

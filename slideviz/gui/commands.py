@@ -58,7 +58,7 @@ def _switch(name: Shown, window: MainWindow) -> None:
 
 
 def _add_section(kind: str, window: MainWindow) -> None:
-    window.docks_.lead_to("sections")
+    window.docks_.bring_to_front("sections")
     panel: Any = window.docks_.panels["sections"]  # a panel, which commands do not know
     panel.add[kind].click()
 
@@ -151,10 +151,11 @@ _RUN = Menu("run", "&Run", entries=(
     Command("run", "&Run", "Deform the mesh with these settings.",
             lambda window: window.start_run(), ("F5",), "run",
             lambda now: now.ready and not now.busy,
-            button="Deform the mesh with these settings (Ctrl+R).", button_key="Ctrl+R"),
+            button_tip="Deform the mesh with these settings (Ctrl+R).", button_key="Ctrl+R"),
     Command("cancel", "&Cancel", "Stop what runs; the steps that are done are kept.",
             lambda window: window.running.cancel(), image="cancel", enabled=lambda now: now.busy,
-            button="Stop within a second (Esc); the steps that are done stay.", button_key="Esc"),
+            button_tip="Stop within a second (Esc); the steps that are done stay.",
+            button_key="Esc"),
     None,
     Command("designs", "&Designs…",
             "Run a table of designs, each with other numbers of the motions or other settings, "
@@ -169,8 +170,8 @@ _COLOURS = Menu("colours", "&Colours", "From which value to which the colours ra
             "one in a comparison.",
             lambda window: window.store.change(changes.fit_colours, every=False),
             ("R",), enabled=valued,
-            button="From the lowest to the highest value of what is shown now (R); of all steps: "
-            "Shift+R."),
+            button_tip="From the lowest to the highest value of what is shown now (R); of all "
+            "steps: Shift+R."),
     Command("fit_all_colours", "Fit to all steps",
             "Let the colours range over the values of all steps, so that they say the same in a "
             "film.",
@@ -201,19 +202,19 @@ _SIDES = Menu("look_from", "Look &from", "Look at the mesh from a side.", (
 STEPS = Menu("steps", "&Steps", "Show another step of the deformation.", (
     Command("step_first", "Undeformed mesh", "Show the mesh before it is deformed.",
             lambda window: window.player.go(0), ("Home",), enabled=stepped,
-            button="Undeformed mesh (Home)"),
+            button_tip="Undeformed mesh (Home)"),
     Command("step_previous", "Step back", "Show the step before this one.",
             lambda window: window.player.step(-1), ("Alt+Left",), enabled=stepped,
-            button="One step back (←)"),
+            button_tip="One step back (Alt+Left)"),
     Command("step_play", "Play or pause", "Show the steps one after the other, or stop that.",
             lambda window: window.player.toggle(), ("Space",), enabled=stepped,
-            button="Play the steps (Space)"),
+            button_tip="Play the steps (Space)"),
     Command("step_next", "Step on", "Show the step after this one.",
             lambda window: window.player.step(1), ("Alt+Right",), enabled=stepped,
-            button="One step on (→)"),
+            button_tip="One step on (Alt+Right)"),
     Command("step_last", "Last step", "Show the deformed mesh.",
             lambda window: window.player.go(10**9), ("End",), enabled=stepped,
-            button="Last step (End)"),
+            button_tip="Last step (End)"),
 ))
 
 

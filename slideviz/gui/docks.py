@@ -260,9 +260,9 @@ class Docks(QObject):
         if _is_in_front(self.by_name[name]):
             self.by_name[name].hide()
         else:
-            self.lead_to(name)
+            self.bring_to_front(name)
 
-    def lead_to(self, name: str) -> None:
+    def bring_to_front(self, name: str) -> None:
         """Bring a dock to the front."""
         dock = self.by_name[name]
         dock.show()

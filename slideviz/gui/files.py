@@ -76,7 +76,7 @@ class Files(QObject):
 
     def open_path(self, path: Path, zone: int | None = None) -> None:
         """Open a mesh or case in the background, once unsaved work is saved or may be lost."""
-        if self.may_go_on(lambda: self.open_path(path, zone)):
+        if self.ask_about_unsaved(lambda: self.open_path(path, zone)):
             path = Path(path).absolute()
             self.window.running.start_job(
                 f"Opening {path.name}", self._opened, jobs.open_file, path, zone
@@ -100,7 +100,7 @@ class Files(QObject):
 
     def open_sample(self, name: str, run: bool = False, size: int | None = None) -> None:
         """Write a sample case into a folder of this program and open it; ``run`` deforms it."""
-        if not self.may_go_on(lambda: self.open_sample(name, run, size)):
+        if not self.ask_about_unsaved(lambda: self.open_sample(name, run, size)):
             return
         self.window.running.start_job(
             f"Opening the sample {name}",
@@ -130,7 +130,9 @@ class Files(QObject):
         words = "opened %s: %dD, %d cells, %d points, %d boundaries"
         log.info(words, session.path, mesh.dim, *counts)
 
-    def may_go_on(self, again: Callable[[], object], before: str = "opening another mesh") -> bool:
+    def ask_about_unsaved(
+        self, again: Callable[[], object], before: str = "opening another mesh"
+    ) -> bool:
         """Ask about unsaved work; return whether it may be dropped or was saved.
 
         Parameters

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QObject
 
-from slideviz.gui.autosave import Autosave, Found, find_sessions
+from slideviz.gui.autosave import Autosave, LeftSession, find_sessions
 from slideviz.gui.widgets.banner import Banner
 from slideviz.gui.widgets.faults import old_crashes
 from slideviz.session import jobs
@@ -41,9 +41,9 @@ class SessionRecovery(QObject):
         self.window = window
         self.banner = banner
         self.autosave = autosave
-        self.waiting: list[Found] = []
+        self.waiting: list[LeftSession] = []
         # Held while this window lasts: what was not wanted now is offered at the next start.
-        self._later: list[Found] = []
+        self._later: list[LeftSession] = []
         self._trace = ""
 
     def look(self, crashes: Path | None = None) -> None:
@@ -77,7 +77,7 @@ class SessionRecovery(QObject):
         found = self.waiting[0]
         if not restore:
             self.waiting.pop(0).remove()
-        elif self.window.files.may_go_on(partial(self.answer, True)):
+        elif self.window.files.ask_about_unsaved(partial(self.answer, True)):
             self._later.append(self.waiting.pop(0))
             done = partial(self._opened, found)
             name = found.case.mesh_file.name
@@ -90,7 +90,7 @@ class SessionRecovery(QObject):
         self._later += self.waiting
         self.waiting = []
 
-    def _opened(self, found: Found, opened: jobs.Opened) -> None:
+    def _opened(self, found: LeftSession, opened: jobs.Opened) -> None:
         session = restored(opened.session, found.source)
         self.window.show_opened(replace(opened, session=session))
         self.autosave.replace(found)

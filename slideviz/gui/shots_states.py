@@ -140,7 +140,7 @@ def section(window: MainWindow, place: Path) -> None:
     """Bring up a cylinder at mid-span, unrolled below the 3D view."""
     _open(window, _stator(place))
     _run(window, **SLIDING)
-    window.docks_.lead_to("sections")
+    window.docks_.bring_to_front("sections")
     window.docks_.panel(SectionsPanel).add["cylinder"].click()
     window.store.change(changes.set_view, passages=1)
     window.section_views.want_flat(True)
@@ -161,7 +161,7 @@ def beside(window: MainWindow, place: Path) -> None:
     settle(window)
     window.viewing.look_from("+x")
     settle(window)
-    (_, (view, scene)) = window.viewing.pairs()
+    (_, (view, scene)) = window.viewing.views_and_scenes()
     scene.camera.zoom_at(0.62 * view.width(), 0.4 * view.height(), 1.06)
 
 
@@ -174,7 +174,7 @@ def dark(window: MainWindow, place: Path) -> None:
     _open(window, place / "passage" / "passage.cfg")
     _run(window)
     window.store.change(changes.set_view, passages=1)
-    window.docks_.lead_to("curves")
+    window.docks_.bring_to_front("curves")
 
 
 STATES = (

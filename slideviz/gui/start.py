@@ -189,7 +189,7 @@ class RecentButton(QPushButton):
         self.setAutoDefault(True)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-        when = changed_words(path)
+        when = when_changed(path)
         self.setEnabled(bool(when))
         self.setToolTip(wrapped(str(path) if when else f"{path} is not there any more."))
         self.setAccessibleName(f"{path.name} in {path.parent}, {when or 'missing'}")
@@ -206,7 +206,7 @@ class RecentButton(QPushButton):
         self.setFixedHeight(self.fontMetrics().height() + 12)
 
 
-def changed_words(path: Path, now: datetime | None = None) -> str:
+def when_changed(path: Path, now: datetime | None = None) -> str:
     """Return when a file was changed, in words; empty when it is not there."""
     try:
         then = datetime.fromtimestamp(path.stat().st_mtime)

@@ -17,7 +17,7 @@ from slideviz.case.motion_words import mesh_words
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.actions import Actions
 from slideviz.gui.autosave import Autosave
-from slideviz.gui.dialogs.exporter import Exports
+from slideviz.gui.dialogs.exports import Exports
 from slideviz.gui.dialogs.help import Help
 from slideviz.gui.docks import Docks, room_for
 from slideviz.gui.files import Files
@@ -286,7 +286,7 @@ class MainWindow(Services):
         if missing.place == "open":
             self.files.ask_and_open()
             return
-        self.docks_.lead_to(missing.place)
+        self.docks_.bring_to_front(missing.place)
         panel = self.docks_.panels[missing.place]
         if isinstance(panel, Panel):
             panel.lead_to(missing)
@@ -330,7 +330,7 @@ class MainWindow(Services):
                 self.files.after_save = self.close
                 event.ignore()
                 return
-            if not self.files.may_go_on(self.close, "closing"):
+            if not self.files.ask_about_unsaved(self.close, "closing"):
                 event.ignore()
                 return
             self._closed = True

@@ -87,7 +87,7 @@ class SectionStyle:
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class SectionInRun:
     """The cut of a section in one run.
 
     Attributes
@@ -145,13 +145,16 @@ def require_picture_name(file: Path) -> None:
 
 
 def section_picture(
-    shown: Sequence[Shown], section: Section, file: str | Path, style: SectionStyle | None = None
+    shown: Sequence[SectionInRun],
+    section: Section,
+    file: str | Path,
+    style: SectionStyle | None = None,
 ) -> None:
     """Write the picture of a section; of a cut through a 2D mesh, the curve along it.
 
     Parameters
     ----------
-    shown : sequence of Shown
+    shown : sequence of SectionInRun
         One run, or two: left or above, and right or below.
     section : Section
     file : str or Path
@@ -169,7 +172,7 @@ def section_picture(
     write_figure(figure, target, figure.dpi if target.suffix.lower() == ".png" else 300.0)
 
 
-def draw_section(shown: Sequence[Shown], section: Section, style: SectionStyle) -> Any:
+def draw_section(shown: Sequence[SectionInRun], section: Section, style: SectionStyle) -> Any:
     """Return the matplotlib figure of a section of one run, or of two.
 
     Raises
@@ -205,7 +208,7 @@ def _head(figure: Any, name: str, words: str, *, rest: Sequence[str]) -> None:
     figure.suptitle(fits, fontsize=size)
 
 
-def _curves(figure: Any, shown: Sequence[Shown], section: Section) -> None:
+def _curves(figure: Any, shown: Sequence[SectionInRun], section: Section) -> None:
     """Draw the numbers along a line or circle into one plot, the first with its colours below."""
     rows = []
     for one in reversed(shown):
@@ -219,7 +222,9 @@ def _curves(figure: Any, shown: Sequence[Shown], section: Section) -> None:
     draw_curves(figure.add_subplot(), rows, labels, replace(PRINT, size=LETTERS), colours)
 
 
-def _cells(figure: Any, shown: Sequence[Shown], section: Section, style: SectionStyle) -> None:
+def _cells(
+    figure: Any, shown: Sequence[SectionInRun], section: Section, style: SectionStyle
+) -> None:
     """Draw polygons, with one colour bar."""
     flats, labels = _laid_beside(shown, section, style)
     labels = labels if style.axes else None
@@ -272,7 +277,7 @@ def _cells(figure: Any, shown: Sequence[Shown], section: Section, style: Section
 
 
 def _laid_beside(
-    shown: Sequence[Shown], section: Section, style: SectionStyle
+    shown: Sequence[SectionInRun], section: Section, style: SectionStyle
 ) -> tuple[list[Polygons], tuple[Label, Label] | None]:
     """Return what lies on paper of each run, in the order it is drawn, and the axes' names."""
     flats: list[Polygons] = []

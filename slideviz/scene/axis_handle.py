@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.sections.around_axis import TURN, Patch, PlaceOnSection, patch_of, shape_of
+from slideviz.sections.around_axis import TURN, Patch, PlaceOnSection, axis_shape, patch_of
 from slideviz.sections.model import Section
 from slideviz.session.section_cuts import Cuts
 
@@ -36,7 +36,7 @@ def points_near(section: Section, mesh: Mesh, cuts: Cuts) -> FloatArray:
 
 def frame_of(section: Section, patch: Patch) -> list[FloatArray]:
     """Return lines (k, 3) around a patch: arcs at both ends of the axis, and what joins them."""
-    shape = shape_of(section)
+    shape = axis_shape(section)
     girth = shape.girth(section, (patch.along[0] + patch.along[1]) / 2.0)
     size = (patch.angles[1] - patch.angles[0]) * girth, patch.along[1] - patch.along[0]
     room = _ROOM * float(np.hypot(*size))
@@ -63,7 +63,7 @@ def drag(
     steep : bool
         Whether that is so.
     """
-    shape, lever = shape_of(section), shape_of(section).lever(section, place[1])
+    shape, lever = axis_shape(section), axis_shape(section).lever(section, place[1])
     # Outwards, around and along the section: of three, one is seen in full length or nearly.
     ways = shape.ways(section.sized(size), place[0])
     (here,) = shape.surface(section, np.array([place]), size)
@@ -90,7 +90,10 @@ def dragged_size(
     start, now : (2,) float64
         From where to where the mouse went, in pixels.
     """
-    size, ends = section.size, (_LEAST * section.size, shape_of(section).size.high * (1.0 - _LEAST))
+    size, ends = (
+        section.size,
+        (_LEAST * section.size, axis_shape(section).size.high * (1.0 - _LEAST)),
+    )
     at, slope, steep = drag(seen, section, place, size)
     target = at + now - start
     if steep:

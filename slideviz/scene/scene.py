@@ -176,7 +176,7 @@ class Scene:
         """Draw boundaries with fewer facets, or all again; tell whether that was a change."""
         return self._coarse.switch(on)
 
-    def set_coarse(self, surfaces: Sequence[Surface]) -> None:
+    def set_coarse_boundaries(self, surfaces: Sequence[Surface]) -> None:
         """Set the coarse boundaries of the mesh that is opened next; none is a choice."""
         self._coarse.surfaces = {one.name: one for one in surfaces}
 

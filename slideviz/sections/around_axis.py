@@ -247,7 +247,7 @@ class AboutAxis(Shape):
         return np.stack([np.cross(up, straight), up, straight])
 
 
-def shape_of(section: Section) -> AboutAxis:
+def axis_shape(section: Section) -> AboutAxis:
     """Return the shape of a section about an axis."""
     assert isinstance(section.shape, AboutAxis)
     return section.shape
@@ -255,7 +255,7 @@ def shape_of(section: Section) -> AboutAxis:
 
 def patch_of(section: Section, points: FloatArray) -> Patch:
     """Return the part of a section that has these points (n, 3): of its cut, or of a mesh."""
-    shape = shape_of(section)
+    shape = axis_shape(section)
     angle, along = shape.places(section, points).T
     turned = np.sort(angle)
     gaps = np.diff(turned, append=turned[0] + TURN)

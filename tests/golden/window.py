@@ -95,7 +95,7 @@ def opened(desk: Desk, window, place: Path) -> None:
         ("motion", "curves", "sections"),
     ):
         for name in (left, right, lower):
-            window.docks_.lead_to(name)
+            window.docks_.bring_to_front(name)
         if lower == "sections":
             window.docks_.panels["sections"].add["plane"].click()
         photograph(desk, window, f"panels_{right}_{lower}")

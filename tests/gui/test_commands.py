@@ -1,5 +1,7 @@
 """The table of commands: complete, in words, and no key twice."""
 
+import re
+
 import pytest
 from qtpy.QtGui import QKeySequence
 
@@ -18,6 +20,14 @@ def test_no_name_and_no_key_stands_for_two_commands(qtbot):
     keys = [QKeySequence(keys).toString() for one in EVERY for keys in (*one.keys, one.button_key)]
     keys = [text for text in keys if text]
     assert len(set(keys)) == len(keys)
+
+
+def test_the_tip_of_a_button_names_the_key_there_is():
+    tips = {one.name: (re.search(r"\((.+)\)", one.button_tip), one) for one in EVERY}
+    named = {name: (found[1], one) for name, (found, one) in tips.items() if found}
+    assert {"step_next", "fit_colours", "cancel"} <= set(named)
+    for key, one in named.values():
+        assert key in (*one.keys, one.button_key), one.name
 
 
 @pytest.mark.parametrize("one", EVERY, ids=lambda one: one.name)

@@ -33,7 +33,7 @@ def method(driver, sample_folder, qtbot):
     driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
     window = driver.window
     window.resize(*SMALL)
-    window.docks_.lead_to("method")
+    window.docks_.bring_to_front("method")
     driver.window.store.change(changes.set_case, reduction=Reduction(multilevel=True))
     driver.click(window.method.more.button)
     settled(qtbot, window)

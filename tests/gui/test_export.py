@@ -20,7 +20,7 @@ from slideviz.export import reel
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.export.reel import Reel
-from slideviz.gui.dialogs import exporter as export
+from slideviz.gui.dialogs import exports as export
 from slideviz.gui.dialogs.film import FilmDialog
 from slideviz.gui.dialogs.film_form import FilmForm, length_words
 from slideviz.gui.dialogs.picture import PictureDialog

@@ -6,8 +6,8 @@ from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.viewport.axis_handle import RoundHandle
 from slideviz.gui.viewport.plane_handle import PlaneHandle
+from slideviz.gui.viewport.round_handle import RoundHandle
 from slideviz.samples.table import write_sample
 from slideviz.scene.pick import to_display
 from slideviz.session import changes
@@ -23,7 +23,7 @@ def wheel(tmp_path_factory):
 @pytest.fixture
 def panel(window, driver, wheel):
     driver.open(wheel)
-    window.docks_.lead_to("sections")
+    window.docks_.bring_to_front("sections")
     QApplication.processEvents()
     panel = window.docks_.panels["sections"]
     driver.click(panel.add["cylinder"])

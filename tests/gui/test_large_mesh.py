@@ -101,7 +101,7 @@ def test_a_dragged_section_keeps_its_picture_until_the_next_is_read(stator):
 def test_worst_cells_are_listed_and_marked(stator, folder):
     found = quality(sv.read(folder / "mesh.su2b"))
     window = stator.window
-    window.docks_.lead_to("worst")
+    window.docks_.bring_to_front("worst")
     panel = window.docks_.panels["worst"]
     stator.qtbot.waitUntil(lambda: panel.model.worst is not None)
     worst = found.worst(3)

@@ -235,7 +235,7 @@ def test_every_thread_stands_back_before_it_works(window, qtbot, monkeypatch):
     runner = JobRunner()
     runner.start(lambda report, stopped: order.append("job"))
     qtbot.waitUntil(lambda: not runner.busy)
-    plot_image.draw_beside(
+    plot_image.draw_in_thread(
         lambda *_: order.append("plot"),
         plot_image.PlotFormat(50, 50, 1.0, PRINT),
         plot_image.AxesPlace(),
@@ -264,7 +264,7 @@ STEERING = re.compile(
     r"\bgc\.\w|setswitchinterval\(|setpriority\(|\bnice\(|\bThread\(|Executor\(|QThread|"
     r"set_num_threads\(|ThreadpoolController|(?:setInterval|singleShot)\([1-9]|^[A-Z_]+_MS\b *="
 )
-OF_THE_FILM = {"viewport/player.py": ("FILM_MS", "STEP_MS")}
+OF_THE_FILM = {"viewport/player.py": ("PLAY_MS", "STEP_MS")}
 """What is seen how long is no matter of the window's answering."""
 
 

@@ -25,7 +25,7 @@ from slideviz.session.changes_view import followed
 @pytest.fixture
 def panel(window, driver, sample_folder):
     driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
-    window.docks_.lead_to("sections")
+    window.docks_.bring_to_front("sections")
     QApplication.processEvents()
     return window.docks_.panels["sections"]
 
@@ -116,7 +116,7 @@ def test_numbers_are_typed(window, driver, panel):
 
 
 def test_sections_are_added_by_keys_and_removed_by_delete(window, driver, panel):
-    window.docks_.lead_to("boundaries")
+    window.docks_.bring_to_front("boundaries")
     QTest.keyClick(window, Qt.Key.Key_C)
     QTest.keyClick(window, Qt.Key.Key_C, Qt.KeyboardModifier.ShiftModifier)
     assert [section.kind for section in sections(window)] == ["plane", "cylinder"]
@@ -212,7 +212,7 @@ def test_several_are_listed_hidden_and_chosen(window, driver, panel):
 
 def test_an_unrolled_cylinder_follows_radius_and_step_and_goes(window, driver, wheel):
     driver.open(wheel)
-    window.docks_.lead_to("sections")
+    window.docks_.bring_to_front("sections")
     panel = window.docks_.panels["sections"]
     driver.click(panel.add["cylinder"])
     assert panel.flat.text() == "Unrolled"
@@ -260,7 +260,7 @@ def test_the_flat_view_comes_back_from_the_case_file(window, driver, panel, tmp_
 
 def test_a_cone_is_added_slid_typed_unrolled_and_kept(window, driver, wheel, tmp_path, answers):
     driver.open(wheel)
-    window.docks_.lead_to("sections")
+    window.docks_.bring_to_front("sections")
     panel = window.docks_.panels["sections"]
     window.actions_.by_name["add_cone"].trigger()
     (cone,) = sections(window)
@@ -548,7 +548,7 @@ def test_a_flat_view_of_a_3d_mesh_becomes_a_curve_with_a_2d_one(
 @pytest.fixture
 def flat_panel(window, driver, sample_folder):
     driver.open(sample_folder / "passage" / "passage.cfg")
-    window.docks_.lead_to("sections")
+    window.docks_.bring_to_front("sections")
     QApplication.processEvents()
     return window.docks_.panels["sections"]
 

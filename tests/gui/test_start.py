@@ -11,7 +11,7 @@ from qtpy.QtWidgets import QApplication
 
 from slideviz.errors import Cancelled
 from slideviz.gui import files
-from slideviz.gui.start import COLUMNS, RECENT, StartPage, changed_words
+from slideviz.gui.start import COLUMNS, RECENT, StartPage, when_changed
 from slideviz.gui.widgets.cards import _DRAWINGS, SIZE, card
 from slideviz.samples.table import SAMPLES
 from slideviz.session import jobs
@@ -91,16 +91,16 @@ def test_recent_files_with_folder_and_time_and_missing_ones_are_grey(qtbot, tmp_
 
 def test_when_a_file_was_changed(tmp_path):
     path, now = tmp_path / "a", datetime(2026, 5, 20, 12, 0)
-    assert changed_words(path) == ""
+    assert when_changed(path) == ""
     path.touch()
     for days, word in ((0, "today 09:30"), (1, "yesterday 09:30")):
         then = (now - timedelta(days=days)).replace(hour=9, minute=30).timestamp()
         os.utime(path, (then, then))
-        assert changed_words(path, now) == word
+        assert when_changed(path, now) == word
     long_ago = datetime(2020, 3, 4).timestamp()
     os.utime(path, (long_ago, long_ago))
-    assert "20" in changed_words(path, now)
-    assert "today" not in changed_words(path, now)
+    assert "20" in when_changed(path, now)
+    assert "today" not in when_changed(path, now)
 
 
 def test_everything_can_be_reached_with_tab(window):

@@ -21,7 +21,7 @@ from slideviz.plots.section_curve import (
     steps,
 )
 from slideviz.plots.section_paint import paint
-from slideviz.plots.section_picture import SectionStyle, Shown, draw_section
+from slideviz.plots.section_picture import SectionInRun, SectionStyle, draw_section
 from slideviz.plots.section_rows import CurveRows, colours_of, facts_of, labels_of
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
@@ -217,7 +217,7 @@ def picture(mesh, section, **style):
     painted = paint(mesh, quality(mesh), "size-skew")
     pieces = {0: cutter.show(mesh.points, section)}
     around = surroundings(cutter, mesh.points, EYE)
-    return draw_section([Shown(pieces, painted, around)], section, SectionStyle(**style))
+    return draw_section([SectionInRun(pieces, painted, around)], section, SectionStyle(**style))
 
 
 def test_the_picture_of_a_cut_is_the_curve(mesh):

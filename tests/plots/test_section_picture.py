@@ -17,7 +17,7 @@ from slideviz.mesh.quality import quality
 from slideviz.plots import cells as plot_cells
 from slideviz.plots.section_layout import in_space
 from slideviz.plots.section_paint import paint
-from slideviz.plots.section_picture import SectionStyle, Shown, draw_section, section_picture
+from slideviz.plots.section_picture import SectionInRun, SectionStyle, draw_section, section_picture
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session.passages import passages, show_passages
@@ -45,7 +45,7 @@ def drawn(mesh, section, count=0, base=None, names=None, by="size-skew", **style
     painted = paint(mesh, quality(mesh, base), by, base)
     matrices = passages(match(base or mesh, *names), count) if names else {0: np.eye(4)}
     pieces = show_passages(Cutter.of(mesh), mesh.points, section, matrices)
-    figure = draw_section([Shown(pieces, painted)], section, SectionStyle(**style))
+    figure = draw_section([SectionInRun(pieces, painted)], section, SectionStyle(**style))
     (shapes,) = figure.axes[0].collections
     return figure, shapes, painted
 
@@ -94,7 +94,9 @@ def test_numbers_of_a_narrow_range_do_not_run_together(size, high):
     painted = paint(mesh, quality(mesh), "size-skew").within(0.946, 0.967)
     section = Section("plane", (0, 0, 0.4))
     pieces = show_passages(Cutter.of(mesh), mesh.points, section, {0: np.eye(4)})
-    figure = draw_section([Shown(pieces, painted)], section, SectionStyle(size, trimmed=True))
+    figure = draw_section(
+        [SectionInRun(pieces, painted)], section, SectionStyle(size, trimmed=True)
+    )
     figure.draw_without_rendering()
     axes = bar_of(figure)
     upright = axes.get_position().height > axes.get_position().width
@@ -291,7 +293,7 @@ def save(file, **style):
     section = Section("plane", (0, 0, 0.4))
     pieces = {0: Cutter.of(mesh).cut(mesh.points, section)}
     painted = paint(mesh, quality(mesh), "size-skew")
-    section_picture([Shown(pieces, painted)], section, file, SectionStyle(**style))
+    section_picture([SectionInRun(pieces, painted)], section, file, SectionStyle(**style))
 
 
 @pytest.mark.parametrize("size", [(1600, 1000), (640, 481)])
@@ -332,7 +334,7 @@ def test_what_cannot_be_drawn_or_written_says_so(tmp_path):
     section = Section("plane", (0, 0, 3))
     pieces = {0: Cutter.of(mesh).cut(mesh.points, section)}
     with pytest.raises(CaseError, match="plane z = 3: it cuts no cell"):
-        section_picture([Shown(pieces, painted)], section, tmp_path / "x.png")
+        section_picture([SectionInRun(pieces, painted)], section, tmp_path / "x.png")
     assert not list(tmp_path.iterdir())
 
 

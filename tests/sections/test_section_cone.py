@@ -14,7 +14,7 @@ from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import quality
 from slideviz.plots.section_layout import laid_flat
 from slideviz.plots.section_paint import paint
-from slideviz.plots.section_picture import SectionStyle, Shown, section_picture
+from slideviz.plots.section_picture import SectionInRun, SectionStyle, section_picture
 from slideviz.scene.axis_handle import dragged_size, frame_of
 from slideviz.scene.flat_scene import flat_matrix
 from slideviz.sections.around_axis import patch_of
@@ -319,7 +319,7 @@ def test_it_is_drawn(tmp_path, whole, in_space):
     painted = paint(mesh, quality(mesh), "skew")
     pieces = {0: Cutter.of(mesh).show(mesh.points, section)}
     style = SectionStyle(size=(400, 300), in_space=in_space)
-    section_picture([Shown(pieces, painted)], section, tmp_path / "a.svg", style)
+    section_picture([SectionInRun(pieces, painted)], section, tmp_path / "a.svg", style)
     text = (tmp_path / "a.svg").read_text()
     assert len(text) > 10_000
 

@@ -32,7 +32,7 @@ from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN, SHOWN, Shown, l
 TIPS = {
     "map": "The colours of values; all are told apart by colour-blind people.",
     "range": "The values at the ends of the colour bar.",
-    "fit": COMMANDS["fit_colours"].button,
+    "fit": COMMANDS["fit_colours"].button_tip,
 }
 ROLES_ONLY = "Roles have colours of their own: colour by a value first."
 NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbouring passages."

@@ -74,7 +74,7 @@ class RunPanel(Panel):
     def _button(self, command: Command, colour: str) -> QPushButton:
         words = command.title.replace("&", "")
         button = push_button(
-            words, command.button, lambda: command.do(main_window(self)), command.name
+            words, command.button_tip, lambda: command.do(main_window(self)), command.name
         )
         button.setIcon(icon(command.image, colour))
         button.setShortcut(command.button_key)
@@ -108,7 +108,7 @@ class RunPanel(Panel):
             self.text.setToolTip(wrapped(tip))
             self.run.setToolTip(wrapped(tip))
             return
-        self.run.setToolTip(COMMANDS["run"].button)
+        self.run.setToolTip(COMMANDS["run"].button_tip)
         self.text.setToolTip("")
         self._tell_run(session)
 

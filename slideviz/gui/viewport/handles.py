@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from slideviz.color_scheme import ColorScheme
-from slideviz.gui.viewport.axis_handle import RoundHandle
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.line_handle import FlatHandle
+from slideviz.gui.viewport.line_handle import Handle2D
 from slideviz.gui.viewport.plane_handle import Bounds, PlaneHandle
+from slideviz.gui.viewport.round_handle import RoundHandle
 from slideviz.mesh.model import Mesh
 from slideviz.scene.axis_handle import patch_in
 from slideviz.scene.scene import Scene
 from slideviz.sections.model import Section, Triple
 
-Handle = PlaneHandle | FlatHandle | RoundHandle
+Handle = PlaneHandle | Handle2D | RoundHandle
 
 _ROOM = 0.03
 """The plane's frame is so much larger than the mesh, as a part of its length."""
@@ -73,7 +73,7 @@ class Handles:
                 handle = None
             if handle is None:
                 handle = self._of[view] = self._make(wanted, view, scene)
-            if isinstance(handle, FlatHandle):
+            if isinstance(handle, Handle2D):
                 handle.show(section, scene.stage.lift(mesh), scheme)
             elif isinstance(handle, RoundHandle):
                 handle.show(section, patch_in(section, shown, scene.sections.cuts), scheme)
@@ -84,7 +84,7 @@ class Handles:
     def _make(self, kind: type[Handle], view: View3D, scene: Scene) -> Handle:
         if kind is PlaneHandle:
             return PlaneHandle(view, self._dragged, self._dragging)
-        made = FlatHandle if kind is FlatHandle else RoundHandle
+        made = Handle2D if kind is Handle2D else RoundHandle
         return made(view, scene.stage.strip, self._moved, self._dragging)
 
     def drop(self, view: View3D) -> None:
@@ -113,7 +113,7 @@ class Handles:
 def kind_of(section: Section, mesh: Mesh) -> type[Handle]:
     """Return the class of the handle of a section of a mesh."""
     if mesh.dim == 2:
-        return FlatHandle
+        return Handle2D
     return {"push": PlaneHandle, "pull": RoundHandle}[section.shape.handle]
 
 

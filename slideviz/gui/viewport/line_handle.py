@@ -29,7 +29,7 @@ from slideviz.sections.model import Section
 NAMES = ("handle:rim", "handle:points", "handle:held")
 
 
-class FlatHandle(MouseHandle[tuple[Section, Box]]):
+class Handle2D(MouseHandle[tuple[Section, Box]]):
     """The handle of a line or circle: points that the mouse drags.
 
     Parameters

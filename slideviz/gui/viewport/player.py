@@ -19,7 +19,7 @@ from slideviz.session import changes
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 
-FILM_MS = 3000
+PLAY_MS = 3000
 """What all steps take together at the usual speed, where no limit for one step is reached."""
 STEP_MS = (50, 500)
 """The shortest and the longest time that a step is seen at the usual speed."""
@@ -31,7 +31,7 @@ NARROW = 540
 def step_ms(steps: int, speed: float = 1.0) -> float:
     """Return the time for which each of ``steps`` is shown, in milliseconds."""
     shortest, longest = STEP_MS
-    return min(max(FILM_MS / max(steps, 1), shortest), longest) / speed
+    return min(max(PLAY_MS / max(steps, 1), shortest), longest) / speed
 
 
 class Player(QWidget):
@@ -48,7 +48,7 @@ class Player(QWidget):
         for command in STEPS.commands():
             name = command.name.removeprefix("step_")
             self.buttons[name] = button = tool_button(
-                command.button,
+                command.button_tip,
                 lambda _=False, do=command.do: do(self.window()),
                 image=name,
                 name=f"player_{name}",

@@ -130,7 +130,7 @@ class SectionViews(QSplitter):
     def _shown(self, session: Session) -> list[tuple[View3D, Scene, Mesh]]:
         """Return the views, each with what it draws and the mesh it shows."""
         sessions = (session, beside(session) or session)
-        pairs = zip(self.viewing.pairs(), sessions, strict=False)
+        pairs = zip(self.viewing.views_and_scenes(), sessions, strict=False)
         return [(view, scene, one.frame.mesh) for (view, scene), one in pairs if one.frame]
 
     def _replaced(self, section: Section) -> None:

@@ -108,7 +108,7 @@ class Viewing(QWidget):
         self._connect(self.second, self.second_scene)
         self.second.spare_software()
         self.second.set_flat(session.mesh.dim == 2)
-        self.second_scene.set_coarse(self.coarse)
+        self.second_scene.set_coarse_boundaries(self.coarse)
         self.second_scene.open(changes.seen_beside(session), self.surfaces)
         self.second_scene.set_motion_ghosts(self.scene.motion_ghosts)
         self.second_scene.camera.take(self.scene.camera)
@@ -202,7 +202,7 @@ class Viewing(QWidget):
         self.view.spare_software()
         self.view.set_flat(session.mesh.dim == 2)
         self.coarse = opened.coarse
-        self.scene.set_coarse(opened.coarse)
+        self.scene.set_coarse_boundaries(opened.coarse)
         self.scene.open(session, opened.surfaces)
         if opened.camera is not None:
             self.scene.camera.go(opened.camera)
@@ -218,7 +218,7 @@ class Viewing(QWidget):
         if old.mesh is not new.mesh:
             return
         if self.store.dragging:  # the mouse drags a section, for example
-            for view, _ in self.pairs():
+            for view, _ in self.views_and_scenes():
                 view.signals.moving.emit()
         try:
             self.scene.update(new)
@@ -247,7 +247,7 @@ class Viewing(QWidget):
             self.second_scene.update(changes.seen_beside(session))
             self.second.render_soon()
 
-    def pairs(self) -> list[tuple[View3D, Scene]]:
+    def views_and_scenes(self) -> list[tuple[View3D, Scene]]:
         """Return the views, one or two, each with its scene."""
         views = (self.view,) if self.second is None else (self.view, self.second)
         return list(zip(views, self._scenes(), strict=True))

@@ -47,7 +47,7 @@ class Command:
         Its title where that changes; an empty one takes it out of the menu.
     tip_now : callable, optional
         What its tooltip says instead, if anything; where it cannot be done, why.
-    button, button_key : str
+    button_tip, button_key : str
         What the tooltip of its button in a panel says, and the key of that.
     short : str
         Its word on the tool bar, if it has no icon.
@@ -63,7 +63,7 @@ class Command:
     checked: Callable[[Now], bool] | None = None
     title_now: Callable[[Now], str] | None = None
     tip_now: Callable[[Now], str] | None = None
-    button: str = ""
+    button_tip: str = ""
     button_key: str = ""
     short: str = ""
 

@@ -21,7 +21,7 @@ from slideviz.gui.responsiveness.settings import LOOK_MS, MOST_REST, REST_MS, RE
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import hint_label
-from slideviz.gui.widgets.plot_image import Draw, Picture, PlotFormat, draw_beside
+from slideviz.gui.widgets.plot_image import Draw, Picture, PlotFormat, draw_in_thread
 from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.plots.draw import PRINT, Style
@@ -112,7 +112,7 @@ class PlotCanvas(QWidget):
         ratio = self.devicePixelRatioF()
         wide, high = (max(1, round(ratio * side)) for side in (self.width(), self.height()))
         paper = PlotFormat(wide, high, ratio, self.style_)
-        self._coming = draw_beside(self.drawing(), paper, self._picture.place)
+        self._coming = draw_in_thread(self.drawing(), paper, self._picture.place)
         self._look_after.start()
 
     def _take(self) -> None:

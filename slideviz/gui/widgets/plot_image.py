@@ -107,7 +107,7 @@ def _beside(axes: Axes) -> list[str]:
     return [text.get_text() for text in (legend.get_title(), *legend.get_texts())]
 
 
-def draw_beside(draw_on: Draw, paper: PlotFormat, place: AxesPlace) -> Future[Picture]:
+def draw_in_thread(draw_on: Draw, paper: PlotFormat, place: AxesPlace) -> Future[Picture]:
     """Return the future of a plot that is drawn in a thread."""
     coming: Future[Picture] = Future()
 

@@ -7,10 +7,10 @@ from itertools import pairwise
 
 from slideviz.mesh.check import printable
 from slideviz.mesh.io.source import Source
+from slideviz.mesh.io.su2.keyword_blocks import boxes_elsewhere, find_blocks, find_bounds
 from slideviz.mesh.io.su2.lines import Rows, number_of
 from slideviz.mesh.io.su2.numbers import parse_cells, parse_points
 from slideviz.mesh.io.su2.scan import Progress, scan
-from slideviz.mesh.io.su2.sections import boxes_elsewhere, find_bounds, find_sections
 from slideviz.mesh.io.su2.send_receive import find_halo
 from slideviz.mesh.io.su2.zone import find_zone
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh, Origin
@@ -70,7 +70,7 @@ def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
         The file has a mistake; the message has the line.
     """
     lines = scan(raw, lambda done: progress(_SCANNED * done))
-    sections = find_sections(lines)
+    sections = find_blocks(lines)
     found = find_zone(lines, sections, find_bounds(lines, sections, zone))
     n_points = number_of(found.points)
     sizes = [

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from slideviz.mesh.io.source import open_source
+from slideviz.mesh.io.su2.keyword_blocks import boxes_elsewhere, find_blocks, find_bounds, is_ffd
 from slideviz.mesh.io.su2.lines import Lines, number_of
 from slideviz.mesh.io.su2.scan import Progress, scan
-from slideviz.mesh.io.su2.sections import boxes_elsewhere, find_bounds, find_sections, is_ffd
 from slideviz.mesh.io.su2.zone import TextZone, find_zone
 
 
@@ -55,6 +55,6 @@ def find_text(path: Path, zone: int | None, progress: Progress = lambda _: None)
         The file has a mistake.
     """
     lines = scan(open_source(path), progress)
-    sections = find_sections(lines)
+    sections = find_blocks(lines)
     bounds = find_bounds(lines, sections, zone)
     return Text(lines, find_zone(lines, sections, bounds), boxes_elsewhere(sections, bounds))

@@ -15,10 +15,10 @@ from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh, check_points
 from slideviz.mesh.io.in_order import in_order
 from slideviz.mesh.io.source import Source
+from slideviz.mesh.io.su2.keyword_blocks import is_ffd
 from slideviz.mesh.io.su2.lines import Piece, Rows
 from slideviz.mesh.io.su2.read import Document
 from slideviz.mesh.io.su2.scan import BLOCK_BYTES
-from slideviz.mesh.io.su2.sections import is_ffd
 from slideviz.mesh.io.su2.zone import SEND_RECEIVE
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 

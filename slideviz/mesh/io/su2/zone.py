@@ -10,8 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.mesh.io.su2.keyword_blocks import (
+    KNOWN,
+    Bounds,
+    KeywordBlock,
+    count_of,
+    is_ffd,
+    misspelt,
+)
 from slideviz.mesh.io.su2.lines import ROWS, Lines, Rows, number_of, show
-from slideviz.mesh.io.su2.sections import KNOWN, Bounds, TextSection, count_of, is_ffd, misspelt
 
 SEND_RECEIVE = "SEND_RECEIVE"
 _NAME_IT = "; name the marker"
@@ -25,7 +32,7 @@ class SectionRows:
         self.lines = lines
         self.text_lines = lines.firsts[:-1][lines.kinds != ROWS]
 
-    def none(self, section: TextSection) -> None:
+    def none(self, section: KeywordBlock) -> None:
         """Raise when a section that should have no numbers has some.
 
         Raises
@@ -41,7 +48,7 @@ class SectionRows:
                 "belong; remove the line or restore the keyword before it",
             )
 
-    def counted(self, section: TextSection, what: str) -> Rows:
+    def counted(self, section: KeywordBlock, what: str) -> Rows:
         """Return the rows of numbers of a section.
 
         Parameters
@@ -117,7 +124,7 @@ class TextZone:
         The boundaries.
     sends : tuple of SendRows
         The ``SEND_RECEIVE`` markers, which tie the nodes of a halo.
-    kept : tuple of TextSection
+    kept : tuple of KeywordBlock
         The unknown sections.
     """
 
@@ -127,7 +134,7 @@ class TextZone:
     points: Rows
     markers: tuple[MarkerRows, ...]
     sends: tuple[SendRows, ...]
-    kept: tuple[TextSection, ...]
+    kept: tuple[KeywordBlock, ...]
 
     @property
     def ffd_at(self) -> tuple[range, ...]:
@@ -136,7 +143,7 @@ class TextZone:
         return tuple(range(part.line, part.stop) for part in boxes)
 
 
-def find_zone(lines: Lines, sections: list[TextSection], bounds: Bounds) -> TextZone:
+def find_zone(lines: Lines, sections: list[KeywordBlock], bounds: Bounds) -> TextZone:
     """Return where the parts of a zone stand.
 
     Raises
@@ -155,7 +162,7 @@ def find_zone(lines: Lines, sections: list[TextSection], bounds: Bounds) -> Text
 class _Walk:
     """A walk through the sections of one zone, which notes where its parts stand."""
 
-    def __init__(self, lines: Lines, sections: list[TextSection], bounds: Bounds) -> None:
+    def __init__(self, lines: Lines, sections: list[KeywordBlock], bounds: Bounds) -> None:
         self.lines = lines
         self.sections = sections
         self.bounds = bounds
@@ -190,7 +197,7 @@ class _Walk:
             kept=kept,
         )
 
-    def _only(self, key: str) -> TextSection:
+    def _only(self, key: str) -> KeywordBlock:
         """Return the section of that key, which must stand once."""
         found = [section for section in self.sections if section.key == key]
         if not found:
@@ -211,7 +218,7 @@ class _Walk:
 
     def _walk(
         self,
-    ) -> tuple[tuple[MarkerRows, ...], tuple[SendRows, ...], tuple[TextSection, ...]]:
+    ) -> tuple[tuple[MarkerRows, ...], tuple[SendRows, ...], tuple[KeywordBlock, ...]]:
         """Return the boundaries, the SEND_RECEIVE markers and the unknown sections."""
         markers, sends, kept = [], [], []
         at = 0
@@ -237,8 +244,8 @@ class _Walk:
         return tuple(markers), tuple(sends), tuple(kept)
 
     def _marker_head(
-        self, tag: TextSection, at: int, sends: bool
-    ) -> tuple[TextSection, bytes, int]:
+        self, tag: KeywordBlock, at: int, sends: bool
+    ) -> tuple[KeywordBlock, bytes, int]:
         """Return the MARKER_ELEMS section of a marker, SEND_TO, and the place after them."""
         self.rows.none(tag)
         following = self.sections[at] if at < len(self.sections) else None
@@ -253,11 +260,11 @@ class _Walk:
             # The elements stand after this line, which belongs to the marker.
             self.rows.none(following)
             head = self.sections[at]
-            following = TextSection(following.key, following.value, head.line, head.stop)
+            following = KeywordBlock(following.key, following.value, head.line, head.stop)
             at, domain = at + 1, head.value
         return following, domain, at
 
-    def _name(self, section: TextSection) -> str:
+    def _name(self, section: KeywordBlock) -> str:
         try:
             name = section.value.decode()
         except UnicodeDecodeError:
@@ -272,7 +279,7 @@ class _Walk:
         return SEND_RECEIVE if name.upper() == SEND_RECEIVE else name
 
     def _check_markers(
-        self, head: TextSection, markers: tuple[MarkerRows, ...], sends: int
+        self, head: KeywordBlock, markers: tuple[MarkerRows, ...], sends: int
     ) -> None:
         """Raise when names repeat or the count is wrong."""
         seen: dict[str, int] = {}

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.elements import SIZES
+from slideviz.mesh.io.su2.keyword_blocks import is_ffd
 from slideviz.mesh.io.su2.read import Document
-from slideviz.mesh.io.su2.sections import is_ffd
 from slideviz.mesh.io.su2b.elements import BLOCK
 from slideviz.mesh.io.su2b.layout import NAME_BYTES, SEND_RECEIVE
 from slideviz.mesh.io.su2b.read import BinaryForm

@@ -25,7 +25,7 @@ from slideviz.mesh.model import FloatArray
 from slideviz.scene.axis_handle import drag, dragged_size, frame_of
 from slideviz.scene.marked_cell import IN_FRONT
 from slideviz.scene.pick import to_display
-from slideviz.sections.around_axis import Patch, PlaceOnSection, shape_of
+from slideviz.sections.around_axis import Patch, PlaceOnSection, axis_shape
 from slideviz.sections.handles import rounded
 from slideviz.sections.model import Section
 
@@ -84,7 +84,9 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
         """Return where the ball lies: in the middle, or beside it in a detail of the view."""
         assert self.section is not None
         places = np.concatenate([np.array([patch.middle]), patch.places])
-        pixels = self.seen(shape_of(self.section).surface(self.section, places, self.section.size))
+        pixels = self.seen(
+            axis_shape(self.section).surface(self.section, places, self.section.size)
+        )
         wide, high = self.view.window_size
         end = np.array([wide - self._strip() - EDGE_PX, high - EDGE_PX])
         within = np.all((pixels >= EDGE_PX) & (pixels <= end), axis=1)

@@ -23,7 +23,7 @@ def is_ffd(text: bytes) -> bool:
 
 
 @dataclass(frozen=True)
-class TextSection:
+class KeywordBlock:
     """A keyword line and the lines up to ``stop``, the next keyword line."""
 
     key: str
@@ -42,7 +42,7 @@ class Bounds:
     end: int
 
 
-def find_sections(lines: Lines) -> list[TextSection]:
+def find_blocks(lines: Lines) -> list[KeywordBlock]:
     """Return all sections of the file, in order."""
     heads = []
     for index in lines.firsts[:-1][lines.kinds == KEYWORD].tolist():
@@ -50,10 +50,10 @@ def find_sections(lines: Lines) -> list[TextSection]:
         if _KEY.fullmatch(key.strip()):
             heads.append((key.strip().decode().upper(), value.strip(), index))
     stops = [line for _, _, line in heads] + [len(lines)]
-    return [TextSection(*head, stop) for head, stop in zip(heads, stops[1:], strict=True)]
+    return [KeywordBlock(*head, stop) for head, stop in zip(heads, stops[1:], strict=True)]
 
 
-def find_bounds(lines: Lines, sections: list[TextSection], number: int | None) -> Bounds:
+def find_bounds(lines: Lines, sections: list[KeywordBlock], number: int | None) -> Bounds:
     """Return where a zone stands.
 
     Parameters
@@ -86,7 +86,7 @@ def find_bounds(lines: Lines, sections: list[TextSection], number: int | None) -
     return Bounds(chosen, zones, begin + 1, min(later, default=len(lines)))
 
 
-def boxes_elsewhere(sections: list[TextSection], bounds: Bounds) -> dict[str, int]:
+def boxes_elsewhere(sections: list[KeywordBlock], bounds: Bounds) -> dict[str, int]:
     """Return the boxes for free-form deformation that other zones have, and their zones."""
     found, zone = {}, 1
     for section in sections:
@@ -97,10 +97,10 @@ def boxes_elsewhere(sections: list[TextSection], bounds: Bounds) -> dict[str, in
     return found
 
 
-def _zone_heads(lines: Lines, sections: list[TextSection]) -> dict[int, TextSection]:
+def _zone_heads(lines: Lines, sections: list[KeywordBlock]) -> dict[int, KeywordBlock]:
     """Return the ``IZONE`` line of each zone by number; none when the file has no zones."""
     totals = [s for s in sections if s.key == "NZONE"]
-    heads: dict[int, TextSection] = {}
+    heads: dict[int, KeywordBlock] = {}
     for section in sections:
         if section.key != "IZONE":
             continue
@@ -134,7 +134,7 @@ def _zone_heads(lines: Lines, sections: list[TextSection]) -> dict[int, TextSect
     return heads
 
 
-def misspelt(sections: list[TextSection], key: str) -> str:
+def misspelt(sections: list[KeywordBlock], key: str) -> str:
     """Return which unknown keyword may be meant as this one, for a message, or nothing."""
     for section in sections:
         if section.key not in KNOWN and get_close_matches(section.key, [key], cutoff=0.8):
@@ -142,7 +142,7 @@ def misspelt(sections: list[TextSection], key: str) -> str:
     return ""
 
 
-def count_of(lines: Lines, section: TextSection) -> int:
+def count_of(lines: Lines, section: KeywordBlock) -> int:
     """Return the number after the keyword; what follows it is not looked at.
 
     Raises
