@@ -26,6 +26,7 @@ from slideviz.mesh.io.files import format_of
 from slideviz.mesh.io.su2.lines import Piece
 from slideviz.mesh.io.su2.text import Text, find_text
 from slideviz.mesh.io.su2.write import box_edits, moved_rows, patched_blocks, require_text_names
+from slideviz.mesh.io.su2b.copying import checksums
 from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.mesh.io.su2b.partial import finish_head, partial_file
 from slideviz.mesh.io.su2b.write import lost_of_text, require_binary_names, sentence_of_lost
@@ -36,8 +37,8 @@ from slideviz.mesh.text_skin import skin_of_text, told_of
 from slideviz.mesh.threads import Tick
 from slideviz.terms import FileFormat
 
-SCANNED, COPIED = 0.15, 0.8
-"""Where, of the time for reading a text, its lines are found, and its binary is made."""
+SCANNED, FILLED, COPIED = 0.15, 0.75, 0.8
+"""Where, of the time for reading a text, its lines are found, its binary made, and added up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,12 +208,15 @@ def given_for(
     state = path.stat()
     about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {plan.size}"
     with partial_file(output, plan.size, about, resume=resume, more=".binary") as copy:
-        is_left = bool(copy.done)
+        is_left = (
+            copy.done > 0
+            and checksums(copy.path, part_of(tick, SCANNED, COPIED), ranks) == copy.sums
+        )
         require_room(output, output, bytes_of_text(plan, is_text, later) - left)
         if not is_left:
-            head = fill(plan, copy.path, part_of(tick, SCANNED, COPIED), ranks)
+            head = fill(plan, copy.path, part_of(tick, SCANNED, FILLED), ranks)
             finish_head(copy.file, head)
-            copy.note([1])
+            copy.note(checksums(copy.path, part_of(tick, FILLED, COPIED), ranks))
         with told_of(text, copy.path):
             yield Given(copy.path, None, text, is_left)
         copy.remove()

@@ -77,7 +77,13 @@ class Output:
             made = partial_file(output, given.path.stat().st_size, about, resume=resume)
         else:
             made = partial_copy(
-                output, given.path, about, resume=resume, replaces=replaces, ranks=ranks
+                output,
+                given.path,
+                about,
+                (_byte(source, self._place, 0), _byte(source, self._place, self._place.n_points)),
+                resume=resume,
+                replaces=replaces,
+                ranks=ranks,
             )
         self._partial = stack.enter_context(made)
         self._is_ready = self._is_right = False
@@ -201,9 +207,8 @@ def moving(
 
 def move(source: BinaryFile, place: ZonePlace, rest: Rest, out: int, part: Part) -> int:
     """Write the points of a part to an open file, and return the checksum of its bytes."""
-    kind = source.point(place.dim)
-    at = place.points + part[0] * kind.itemsize
-    rows = source.array(at, part[1] - part[0], kind, "the points")
+    at = _byte(source, place, part[0])
+    rows = source.array(at, part[1] - part[0], source.point(place.dim), "the points")
     points = rows["x"].astype(np.float64)
     for now in rest.after_steps(np.arange(*part), points):
         points = now
@@ -224,7 +229,7 @@ def checking(path: Path, zone: int | None, partial: Path) -> Iterator[Callable[[
         kind, written = source.point(place.dim), source.of(other)
 
         def check(part: Part) -> int:
-            at = place.points + part[0] * kind.itemsize
+            at = _byte(source, place, part[0])
             rows = written.array(at, part[1] - part[0], kind, "the points")
             return zlib.crc32(rows.view(np.uint8).data)
 
@@ -251,3 +256,8 @@ def measuring(
 def _zone(path: Path, file: BinaryIO, zone: int | None) -> tuple[BinaryFile, ZonePlace]:
     source = BinaryFile(path, file)
     return source, find_zone(source, zone)
+
+
+def _byte(source: BinaryFile, place: ZonePlace, point: int) -> int:
+    """Return where a point begins in the file."""
+    return place.points + point * source.point(place.dim).itemsize

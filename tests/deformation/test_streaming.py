@@ -22,7 +22,7 @@ from slideviz.deformation.solver import folded_at
 from slideviz.deformation.steps import Progress
 from slideviz.deformation.streaming import stream
 from slideviz.errors import CaseError, MeshError, NodeError, UnsoundError
-from slideviz.mesh.io.su2b import partial
+from slideviz.mesh.io.su2b import copying
 from slideviz.mesh.io.su2b.layout import MAGIC
 from slideviz.mesh.io.su2b.partial import names_of
 from slideviz.mesh.skin import read_skin
@@ -191,6 +191,17 @@ class KilledError(BaseException):
     """What ends a process without a chance to tidy up."""
 
 
+def killed_at(move, point):
+    """Return what writes parts until one begins at this point, or after it."""
+
+    def moving(*arguments):
+        if arguments[-1][0] >= point:
+            raise KilledError
+        return move(*arguments)
+
+    return moving
+
+
 def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
     monkeypatch.setattr(output, "CHUNK", 60)
     case = made(tmp_path, "square", 25, ("STEPS=2",))
@@ -200,13 +211,7 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
     parts = -(-len(sv.read(case.mesh_file).points) // 60)
     out.write_bytes(b"older")
     for stop in range(parts):
-
-        def stopping(*arguments, stop=stop):
-            if arguments[-1][0] >= 60 * stop:
-                raise KilledError
-            return move(*arguments)
-
-        monkeypatch.setattr(output, "move", stopping)
+        monkeypatch.setattr(output, "move", killed_at(move, 60 * stop))
         with pytest.raises(KilledError):
             stream(case, out)
         assert out.read_bytes() == b"older"
@@ -223,6 +228,33 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
         assert out.read_bytes() == whole
         assert not list(tmp_path.glob(".*"))
         out.write_bytes(b"older")
+
+
+def flip(path, at):
+    """Change 64 bytes of a file."""
+    data = bytearray(path.read_bytes())
+    data[at : at + 64] = bytes(byte ^ 255 for byte in data[at : at + 64])
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("at", [8, 500, -64])
+def test_what_is_copied_and_then_changed_by_another_is_copied_again(tmp_path, monkeypatch, at):
+    """The first bytes of the zone, its cells, and its markers behind the points."""
+    monkeypatch.setattr(output, "CHUNK", 60)
+    monkeypatch.setattr(copying, "_PIECE", 4096)
+    case = made(tmp_path, "square", 25, ("STEPS=1",))
+    out, move = tmp_path / "out.su2b", output.move
+    stream(case, out)
+    whole = out.read_bytes()
+    with monkeypatch.context() as patch:
+        patch.setattr(output, "move", killed_at(move, 120))
+        with pytest.raises(KilledError):
+            stream(case, out)
+    flip(names_of(out)[0], at % len(whole))
+    told: list[str] = []
+    stream(case, out, note=told.append, resume=True)
+    assert "goes on after 2 of" in told[0]
+    assert out.read_bytes() == whole
 
 
 def test_another_case_or_a_changed_mesh_begins_anew(tmp_path, monkeypatch):
@@ -432,7 +464,7 @@ def test_two_processes_do_not_write_one_file(tmp_path):
 def test_a_copy_is_the_same_where_the_system_cannot_copy_by_itself(tmp_path, monkeypatch):
     case = made(tmp_path, "square", 8, ("STEPS=1",))
     stream(case, tmp_path / "one.su2b")
-    monkeypatch.setattr(partial, "_PIECE", 100)
+    monkeypatch.setattr(copying, "_PIECE", 100)
     monkeypatch.delattr(os, "copy_file_range")
     stream(case, tmp_path / "two.su2b")
     assert (tmp_path / "one.su2b").read_bytes() == (tmp_path / "two.su2b").read_bytes()

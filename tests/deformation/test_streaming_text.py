@@ -25,7 +25,7 @@ from slideviz.mesh.io.su2b.layout import MAGIC
 from slideviz.mesh.io.su2b.partial import names_of
 from slideviz.samples.table import write_sample
 from tests.builders import grid
-from tests.deformation.test_streaming import RUNS, KilledError
+from tests.deformation.test_streaming import RUNS, KilledError, flip, killed_at
 
 
 def made(folder, name, size, sets=()):
@@ -281,6 +281,21 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, smal
         assert out.read_bytes() == whole
         assert not list(tmp_path.glob(".*"))
         out.write_bytes(b"older")
+
+
+@pytest.mark.parametrize("ending", ["su2", "su2b"])
+def test_a_binary_copy_that_another_has_changed_is_made_anew(tmp_path, monkeypatch, small, ending):
+    case = made(tmp_path, "square", 25, ("STEPS=1",))
+    out = tmp_path / f"out.{ending}"
+    with monkeypatch.context() as patch:
+        patch.setattr(output, "move", killed_at(output.move, 120))
+        with pytest.raises(KilledError):
+            stream(case, out)
+    flip(names_of(out, ".binary")[0], 500)
+    told = []
+    stream(case, out, resume=True, note=told.append)
+    assert "goes on after 2 of" in told[0]
+    assert out.read_bytes() == in_memory(case, tmp_path / f"memory.{ending}")
 
 
 def test_a_text_that_changed_is_read_anew(tmp_path, monkeypatch, small):

@@ -11,23 +11,21 @@ import errno
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event
 from typing import BinaryIO
 
 from slideviz.errors import MeshError
 from slideviz.mesh.io.atomic import mode_of, reason_of
 from slideviz.mesh.io.cleanup import keep, removed_at_stop
 from slideviz.mesh.io.file_checks import require_no_input
+from slideviz.mesh.io.su2b.copying import Piece, copying
 from slideviz.mesh.ranks import ALONE, Alone
 from slideviz.mesh.threads import Tick
 
 HEAD = 8
 """Bytes that are zeros until the end."""
-_PIECE = 1 << 26
 
 
 @dataclass(eq=False)
@@ -136,6 +134,7 @@ def partial_copy(
     path: Path,
     source: Path,
     about: str,
+    changed: Piece,
     *,
     resume: bool,
     replaces: Path | None,
@@ -143,12 +142,14 @@ def partial_copy(
 ) -> Iterator[Partial]:
     """Return a copy of ``source`` to be changed; it takes the place of ``path`` at the end.
 
-    One process makes the copy beside its other work, ranks make it when it has to be ready.
+    Of a copy that a stopped process has left, all that is not ``changed`` is made equal again.
 
     Parameters
     ----------
     about, resume
         As of `partial_file`.
+    changed : tuple of int
+        The first of the bytes that the caller changes, and the one after the last.
     ranks : Alone or Ranks
         Those that copy.
 
@@ -162,9 +163,9 @@ def partial_copy(
     with partial_file(path, size, about, resume=resume) as partial:
         with source.open("rb") as given:
             head = given.read(HEAD)
-        copying = _beside if ranks.size == 1 else _together
-        tasks = [] if partial.done else _pieces(size)
-        with copying(source, partial.path, tasks, ranks) as partial.ready:
+        is_left = partial.done > 0
+        copied = [(HEAD, changed[0]), (changed[1], size)] if is_left else [(HEAD, size)]
+        with copying(source, partial.path, copied, ranks, is_left=is_left) as partial.ready:
             yield partial
         finish_head(partial.file, head)
         partial.path.chmod(0o644 & ~_umask() if partial.mode is None else partial.mode)
@@ -204,88 +205,6 @@ def _lock(file: BinaryIO, path: Path) -> None:
         raise MeshError(
             f"{path}: another process is writing it; wait for it, or choose another name"
         ) from problem
-
-
-Piece = tuple[int, int]
-"""The first of some bytes, and the one after the last."""
-
-
-def _pieces(size: int) -> list[Piece]:
-    """Return the pieces of a file without its head; each ends where a page does."""
-    ends = [*range(_PIECE, size, _PIECE), size]
-    return list(zip([HEAD, *ends[:-1]], ends, strict=True))
-
-
-@contextmanager
-def _together(
-    source: Path, ours: Path, tasks: list[Piece], ranks: Alone
-) -> Iterator[Callable[[Tick], None]]:
-    """Return what copies the pieces of a file, all ranks some."""
-
-    def ready(tick: Tick) -> None:
-        with ranks.sharing(_copying, source, ours) as do:
-            for (_, end), _ in zip(tasks, do(tasks), strict=True):
-                tick(end / tasks[-1][1])
-
-    yield ready
-
-
-@contextmanager
-def _beside(
-    source: Path, ours: Path, tasks: list[Piece], _: Alone
-) -> Iterator[Callable[[Tick], None]]:
-    """Return what waits until the pieces of a file are copied, as they are from now on."""
-    stopped, done = Event(), 0
-
-    def run() -> None:
-        nonlocal done
-        with _copying(source, ours) as copy:
-            for task in tasks:
-                if stopped.is_set():
-                    return
-                copy(task)
-                done += 1
-
-    with ThreadPoolExecutor(1, "slideviz-copy") as pool:
-        found = pool.submit(run)
-
-        def ready(tick: Tick) -> None:
-            while not found.done():
-                tick(done / max(len(tasks), 1))
-                wait([found], 0.05)
-            found.result()
-            tick(1.0)
-
-        try:
-            yield ready
-        finally:
-            stopped.set()
-
-
-@contextmanager
-def _copying(source: Path, ours: Path) -> Iterator[Callable[[Piece], None]]:
-    """Return what copies some bytes of a file to the same place of another, and to the disk."""
-    with source.open("rb") as given, ours.open("r+b") as file:
-
-        def copy(task: Piece) -> None:
-            at, end = task
-            while at < end:
-                at += _copied(given, file, at, end - at)
-            os.fsync(file.fileno())
-
-        yield copy
-
-
-def _copied(given: BinaryIO, file: BinaryIO, at: int, count: int) -> int:
-    """Copy some bytes within the kernel where that is possible, and return how many."""
-    with suppress(OSError, AttributeError):
-        moved = os.copy_file_range(given.fileno(), file.fileno(), count, at, at)
-        if moved:
-            return moved
-    block = os.pread(given.fileno(), count, at)
-    if not block:
-        raise MeshError(f"{given.name}: became shorter while it was read; run it again")
-    return os.pwrite(file.fileno(), block, at)
 
 
 def _removed(*paths: Path) -> None:
