@@ -62,7 +62,7 @@ def add_run(calls: argparse._SubParsersAction) -> None:
         call, "stream", help="for meshes larger than memory (SU2): only the boundary is in memory"
     )
     call.add_argument(
-        "--resume", action="store_true", help="go on where a streamed run was stopped"
+        "--resume", action="store_true", help="go on where a run with --stream was stopped"
     )
     add_shared(call, "quiet")
     call.add_argument("--force", action="store_true", help="allow writing over the input mesh")

@@ -57,13 +57,15 @@ def is_to_be_streamed(
     """Tell whether a run is streamed: as asked for, or as the mesh is too large for the memory."""
     from slideviz.deformation.memory import missing_memory
 
-    if arguments.stream or arguments.resume:
+    if arguments.stream:
         return True
     able = _is_su2(output, kind) and not _needing_memory(arguments)
-    missing = missing_memory(case) if able else ""
-    if missing and not arguments.quiet:
-        say("note", f"{missing}; it is streamed")
-    return bool(missing)
+    why = missing_memory(case) if able else ""
+    if arguments.resume:
+        why = why or "--resume is there for runs with --stream"
+    if why and not arguments.quiet:
+        say("note", f"{why}; it is streamed")
+    return bool(why)
 
 
 def _needing_memory(arguments: argparse.Namespace) -> list[str]:

@@ -165,6 +165,15 @@ def test_resume_does_nothing_where_the_run_is_finished(tmp_path, monkeypatch, ca
     assert Path("other.json").read_bytes() == Path("one.json").read_bytes()
 
 
+def test_resume_says_that_it_streams(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    made(tmp_path, "square", 8)
+    said = "slideviz: note: --resume is there for runs with --stream; it is streamed\n"
+    for more, is_said in ((["--resume"], True), (["--resume", "--stream"], False)):
+        assert run(["run", "square.cfg", "-o", "out.su2b", "--steps", "1", *more]) == 0
+        assert (said in capsys.readouterr().err) is is_said
+
+
 @pytest.mark.parametrize("change", ["mesh", "quality", "case", "note"])
 def test_resume_does_again_what_is_not_as_it_was_left(tmp_path, monkeypatch, capsys, change):
     monkeypatch.chdir(tmp_path)
@@ -569,6 +578,8 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     told = capsys.readouterr().err
     assert "slideviz: note: mesh.su2b needs about 0 GB of memory" in told
     assert "it is streamed" in told
+    assert run([*call, "-o", "out.su2b", "--resume"]) == 0
+    assert capsys.readouterr().err.count("it is streamed") == 1
     monkeypatch.setattr(streaming, "stream", None)
     for more in (["-o", "out.vtu"], ["-o", "b.su2b", "--steps-dir", "steps"]):
         assert run([*call, *more, "-q"]) == 0
