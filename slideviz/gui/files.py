@@ -34,10 +34,12 @@ class Files(QObject):
     """The files of a window: recent ones, opening, saving."""
 
     def __init__(self, window: MainWindow, settings: QSettings) -> None:
+        from slideviz.samples.table import SAMPLES
+
         super().__init__(window)
         self.window = window
         self.settings = settings
-        self.samples = known_samples()
+        self.samples = {name: row.about for name, row in SAMPLES.items()}
         self._saved_to: Path | None = None
         self.saving = False
         self._answered = False
@@ -144,14 +146,15 @@ class Files(QObject):
             What the changes would be lost by, in words.
         """
         window, designs = self.window, self.window.docks_.panel(DesignsPanel)
-        words = designs.unsaved, designs.unsaved_results
-        unsaved = Unsaved.of(window.store.session, window.runner.busy, *words)
+        unsaved = self._unsaved()
         if self._answered or not unsaved.what:
             return True
-        question = unsaved.question(before)
-        answer = questions.ask_unsaved(self.window, question, unsaved.can_save)
+        can_save = unsaved.can_save
+        answer = questions.ask_unsaved(
+            window, unsaved.question(before), can_save, lambda: self._unsaved().question(before)
+        )
         # What else there is was in the question, too: it is not asked about again.
-        wanted = unsaved.can_save if answer == "all" else [answer]
+        wanted = can_save if answer == "all" else [answer]
         savers = {"case": self.save_case, "table": designs.save_table}
         if not all(save() for name, save in savers.items() if name in wanted):
             return False
@@ -159,6 +162,11 @@ class Files(QObject):
             self.save_mesh(last=True, then=lambda: self._go_on(again))
             return False
         return answer != "cancel"
+
+    def _unsaved(self) -> Unsaved:
+        window = self.window
+        designs = window.docks_.panel(DesignsPanel).unsaved
+        return Unsaved.of(window.store.session, window.runner.busy, designs)
 
     def _go_on(self, again: Callable[[], object]) -> None:
         """Do what was asked about, without asking once more."""
@@ -292,10 +300,3 @@ def sample_folder() -> Path:
     """Return the folder into which sample cases are written to be opened."""
     places = QStandardPaths.standardLocations(QStandardPaths.StandardLocation.CacheLocation)
     return Path(places[0] if places else tempfile.gettempdir()) / "slideviz-samples"
-
-
-def known_samples() -> dict[str, str]:
-    """Return the sample cases: name and description."""
-    from slideviz.samples.table import SAMPLES
-
-    return {name: row.about for name, row in SAMPLES.items()}

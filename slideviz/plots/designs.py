@@ -148,8 +148,6 @@ def against_designs(
         axes.plot(
             places, [0.0] * len(places), marker="X", gid="failed", label="failed", mew=0.4, **bold
         )
-        if not curves:
-            axes.set_yticks([])
     if any(curve.inverted.any() for curve in curves):
         axes.plot([], [], "x", color=style.alarm, label="inverted")
     if what == "quality" and curves:
@@ -199,9 +197,10 @@ def _draw_curve(
         "marker": look.marker,
         "markersize": 4.5,
     }
-    sound = np.where(curve.inverted, np.nan, curve.values)
     label = curve.label if series is not None and curve.label else None
-    axes.plot(curve.places, sound, label=label, gid=f"curve:{curve.label}", **line)
+    sound: dict[str, Any] = {"markevery": np.flatnonzero(~curve.inverted).tolist()}
+    curve_id = f"curve:{curve.label}"
+    axes.plot(curve.places, curve.values, label=label, gid=curve_id, **line, **sound)
     if mean:
         hollow = line | {"markerfacecolor": style.scheme.background}
         axes.plot(curve.places, curve.mean, gid=f"mean:{curve.label}", **hollow)

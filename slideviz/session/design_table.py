@@ -16,7 +16,7 @@ from slideviz.case.key import FILES, MOTION, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.case.words import is_number
-from slideviz.design.sweeps.columns import numbers_of, own_values
+from slideviz.design.sweeps.columns import columns_of, numbers_of, own_values
 from slideviz.design.sweeps.designs import read_designs
 from slideviz.design.sweeps.row import NUMBERS, DesignRow
 from slideviz.errors import CaseError
@@ -27,6 +27,8 @@ MOST = 100_000
 """Designs that a table in the window has room for."""
 FINE = 1e-5
 """What values of a range may be off, as a part of the step between them."""
+_NAMED = 5
+"""Designs that are named of those that failed for the same reason."""
 _RANGE = re.compile(r"(\S+)\s*(?:to|\.\.)\s*(\S+)\s*(?:in|:)\s*(\d+)\Z", re.IGNORECASE)
 
 
@@ -103,6 +105,19 @@ class DesignTable:
             if values in known
         )
 
+    def count_done(self) -> int:
+        """Return how many designs have a result, and did not fail."""
+        return sum(not row.problem for row in self.results.values())
+
+    def filled(self, case: Case | None) -> DesignTable:
+        """Return the table with what the case of its results has where a cell is empty."""
+        if case is None or not self.results or all(map(all, self.rows)):
+            return self
+        own = own_values(case, columns_of(case, self.columns))
+        texts = {name: _shown(value) for name, value in own.items()}
+        rows = (zip(self.columns, row, strict=True) for row in self.rows)
+        return replace(self, rows=tuple(tuple(c or texts[name] for name, c in row) for row in rows))
+
     def without_results(self) -> DesignTable:
         """Return the table as it was before it ran."""
         return replace(self, results=MappingProxyType({}))
@@ -140,13 +155,25 @@ class DesignTable:
         return self.results[number].problem.removeprefix(f"{name}: ")
 
     def summary(self, mesh: Mesh | None) -> str:
-        """Return in words how the designs went on a mesh: first why one failed."""
-        failed = [number for number, row in self.results.items() if row.problem]
-        bad = sum(row.inverted > 0 for row in self.results.values())
-        parts = [f"{len(failed):,} failed: {self.reason(failed[0], mesh)}"] if failed else []
-        parts += [f"{len(self.results):,} designs done"]
+        """Return in words how the designs went on a mesh, with a line for each reason to fail."""
+        done, bad = self.count_done(), sum(row.inverted > 0 for row in self.results.values())
+        reasons: dict[str, list[int]] = {}
+        for number in sorted(self.results):
+            if self.results[number].problem:
+                reasons.setdefault(self.reason(number, mesh), []).append(number)
+        failed = len(self.results) - done
+        parts = [f"{done:,} design{'s' * (done != 1)} done"]
+        parts += [f"{failed:,} failed"] * bool(failed)
         parts += [f"{bad:,} with inverted cells"] * bool(bad)
-        return "; ".join(parts)
+        lines = [f"{_named(numbers)}: {reason}" for reason, numbers in reasons.items()]
+        return "\n".join(["; ".join(parts), *lines])
+
+
+def _named(numbers: list[int]) -> str:
+    """Return the names of designs, of many the first."""
+    first = ", ".join(map(str, numbers[:_NAMED]))
+    more = f" and {len(numbers) - _NAMED:,} more" if len(numbers) > _NAMED else ""
+    return f"Design{'s' * (len(numbers) > 1)} {first}{more}"
 
 
 def _settings(case: Case) -> Case:

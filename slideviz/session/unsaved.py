@@ -17,14 +17,14 @@ class Unsaved:
     session : Session
     what : mapping
         The words for what would be lost: of a case, of a mesh, of a run that goes on; of designs,
-        a sentence: as ``table`` where some have results.
+        as ``table``, a sentence.
     """
 
     session: Session
     what: Mapping[str, str]
 
     @classmethod
-    def of(cls, session: Session, busy: bool, designs: str = "", results: int = 0) -> Unsaved:
+    def of(cls, session: Session, busy: bool, designs: str = "") -> Unsaved:
         """Return the unsaved work of a session, while a job runs or none does, and of designs."""
         what = {}
         if session.unsaved_case:
@@ -39,13 +39,13 @@ class Unsaved:
             name = "mesh" if run.end and not busy else "run"
             what[name] = f"the deformed mesh of run {run.number}"
         if designs:
-            what["table" if results else "designs"] = designs
+            what["table"] = designs
         return cls(session, what)
 
     @property
     def can_save(self) -> list[str]:
         """Return what can be saved now: ``case``, ``mesh`` and ``table``."""
-        return [name for name in self.what if name not in ("run", "designs")]
+        return [name for name in self.what if name != "run"]
 
     def question(self, before: str) -> str:
         """Return the question to the user; a second line says what saving is good for.
@@ -56,13 +56,11 @@ class Unsaved:
             What the work would be lost by, as ``closing``.
         """
         number = self.session.shown
-        for name in ("designs", "table"):
-            if name in self.what and len(self.what) > 1:
-                return f"{self._without(name).question(before)}\n{self.what[name]}"
-        if "designs" in self.what:
-            return f"{self.what['designs']} Lose their results?"
         if "table" in self.what:
-            return f"Save the table of designs before {before}?\n{self.what['table']}"
+            rest = self._without("table")
+            what = "Save the table of designs"
+            question = rest.question(before) if rest.what else f"{what} before {before}?"
+            return f"{question}\n{self.what['table']}"
         if "run" in self.what:
             if len(self.what) == 1:
                 return f"Run {number} goes on. Lose its steps?"

@@ -28,7 +28,6 @@ DIALOGS = (
     "ask_sample",
     "ask_unsaved",
     "ask_overwrite_input",
-    "ask_lose_results",
 )
 
 

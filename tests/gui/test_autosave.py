@@ -316,7 +316,7 @@ def test_case_and_mesh_are_saved_with_one_answer_before_the_window_closes(
     asked = []
     names = iter([tmp_path / "out.cfg", tmp_path / "out.su2"])
 
-    def ask(_parent, what, can_save):
+    def ask(_parent, what, can_save, _now):
         asked.append((what, tuple(can_save)))
         return "all"
 
@@ -376,3 +376,17 @@ def test_the_question_offers_what_can_be_saved(make, monkeypatch, can_save, word
     answer = questions.ask_unsaved(window, "Save it?\nIt is worth it.", can_save)
     assert sorted(seen[0]) == sorted(words)
     assert answer == (can_save[0] if can_save else "discard")
+
+
+def test_the_question_tells_how_far_a_sweep_is_meanwhile(make, qtbot, monkeypatch):
+    window = make()
+    monkeypatch.undo()
+    counts = iter(range(1, 100))
+
+    def look(box):
+        qtbot.waitUntil(lambda: box.informativeText() == "2 are done.")
+        box.buttons()[0].click()
+
+    monkeypatch.setattr(QMessageBox, "exec", look)
+    words = "Save it?\n0 are done."
+    questions.ask_unsaved(window, words, ["table"], lambda: f"Save it?\n{next(counts)} are done.")

@@ -57,7 +57,7 @@ def test_designs_are_run_drawn_and_shown(window, passage, qtbot, in_a_thread, dr
     assert panel.rows.model.rowCount() == 3
     assert panel.run.text() == "Run 3 designs"
     run(panel, qtbot)
-    assert panel.said.text().startswith("3 designs done")
+    assert panel.said.label.text().startswith("3 designs done")
     assert set(panel.table.results) == {1, 2, 3}
     columns = [panel.rows.model.headerData(k, Qt.Orientation.Horizontal) for k in range(4)]
     assert columns == ["airfoil.rotate\nangle_deg", "STEPS", "min", "mean"]
@@ -114,7 +114,7 @@ def test_the_last_of_several_clicks_counts(window, passage, qtbot, in_a_thread, 
     window.start_run()
     assert window.runner.busy
     panel.show_design(1)
-    assert panel.said.text().startswith("Another job runs")
+    assert panel.said.label.text().startswith("Another job runs")
     assert panel.shown == 3
     driver.settle()
 
@@ -138,38 +138,69 @@ def test_the_design_shown_is_none_of_another_table(passage, answers, tmp_path):
 def test_designs_that_fail_say_why(passage, qtbot, in_a_thread):
     panel = passage
     fill(panel, "SLIDING_MODE", "ps, none")
+    assert panel.rows.model.headerData(0, Qt.Orientation.Horizontal) == "SLIDING_\nMODE"
     run(panel, qtbot)
-    assert "1 failed: PERIODIC_MODE= moving needs" in panel.said.text()
+    assert panel.said.label.text().startswith(
+        "1 design done; 1 failed\nDesign 2: PERIODIC_MODE= moving needs"
+    )
     assert [panel.rows.model.index(k, 1).data() for k in (0, 1)][1] == "failed"
     panel.show_design(2)
-    assert panel.said.text().startswith("Design 2: PERIODIC_MODE= moving needs")
+    assert panel.said.label.text().startswith("Design 2: PERIODIC_MODE= moving needs")
     assert panel.shown is None
 
 
-def test_what_is_said_is_seen_whole_and_begins_with_the_reason(window, passage, qtbot):
+def test_what_is_said_can_be_read_to_its_end(window, passage, qtbot):
     panel = passage
     window.resize(1280, 800)
-    fill(panel, "STEPS", "1, 2")
+    fill(panel, "STEPS", "1, 2, 3")
     why = f"the cells around the tip of the blade turn over in step 1. {'Make more steps. ' * 8}"
     name = window.store.session.mesh.name
     panel.mesh = window.store.session.mesh
-    panel.table = panel.table.with_results(
-        [DesignRow(1, problem=f"{name}: {why}"), DesignRow(2, inverted=3)]
-    )
-    panel._ended("", wrong=False)
-    assert panel.said.text().startswith("1 failed: the cells around")
-    assert panel.said.text().endswith("2 designs done; 1 with inverted cells")
-    qtbot.waitUntil(lambda: panel.said.height() > 2 * panel.fontMetrics().height())
-    assert panel.said.width() > 0.9 * panel.width()
-    assert panel.said.height() >= panel.said.heightForWidth(panel.said.width())
+    panel.table = panel.table.with_results([DesignRow(1, problem=f"{name}: {why}")])
     panel.show_design(1)
-    assert panel.said.text() == f"Design 1: {why}"
+    assert panel.said.label.text() == f"Design 1: {why}"
+    bar, high = panel.said.verticalScrollBar(), panel.fontMetrics().height()
+    qtbot.waitUntil(lambda: panel.said.height() > 1.9 * high)
+    assert panel.said.width() > 0.9 * panel.width()
+    assert not bar.maximum()
+    assert panel.said.height() >= panel.said.label.heightForWidth(panel.said.viewport().width())
+    # Of many lines, three are seen, and the others scrolled to.
+    more = [DesignRow(2, inverted=3), DesignRow(3, problem=f"{name}: another reason")]
+    panel.table = panel.table.with_results(more)
+    panel._ended("", wrong=False)
+    assert panel.said.label.text().splitlines() == [
+        "1 design done; 2 failed; 1 with inverted cells",
+        f"Design 1: {why}",
+        "Design 3: another reason",
+    ]
+    qtbot.waitUntil(lambda: bar.maximum() > 0)
+    assert panel.said.height() < 4 * high
+    panel._say("")
+    assert not panel.said.isVisible()
+
+
+def test_where_all_failed_there_is_no_plot(passage):
+    panel = passage
+    fill(panel, "STEPS", "1, 2")
+    panel._put(panel.table.with_results([DesignRow(1, problem="no")]))
+    assert "failed" in panel.plot.area.words.text()
+    assert not panel.plot.save.isEnabled()
+    panel._put(panel.table.with_results([DesignRow(2, min=0.5, mean=0.6)]))
+    assert panel.plot.save.isEnabled()
+
+
+def test_the_number_that_varies_is_read_whole(window, passage, qtbot):
+    window.resize(1280, 800)
+    column = passage.rows.column
+    column.setCurrentIndex(column.findData("airfoil.rotate.angle_deg"))
+    qtbot.waitUntil(lambda: column.width() > 200)
+    assert column.shown == column.currentText()
 
 
 def test_mistakes_are_told_and_change_nothing(passage):
     panel = passage
     fill(panel, "STEPS", "1, many")
-    assert "whole number" in panel.said.text()
+    assert "whole number" in panel.said.label.text()
     fill(panel, "airfoil.translate.y", "0 to 1 in")
     assert panel.rows.model.rowCount() == 0
     fill(panel, "STEPS", "1, 2")
@@ -195,16 +226,17 @@ def test_tables_are_loaded_and_saved(passage, answers, tmp_path):
     file.write_text("nothing\n1\n")
     answers("ask_table", file)
     QTest.mouseClick(panel.load, LEFT)
-    assert "no such number of a motion" in panel.said.text()
+    assert "no such number of a motion" in panel.said.label.text()
 
 
-def test_other_settings_make_results_old(window, passage, qtbot, in_a_thread):
+def test_other_settings_make_results_old(window, passage, qtbot, in_a_thread, answers):
     panel = passage
     fill(panel, "STEPS", "1, 2")
     run(panel, qtbot)
     before = dict(panel.table.results)
     window.store.change(changes.set_case, sliding="ds")
-    assert "settings have changed" in panel.said.text()
+    assert "settings have changed" in panel.said.label.text()
+    answers("ask_unsaved", "discard")
     run(panel, qtbot)
     assert panel.table.results[1].seconds != before[1].seconds
     assert panel.case.sliding == "ds"
@@ -231,7 +263,7 @@ def test_a_stop_keeps_what_is_there(passage, qtbot, in_a_thread):
     qtbot.waitUntil(lambda: len(panel.table.results) > 1, timeout=60_000)
     QTest.mouseClick(panel.stop, LEFT)
     qtbot.waitUntil(lambda: not panel.runner.busy, timeout=60_000)
-    assert panel.said.text() == "Stopped; the results stay."
+    assert panel.said.label.text() == "Stopped; the results stay."
     assert 1 < len(panel.table.results) < 500
 
 
@@ -245,11 +277,16 @@ def test_results_are_not_lost_without_a_question(
     file = tmp_path / "designs.csv"
     file.write_text("STEPS\n2\n3\n")
     answers("ask_table", file)
-    asked = answers("ask_lose_results", False)
+    asked = answers("ask_unsaved", "cancel")
     QTest.mouseClick(panel.load, LEFT)
-    assert asked == [(1,)]
+    assert asked == [
+        (
+            "Save the table of designs first?\nWhat comes now takes away the result of a design.",
+            ["table"],
+        )
+    ]
     assert panel.table.rows == (("1",), ("2",))
-    answers("ask_lose_results", True)
+    answers("ask_unsaved", "discard")
     QTest.mouseClick(panel.load, LEFT)
     assert panel.table.rows == (("2",), ("3",))
     assert {k: row.steps for k, row in panel.table.results.items()} == {1: 2}
@@ -267,6 +304,32 @@ def test_results_are_not_lost_without_a_question(
     assert (tmp_path / "out.csv").read_text().count("\n") == 3
 
 
+def test_results_can_be_saved_before_a_number_is_added_or_all_is_run_again(
+    window, passage, qtbot, in_a_thread, answers, tmp_path
+):
+    panel = passage
+    fill(panel, "STEPS", "1, 2")
+    run(panel, qtbot)
+    before = panel.table
+    asked = answers("ask_unsaved", "table")
+    answers("ask_save", None)
+    fill(panel, "airfoil.rotate.angle_deg", "-1, -2")
+    assert panel.table is before
+    assert "the results of 2 designs" in asked[0][0]
+    window.store.change(changes.set_case, sliding="ds")
+    answers("ask_unsaved", "cancel")
+    QTest.mouseClick(panel.run, LEFT)
+    assert panel.table is before
+    assert not panel.runner.busy
+    answers("ask_unsaved", "table")
+    answers("ask_save", tmp_path / "out.csv")
+    fill(panel, "airfoil.rotate.angle_deg", "-1, -2")
+    assert len(panel.table.rows) == 4
+    assert not panel.table.results
+    with (tmp_path / "out.csv").open() as file:
+        assert [row["steps"] for row in csv.DictReader(file)] == ["1", "2"]
+
+
 def test_what_is_done_is_not_run_again(window, passage, qtbot, in_a_thread, tmp_path):
     panel = passage
     fill(panel, "SLIDING_MODE", "ps, none")
@@ -281,7 +344,7 @@ def test_what_is_done_is_not_run_again(window, passage, qtbot, in_a_thread, tmp_
     case = window.store.session.case.change(source=tmp_path / "other.cfg")
     window.store.change(changes.saved_case, case)
     assert not panel.run.isEnabled()
-    assert not panel.said.text().startswith("The settings")
+    assert not panel.said.label.text().startswith("The settings")
     window.store.change(changes.set_case, steps=3)
     assert panel.run.text() == "Run 1 design"
 
@@ -294,6 +357,10 @@ def test_closing_asks_about_designs_that_go_on(
     asked = answers("ask_unsaved", "cancel")
     assert not window.close()
     assert "The sweep still runs (0 of 500 designs are done) and will be stopped." in asked[0][0]
+    # The question counts on while it is there.
+    now = asked[0][2]
+    passage._came([DesignRow(1, min=0.5)])
+    assert "(1 of 500 designs are done)" in now()
     assert passage.runner.busy
     # What is done can be saved before it is stopped.
     qtbot.waitUntil(lambda: len(passage.table.results) > 1, timeout=60_000)
@@ -311,7 +378,7 @@ def test_all_mistakes_of_a_file_are_told_with_their_rows(window, passage, answer
     file.write_text("STEPS\n1\nmany\n0.5\nx\ny\nz\n")
     answers("ask_table", file)
     QTest.mouseClick(passage.load, LEFT)
-    assert "(and 4 more)" in passage.said.text()
+    assert "(and 4 more)" in passage.said.label.text()
     assert window.banner.isVisible()
     window.banner.details.click()
     told = window.banner.dialog.text.toPlainText()

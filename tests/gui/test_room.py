@@ -16,6 +16,7 @@ from slideviz.gui.panels.worst import info_text
 from slideviz.gui.start import StartPage
 from slideviz.gui.widgets import questions
 from slideviz.gui.window import MainWindow
+from slideviz.samples.table import SAMPLES
 from slideviz.session import changes
 
 SIZES = """
@@ -85,7 +86,7 @@ def test_hidden_panels_are_there_in_the_next_window(driver, settings, qtbot):
 
 
 def test_cards_take_the_columns_that_there_is_room_for(qtbot):
-    page = StartPage(dict.fromkeys(files.known_samples(), "2D: a case"))
+    page = StartPage(dict.fromkeys(SAMPLES, "2D: a case"))
     qtbot.addWidget(page)
     for width, columns in ((900, 4), (420, 2)):
         page.resize(QSize(width, 700))
@@ -221,7 +222,7 @@ def test_the_dialog_of_the_size_says_what_is_counted(qtbot, driver, monkeypatch)
         return QDialog.DialogCode.Accepted
 
     monkeypatch.setattr(QDialog, "exec", look)
-    samples = files.known_samples()
+    samples = driver.window.files.samples
     sizes = dict.fromkeys(samples, 25) | {"stator": 20_000}
     found = questions.ask_sample(driver.window, samples, sizes)
     assert seen == [(25, True, False), (20_000, False, True)]

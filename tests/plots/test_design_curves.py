@@ -1,6 +1,5 @@
 """Plots of designs: a curve for each choice of the other numbers, points that can be found."""
 
-import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -59,7 +58,9 @@ def test_what_is_drawn(table):
     axes, _ = drawn(table, shown=3)
     by_gid = {line.get_gid(): line for line in axes.lines}
     assert by_gid["curve:0"].get_ydata() == pytest.approx([0.3, 0.1, 0.5])
-    assert np.isnan(by_gid["curve:0.5"].get_ydata()[0])  # inverted: a cross instead
+    # One with inverted cells is a cross instead of a point; its curve goes through it.
+    assert by_gid["curve:0.5"].get_ydata() == pytest.approx([0.4, 0.2])
+    assert by_gid["curve:0.5"].get_markevery() == [1]
     assert by_gid["inverted"].get_ydata() == pytest.approx([0.4])
     assert by_gid["shown"].get_ydata() == pytest.approx([0.3])
     labels = [text.get_text() for text in axes.get_legend().get_texts()]

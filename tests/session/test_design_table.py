@@ -156,3 +156,25 @@ def test_another_table_keeps_the_results_of_the_same_designs():
         2: (2, 2.0)
     }
     assert not DesignTable(("a",), (("1",),)).keeping(old).results
+
+
+def test_reasons_to_fail_are_told_once_with_their_designs(passage):
+    table = DesignTable().crossed("STEPS", [str(k) for k in range(1, 11)])
+    name = passage.mesh.name
+    why = {n: DesignRow(n, problem=f"{name}: too far") for n in range(1, 8)}
+    rows = why | {3: DesignRow(3, problem=f"{name}: too near"), 8: DesignRow(8, inverted=2)}
+    assert table.with_results(rows.values()).summary(passage.mesh).splitlines() == [
+        "1 design done; 7 failed; 1 with inverted cells",
+        "Designs 1, 2, 4, 5, 6 and 1 more: too far",
+        "Design 3: too near",
+    ]
+
+
+def test_values_that_are_left_out_are_those_of_the_case(passage):
+    table = DesignTable(("airfoil.translate.y", "STEPS"), (("0.1", ""), ("", "2")))
+    assert table.filled(passage.case) is table
+    table = table.with_results([DesignRow(1, min=0.5)])
+    assert table.filled(passage.case).rows == (("0.1", "5"), ("0.12", "2"))
+    whole = DesignTable(("STEPS",), (("1",),)).with_results([DesignRow(1, min=0.5)])
+    assert whole.filled(passage.case) is whole
+    assert table.filled(None) is table

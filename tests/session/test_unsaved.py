@@ -85,24 +85,11 @@ def test_the_mesh_of_a_design_that_is_looked_at_is_not_asked_about(session):
 
 def test_designs_with_results_can_be_saved(session):
     words = "The table of designs, 2 with results, is not saved."
-    alone = Unsaved.of(saved(session, 1, 2), busy=False, designs=words, results=2)
+    alone = Unsaved.of(saved(session, 1, 2), busy=False, designs=words)
     assert alone.can_save == ["table"]
     assert alone.question("closing") == f"Save the table of designs before closing?\n{words}"
-    both = Unsaved.of(saved(session, 1), busy=False, designs=words, results=2)
-    assert both.can_save == ["mesh", "table"]
-    assert both.question("closing").splitlines() == [
-        "Save the deformed mesh of run 2 before closing?",
-        words,
-    ]
-
-
-def test_designs_are_asked_about_in_the_same_question(session):
-    words = "The sweep still runs (2 of 9 designs are done) and will be stopped."
-    alone = Unsaved.of(saved(session, 1, 2), busy=False, designs=words)
-    assert not alone.can_save
-    assert alone.question("closing") == f"{words} Lose their results?"
     both = Unsaved.of(saved(session, 1), busy=False, designs=words)
-    assert both.can_save == ["mesh"]
+    assert both.can_save == ["mesh", "table"]
     assert both.question("closing").splitlines() == [
         "Save the deformed mesh of run 2 before closing?",
         words,

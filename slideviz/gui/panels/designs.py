@@ -18,14 +18,13 @@ from slideviz.gui.panels.designs_plot import DesignPlot
 from slideviz.gui.panels.designs_rows import DesignRows
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import QuietBar, in_column, in_row, push_button, set_style
-from slideviz.gui.widgets.labels import wide_label, wrapped
+from slideviz.gui.widgets.labels import WideLabel
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import Services
 from slideviz.mesh.model import Mesh
 from slideviz.session.design_table import DesignTable, read_table, values_of, write_results
 from slideviz.session.state import Session
 
-TABLES = "Table (*.csv)"
 RUN = "Run the designs that have no result yet, or failed."
 
 
@@ -90,8 +89,7 @@ class DesignsPanel(Panel):
         self.bar.setRange(0, 1000)
         self.bar.setTextVisible(False)
         self.bar.setFixedWidth(110)
-        self.said = wide_label(lines=3)
-        self.said.hide()
+        self.said = WideLabel(lines=3)
         files = (self.load, self.remove, self.save, self.plot.save)
         return in_row(self.run, self.stop, self.bar, None, *files, spacing=4)
 
@@ -139,7 +137,7 @@ class DesignsPanel(Panel):
         opened = self.store.session.mesh is not None and not in_file
         count = 0 if busy else len(self.table.rows) - len(self._left().results)
         self.rows.show_table(self.table, editable=not busy)
-        self.plot.show_table(self.table, self.shown)
+        self.plot.show_table(self.table.filled(self.case), self.shown)
         for widget, able in (
             (self.rows.add, opened and not busy),
             (self.load, opened and not busy),
@@ -158,10 +156,8 @@ class DesignsPanel(Panel):
         self.run.setVisible(not busy)
 
     def _say(self, text: str, wrong: bool = False) -> None:
-        self.said.setText(text)
-        self.said.setToolTip(wrapped(text))
-        self.said.setVisible(bool(text))
-        set_style(self.said, "bad", wrong)
+        self.said.say(text)
+        set_style(self.said.label, "bad", wrong)
 
     # What the user does ----------------------------------------------------------------
 
@@ -169,11 +165,6 @@ class DesignsPanel(Panel):
     def unsaved(self) -> str:
         """Return what would be lost with this panel, in a sentence, or nothing."""
         return self.table.unsaved(self.runner.busy, self.written)
-
-    @property
-    def unsaved_results(self) -> int:
-        """Return how many results there are that were not saved."""
-        return 0 if self.table is self.written else len(self.table.results)
 
     def _try(self, change: Callable[[], DesignTable]) -> None:
         """Change the table, or say why that cannot be."""
@@ -208,8 +199,7 @@ class DesignsPanel(Panel):
 
     def _edited(self, row: int, column: int, text: str) -> None:
         def changed() -> DesignTable:
-            name = self.table.columns[column]
-            read_designs(self.store.session.case, {name: [text]})
+            read_designs(self.store.session.case, {self.table.columns[column]: [text]})
             return self.table.with_cell(row, column, text)
 
         self._try(changed)
@@ -220,10 +210,19 @@ class DesignsPanel(Panel):
             self._try(lambda: self._replacing(read_table(self.store.session.case, path)))
 
     def _replacing(self, table: DesignTable) -> DesignTable:
-        """Return another table with the results there are; this one if too many were lost."""
+        """Return another table with the results there are; this one where results would be lost."""
         table = table.keeping(self.table)
-        lost = len(self.table.results) - len(table.results)
-        return table if lost <= 0 or questions.ask_lose_results(self, lost) else self.table
+        return table if self._may_become(table) else self.table
+
+    def _may_become(self, table: DesignTable) -> bool:
+        """Return whether a table may take the place of this one: results that go may be saved."""
+        lost = self.table.count_done() - table.count_done()
+        if lost <= 0 or self.table is self.written:
+            return True
+        what = f"the results of {lost:,} designs" if lost > 1 else "the result of a design"
+        text = f"Save the table of designs first?\nWhat comes now takes away {what}."
+        answer = questions.ask_unsaved(self, text, ["table"])
+        return self.save_table() if answer == "table" else answer == "discard"
 
     def _remove(self) -> None:
         self._try(lambda: self.table.without(self.rows.selected))
@@ -231,7 +230,7 @@ class DesignsPanel(Panel):
     def save_table(self) -> bool:
         """Ask for a file and save the table there; return whether it was written."""
         default = self.services.files.folder() / f"{self.services.files.stem()}_designs.csv"
-        path = questions.ask_save(self, "Save designs and results", default, TABLES)
+        path = questions.ask_save(self, "Save designs and results", default, "Table (*.csv)")
         if path is None:
             return False
         table = self.table  # a question waits, and results come meanwhile
@@ -273,8 +272,9 @@ class DesignsPanel(Panel):
     def start(self) -> None:
         """Run the designs that have no result with the present settings."""
         session, table = self.store.session, self._left()
-        done = len(table.results) == len(table.rows)
-        if self.runner.busy or session.mesh is None or session.in_file or done:
+        if self.runner.busy or session.mesh is None or session.in_file:
+            return
+        if len(table.results) == len(table.rows) or not self._may_become(table):
             return
         self.case, self.mesh = session.case, session.mesh
         self._put(table)
@@ -291,7 +291,7 @@ class DesignsPanel(Panel):
         self._say(words)
 
     def _ended(self, text: str, wrong: bool) -> None:
-        failed = any(row.problem for row in self.table.results.values())
+        failed = self.table.count_done() < len(self.table.results)
         self._say(text or self.table.summary(self.mesh), wrong or failed)
         self._sync()
 

@@ -74,8 +74,9 @@ class DesignsModel(QAbstractTableModel):
             shown = role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole)
             name = self.table.columns[section]
             # In two lines: columns are many, and the room is not wide.
-            head, dot, part = name.rpartition(".")
-            short = f"{head}\n{part}" if dot else name
+            sign = "." if "." in name else "_"
+            head, found, part = name.rpartition(sign)
+            short = f"{head}{sign.strip('.')}\n{part}" if found else name
             return short if role == Qt.ItemDataRole.DisplayRole else name if shown else None
         name = list(RESULTS)[section - values]
         if role == Qt.ItemDataRole.DisplayRole:

@@ -27,6 +27,7 @@ from slideviz.plots.style import Style
 from slideviz.session.design_table import DesignTable
 
 EMPTY = "Here are the curves of quality: give the designs, and run them."
+FAILED = "No design has a result yet: those that were run failed."
 
 
 class DesignCanvas(PlotCanvas):
@@ -84,18 +85,18 @@ class DesignPlot(QWidget):
             for name in table.columns:
                 self.across.addItem(name, name)
         self._table, self._shown = table, shown
-        plotted = bool(table.results)
+        plotted = table.count_done() > 0
         self.save.setEnabled(plotted)
         self.across.setVisible(len(table.columns) > 1)
         if plotted:
             self.area.plot()
         else:
-            self.area.say(EMPTY)
+            self.area.say(FAILED if table.results else EMPTY)
 
     def drawing(self) -> Draw:
         """Return the function that draws the plot."""
         column, what = self.across.currentData(), self.what.currentData()
-        if column is None or not self._table.results:
+        if column is None or not self._table.count_done():
             return lambda _figure, _style: None
         return partial(_draw, self._table, column, what, self._shown)
 

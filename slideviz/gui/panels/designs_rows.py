@@ -55,10 +55,8 @@ class DesignRows(QWidget):
         self._stack = QStackedWidget()
         self._stack.addWidget(self.hint)
         self._stack.addWidget(self.view)
-        fill = in_row(
-            self.column, self.values, self.add, wide=[self.column, self.values], spacing=4
-        )
-        in_column(fill, self._stack, wide=[self._stack], spacing=4, on=self)
+        fill = in_row(self.values, self.add, wide=[self.values], spacing=4)
+        in_column(self.column, fill, self._stack, wide=[self._stack], spacing=4, on=self)
 
     def _make_view(self) -> QTableView:
         view = QTableView()

@@ -8,10 +8,12 @@ import html
 from typing import TypeAlias
 
 from qtpy.QtCore import QModelIndex, QPersistentModelIndex, QSize, Qt
-from qtpy.QtGui import QFont, QFontDatabase, QFontMetrics, QPainter, QPaintEvent
+from qtpy.QtGui import QFont, QFontDatabase, QFontMetrics, QPainter, QPaintEvent, QResizeEvent
 from qtpy.QtWidgets import (
     QAbstractItemView,
+    QFrame,
     QLabel,
+    QScrollArea,
     QSizePolicy,
     QStyledItemDelegate,
     QStyleOptionViewItem,
@@ -103,16 +105,43 @@ class ElidedLabel(QLabel):
         )
 
 
-def wide_label(lines: int) -> QLabel:
-    """Return a label over the whole width, for a text in as many lines as it needs, up to some."""
-    label = QLabel()
-    label.setTextFormat(Qt.TextFormat.PlainText)
-    label.setWordWrap(True)
-    label.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
-    label.setMaximumHeight(lines * label.fontMetrics().lineSpacing() + 2)
-    # A long word may not make what it stands in wider.
-    label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-    return label
+class WideLabel(QScrollArea):
+    """A label over the whole width, as high as its text up to some lines; the others are scrolled.
+
+    Parameters
+    ----------
+    lines : int
+        That are seen at once.
+    """
+
+    def __init__(self, lines: int) -> None:
+        super().__init__()
+        self.label = QLabel()
+        self.label.setTextFormat(Qt.TextFormat.PlainText)
+        self.label.setWordWrap(True)
+        self.label.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
+        self.label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._most = lines * self.label.fontMetrics().lineSpacing() + 2
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setWidgetResizable(True)
+        self.setWidget(self.label)
+
+    def say(self, text: str) -> None:
+        """Show a text from its beginning, or hide where there is none."""
+        self.label.setText(text)
+        self.setVisible(bool(text))
+        self.verticalScrollBar().setValue(0)
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        high = self.label.heightForWidth(self.viewport().width())
+        self.setFixedHeight(max(min(high, self._most), 0))
 
 
 class _Narrow(QStyledItemDelegate):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from qtpy.QtCore import Qt
+from qtpy.QtCore import Qt, QTimer
 from qtpy.QtWidgets import (
     QDialog,
     QDialogButtonBox,
@@ -15,6 +15,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from slideviz.gui.responsiveness.settings import ROWS_MS
 from slideviz.gui.widgets.build import decimal_box, dialog_buttons, hint_label
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberBox
@@ -74,7 +75,12 @@ def _save_name(
     return path
 
 
-def ask_unsaved(parent: QWidget, what: str, can_save: Sequence[str] = ("case",)) -> str:
+def ask_unsaved(
+    parent: QWidget,
+    what: str,
+    can_save: Sequence[str] = ("case",),
+    now: Callable[[], str] | None = None,
+) -> str:
     """Return ``case``, ``mesh``, ``table`` or ``all`` to save, ``discard`` or ``cancel``.
 
     Parameters
@@ -83,6 +89,8 @@ def ask_unsaved(parent: QWidget, what: str, can_save: Sequence[str] = ("case",))
         The question; what follows after a line break is said in smaller letters.
     can_save : sequence of {"case", "mesh", "table"}
         What can be saved now.
+    now : callable, optional
+        Returns the question as it is now, for what goes on meanwhile.
     """
     box = QMessageBox(parent)
     box.setIcon(QMessageBox.Icon.Question)
@@ -91,6 +99,10 @@ def ask_unsaved(parent: QWidget, what: str, can_save: Sequence[str] = ("case",))
     question, _, more = what.partition("\n")
     box.setText(question)
     box.setInformativeText(more)
+    if now is not None:
+        tick = QTimer(box)
+        tick.timeout.connect(lambda: box.setInformativeText(now().partition("\n")[2]))
+        tick.start(ROWS_MS)
     several = len(can_save) > 1
     words = {"case": "Save &case…", "mesh": "Save &mesh…", "table": "Save &table…"}
     words["all"] = "Save &both…" if len(can_save) == 2 else "Save a&ll…"
@@ -169,13 +181,6 @@ def ask_replace(parent: QWidget, paths: Sequence[Path]) -> bool:
     if several:
         text = f"{len(paths)} files exist already ({names}). Replace them?"
     return _agreed(parent, QMessageBox.Icon.Question, "Replace files?", text)
-
-
-def ask_lose_results(parent: QWidget, count: int) -> bool:
-    """Return whether the results of so many designs may be lost."""
-    what = f"the results of {count:,} designs" if count > 1 else "the result of a design"
-    text = f"The other table takes away {what}. Go on?"
-    return _agreed(parent, QMessageBox.Icon.Question, "Lose results?", text)
 
 
 def ask_overwrite_input(parent: QWidget, path: Path) -> bool:
