@@ -17,11 +17,11 @@ if TYPE_CHECKING:
         FromFile,
         Prescribed,
         Radial,
-        Reduction,
         Rotate,
         Scale,
         Translate,
     )
+    from slideviz.case.reduction import Reduction
     from slideviz.deformation.solver import Step, deform
     from slideviz.design.deformer import Deformer
     from slideviz.design.sweeps.sweep import sweep
@@ -45,7 +45,7 @@ _HOME = {
     "Quality": "mesh.quality",
     "QualityDerivative": "mesh.quality_derivative",
     "Radial": "case.model",
-    "Reduction": "case.model",
+    "Reduction": "case.reduction",
     "Rotate": "case.model",
     "Scale": "case.model",
     "SlidevizError": "errors",

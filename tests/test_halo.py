@@ -8,7 +8,8 @@ from builders import grid, halo_text, passage, sector
 from mesh.su2_samples import save
 
 import slideviz as sv
-from slideviz.case.model import Case, Reduction, Rotate, Translate
+from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
 
 UP = np.array([[0.0, 0, 0], [0, 0, 0], [0, -1.0, 0]])

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Reduction, Rotate, Translate
+from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.reduction import Reduction
 from slideviz.cli import run as command
 from slideviz.deformation import stepping
 from slideviz.deformation.setup import make_setup

@@ -7,7 +7,8 @@ import pytest
 from builders import annulus, grid, layered, square
 
 import slideviz as sv
-from slideviz.case.model import Case, Reduction, Rotate, Translate
+from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.reduction import Reduction
 from slideviz.errors import UnsoundError
 from slideviz.rbf import methods
 

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Reduction, Rotate, Translate
+from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.reduction import Reduction
 from slideviz.deformation.setup import make_setup
 from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.axis import corners

@@ -62,7 +62,7 @@ def write_case(path: Path, case: Case, remarks: Iterable[str] = ()) -> None:
     # Whatever is saved can be opened again: better no file than one that has to be mended.
     again, problems, _ = _parsed(path, text)
     if not problems and again.change(source=case.source, warnings=case.warnings) != named:
-        problems = [(0, "a case file cannot hold some of its values; check roles and motions")]
+        problems = [(0, "a case file cannot hold some of its values; check points and motions")]
     if problems:
         raise CaseError("\n".join(f"{path}: cannot be written: {text}" for _, text in problems))
     with atomic_write(path, CaseError, case.source) as file:

@@ -10,19 +10,27 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.case.words import nearest
+from slideviz.case.reduction import AUTO, Reduction, require_chosen
+from slideviz.case.words import nearest, not_one_of
 from slideviz.errors import CaseError
 from slideviz.mesh.model import frozen_array
 from slideviz.terms import (
+    FFD_BLENDINGS,
+    FILE_FORMATS,
+    KERNELS,
+    METHODS,
+    METRICS,
+    PERIODIC_MODES,
+    PERIODIC_TYPES,
+    ROLES,
+    SLIDING,
     FfdBlending,
     FileFormat,
-    LevelCriterion,
     Method,
     Metric,
     PeriodicMode,
     PeriodicType,
     Role,
-    Selection,
     Sliding,
 )
 
@@ -145,48 +153,6 @@ def moves(motion: Motion, marker: str) -> bool:
 
 
 @dataclass(frozen=True)
-class Reduction:
-    """Settings of the greedy selection of control nodes (thesis sections 2.5 and 5.3).
-
-    Attributes
-    ----------
-    tolerance : float
-        Largest error of the boundary that is left to the correction, in the length unit.
-    multilevel : bool
-        Select in levels instead of all at once.
-    criterion : "size" or "tol"
-        A level ends at ``level_size`` nodes, or when its error has shrunk by the factor
-        ``level_tolerance``.
-    selection : "block", "double" or "one"
-        Nodes taken in a cycle: a growing number of them; the one of largest error and the one
-        of largest error in an opposite direction; or the one of largest error.
-    relative : float or None
-        The tolerance as a part of the mesh's largest extent, instead of ``tolerance``.
-    max_nodes : int or None
-        Stop at so many control nodes, whatever the error.
-    gamma : float
-        The correction reaches ``gamma`` times the largest error (thesis Eq. 2.31).
-    auto : bool
-        Only where the boundary has many nodes, and with a tolerance that is a part of the largest
-        displacement, whatever ``tolerance`` and ``relative`` are.
-    """
-
-    tolerance: float = 1e-3
-    multilevel: bool = False
-    criterion: LevelCriterion = "size"
-    level_tolerance: float = 0.5
-    level_size: int = 16
-    selection: Selection = "block"
-    relative: float | None = None
-    max_nodes: int | None = None
-    gamma: float = 25.0
-    auto: bool = False
-
-
-AUTO = Reduction(auto=True)
-
-
-@dataclass(frozen=True)
 class Case:
     """A deformation case, the content of a ``.cfg`` file.
 
@@ -219,19 +185,19 @@ class Case:
 
     mesh_file: Path | None = None
     mesh_out: Path | None = None
-    mesh_format: FileFormat | None = None
-    mesh_out_format: FileFormat | None = None
+    mesh_format: FileFormat | None = field(default=None, metadata=FILE_FORMATS)
+    mesh_out_format: FileFormat | None = field(default=None, metadata=FILE_FORMATS)
     zone: int | None = None
     roles: Mapping[str, Role] = field(default_factory=dict)
     motions: tuple[Motion, ...] = ()
     ffd_boxes: tuple[tuple[str, tuple[float, ...]], ...] = ()
     ffd_degrees: tuple[tuple[int, int, int], ...] = ()
-    ffd_blending: FfdBlending = "BEZIER"
+    ffd_blending: FfdBlending = field(default="BEZIER", metadata=FFD_BLENDINGS)
     ffd_orders: tuple[int, int, int] = (2, 2, 2)
-    method: Method = "rbf"
-    sliding: Sliding = "none"
-    periodic: PeriodicMode = "none"
-    periodic_type: PeriodicType = "auto"
+    method: Method = field(default="rbf", metadata=METHODS)
+    sliding: Sliding = field(default="none", metadata=SLIDING)
+    periodic: PeriodicMode = field(default="none", metadata=PERIODIC_MODES)
+    periodic_type: PeriodicType = field(default="auto", metadata=PERIODIC_TYPES)
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     direction: int | None = None
@@ -240,17 +206,26 @@ class Case:
     steps: int = 1
     steps_gain: float = 0.02
     influence_factor: float = 2.5
-    kernel: str = "wendland-c2"
+    kernel: str = field(default="wendland-c2", metadata=KERNELS)
     reduction: Reduction | None = AUTO
     idw_power: float | None = None
     idw_fixed_weight: float = 1.0
-    quality_metric: Metric = "knupp"
+    quality_metric: Metric = field(default="knupp", metadata=METRICS)
     generate_quality: bool = True
     source: Path | None = None
     view: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        require_chosen(self)
+        for name, role in self.roles.items():
+            if role not in ROLES:
+                raise CaseError(f"roles: {name!r}: {not_one_of(role, ROLES)}")
+        reduction: object = self.reduction
+        if not isinstance(reduction, Reduction | None):
+            raise CaseError(
+                f"reduction is {reduction!r}; needed is a Reduction, or None for all boundary nodes"
+            )
         given: object = self.steps
         if isinstance(given, str):
             if given.lower() != "auto":  # as in a case file
@@ -263,7 +238,7 @@ class Case:
         Raises
         ------
         CaseError
-            A case has no such value.
+            A case has no such value, or it is none of an enumeration.
         """
         names = [each.name for each in fields(self)]
         for name in values:

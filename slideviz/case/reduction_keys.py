@@ -6,7 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 from slideviz.case.key import NO_DEFAULT, REDUCTION, Key, other_method
-from slideviz.case.model import Case, Reduction
+from slideviz.case.model import Case
+from slideviz.case.reduction import Reduction
 from slideviz.case.values import YES_NO, Kind, one_of, real, whole
 from slideviz.terms import DATA_REDUCTIONS, LEVEL_CRITERIA, SELECTIONS, DataReduction
 

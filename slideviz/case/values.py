@@ -18,7 +18,7 @@ from slideviz.case.words import (
     is_none,
     list_of,
     name_text,
-    nearest,
+    not_one_of,
     number,
     shown,
     words_of,
@@ -96,20 +96,19 @@ def choice(words: Mapping[str, Any]) -> Kind:
     written: dict[Any, str] = {}
     for word, value in words.items():
         written.setdefault(value, word)
-    allowed = " | ".join(written.values())
 
     def read(text: str) -> Any:
         for word, value in words.items():
             if word.lower() == text.lower():
                 return value
-        raise CaseError(f"{shown(text)} is not one of {allowed}{nearest(text, written.values())}")
+        raise CaseError(not_one_of(text, written.values()))
 
     def write(value: Any) -> str:
         if value not in written:
-            raise CaseError(f"{value!r} is not one of {allowed}")
+            raise CaseError(not_one_of(value, written.values()))
         return written[value]
 
-    return Kind(allowed, read, write)
+    return Kind(" | ".join(written.values()), read, write)
 
 
 def one_of(terms: Mapping[Any, Term], also: Mapping[str, str] | None = None) -> Kind:

@@ -170,6 +170,13 @@ def shown(text: str) -> str:
     return repr(text if len(text) <= 60 else f"{text[:57]}...")
 
 
+def not_one_of(value: object, known: Iterable[str]) -> str:
+    """Return in words that a value is none of the known ones, and which is most like it."""
+    words = list(known)
+    said = shown(value) if isinstance(value, str) else repr(value)
+    return f"{said} is not one of {' | '.join(words)}{nearest(str(value), words)}"
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return ``; did you mean X?`` with the known name most like a text, or nothing."""
     by_lower = {other.lower(): other for other in known}

@@ -17,7 +17,8 @@ from typing import ClassVar
 import numpy as np
 
 from slideviz.case.displacement import Displacements
-from slideviz.case.model import Case, FromFile, Reduction
+from slideviz.case.model import Case, FromFile
+from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
 from slideviz.mesh.io.su2b.write import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh

@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.case.model import Case, Reduction, Scale, Translate
+from slideviz.case.model import Case, Scale, Translate
+from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
 from slideviz.mesh.caching import njit
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from slideviz.case.model import Case, Ffd, Reduction
+from slideviz.case.model import Case, Ffd
+from slideviz.case.reduction import Reduction
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.session.changes_view import flat_one

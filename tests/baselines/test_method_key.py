@@ -11,7 +11,8 @@ import slideviz as sv
 from slideviz.case.cfg import set_key
 from slideviz.case.check import effective, idle_settings
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, Reduction, Rotate
+from slideviz.case.model import Case, Rotate
+from slideviz.case.reduction import Reduction
 from slideviz.cli import run
 from slideviz.deformation import solver
 from slideviz.errors import CaseError, DeformError

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.key import METHOD, REDUCTION
+from slideviz.case.key import METHOD, REDUCTION, VIEW
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, Reduction, Translate
+from slideviz.case.model import Case, Translate
+from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
 from slideviz.rbf.kernels import KERNELS
 from tests import builders
@@ -101,3 +102,40 @@ def test_a_program_is_told_of_absurd_steps_and_names():
         case.change(stepz=3)
     with pytest.raises(CaseError, match="steps is 'many'; needed is a whole number"):
         case.change(steps="many")
+
+
+CHOSEN = [
+    key
+    for key in KEYS.values()
+    if key.kind.entry == "choice" and key.group != VIEW and key.name != "DATA_REDUCTION"
+]
+
+
+@pytest.mark.parametrize("key", CHOSEN, ids=lambda key: key.name)
+def test_a_program_gives_the_words_of_a_case_file(key):
+    """The sentence of the file, but for its key."""
+    kind = Reduction if key.group == REDUCTION else Case
+    usual = getattr(kind(), key.field)
+    wrong = f"{usual[:-1]}{usual[-1] * 2}"
+    with pytest.raises(CaseError) as found:
+        kind(**{key.field: wrong})
+    assert str(found.value) == f"{key.field}: {key.kind.problem(wrong)}"
+    assert f"did you mean {usual}?" in str(found.value)
+
+
+def test_a_program_is_told_of_wrong_words():
+    case = Case(mesh_format="su2b")
+    with pytest.raises(
+        CaseError, match=r"method: 'elstic' is not one of rbf \| idw \| elastic; did"
+    ):
+        case.change(method="elstic")
+    with pytest.raises(CaseError, match=r"sliding: None is not one of none \| ps \| ds"):
+        case.change(sliding=None)
+    with pytest.raises(CaseError, match=r"mesh_format: 'cgns' is not one of su2 \| su2b"):
+        case.change(mesh_format="cgns")
+    with pytest.raises(
+        CaseError, match=r"roles: 'A': 'movng' is not one of .*; did you mean moving"
+    ):
+        Case(roles={"A": "movng"})
+    with pytest.raises(CaseError, match="reduction is 'NO'; needed is a Reduction, or None"):
+        Case(reduction="NO")

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.model import Case, FromFile, Radial, Reduction, Rotate, Scale, Translate
+from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.case.motion import check_case, require_valid
+from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
 
 UP = Translate("UPPER", (0.0, 0.1))
@@ -95,10 +96,6 @@ def test_good_cases(square, case):
             "motion 1: the axis (0, 0, 0) has no direction; write x, y, z or another vector",
         ),
         (good(steps=-1), "STEPS: -1 is too small; needed is a whole number from 1, or auto"),
-        (
-            good(sliding="slide"),
-            "SLIDING_MODE: 'slide' is not one of none | ps | ds",
-        ),
         (
             good(reduction=Reduction(gamma=-1.0)),
             "GAMMA: -1.0 is out of range; needed is a number above 0",

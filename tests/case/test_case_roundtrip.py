@@ -9,18 +9,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from slideviz.case.cfg import read_case, write_case
-from slideviz.case.model import (
-    Case,
-    Ffd,
-    FromFile,
-    Radial,
-    Reduction,
-    Rotate,
-    Scale,
-    Translate,
-)
+from slideviz.case.model import Case, Ffd, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.case.motion import moved_points
 from slideviz.case.motion_text import read_motions, write_motions
+from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
 from slideviz.terms import FFD_BLENDINGS, PERIODIC_MODES, ROLES, SLIDING
 
@@ -200,14 +192,13 @@ def test_links_lead_to_the_right_file(tmp_path):
         (Case(mesh_file=Path("a\\b.su2")), r"MESH_FILENAME: .* it has a backslash; rename it"),
         (Case(steps=-1), "STEPS: -1 is too small"),
         (Case(influence_factor=float("nan")), "INFLUENCE_FACTOR: 'nan' is not a number"),
-        (Case(sliding="maybe"), "SLIDING_MODE: 'maybe' is not one of none"),
         (Case(axis=(0.0, 0.0, 0.0)), "PERIODIC_AXIS: the axis .* has no direction"),
         (Case(motions=(Translate("A", (1.0, 0.0)),)), "motion 1 names 'A', which does not move"),
         (
             Case(roles={"A": "moving"}, motions=(Translate("A", (1.0,)), Scale("A", (0.0,)))),
             r"motion 1: the shift has 1 values(.|\n)*motion 2: the factor 0 is not above 0",
         ),
-        (Case(roles={"A": "wall"}), "a case file cannot hold some of its values; check roles"),
+        (Case(origin=(1.0, 2.0)), "a case file cannot hold some of its values; check points"),
     ],
 )
 def test_what_cannot_be_read_back_is_not_written(tmp_path, case, words):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import AUTO, Reduction
+from slideviz.case.reduction import AUTO, Reduction
 from slideviz.deformation import reduction, setup
 from slideviz.deformation.solver import Step
 from slideviz.mesh.quality import quality

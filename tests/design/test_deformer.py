@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Reduction, Rotate, Translate
+from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.reduction import Reduction
 from slideviz.errors import (
     CaseError,
     ConditionWarning,

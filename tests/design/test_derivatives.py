@@ -11,7 +11,8 @@ import pytest
 
 import slideviz as sv
 from slideviz.baselines import multigrid
-from slideviz.case.model import Case, Reduction, Rotate, Translate
+from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.reduction import Reduction
 from slideviz.design.frozen.interpolation import WAYS
 from slideviz.errors import DeformError
 from slideviz.mesh.axis_frame import axis_basis

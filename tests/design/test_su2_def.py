@@ -402,7 +402,10 @@ def test_roles_follow_from_the_lists_of_su2_and_of_ours(here):
             "FFD_COORD_SYSTEM: 'POLAR' is",
         ),
         ("DV_KIND= SCALE\nDV_VALUE= 1\nFFD_CONTINUITY= 3RD", "FFD_CONTINUITY: '3RD' is not supp"),
-        ("DV_KIND= SCALE\nDV_VALUE= 1\nMESH_FORMAT= BOX", "MESH_FORMAT: 'BOX' is not one of SU2, "),
+        (
+            "DV_KIND= SCALE\nDV_VALUE= 1\nMESH_FORMAT= BOX",
+            r"MESH_FORMAT: 'BOX' is not one of SU2 \| ",
+        ),
         ("DV_KIND= SCALE\nDV_VALUE= 1\nMOTION= (a, scale, 2)", "MOTION: belongs into a case file"),
         ("DV_KIND= SCALE\nDV_VALUE= 1\nOPT_RELAX_FACTOR= x", "OPT_RELAX_FACTOR: 'x' is not a numb"),
         ("DV_KIND= SCALE\nDV_VALUE= 1\nDV_VALUE= 2", "a.cfg:6: DV_VALUE is given again in line 7"),

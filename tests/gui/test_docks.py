@@ -9,7 +9,7 @@ from qtpy.QtGui import QWheelEvent
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QWidget
 
-from slideviz.case.model import Reduction
+from slideviz.case.reduction import Reduction
 from slideviz.gui.docks import LEFT_WIDTH, RIGHT_WIDTH
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.choice import Choice

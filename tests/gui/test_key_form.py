@@ -5,7 +5,7 @@ from qtpy.QtTest import QTest
 
 from slideviz.case.key import REDUCTION
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Reduction
+from slideviz.case.reduction import Reduction
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberBox, NumberField, Switch
 from slideviz.gui.widgets.vector_field import VectorField

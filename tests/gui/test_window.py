@@ -12,7 +12,8 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QMenu, QToolButton
 
 from slideviz import Case, read
-from slideviz.case.model import AUTO, FromFile, Reduction, Rotate, Scale, Translate
+from slideviz.case.model import FromFile, Rotate, Scale, Translate
+from slideviz.case.reduction import AUTO, Reduction
 from slideviz.errors import Note
 from slideviz.gui.viewport import player as player_module
 from slideviz.gui.viewport.player import plain, result_parts, step_ms

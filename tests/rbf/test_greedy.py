@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, FromFile, Reduction, Translate
+from slideviz.case.model import Case, FromFile, Translate
+from slideviz.case.reduction import Reduction
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf import evaluate as evaluation
 from slideviz.samples.table import sample, write_sample

@@ -8,7 +8,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import slideviz as sv
-from slideviz.case.model import Case, Reduction, Scale, Translate
+from slideviz.case.model import Case, Scale, Translate
+from slideviz.case.reduction import Reduction
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.evaluate import Basis, no_tick
 from slideviz.rbf.methods import correct, correction_of

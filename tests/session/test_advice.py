@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slideviz.case.model import Case, Reduction
+from slideviz.case.model import Case
+from slideviz.case.reduction import Reduction
 from slideviz.deformation import solver
 from slideviz.deformation.solver import deform
 from slideviz.mesh.model import Cells, Marker, Mesh

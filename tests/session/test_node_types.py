@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slideviz.case.model import Reduction, Translate
+from slideviz.case.model import Translate
+from slideviz.case.reduction import Reduction
 from slideviz.deformation.solver import deform
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from slideviz.case.model import Reduction, Rotate
+from slideviz.case.model import Rotate
 from slideviz.case.motion_words import describe
+from slideviz.case.reduction import Reduction
 from slideviz.deformation.solver import deform
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality

@@ -7,8 +7,9 @@ import pytest
 
 from slideviz.case.key import METHOD, PERIODICITY, QUALITY, REDUCTION
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, FromFile, Radial, Reduction, Rotate, Scale, Translate
+from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.case.motion_words import describe, motion_labels
+from slideviz.case.reduction import Reduction
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
 from slideviz.session.panes import choices

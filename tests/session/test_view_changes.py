@@ -4,7 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from slideviz.case.model import AUTO, Case, FromFile, Radial, Rotate, Scale, Translate
+from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
+from slideviz.case.reduction import AUTO
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.sections.model import Section
 from slideviz.sections.threshold import ONLY_INVERTED

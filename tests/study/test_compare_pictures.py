@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from slideviz.case.model import Reduction, Translate
+from slideviz.case.model import Translate
+from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
 from slideviz.samples.table import sample
 from slideviz.study.combinations import COMPARED_METHODS, MODES, compare

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.case.model import Case, Motion, Radial, Reduction, Rotate, Scale, Translate
+from slideviz.case.model import Case, Motion, Radial, Rotate, Scale, Translate
+from slideviz.case.reduction import Reduction
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.kernels import KERNELS, PLAIN
 from slideviz.terms import SLIDING, Role

@@ -13,10 +13,10 @@ from slideviz.case.key import MOTION
 from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text
 from slideviz.case.model import Case
-from slideviz.case.words import list_of, nearest, shown
+from slideviz.case.words import list_of, nearest, not_one_of, shown
 from slideviz.design.su2.variables import KINDS, DesignVariable, read_variables
 from slideviz.errors import CaseError
-from slideviz.terms import ROLES, Role
+from slideviz.terms import FILE_FORMATS, ROLES, Role
 
 ROLE_KEYS: dict[str, Role] = {
     "MARKER_SYM": "sliding",
@@ -221,9 +221,10 @@ class _Reader:
             value = "SU2" if entry is None else entry.value.upper()
             if value not in ("SU2", "SU2B", "CGNS"):
                 assert entry is not None
-                self.note(entry, f"{shown(value)} is not one of SU2, SU2B, CGNS")
+                self.note(entry, not_one_of(value, ("SU2", "SU2B", "CGNS")))
             # Without the key the ending tells, as it does for CGNS.
-            found[field] = None if entry is None or value == "CGNS" else value.lower()
+            known = entry is not None and value.lower() in FILE_FORMATS
+            found[field] = value.lower() if known else None
         return found
 
     def check(self, words: dict[str, str]) -> None:

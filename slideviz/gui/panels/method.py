@@ -12,8 +12,9 @@ from qtpy.QtWidgets import QFormLayout, QWidget
 from slideviz.case.key import Key
 from slideviz.case.keys import KEYS
 from slideviz.case.method_keys import nothing_slides
-from slideviz.case.model import AUTO, Case, Reduction
+from slideviz.case.model import Case
 from slideviz.case.periodic_keys import no_pair
+from slideviz.case.reduction import AUTO, Reduction
 from slideviz.case.reduction_keys import get_reduction, put_reduction
 from slideviz.gui.panels.key_form import KeyForm
 from slideviz.gui.widgets.build import (

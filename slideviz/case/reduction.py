@@ -1,0 +1,72 @@
+"""The settings of data reduction, and the check of fields with a value of an enumeration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING
+
+from slideviz.case.words import not_one_of
+from slideviz.errors import CaseError
+from slideviz.terms import LEVEL_CRITERIA, SELECTIONS, LevelCriterion, Selection
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+def require_chosen(given: DataclassInstance) -> None:
+    """Check fields that have a value of an enumeration, whose terms are the field's metadata.
+
+    Raises
+    ------
+    CaseError
+        A value is none of them; None may stand where it is the usual one.
+    """
+    for each in fields(given):
+        value, terms = getattr(given, each.name), each.metadata
+        if terms and value not in (*terms, each.default):
+            raise CaseError(f"{each.name}: {not_one_of(value, terms)}")
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """Settings of the greedy selection of control nodes (thesis sections 2.5 and 5.3).
+
+    Attributes
+    ----------
+    tolerance : float
+        Largest error of the boundary that is left to the correction, in the length unit.
+    multilevel : bool
+        Select in levels instead of all at once.
+    criterion : "size" or "tol"
+        A level ends at ``level_size`` nodes, or when its error has shrunk by the factor
+        ``level_tolerance``.
+    selection : "block", "double" or "one"
+        Nodes taken in a cycle: a growing number of them; the one of largest error and the one
+        of largest error in an opposite direction; or the one of largest error.
+    relative : float or None
+        The tolerance as a part of the mesh's largest extent, instead of ``tolerance``.
+    max_nodes : int or None
+        Stop at so many control nodes, whatever the error.
+    gamma : float
+        The correction reaches ``gamma`` times the largest error (thesis Eq. 2.31).
+    auto : bool
+        Only where the boundary has many nodes, and with a tolerance that is a part of the largest
+        displacement, whatever ``tolerance`` and ``relative`` are.
+    """
+
+    tolerance: float = 1e-3
+    multilevel: bool = False
+    criterion: LevelCriterion = field(default="size", metadata=LEVEL_CRITERIA)
+    level_tolerance: float = 0.5
+    level_size: int = 16
+    selection: Selection = field(default="block", metadata=SELECTIONS)
+    relative: float | None = None
+    max_nodes: int | None = None
+    gamma: float = 25.0
+    auto: bool = False
+
+    def __post_init__(self) -> None:
+        require_chosen(self)
+
+
+AUTO = Reduction(auto=True)
