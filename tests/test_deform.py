@@ -144,7 +144,8 @@ def test_the_generator_can_be_closed_in_the_middle():
 
 def test_nothing_is_done_before_the_first_step_is_pulled():
     heard = []
-    sv.deform(square_case(builders.square(6), vector=(np.nan, 0.0)), None, heard.append)
+    mesh = builders.square(6)
+    sv.deform(square_case(mesh, vector=(np.nan, 0.0)), mesh, heard.append)
     assert heard == []
 
 

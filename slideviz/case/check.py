@@ -146,7 +146,7 @@ def _motion_problems(motion: Motion, dim: int) -> Iterator[str]:
         return
     try:
         read_motions(write_motions((motion,)))
-    except CaseError as problem:
+    except (CaseError, TypeError, ValueError) as problem:
         yield str(problem).removeprefix("motion 1: ")
         return
     if isinstance(motion, Ffd):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from slideviz.case.reduction import AUTO, Reduction, require_chosen
 from slideviz.case.words import nearest, not_one_of
-from slideviz.errors import CaseError
+from slideviz.errors import FILE, CaseError, takes
 from slideviz.mesh.model import frozen_array
 from slideviz.terms import (
     FFD_BLENDINGS,
@@ -152,6 +152,14 @@ def moves(motion: Motion, marker: str) -> bool:
     return not motion.marker or marker in named(motion.marker)
 
 
+_KINDS = (
+    ("roles", Mapping, 'a role for each marker, as {"blade": "moving"}'),
+    ("motions", tuple | list, "a tuple of motions"),
+    ("reduction", Reduction | None, "a Reduction, or None for all boundary nodes"),
+)
+"""What some fields of a case are, and the words for it."""
+
+
 @dataclass(frozen=True)
 class Case:
     """A deformation case, the content of a ``.cfg`` file.
@@ -218,14 +226,16 @@ class Case:
 
     def __post_init__(self) -> None:
         require_chosen(self)
-        for name, role in self.roles.items():
+        for name, kind, needed in _KINDS:
+            if not isinstance(value := getattr(self, name), kind):
+                raise CaseError(f"{name} is {value!r}; needed is {needed}")
+        for marker, role in self.roles.items():
             if role not in ROLES:
-                raise CaseError(f"roles: {name!r}: {not_one_of(role, ROLES)}")
-        reduction: object = self.reduction
-        if not isinstance(reduction, Reduction | None):
-            raise CaseError(
-                f"reduction is {reduction!r}; needed is a Reduction, or None for all boundary nodes"
-            )
+                raise CaseError(f"roles: {marker!r}: {not_one_of(role, ROLES)}")
+        for motion in self.motions:
+            if not isinstance(motion, Motion):
+                raise CaseError(f"motions: {motion!r} is none, as Translate(...) is")
+        object.__setattr__(self, "motions", tuple(self.motions))
         given: object = self.steps
         if isinstance(given, str):
             if given.lower() != "auto":  # as in a case file
@@ -259,6 +269,7 @@ class Case:
         return found | dict.fromkeys(files, "a displacement file")
 
     @classmethod
+    @takes(path=FILE)
     def read(cls, path: str | Path) -> Case:
         """Return the case that a ``.cfg`` file describes.
 
@@ -271,6 +282,7 @@ class Case:
 
         return read_case(Path(path))
 
+    @takes(path=FILE)
     def write(self, path: str | Path) -> None:
         """Write the ``.cfg`` file, with paths relative to its folder."""
         from slideviz.case.cfg import write_case

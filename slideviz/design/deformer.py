@@ -24,10 +24,7 @@ from slideviz.design.frozen.loops import to_points
 from slideviz.design.frozen.step import FrozenStep, StepState
 from slideviz.design.frozen.tape import Array, Tape, Variable, value
 from slideviz.design.given import given_input
-from slideviz.errors import (
-    CaseError,
-    DeformError,
-)
+from slideviz.errors import CaseError, DeformError, takes
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 from slideviz.rbf.images import FAR
 
@@ -88,6 +85,7 @@ class Deformer:
     array([0.  , 0.28, 0.5 ])
     """
 
+    @takes(mesh=Mesh, case=Case)
     def __init__(
         self,
         mesh: Mesh,
@@ -241,7 +239,10 @@ class Deformer:
         CaseError
             They are none.
         """
-        out = np.asarray(vectors, np.float64)
+        try:
+            out = np.asarray(vectors, np.float64)
+        except (TypeError, ValueError) as problem:
+            raise CaseError(f"{name} is no table of numbers: {problem}") from problem
         if out.shape[-2:] != shape or out.ndim not in (2, 3):
             raise CaseError(
                 f"{name} has the shape {out.shape}; needed is {shape}, a row for each node, or "

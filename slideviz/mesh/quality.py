@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.errors import CaseError, MeshError
+from slideviz.errors import CaseError, MeshError, takes
 from slideviz.mesh.check import check_size
 from slideviz.mesh.jacobians import (
     CORNERS,
@@ -145,6 +145,7 @@ class Quality:
         return numbers
 
 
+@takes(mesh=Mesh, reference=Mesh)
 def quality(
     mesh: Mesh,
     reference: Mesh | None = None,

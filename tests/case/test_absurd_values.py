@@ -137,5 +137,3 @@ def test_a_program_is_told_of_wrong_words():
         CaseError, match=r"roles: 'A': 'movng' is not one of .*; did you mean moving"
     ):
         Case(roles={"A": "movng"})
-    with pytest.raises(CaseError, match="reduction is 'NO'; needed is a Reduction, or None"):
-        Case(reduction="NO")

@@ -15,7 +15,7 @@ from slideviz.design.sweeps.processes import Processes, usable_cores
 from slideviz.design.sweeps.results import SweepResults, sources_of
 from slideviz.design.sweeps.row import DesignRow
 from slideviz.design.sweeps.worker import Answer, Packed, Task, packed, work
-from slideviz.errors import CaseError, DeformError
+from slideviz.errors import CaseError, DeformError, takes
 from slideviz.mesh.io.files import read, usual_ending
 from slideviz.mesh.model import Mesh, Origin
 
@@ -26,6 +26,7 @@ _EVERY = 0.2
 """Seconds between two questions whether to go on."""
 
 
+@takes(case=Case, designs=object, executor=Executor, mesh=Mesh)
 def sweep(
     case: Case,
     designs: Table,

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
+from slideviz.errors import FILE, takes
 from slideviz.mesh.check import path_error
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.files import read, write
@@ -18,6 +19,7 @@ from slideviz.mesh.model import Mesh, Origin
 _ZONED = {".su2": "su2", ".su2b": "su2b"}
 
 
+@takes(source=FILE, target=FILE)
 def convert(
     source: str | Path,
     target: str | Path,

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from slideviz.errors import MeshError
+from slideviz.errors import FILE, MeshError, takes
 from slideviz.mesh.check import check_mesh, path_error
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.file_checks import require_ordinary
@@ -20,13 +20,14 @@ from slideviz.mesh.io.su2.write import su2_blocks
 from slideviz.mesh.io.su2b.read import is_su2b, read_su2b
 from slideviz.mesh.io.su2b.write import su2b_blocks
 from slideviz.mesh.model import Mesh
-from slideviz.terms import FileFormat
+from slideviz.terms import FILE_FORMATS, FileFormat
 
 _SNIFFED_BYTES = 1 << 16
 _UNSURE = ("", ".txt", ".dat", ".mesh", ".grid")
 _NDIME = re.compile(rb"^\s*NDIME\s*=", re.IGNORECASE | re.MULTILINE)
 
 
+@takes(path=FILE)
 def read(
     path: str | Path,
     zone: int | None = None,
@@ -59,7 +60,7 @@ def read(
     >>> sv.read("square.su2")
     Mesh('square.su2', 2D, 4 points, Cells(1 quadrilateral), markers: none)
     """
-    path = Path(path)
+    path = _named(path, file_format)
     tick = progress or (lambda _: None)
     try:
         kind = format_of(path, file_format)
@@ -105,6 +106,7 @@ def usual_ending(mesh: Mesh) -> str:
     return mesh.origin.ending or ".su2"
 
 
+@takes(path=FILE, mesh=Mesh)
 def write(
     path: str | Path,
     mesh: Mesh,
@@ -150,7 +152,7 @@ def write(
     >>> sv.write("square.su2", square)
     >>> sv.write("square.vtu", square, cell_data={"quality": sv.quality(square).values})
     """
-    path = Path(path)
+    path = _named(path, file_format)
     if not overwrite and is_source(path, mesh):
         raise path_error(
             path,
@@ -202,6 +204,20 @@ def _write_other(
         from slideviz.mesh.io.meshio.write import write_other_format
 
         write_other_format(path, mesh, values, point_data, replaces)
+
+
+def _named(path: str | Path, file_format: FileFormat | None) -> Path:
+    """Return the path of a file whose format, where it is given, is one of SU2.
+
+    Raises
+    ------
+    MeshError
+        It is none.
+    """
+    if file_format not in (None, *FILE_FORMATS):
+        known = " | ".join(FILE_FORMATS)
+        raise path_error(Path(path), f"file_format {file_format!r} is not one of {known}")
+    return Path(path)
 
 
 def is_source(path: Path, mesh: Mesh) -> bool:
