@@ -15,7 +15,7 @@ from typing import Any
 from slideviz.case.check import contradictions
 from slideviz.case.key import GROUPS, REDUCTION, Key
 from slideviz.case.keys import KEYS
-from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text
+from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, require_no_mesh
 from slideviz.case.model import Case, FromFile
 from slideviz.case.words import nearest, shown
 from slideviz.errors import CaseError
@@ -104,10 +104,9 @@ def set_key(case: Case, key: str, value: str) -> Case:
 def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]]:
     """Return the case with paths as written, the problems, and warnings."""
     entries, problems = entries_of(text)
+    require_no_mesh(path, entries)
     rows: dict[str, Entry] = {}
     for entry in entries:
-        if entry.key in ("NDIME", "NZONE"):
-            raise CaseError(f"{path}: is an SU2 mesh, not a case file; name it in MESH_FILENAME=")
         first = rows.setdefault(entry.key, entry)
         if entry.key not in KEYS:
             problems.append((entry.line, _unknown(entry.key)))

@@ -89,6 +89,12 @@ def entries_of(text: str, signs: str = COMMENT_SIGNS) -> tuple[list[Entry], list
     return entries, problems
 
 
+def require_no_mesh(path: Path, entries: list[Entry]) -> None:
+    """Raise CaseError where the entries of a file are those of an SU2 mesh."""
+    if any(entry.key in ("NDIME", "NZONE") for entry in entries):
+        raise CaseError(f"{path}: is an SU2 mesh, not a case file; name it in MESH_FILENAME=")
+
+
 def _joined(text: str, problems: list[Problem], signs: str) -> Iterator[tuple[int, str]]:
     """Return the lines that hold something, each with what goes on in the lines after it."""
     start = 0

@@ -409,6 +409,7 @@ def test_roles_follow_from_the_lists_of_su2_and_of_ours(here):
         ("DV_KIND= SCALE\nDV_VALUE= 1\nMOTION= (a, scale, 2)", "MOTION: belongs into a case file"),
         ("DV_KIND= SCALE\nDV_VALUE= 1\nOPT_RELAX_FACTOR= x", "OPT_RELAX_FACTOR: 'x' is not a numb"),
         ("DV_KIND= SCALE\nDV_VALUE= 1\nDV_VALUE= 2", "a.cfg:6: DV_VALUE is given again in line 7"),
+        ("NDIME= 2\n0 1", "^a.cfg: is an SU2 mesh, not a case file; name it in MESH_FILENAME=$"),
         ("DV_KIND= SCALE\nDV_VALUE= 1\nFFD_FIX_I= (a)", r"FFD_FIX_I: '\(a\)' is no list of whole"),
     ],
 )

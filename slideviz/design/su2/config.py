@@ -11,7 +11,7 @@ from pathlib import Path
 
 from slideviz.case.key import MOTION
 from slideviz.case.keys import KEYS
-from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text
+from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, require_no_mesh
 from slideviz.case.model import Case
 from slideviz.case.words import list_of, nearest, not_one_of, shown
 from slideviz.design.su2.variables import KINDS, DesignVariable, read_variables
@@ -112,6 +112,7 @@ def read_config(path: Path) -> Su2Config:
     """
     text, warnings = read_text(path, "case file")
     entries, problems = entries_of(text, "%")  # other signs have a meaning in some values
+    require_no_mesh(path, entries)
     rows = {entry.key: entry for entry in entries}  # of two, SU2 would complain
     for entry in entries:
         if rows[entry.key] is not entry:
