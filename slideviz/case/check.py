@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -104,18 +104,22 @@ def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
 
 def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return the markers of the case that the mesh lacks, and whether any marker moves."""
-    known = mesh.marker_names
-    names = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
-    has = f"it has {names}" if known else "it has none"
-    found = [
-        f"{ROLES[role].key}: {mesh.name} has no marker {marker!r}"
-        f"{nearest(marker, known) or f'; {has}'}"
-        for marker, role in case.roles.items()
-        if marker not in known
-    ]
+    found = unknown_markers(mesh, {name: ROLES[role].key for name, role in case.roles.items()})
     if not case.markers_with("moving"):
         found.append("no marker moves; name one in MARKER_MOVING")
     return tuple(found)
+
+
+def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:
+    """Return a sentence for each marker that the mesh lacks; ``named`` has the key of each."""
+    known = mesh.marker_names
+    names = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
+    has = f"it has {names}" if known else "it has none"
+    return [
+        f"{key}: {mesh.name} has no marker {marker!r}{nearest(marker, known) or f'; {has}'}"
+        for marker, key in named.items()
+        if marker not in known
+    ]
 
 
 def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:

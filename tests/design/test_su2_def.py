@@ -2,6 +2,7 @@
 
 import json
 import lzma
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -440,6 +441,27 @@ def test_what_the_mesh_does_not_have_is_told(text, message, here):
     Path("a.cfg").write_text(files + text)
     with pytest.raises(CaseError, match=message):
         make_surface(read_config(Path("a.cfg")), sv.read("mesh.su2"))
+
+
+def test_all_that_the_mesh_does_not_have_is_told_at_once(here, capsys):
+    Path("a.cfg").write_text(
+        f"{FILES.replace('low', 'lwo')}MARKER_FIXED= (hihg)\n{BOXED}"
+        "DV_KIND= FFD_CONTROL_POINT_2D, FFD_CONTROL_POINT_2D\nDV_VALUE= 1, 1\n"
+        "DV_PARAM= (BOXX, 0, 0, 0, 1) ; (BOX, 9, 0, 0, 1)\n"
+    )
+    assert run(["def", "a.cfg", "-q"]) == 1
+    lines = capsys.readouterr().err.splitlines()
+    said = ["no marker 'hihg'; did", "no marker 'lwo'; did", "no FFD box 'BOXX'", "with i = 9"]
+    assert [any(text in line for line in lines) for text in said] == [True] * 4
+    assert len(lines) == 4
+
+
+def test_a_long_list_of_markers_is_cut(here):
+    mesh = sv.read("mesh.su2")
+    one = mesh.markers[0]
+    many = replace(mesh, markers=tuple(replace(one, name=f"m{k}") for k in range(99)))
+    with pytest.raises(CaseError, match=r"no marker 'low'; it has m0, .*, m11, \.\.\.$"):
+        make_surface(config("DV_KIND= SCALE\nDV_VALUE= 1.1\n"), many)
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from slideviz.case.check import raise_all
+from slideviz.case.check import unknown_markers
 from slideviz.case.words import nearest
 from slideviz.design.su2.config import ROLE_KEYS, Su2Config
-from slideviz.errors import CaseError
 from slideviz.mesh.model import Mesh
 
 PASSED_OVER = {*ROLE_KEYS, "MARKER_DEFORM_MESH"}
@@ -20,10 +19,8 @@ PASSED_OVER = {*ROLE_KEYS, "MARKER_DEFORM_MESH"}
 def on_mesh(config: Su2Config, mesh: Mesh) -> Su2Config:
     """Return a configuration without the boundaries that SU2 passes over, with a warning each key.
 
-    Raises
-    ------
-    CaseError
-        `require_markers` does, or one of a periodic pair is missing, or all that would move.
+    A periodic pair of which one is missing stays, and so does all that would move where all of it
+    is missing: `problems_of_markers` tells them.
     """
     lacking = [name for name in config.named if name not in mesh.marker_names]
     passed = {name: key for name in lacking if (key := config.named[name]) in PASSED_OVER}
@@ -44,24 +41,14 @@ def on_mesh(config: Su2Config, mesh: Mesh) -> Su2Config:
         case = case.change(periodic="none")
         if "sliding" not in left.values():
             case = case.change(sliding="none")
-    config = replace(config, case=case, named=named, markers=markers)
-    require_markers(config, mesh)
-    return config
+    return replace(config, case=case, named=named, markers=markers)
 
 
-def require_markers(config: Su2Config, mesh: Mesh) -> None:
-    """Raise CaseError where nothing would move, or where the mesh lacks a boundary."""
+def problems_of_markers(config: Su2Config, mesh: Mesh) -> list[str]:
+    """Return that nothing would move, or each boundary that the mesh lacks."""
     if not config.markers:
-        raise CaseError(f"{config.source}: DV_MARKER names no boundary; nothing would move")
-    known = mesh.marker_names
-    has = f"it has {', '.join(known)}" if known else "it has none"
-    unknown = [
-        f"{config.source}: {key}: {mesh.name} has no marker {name!r}"
-        f"{nearest(name, known) or f'; {has}'}"
-        for name, key in config.named.items()
-        if name not in known
-    ]
-    raise_all(tuple(unknown))
+        return [f"{config.source}: DV_MARKER names no boundary; nothing would move"]
+    return [f"{config.source}: {text}" for text in unknown_markers(mesh, config.named)]
 
 
 def _warnings(config: Su2Config, mesh: Mesh, passed: dict[str, str]) -> list[str]:

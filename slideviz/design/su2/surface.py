@@ -18,7 +18,7 @@ from slideviz.case.model import Case, Prescribed
 from slideviz.deformation.setup import make_setup
 from slideviz.deformation.steps import Step
 from slideviz.design.su2.config import Su2Config
-from slideviz.design.su2.markers import require_markers
+from slideviz.design.su2.markers import problems_of_markers
 from slideviz.design.su2.planes import idle_variables
 from slideviz.design.su2.positions import read_positions
 from slideviz.design.su2.variables import BOXED, DesignVariable
@@ -152,12 +152,15 @@ def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
     CaseError
         Boundaries or boxes are not there, a box has no such control point or no node inside.
     """
-    require_markers(config, mesh)
+    names = tuple(dict.fromkeys(v.box for v in config.variables if v.kind in BOXED))
+    known, problems = {}, problems_of_markers(config, mesh)
+    try:
+        known = boxes_for(config.case, mesh) if names else {}
+        problems += _problems_of_boxes(config, mesh, known)
+    except CaseError as problem:
+        problems += str(problem).splitlines()
+    raise_all(tuple(problems))
     nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in config.markers]))
-    variables = config.variables
-    names = tuple(dict.fromkeys(v.box for v in variables if v.kind in BOXED))
-    known = boxes_for(config.case, mesh) if names else {}
-    _require_boxes(config, mesh, known)
     boxes, inside, warnings = {}, {}, []
     for name in names:
         on = {marker: embedding(known[name], mesh, marker) for marker in config.markers}
@@ -199,8 +202,8 @@ def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
     CaseError
         There are none, or a box is not possible.
     """
-    require_markers(config, mesh)
-    raise_all(tuple(text for _, text in ffd_contradictions(config.case)))
+    contradictions = (text for _, text in ffd_contradictions(config.case))
+    raise_all((*problems_of_markers(config, mesh), *contradictions))
     boxes = []
     for box in defined_boxes(config.case, mesh).values():
         on = {name: embedding(box, mesh, name)[0] for name in config.markers}
@@ -211,8 +214,8 @@ def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
     return with_boxes(mesh, boxes, anew=True), tuple(boxes)
 
 
-def _require_boxes(config: Su2Config, mesh: Mesh, known: dict[str, Box]) -> None:
-    """Raise where a variable moves what is not there."""
+def _problems_of_boxes(config: Su2Config, mesh: Mesh, known: dict[str, Box]) -> list[str]:
+    """Return which variables move what is not there."""
     problems = []
     for place, variable in enumerate(config.variables, start=1):
         if variable.kind not in BOXED:
@@ -224,7 +227,7 @@ def _require_boxes(config: Su2Config, mesh: Mesh, known: dict[str, Box]) -> None
             problems.append(f"variable {place}: {wrong}")
         elif mesh.dim == 2 and variable.numbers[2]:
             problems.append(f"variable {place}: its direction leaves the plane; write dz = 0")
-    raise_all(tuple(f"{config.source}: {text}" for text in problems))
+    return [f"{config.source}: {text}" for text in problems]
 
 
 def _embedded(
