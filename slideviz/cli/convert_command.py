@@ -25,7 +25,6 @@ def add_convert(calls: argparse._SubParsersAction) -> None:
 
 def convert(arguments: argparse.Namespace) -> int:
     """Write a mesh in another format, and say what the format does not hold."""
-    import sys
     from dataclasses import replace
 
     from slideviz import quality, read
@@ -33,18 +32,19 @@ def convert(arguments: argparse.Namespace) -> int:
     from slideviz.cli.places import OutputPath, require_places, tell_lost
     from slideviz.cli.report import cell_data
     from slideviz.mesh.io.convert import convert as write_converted
-    from slideviz.session.formats import holds_quality, left_out
+    from slideviz.session.formats import holds_quality
 
     require_places(arguments, OutputPath(arguments.output, "OUT", is_mesh=True))
     if _is_to_be_streamed(arguments):
         return _convert_streamed(arguments)
     mesh = read(arguments.mesh, zone=arguments.zone)
     binary = arguments.output.suffix.lower() == ".su2b"
-    if arguments.zone and mesh.zones > 1 and arguments.output.suffix.lower() == mesh.origin.ending:
+    alone = bool(arguments.zone) and mesh.zones > 1
+    if alone and arguments.output.suffix.lower() == mesh.origin.ending:
         words = f"{arguments.output} will have zone {mesh.zone} alone, and of {mesh.name} nothing"
         say("warning", f"{words} but that mesh: leave out --zone to keep FFD boxes and the rest")
     # Without --zone no zone is lost.
-    tell_lost(arguments.output, mesh if arguments.zone else replace(mesh, zones=1))
+    tell_lost(arguments.output, mesh if alone else replace(mesh, zones=1), alone=alone)
     if not arguments.zone and mesh.origin.ending == ".su2" and binary:
         for zone in range(2, mesh.zones + 1):
             other = read(arguments.mesh, zone=zone)
@@ -53,9 +53,6 @@ def convert(arguments: argparse.Namespace) -> int:
     if holds_quality(arguments.output) and (arguments.zone or mesh.zones == 1):
         values = cell_data(arguments.output, quality(mesh))
     write_converted(arguments.mesh, arguments.output, arguments.zone, mesh, values)
-    lost = "" if binary else left_out(arguments.output, replace(mesh, zones=1))
-    if lost:
-        print(f"slideviz: note: {lost}", file=sys.stderr)
     print(arguments.output)
     return DONE
 

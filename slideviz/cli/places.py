@@ -15,6 +15,8 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from slideviz.cli.terminal import say
+
 if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
@@ -153,32 +155,33 @@ def _require_mesh_ending(file: Path) -> None:
         formats_of(file)
 
 
-def tell_lost(output: Path, mesh: Mesh, file_format: FileFormat | None = None) -> None:
-    """Say before the work what a file will not keep of a mesh; ask for the source of CGNS.
+def tell_lost(
+    output: Path, mesh: Mesh, file_format: FileFormat | None = None, *, alone: bool = False
+) -> None:
+    """Warn before the work of what a file will not keep of a mesh; ask for the source of CGNS.
+
+    ``alone`` tells whether one of several zones is converted.
 
     Raises
     ------
     MeshError
         It cannot hold the mesh at all.
     """
+    from slideviz.mesh.io.files import usual_ending
+    from slideviz.mesh.io.su2b.write import OTHER_ZONES, require_binary, sentence_of_lost
+    from slideviz.session.formats import lost_in
+
     kind = file_format or output.suffix.lower().removeprefix(".")
     if kind == "cgns":
         from slideviz.mesh.io.cgns.write import require_cgns
 
         require_cgns(output, mesh)
-    if kind != "su2b":
-        ending = mesh.origin.ending
-        if mesh.zones > 1 and f".{kind}" != ending:
-            words = f"{output} will have zone {mesh.zone} alone, not the others of {mesh.name}"
-            remedy = f"write a {ending} file to keep them"
-            print(f"slideviz: warning: {words}; {remedy}", file=sys.stderr, flush=True)
-        return
-    from slideviz.mesh.io.su2b.write import lost_in_binary, require_binary, sentence_of_lost
-
-    require_binary(mesh)
-    words = sentence_of_lost(output, mesh.name, lost_in_binary(mesh))
-    if words:
-        print(f"slideviz: warning: {words}", file=sys.stderr, flush=True)
+    elif kind == "su2b":
+        require_binary(mesh)
+    lost, ending = lost_in(f".{kind}", mesh), usual_ending(mesh)
+    if ending == ".su2b" and lost != [OTHER_ZONES]:
+        ending = ".su2"
+    say("warning", sentence_of_lost(output, mesh.name, lost, ending, alone=alone))
 
 
 def make_folder(folder: Path) -> None:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from slideviz.deformation.given_mesh import lost_zones, part_of
+from slideviz.deformation.given_mesh import part_of
 from slideviz.deformation.room import require_room, text_size
 from slideviz.deformation.text_of_binary import text_of_binary
 from slideviz.mesh.check import printable
@@ -17,6 +17,7 @@ from slideviz.mesh.io.su2.text import Text, find_text
 from slideviz.mesh.io.su2.write import require_text_names
 from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace, find_zone, find_zones
 from slideviz.mesh.io.su2b.write import (
+    OTHER_ZONES,
     file_head,
     halo_error,
     lost_of_text,
@@ -80,7 +81,7 @@ def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: T
         _require_binary(text, name)
         keys = (part.key for part in text.zone.kept)
         lost = lost_of_text(keys, 1 if zone is None else zones)
-        warn(sentence_of_lost(target, name, lost))
+        warn(sentence_of_lost(target, name, lost, alone=zone is not None and zones > 1))
         begin = plans[-1].size if plans else 8
         plans.append(planned(text, is_result=True, begin=begin, number=number))
     require_room(target, target, plans[-1].size)
@@ -114,7 +115,8 @@ def _to_text(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tic
         for place in places:
             require_text_names(binary.name, (marker.name for marker in place.markers))
         if len(places) < binary.zones:
-            warn(lost_zones(target, printable(source.name), places[0].number))
+            name = printable(source.name)
+            warn(sentence_of_lost(target, name, [OTHER_ZONES], alone=True))
         sizes = [text_size(place) for place in places]
         more = PLACE * max(place.cells.count for place in places)
         require_room(target, target, sum(sizes) + more)

@@ -29,7 +29,12 @@ from slideviz.mesh.io.su2.write import box_edits, moved_rows, patched_blocks, re
 from slideviz.mesh.io.su2b.copying import checksums
 from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.mesh.io.su2b.partial import finish_head, partial_file
-from slideviz.mesh.io.su2b.write import lost_of_text, require_binary_names, sentence_of_lost
+from slideviz.mesh.io.su2b.write import (
+    OTHER_ZONES,
+    lost_of_text,
+    require_binary_names,
+    sentence_of_lost,
+)
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.ranks import ALONE, Alone
 from slideviz.mesh.skin import read_skin
@@ -235,15 +240,7 @@ def _lost_in_text(output: Path, path: Path, zone: int | None) -> str:
         place = find_zone(source, zone)
     name = printable(path.name)
     require_text_names(name, (marker.name for marker in place.markers))
-    return lost_zones(output, name, place.number) if source.zones > 1 else ""
-
-
-def lost_zones(output: Path, name: str, zone: int) -> str:
-    """Return in words that a text will have one zone of a binary mesh."""
-    return (
-        f"{output} will have zone {zone} alone, not the others of {name}; write a .su2b file to "
-        "keep them"
-    )
+    return sentence_of_lost(output, name, [OTHER_ZONES] * (source.zones > 1), ".su2b")
 
 
 def text_blocks(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from slideviz.mesh.io.su2b.write import listed, lost_in_binary, lost_of_mesh
+from slideviz.mesh.io.su2b.write import OTHER_ZONES, listed, lost_in_binary, lost_of_mesh
 from slideviz.mesh.model import Mesh
 
 
@@ -60,18 +60,25 @@ def holds_quality(path: Path) -> bool:
 def left_out(path: Path, mesh: Mesh) -> str:
     """Return a sentence on the parts of a mesh that a file of that name leaves out, or nothing."""
     end = path.suffix.lower()
+    has_quality = end in (".su2", ".su2b", ".cgns") or holds_quality(path)
+    lost = [*([] if has_quality else ["the quality of the cells"]), *lost_in(end, mesh)]
+    return f"{path.name} does not hold {listed(lost)}." if lost else ""
+
+
+def lost_in(end: str, mesh: Mesh) -> list[str]:
+    """Return what of the file of a mesh, in words, one with this ending does not keep."""
     if end == ".cgns":
-        return ""
-    row = MESH_FORMATS.get(end)
-    lost = list(lost_in_binary(mesh)) if end == ".su2b" else []
-    if end not in (".su2", ".su2b"):
-        if row is None or row.boundaries == "numbers":
+        return []
+    lost: list[str] = []
+    if end == ".su2b":
+        lost += lost_in_binary(mesh)
+    elif end != ".su2":
+        row = MESH_FORMATS.get(end)
+        if mesh.markers and (row is None or row.boundaries == "numbers"):
             lost.append("the names of the boundaries (they are numbers now)")
-        if row is None or not row.quality:
-            lost.append("the quality of the cells")
         lost += lost_of_mesh(mesh)
+    elif mesh.zones > 1 and mesh.origin.ending != end:
+        lost.append(OTHER_ZONES)
     if mesh.origin.ending == ".cgns":
         lost.append("what else was in the CGNS file, such as its zones and solutions")
-    if not lost:
-        return ""
-    return f"{path.name} does not hold {listed(lost)}."
+    return lost

@@ -29,6 +29,8 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 SORTED = (3, 5, 9, 10, 12, 13, 14)
 """SU2's order of the types of elements."""
 LARGEST_4 = 2**32 - 1
+OTHER_ZONES = "its other zones"
+"""What a file of one zone loses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +153,7 @@ def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:
     lost = {
         "its FFD boxes": any(is_ffd(key.encode()) for key in unique),
         f"its other sections ({others})": bool(others),
-        "its other zones": zones > 1,
+        OTHER_ZONES: zones > 1,
     }
     return tuple(words for words, is_lost in lost.items() if is_lost)
 
@@ -162,14 +164,26 @@ def listed(lost: Sequence[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
-def sentence_of_lost(output: Path, name: str, lost: Sequence[str]) -> str:
-    """Return in words what a binary file will not have of a mesh; nothing where it has all."""
+def sentence_of_lost(
+    output: Path, name: str, lost: Sequence[str], ending: str = ".su2", *, alone: bool = False
+) -> str:
+    """Return in words what a file will not have of a mesh; nothing where it has all.
+
+    Parameters
+    ----------
+    ending : str
+        Of a file that would have it.
+    alone : bool
+        Whether one of several zones is converted, as ``--zone`` asks for.
+    """
     if not lost:
         return ""
-    return (
-        f"{output} is an SU2 binary mesh and will not have {listed(lost)} of {name}; write a "
-        ".su2 file to keep them"
-    )
+    remedy = f"write a {ending} file"
+    if alone:
+        has_zones = output.suffix.lower() in (".su2", ".su2b")
+        is_enough = has_zones and list(lost) == [OTHER_ZONES]
+        remedy = "leave out --zone" if is_enough else f"leave out --zone and {remedy}"
+    return f"{output} will not have {listed(lost)} of {name}; {remedy} to keep them"
 
 
 def file_head(zones: int, form: BinaryForm | None = None) -> Iterator[bytes]:
