@@ -27,6 +27,8 @@ from slideviz.gui.responsiveness.settings import AUTOSAVE_MS
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.mesh.io.private import private_file, private_folder
+from slideviz.session.design_files import read_results, write_results
+from slideviz.session.design_table import DesignTable
 from slideviz.session.keep import Camera, keep_view
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -34,6 +36,7 @@ from slideviz.session.store import Store
 HALF_WRITTEN_S = 60.0
 """A temporary file older than this is not being written any more."""
 SOURCE = "saved as: "
+CURRENT = "the results of the designs are of this case"
 _numbers = count(1)
 log = logging.getLogger("slideviz")
 
@@ -48,6 +51,8 @@ class Autosave(QObject):
         Where the files are, of all windows; made when needed.
     camera : callable
         Tells from where the mesh is looked at.
+    designs : callable
+        Returns the table of designs, and the case of its results.
     """
 
     def __init__(
@@ -55,12 +60,13 @@ class Autosave(QObject):
         store: Store,
         folder: Path,
         camera: Callable[[], Camera | None],
+        designs: Callable[[], tuple[DesignTable, Case | None]],
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
         self.store = store
         self.path = folder / f"session-{os.getpid()}-{next(_numbers)}.cfg"
-        self._camera = camera
+        self._camera, self._designs = camera, designs
         self._lock: QLockFile | None = None
         self._written: tuple[object, ...] = ()
         self._asked: tuple[object, ...] = ()
@@ -76,10 +82,12 @@ class Autosave(QObject):
         session = self.store.session
         if self._runner.busy:
             self._timer.start()
-        elif session.mesh is not None and _key(session) != self._written:
-            self._asked = _key(session)
+        elif session.mesh is not None and self._key(session) != self._written:
+            self._asked = self._key(session)
             case = keep_view(session, self._camera())
-            self._runner.start(self._write, case)
+            table, of = self._designs()
+            up_to_date = bool(table.left(of, session.case).results)
+            self._runner.start(self._write, case, table, up_to_date)
 
     def replace(self, found: LeftSession) -> None:
         """Remove the session of an earlier start once this one, restored from it, is written."""
@@ -92,22 +100,37 @@ class Autosave(QObject):
         self._timer.stop()
         self._runner.close()
         with contextlib.suppress(OSError):
-            self.path.unlink(missing_ok=True)
+            _unlink(self.path)
         if self._lock is not None:
             self._lock.unlock()
 
+    def look(self) -> None:
+        """Write the session after a while, if it has changed."""
+        self._changed(self.store.session, self.store.session)
+
     def _changed(self, _old: Session, new: Session) -> None:
         # Not put off by the next change: somebody who never rests is saved as well.
-        if new.mesh is not None and _key(new) != self._written and not self._timer.isActive():
+        if new.mesh is not None and self._key(new) != self._written and not self._timer.isActive():
             self._timer.start()
 
-    def _write(self, case: Case, _report: object, _stopped: object) -> None:
+    def _key(self, session: Session) -> tuple[object, ...]:
+        return session.mesh, session.case, session.view.style, self._designs()
+
+    def _write(
+        self, case: Case, table: DesignTable, up_to_date: bool, _report: object, _stopped: object
+    ) -> None:
         private_folder(self.path.parent)
         if self._lock is None:
             self._lock = _lock(self.path)
             if self._lock.tryLock(0):
                 private_file(Path(self._lock.fileName()))
-        remarks = () if case.source is None else (f"{SOURCE}{case.source}",)
+        remarks = [f"{SOURCE}{case.source}"] if case.source is not None else []
+        if table.rows:
+            write_results(_designs_file(self.path), table)
+            private_file(_designs_file(self.path))
+            remarks += [CURRENT] * up_to_date
+        else:
+            _designs_file(self.path).unlink(missing_ok=True)
         write_case(self.path, case, remarks)
         private_file(self.path)
 
@@ -116,15 +139,11 @@ class Autosave(QObject):
         for found in self._replaces:
             found.remove()
         self._replaces.clear()
-        self._changed(self.store.session, self.store.session)
+        self.look()
 
     def _failed(self, error: Exception) -> None:
         # Tried again with the next change; the log shows the same line once.
         log.warning("the session could not be kept for a restart: %s", error)
-
-
-def _key(session: Session) -> tuple[object, ...]:
-    return session.mesh, session.case, session.view.style
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,9 +172,22 @@ class LeftSession:
         """Return when the session was written."""
         return datetime.fromtimestamp(self.path.stat().st_mtime)
 
+    def designs(self) -> tuple[DesignTable, bool]:
+        """Return the table of designs, and whether its results are of the case.
+
+        Raises
+        ------
+        CaseError
+            It cannot be read.
+        """
+        file = _designs_file(self.path)
+        if not file.exists():
+            return DesignTable(), False
+        return read_results(file), f"% {CURRENT}" in self.path.read_text(encoding="utf-8")
+
     def remove(self) -> None:
-        """Remove the file of the session."""
-        self.path.unlink(missing_ok=True)
+        """Remove the files of the session."""
+        _unlink(self.path)
         self.lock.unlock()
 
 
@@ -184,6 +216,16 @@ def find_sessions(folder: Path) -> tuple[list[LeftSession], list[str]]:
 
 def _is_left(path: Path) -> bool:
     return time.time() - _modified(path) > HALF_WRITTEN_S
+
+
+def _designs_file(path: Path) -> Path:
+    """Return the file with the designs of a session."""
+    return path.with_suffix(".csv")
+
+
+def _unlink(path: Path) -> None:
+    for file in (_designs_file(path), path):
+        file.unlink(missing_ok=True)
 
 
 def _lock(path: Path) -> QLockFile:

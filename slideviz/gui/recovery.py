@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QObject
 
+from slideviz.errors import CaseError
 from slideviz.gui.autosave import Autosave, LeftSession, find_sessions
+from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets.banner import Banner
 from slideviz.gui.widgets.faults import old_crashes
 from slideviz.session import jobs
@@ -93,8 +95,20 @@ class SessionRecovery(QObject):
     def _opened(self, found: LeftSession, opened: jobs.Opened) -> None:
         session = restored(opened.session, found.source)
         self.window.show_opened(replace(opened, session=session))
+        self._restore_designs(found)
         self.autosave.replace(found)
         self.window.say("Session restored. Runs are not kept; Run computes them again")
+
+    def _restore_designs(self, found: LeftSession) -> None:
+        """Show the table of designs there was; results of another case are those of none here."""
+        panel, session = self.window.docks_.panel(DesignsPanel), self.window.store.session
+        try:
+            table, current = found.designs()
+        except CaseError as error:
+            self.window.banner.tell_error(error)
+            return
+        panel.case, panel.mesh = session.case if current else None, session.mesh
+        panel.put(table)
         log.info("restored the session of %s", _time_text(found.when))
 
 

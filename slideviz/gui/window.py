@@ -211,7 +211,15 @@ class MainWindow(Services):
         self.autosave: Autosave | None = None
         self.recovery: SessionRecovery | None = None
         if folder is not None:
-            self.autosave = Autosave(self.store, folder, lambda: self.scene.camera.view, self)
+            designs = self.docks_.panel(DesignsPanel)
+            self.autosave = Autosave(
+                self.store,
+                folder,
+                lambda: self.scene.camera.view,
+                lambda: (designs.table, designs.case),
+                self,
+            )
+            designs.changed.connect(self.autosave.look)
             self.recovery = SessionRecovery(self, self.offer, self.autosave)
 
     # The session -----------------------------------------------------------------------
@@ -339,7 +347,7 @@ class MainWindow(Services):
             # First the work, then the view: a job may still hand over a step.
             self.player.stop()
             self.exports.end()
-            self.docks_.panel(DesignsPanel).end()
+            self.docks_.panel(DesignsPanel).runner.close()
             self.warmup.close()
             self.intersection_check.close()
             self.section_reader.close()

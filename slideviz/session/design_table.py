@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from io import StringIO
-from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -17,10 +14,8 @@ from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.case.words import is_number
 from slideviz.design.sweeps.columns import columns_of, numbers_of, own_values
-from slideviz.design.sweeps.designs import read_designs
-from slideviz.design.sweeps.row import NUMBERS, DesignRow
+from slideviz.design.sweeps.row import DesignRow
 from slideviz.errors import CaseError
-from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import Mesh
 
 MOST = 100_000
@@ -114,7 +109,7 @@ class DesignTable:
         if case is None or not self.results or all(map(all, self.rows)):
             return self
         own = own_values(case, columns_of(case, self.columns))
-        texts = {name: _shown(value) for name, value in own.items()}
+        texts = {name: shown(value) for name, value in own.items()}
         rows = (zip(self.columns, row, strict=True) for row in self.rows)
         return replace(self, rows=tuple(tuple(c or texts[name] for name, c in row) for row in rows))
 
@@ -181,42 +176,6 @@ def _settings(case: Case) -> Case:
     return case.change(mesh_out=None, source=None, warnings=(), view={})
 
 
-def read_table(case: Case, path: Path) -> DesignTable:
-    """Return the table of a CSV file, checked against a case.
-
-    Raises
-    ------
-    CaseError
-        It cannot be read, or has mistakes.
-    """
-    found = read_designs(case, path)
-    if len(found.rows) > MOST:
-        raise CaseError(f"{path}: has {len(found.rows):,} designs; use `slideviz sweep` for them")
-    columns = tuple(found.columns)
-    rows = tuple(tuple(_shown(design.values[name]) for name in columns) for design in found.rows)
-    return DesignTable(columns, rows)
-
-
-def write_results(path: Path, table: DesignTable) -> None:
-    """Write designs and results as CSV, a row for each design.
-
-    Raises
-    ------
-    CaseError
-        The file cannot be written.
-    """
-    out = StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["design", *table.columns, *NUMBERS, "problem"])
-    for number, values in enumerate(table.rows, start=1):
-        row = table.results.get(number)
-        done = row is not None and not row.problem
-        numbers = [getattr(row, name) if done else "" for name in NUMBERS]
-        writer.writerow([number, *values, *numbers, row.problem if row is not None else ""])
-    with atomic_write(path, CaseError) as file:
-        file.write(out.getvalue().encode())
-
-
 def column_choices(case: Case, dim: int) -> dict[str, str]:
     """Return the columns that there can be, with what the case has there: numbers, then keys.
 
@@ -233,7 +192,7 @@ def column_choices(case: Case, dim: int) -> dict[str, str]:
         if key.group not in (FILES, VIEW, MOTION) and key.get(case) is not None
     }
     found = own_values(case, {**numbers, **keys})
-    return {name: _shown(value) for name, value in found.items()}
+    return {name: shown(value) for name, value in found.items()}
 
 
 def values_of(text: str) -> list[str]:
@@ -262,7 +221,7 @@ def values_of(text: str) -> list[str]:
     return [repr(value) for value in values.tolist()]
 
 
-def _shown(value: str | float) -> str:
+def shown(value: str | float) -> str:
     """Return a value as people write it, with all its digits."""
     if isinstance(value, str):
         return value

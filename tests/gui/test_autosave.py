@@ -9,11 +9,14 @@ import pytest
 from qtpy.QtWidgets import QMessageBox
 
 from slideviz.case.model import Case
+from slideviz.design.sweeps.row import DesignRow
 from slideviz.gui import autosave
 from slideviz.gui.autosave import find_sessions
+from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import faults, questions
 from slideviz.gui.window import MainWindow
 from slideviz.session import changes
+from slideviz.session.design_table import DesignTable
 
 
 @pytest.fixture
@@ -159,6 +162,57 @@ def test_after_a_crash_it_is_offered_and_restored(make, qtbot, crashed, case_fil
     qtbot.waitUntil(lambda: not crashed.exists())
     assert Case.read(window.autosave.path).steps == 7, "it is safe under its new name"
     assert find_sessions(folder) == ([], [])
+
+
+@pytest.mark.parametrize("changed", [False, True], ids=["as they ran", "changed since"])
+def test_the_designs_and_their_results_come_back(make, qtbot, folder, case_file, changed):
+    window = make()
+    open_in(window, case_file, qtbot)
+    panel = window.docks_.panel(DesignsPanel)
+    panel.put(DesignTable().crossed("STEPS", ["1", "2", "3"]))
+    panel.case = window.store.session.case
+    results = [
+        DesignRow(1, min=0.25, mean=0.5, max_error=0.0, steps=1),
+        DesignRow(3, problem="too\nfar"),
+    ]
+    panel.put(panel.table.with_results(results))
+    if changed:
+        window.store.change(changes.set_case, sliding="ds")
+    kept(window, qtbot)
+    texts = {path.suffix: path.read_text() for path in folder.glob("session-*")}
+    modes = {path.stat().st_mode & 0o777 for path in folder.iterdir()}
+    assert modes == {0o600}
+    window.close()
+    assert list(folder.iterdir()) == []
+    for suffix in (".cfg", ".csv"):
+        folder.joinpath("session-4194399-1").with_suffix(suffix).write_text(texts[suffix])
+    window = make()
+    window.recovery.look()
+    window.offer.answers["Restore"].click()
+    panel = window.docks_.panel(DesignsPanel)
+    qtbot.waitUntil(lambda: bool(panel.table.rows))
+    assert panel.table.designs() == [{"STEPS": "1"}, {"STEPS": "2"}, {"STEPS": "3"}]
+    assert panel.table.results[1] == results[0]
+    assert panel.table.results[3].problem == "too\nfar"
+    assert panel.run.text() == ("Run 3 designs" if changed else "Run 2 designs")
+    assert panel.unsaved
+    qtbot.waitUntil(lambda: not any(folder.glob("session-4194399*")))
+    assert window.autosave.path.with_suffix(".csv").exists()
+    # An empty table takes its file away.
+    panel.put(DesignTable())
+    kept(window, qtbot)
+    assert not window.autosave.path.with_suffix(".csv").exists()
+
+
+def test_designs_that_cannot_be_read_are_told_and_the_session_is_restored(make, qtbot, crashed):
+    crashed.with_suffix(".csv").write_text("design,STEPS\n1\n")
+    window = make()
+    window.recovery.look()
+    window.offer.answers["Restore"].click()
+    qtbot.waitUntil(lambda: window.store.session.mesh is not None and not window.runner.busy)
+    qtbot.waitUntil(window.banner.isVisible)
+    assert "is no table of results" in window.banner.text.text()
+    assert window.store.session.case.steps == 7
 
 
 def test_discard_throws_it_away(make, crashed, folder):

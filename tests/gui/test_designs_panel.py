@@ -182,10 +182,10 @@ def test_what_is_said_can_be_read_to_its_end(window, passage, qtbot):
 def test_where_all_failed_there_is_no_plot(passage):
     panel = passage
     fill(panel, "STEPS", "1, 2")
-    panel._put(panel.table.with_results([DesignRow(1, problem="no")]))
+    panel.put(panel.table.with_results([DesignRow(1, problem="no")]))
     assert "failed" in panel.plot.area.words.text()
     assert not panel.plot.save.isEnabled()
-    panel._put(panel.table.with_results([DesignRow(2, min=0.5, mean=0.6)]))
+    panel.put(panel.table.with_results([DesignRow(2, min=0.5, mean=0.6)]))
     assert panel.plot.save.isEnabled()
 
 

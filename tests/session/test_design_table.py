@@ -12,13 +12,8 @@ from slideviz.design.sweeps.row import DesignRow
 from slideviz.errors import CaseError
 from slideviz.samples.table import sample
 from slideviz.session import design_table
-from slideviz.session.design_table import (
-    DesignTable,
-    column_choices,
-    read_table,
-    values_of,
-    write_results,
-)
+from slideviz.session.design_files import read_results, read_table, write_results
+from slideviz.session.design_table import DesignTable, column_choices, values_of
 from slideviz.session.jobs import Doing
 from slideviz.session.jobs_designs import run_designs
 
@@ -112,15 +107,25 @@ def test_files(passage, tmp_path):
     file.write_text("airfoil.translate.y,STEPS\n0.1234567890123456,2\n-1e-9,\n")
     table = read_table(passage.case, file)
     assert table.rows == (("0.1234567890123456", "2"), ("-1e-09", ""))
-    table = table.with_results([DesignRow(2, min=0.25, mean=0.5, steps=5)])
+    table = table.with_results([DesignRow(2, min=0.25, mean=0.5, max_error=0.0, steps=5)])
     write_results(tmp_path / "out.csv", table)
     with (tmp_path / "out.csv").open(newline="") as found:
         first, second = csv.DictReader(found)
     assert (first["min"], first["STEPS"]) == ("", "2")
     assert (second["design"], second["min"], second["mean"]) == ("2", "0.25", "0.5")
+    assert read_results(tmp_path / "out.csv") == table
     # Of a table with results the designs are read.
     again = read_table(passage.case, tmp_path / "out.csv")
     assert (again.columns, again.rows) == (table.columns, table.rows)
+
+
+@pytest.mark.parametrize("text", ["", "a,b\n1\n", "design,STEPS\n1,2\n"])
+def test_other_files_are_no_results(tmp_path, text):
+    (tmp_path / "out.csv").write_text(text)
+    with pytest.raises(CaseError, match="is no table of results"):
+        read_results(tmp_path / "out.csv")
+    with pytest.raises(CaseError, match="is no table of results"):
+        read_results(tmp_path / "missing.csv")
 
 
 def test_only_what_has_no_result_is_run(passage, monkeypatch):

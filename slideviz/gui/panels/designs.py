@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from qtpy.QtCore import QSize, Qt
+from qtpy.QtCore import QSize, Qt, Signal
 from qtpy.QtWidgets import QHBoxLayout, QSplitter
 
 from slideviz.case.model import Case
@@ -22,7 +22,8 @@ from slideviz.gui.widgets.labels import WideLabel
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import Services
 from slideviz.mesh.model import Mesh
-from slideviz.session.design_table import DesignTable, read_table, values_of, write_results
+from slideviz.session.design_files import read_table, write_results
+from slideviz.session.design_table import DesignTable, values_of
 from slideviz.session.state import Session
 
 RUN = "Run the designs that have no result yet, or failed."
@@ -40,7 +41,14 @@ class DesignsPanel(Panel):
         The design whose mesh was asked for last.
     written : DesignTable or None
         The table that was saved last.
+
+    Signals
+    -------
+    changed
+        The table or its results are others.
     """
+
+    changed = Signal()
 
     def __init__(self, services: Services) -> None:
         super().__init__(services.store)
@@ -62,15 +70,20 @@ class DesignsPanel(Panel):
             split.addWidget(part)
         split.setChildrenCollapsible(False)
         split.setSizes([1000, 1000])
-        foot = self._make_foot()
-        in_column(split, foot, self.said, wide=[split], spacing=4, on=self, margins=(6, 4, 6, 4))
+        in_column(
+            split,
+            self._make_foot(),
+            self.said,
+            wide=[split],
+            spacing=4,
+            on=self,
+            margins=(6, 4, 6, 4),
+        )
         self._connect()
         self.follow()
 
     def sizeHint(self) -> QSize:
         return QSize(600, 330)
-
-    # Parts -----------------------------------------------------------------------------
 
     def _make_foot(self) -> QHBoxLayout:
         self.load = push_button(
@@ -85,7 +98,6 @@ class DesignsPanel(Panel):
             "Stop", "Stop; the results that are there stay.", self.runner.cancel
         )
         self.bar = QuietBar()
-        self.bar.setObjectName("designs_bar")
         self.bar.setRange(0, 1000)
         self.bar.setTextVisible(False)
         self.bar.setFixedWidth(110)
@@ -111,7 +123,7 @@ class DesignsPanel(Panel):
         if session.mesh is not self._drawn[0]:
             self.runner.cancel()
             self.case = self.mesh = self.shown = None
-            self._put(DesignTable())
+            self.put(DesignTable())
             self._say("")
         self._drawn = now
         self.rows.show_columns(session.case, session.mesh)
@@ -123,13 +135,14 @@ class DesignsPanel(Panel):
         """Return the table with the results that a run now would not change."""
         return self.table.left(self.case, self.store.session.case)
 
-    def _put(self, table: DesignTable) -> None:
+    def put(self, table: DesignTable) -> None:
         """Show another table; the design that is shown is none of it if it has other values."""
         at = slice((self.shown or 1) - 1, self.shown)
         if table.columns != self.table.columns or table.rows[at] != self.table.rows[at]:
             self.shown = None
         self.table = table
         self._sync()
+        self.changed.emit()
 
     def _sync(self) -> None:
         busy, rows = self.runner.busy, bool(self.table.rows)
@@ -151,9 +164,8 @@ class DesignsPanel(Panel):
         self.run.setText(f"Run {count:,} design{'' if count == 1 else 's'}" if count else "Run")
         done = rows and not count
         self.run.setToolTip("All designs are done with these settings." if done else RUN)
-        self.bar.setVisible(busy)
-        self.stop.setVisible(busy)
-        self.run.setVisible(not busy)
+        for part, seen in ((self.bar, busy), (self.stop, busy), (self.run, not busy)):
+            part.setVisible(seen)
 
     def _say(self, text: str, wrong: bool = False) -> None:
         self.said.say(text)
@@ -180,7 +192,7 @@ class DesignsPanel(Panel):
                 self.services.banner.tell_error(error)
             return
         self._say(f"{len(table.rows):,} designs" if table.rows else "")
-        self._put(table)
+        self.put(table)
 
     def _picked(self, number: int) -> None:
         self.rows.view.selectRow(number - 1)
@@ -277,14 +289,14 @@ class DesignsPanel(Panel):
         if len(table.results) == len(table.rows) or not self._may_become(table):
             return
         self.case, self.mesh = session.case, session.mesh
-        self._put(table)
+        self.put(table)
         self._say("")
         self.job.start(self.case, self.mesh, table)
         self._sync()
 
     def _came(self, rows: list[DesignRow]) -> None:
         if self.mesh is self.store.session.mesh:
-            self._put(self.table.with_results(rows))
+            self.put(self.table.with_results(rows))
 
     def _going(self, words: str, fraction: float) -> None:
         self.bar.setValue(round(1000 * fraction))
@@ -294,7 +306,3 @@ class DesignsPanel(Panel):
         failed = self.table.count_done() < len(self.table.results)
         self._say(text or self.table.summary(self.mesh), wrong or failed)
         self._sync()
-
-    def end(self) -> None:
-        """End what runs, without a word: the window closes."""
-        self.runner.close()
