@@ -12,13 +12,13 @@ from qtpy.QtWidgets import QApplication
 
 from slideviz.gui.panels import worst
 from slideviz.gui.panels.worst import WorstPanel, info_text
-from slideviz.gui.panels.worst_table import CELL, COLUMNS, QUALITY, SINCE, digits_apart
+from slideviz.gui.panels.worst_table import CELL, COLUMNS, QUALITY, SINCE, WorstModel, digits_apart
 from slideviz.gui.widgets import plot_canvas
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
 from slideviz.session import changes
-from slideviz.session.inspect import cell_info, worst_cells
+from slideviz.session.inspect import WorstCells, cell_info, worst_cells
 from slideviz.session.locate import nearest_boundary
 from slideviz.session.state import StepFrame
 from slideviz.session.store import Store
@@ -393,3 +393,42 @@ def test_qualities_have_as_many_digits_as_tell_them_apart():
     assert digits_apart(np.array([0.94915, 0.94916, 0.94917, 0.94918])) == 5
     assert digits_apart(np.full(9, 0.5)) == 4
     assert digits_apart(np.empty(0)) == 4
+
+
+def worst_at(positions, numbers):
+    count = len(positions)
+    return WorstCells(
+        np.array(numbers),
+        np.linspace(0.1, 0.2, count),
+        np.zeros(count, bool),
+        np.array(positions),
+        np.zeros(count, np.int64),
+        ("quadrilateral",) * count,
+        "size-skew",
+    )
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-7, 1e4])
+def test_coordinates_have_as_many_digits_as_tell_cells_apart(scale):
+    model = WorstModel()
+    places = scale * np.array([[0.80001, 0.5], [0.80002, 0.5], [-20.0, 0.5]])
+    model.show(worst_at(places, [1, 2, 3]))
+    texts = [model.index(row, len(COLUMNS)).data() for row in range(3)]
+    assert len(set(texts)) == 3
+    assert float(texts[1]) - float(texts[0]) == pytest.approx(1e-5 * scale)
+    # Where the usual ones do, there are no more.
+    model.show(worst_at([[0.81, 0.5], [0.82, 0.5]], [1, 2]))
+    assert model.index(0, len(COLUMNS)).data() == "0.8100"
+
+
+def test_columns_grow_with_the_numbers_of_another_mesh(full):
+    table = full.table
+    room = table.columnWidth(CELL)
+    dim = full.model.places.shape[1]
+    full.model.show(worst_at(np.zeros((1, dim)), [123_456_789]))
+    wide = table.fontMetrics().horizontalAdvance("123456789")
+    assert room < wide < table.columnWidth(CELL)
+    # Nobody's own choice is changed by it.
+    table.setColumnWidth(CELL, 33)
+    full.model.show(worst_at(np.zeros((1, dim)), [12_345_678_901]))
+    assert table.columnWidth(CELL) == 33

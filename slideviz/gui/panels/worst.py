@@ -248,6 +248,6 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
 def _place_text(position: FloatArray, around: Around | None) -> str:
     names, values = coordinates(position[None], around)
     return "&nbsp; ".join(
-        f"{name.removesuffix(' [°]')} {value:.5g}{'°' if '°' in name else ''}"
+        f"{name.removesuffix(' [°]')} {value:.7g}{'°' if '°' in name else ''}"
         for name, value in zip(names, values[0], strict=True)
     )

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from qtpy.QtCore import QAbstractTableModel, Qt, Signal
 from qtpy.QtGui import QBrush, QColor, QKeyEvent, QResizeEvent
@@ -27,6 +29,8 @@ _LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
 _MIDDLE = int(Qt.AlignmentFlag.AlignCenter)
 FEWEST, MOST = 4, 5
 """Digits of a quality."""
+MOST_MORE = 4
+"""Digits that coordinates have at most where the usual ones do not tell cells apart."""
 TIPS = {
     CELL: "Number of the cell, from 0 as in an SU2 file",
     QUALITY: "Quality of the step that is shown",
@@ -43,6 +47,18 @@ def digits_apart(values: FloatArray) -> int:
     return MOST
 
 
+def digits_more(places: FloatArray, digits: Sequence[int]) -> int:
+    """Return how many more digits than given tell places (n, d) apart, `MOST_MORE` at most."""
+    different = len(np.unique(places, axis=0))
+    for more in range(MOST_MORE):
+        rounded = [
+            column.round(count + more) for column, count in zip(places.T, digits, strict=True)
+        ]
+        if len(np.unique(np.column_stack(rounded), axis=0)) == different:
+            return more
+    return MOST_MORE
+
+
 class WorstModel(QAbstractTableModel):
     """The model of the worst cells: rows in any order."""
 
@@ -51,7 +67,8 @@ class WorstModel(QAbstractTableModel):
         self.worst: WorstCells | None = None
         self.names: tuple[str, ...] = ()
         self.places = np.empty((0, 0))
-        self._decimals: tuple[int, ...] = ()
+        self._decimals: list[int] = []
+        self._more = 0
         self._mixed = False
         self._digits = FEWEST
         self.order = np.empty(0, np.int64)
@@ -63,10 +80,12 @@ class WorstModel(QAbstractTableModel):
         self.worst = worst
         if worst is not None:
             self.names, self.places = coordinates(worst.positions, around)
-            self._decimals = tuple(
+            digits = [
                 min(decimals(column), 2) if "°" in name else decimals(column)
                 for name, column in zip(self.names, self.places.T, strict=True)
-            )
+            ]
+            self._more = digits_more(self.places, digits)
+            self._decimals = [count + self._more for count in digits]
             self._digits = digits_apart(worst.values[~worst.inverted])
             self._mixed = len(set(worst.kinds)) > 1
         self._arrange()
@@ -138,7 +157,9 @@ class WorstModel(QAbstractTableModel):
             return SHORT.get(worst.kinds[at], worst.kinds[at])
         value, digits = float(self.places[at, axis]), self._decimals[axis]
         # Without a sign before zeros.
-        return f"{round(value, digits) + 0.0:.{digits}f}" if digits < 8 else f"{value:.3g}"
+        if digits - self._more < 8:
+            return f"{round(value, digits) + 0.0:.{digits}f}"
+        return f"{value:.{3 + self._more}g}"
 
     def sort(self, column: int, order: Qt.SortOrder = Qt.SortOrder.AscendingOrder) -> None:
         self._by, self._down = column, order == Qt.SortOrder.DescendingOrder
@@ -202,19 +223,23 @@ class WorstTable(QTableView):
         self.setSortingEnabled(True)
 
     def _share(self) -> None:
-        """Give every column what its numbers need, when there are others than before."""
+        """Give every column what its numbers need; while it is the same one, never less again."""
         model = self.model()
         assert isinstance(model, WorstModel)
-        if model.rowCount() and model.headers != self._shared:
-            self._shared = model.headers
-            metrics, rows = self.fontMetrics(), range(model.rowCount())
-            self._needed = []
-            for column, words in enumerate(self._shared):
-                texts = [model.index(row, column).data() for row in rows]
-                room = max(metrics.horizontalAdvance(text) for text in (*texts, *words.split()))
-                # What Qt would take is more than there is.
-                self._needed.append(room + 8 + (ARROW if column == QUALITY else 0))
-            self._given = []
+        if not model.rowCount():
+            return
+        if model.headers != self._shared:
+            self._shared, self._given = model.headers, []
+            self._needed = [0] * len(self._shared)
+        metrics, rows, before = self.fontMetrics(), range(model.rowCount()), self._needed
+        self._needed = []
+        for column, words in enumerate(self._shared):
+            texts = [model.index(row, column).data() for row in rows]
+            room = max(metrics.horizontalAdvance(text) for text in (*texts, *words.split()))
+            # What Qt would take is more than there is.
+            room += 8 + (ARROW if column == QUALITY else 0)
+            self._needed.append(max(room, before[column]))
+        if self._needed != before:
             self._spread()
 
     def _spread(self) -> None:
