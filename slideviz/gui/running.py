@@ -13,7 +13,7 @@ from qtpy.QtCore import QObject, Signal
 from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.worker import JobRunner
-from slideviz.gui.widgets.banner import Banner
+from slideviz.gui.widgets.banner import NO_ANSWERS, Banner
 from slideviz.session import changes, jobs
 from slideviz.session.jobs import Doing
 from slideviz.session.jobs_large import compute_in_file
@@ -41,6 +41,8 @@ class Running(QObject):
         The running job was asked to stop.
     said(str)
         Something for the status bar.
+    worst_wanted()
+        The worst cell is to be seen.
     """
 
     began = Signal(str)
@@ -48,6 +50,7 @@ class Running(QObject):
     ended = Signal()
     cancelling = Signal()
     said = Signal(str)
+    worst_wanted = Signal()
 
     def __init__(self, store: Store, banner: Banner, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -205,7 +208,8 @@ class Running(QObject):
             warnings.insert(0, f"The deformed mesh is in {file}.")
             log.info("the deformed mesh is in %s", file)
         if warnings:
-            self.banner.tell("\n".join(warnings), calm=not bad)
+            show = {"Show the worst": self.worst_wanted.emit} if bad else NO_ANSWERS
+            self.banner.tell("\n".join(warnings), calm=not bad, answers=show)
             self._about = run.number
         self.said.emit(f"Done: {text}")
 

@@ -28,6 +28,7 @@ from slideviz.gui.panels.log import LogPanel
 from slideviz.gui.panels.method import MethodPanel
 from slideviz.gui.panels.motions import MotionPanel
 from slideviz.gui.panels.run import RunPanel
+from slideviz.gui.panels.worst import WorstPanel
 from slideviz.gui.recovery import SessionRecovery
 from slideviz.gui.responsiveness.warmup_thread import WarmupThread
 from slideviz.gui.running import Running
@@ -198,6 +199,7 @@ class MainWindow(Services):
         for change in (running.began, running.ended):
             change.connect(lambda *_: self.sync_actions())
         running.said.connect(self.say)
+        running.worst_wanted.connect(self._show_worst)
         panel.place_wanted.connect(self.lead_to)
         self.start.file_wanted.connect(self.files.open_path)
         self.start.sample_wanted.connect(self.files.open_sample)
@@ -298,6 +300,10 @@ class MainWindow(Services):
         panel = self.docks_.panels[missing.place]
         if isinstance(panel, Panel):
             panel.lead_to(missing)
+
+    def _show_worst(self) -> None:
+        self.docks_.lead_to("worst")
+        self.docks_.panel(WorstPanel).show_worst()
 
     def set_theme(self, name: str) -> None:
         """Change to the light or dark theme, or to that of the desktop."""

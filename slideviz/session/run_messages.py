@@ -77,7 +77,11 @@ def help_for(case: Case, folding: str = "") -> str:
     helps = []
     if case.method != "rbf":
         helps.append("radial basis functions as the method")
-    if case.sliding == "none" and {"sliding", "periodic"} & set(case.roles.values()):
+    roles = set(case.roles.values())
+    if not {"sliding", "periodic"} & roles and "fixed" in roles:
+        method = ", and a sliding method" if case.sliding == "none" else ""
+        helps.append(f"the role “sliding” for boundaries near these cells{method}")
+    elif case.sliding == "none" and {"sliding", "periodic"} & roles:
         helps.append("sliding boundary nodes")
     if case.steps:
         helps.append("more steps, or automatic steps")

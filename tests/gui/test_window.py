@@ -15,11 +15,13 @@ from slideviz import Case, read
 from slideviz.case.model import FromFile, Rotate, Scale, Translate
 from slideviz.case.reduction import AUTO, Reduction
 from slideviz.errors import Note
+from slideviz.gui.panels.worst_table import CELL
 from slideviz.gui.viewport import player as player_module
 from slideviz.gui.viewport.player import plain, result_parts, step_ms
 from slideviz.gui.widgets.fields import NumberField
 from slideviz.mesh.quality import INVERTED
 from slideviz.session import changes, jobs
+from slideviz.session.inspect import worst_cells
 from slideviz.session.run_messages import ended
 from slideviz.session.runs_table import described
 
@@ -776,10 +778,21 @@ def test_inverted_cells_are_told_in_red_with_what_would_help(ready):
     assert banner.property("calm") is False
     assert "38 inverted cells. What may help: " in banner.text.text()
     assert "inverted" in ended(run_)
+    # From step 0, and from an order of one's own, too.
+    session, table = ready.session, ready.window.docks_.panels["worst"].table
+    table.sortByColumn(CELL, Qt.SortOrder.DescendingOrder)
+    ready.window.store.change(changes.show_frame, 0)
+    banner.answers["Show the worst"].click()
+    worst = worst_cells(session.frames, 1, "size-skew").cells[0]
+    assert ready.session.view.marked_cell == worst
+    assert ready.session.frame is session.frames[-1]
+    assert not table.visibleRegion().isEmpty()
     run(ready, 1)
     assert panel.text.text() == "Done."
     assert not panel.text.property("bad")
     assert not banner.isVisible()
+    banner.tell("something else")
+    assert not banner.answers
 
 
 def test_the_banner_is_not_about_a_run_that_is_no_longer_shown(ready):

@@ -46,7 +46,13 @@ def test_it_tells_the_end_and_the_inverted_cells(run):
     ("case", "words", "not_words"),
     [
         (Case(roles={"a": "sliding"}), ("sliding", "more steps"), ("radial",)),
-        (Case(roles={"a": "fixed"}, steps=0), ("smaller motion",), ("sliding", "steps")),
+        (
+            Case(roles={"a": "fixed", "b": "moving"}, steps=0),
+            ("help: the role “sliding” for boundaries near these cells, and a", "smaller motion"),
+            ("steps",),
+        ),
+        (Case(roles={"a": "fixed"}, sliding="ps"), ("help: the role “sliding”",), ("method",)),
+        (Case(roles={"a": "sliding", "b": "fixed"}, sliding="ps"), (), ("sliding",)),
         (Case(method="elastic", sliding="ds", steps=1), ("radial", "more steps"), ("sliding b",)),
     ],
 )

@@ -183,6 +183,13 @@ class WorstPanel(Panel):
         self.store.change(changes.mark_cell, cell)
         self._fly_to(cell)
 
+    def show_worst(self) -> None:
+        """Fly to the worst cell of the last step."""
+        self.store.change(changes.show_frame, len(self.store.session.frames) - 1)
+        self._fill(self.store.session)
+        if self.model.worst is not None:
+            self._go(self.model.row_of(int(self.model.worst.cells[0])))
+
     def _clicked(self, index: QModelIndex) -> None:
         if self.model.cell(index.row()) == self.store.session.view.marked_cell:
             self.unmark()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
 from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import (
@@ -30,6 +31,8 @@ from slideviz.gui.widgets.labels import rich_label
 
 MOST_LINES = 4
 """Of a message; the rest is behind “Details”."""
+Answers = Mapping[str, Callable[[], object]]
+NO_ANSWERS: Answers = MappingProxyType({})
 
 
 class DetailsDialog(QDialog):
@@ -80,8 +83,14 @@ class Banner(QFrame):
         self._later: Callable[[], object] | None = None
         self.hide()
 
-    def tell(self, text: str, full: str = "", calm: bool = True) -> None:
-        """Show a message, with a longer text behind “Details”; calm ones are no error."""
+    def tell(
+        self, text: str, full: str = "", calm: bool = True, answers: Answers = NO_ANSWERS
+    ) -> None:
+        """Show a message, with a longer text behind “Details”; calm ones are no error.
+
+        ``answers`` has what there are buttons for, by their words.
+        """
+        self._offer(answers)
         set_style(self, "calm", calm)
         self._text = text
         lines = text.splitlines() or [""]
@@ -111,25 +120,25 @@ class Banner(QFrame):
     def ask(
         self,
         text: str,
-        answers: Mapping[str, Callable[[], object]],
+        answers: Answers,
         full: str = "",
         later: Callable[[], object] | None = None,
     ) -> None:
         """Show a question with a button for each answer; ``later`` when it is closed instead."""
-        self._forget_answers()
-        for name, function in answers.items():
-            button = push_button(name, "", lambda _=False, function=function: function())
-            self.answers[name] = button
-            self._row.insertWidget(self._row.count() - 1, button)
         self._later = later
-        self.tell(text, full)
+        self.tell(text, full, answers=answers)
 
-    def _forget_answers(self) -> None:
+    def _offer(self, answers: Answers) -> None:
+        """Make a button for each answer, in place of those there were."""
         for button in self.answers.values():
             self._row.removeWidget(button)
             button.hide()
             button.deleteLater()
         self.answers = {}
+        for name, function in answers.items():
+            button = push_button(name, "", lambda _=False, function=function: function())
+            self.answers[name] = button
+            self._row.insertWidget(self._row.count() - 1, button)
 
     def _closed(self) -> None:
         later, self._later = self._later, None
