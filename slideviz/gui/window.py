@@ -302,7 +302,7 @@ class MainWindow(Services):
             panel.lead_to(missing)
 
     def _show_worst(self) -> None:
-        self.docks_.lead_to("worst")
+        self.docks_.bring_to_front("worst")
         self.docks_.panel(WorstPanel).show_worst()
 
     def set_theme(self, name: str) -> None:
