@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.baselines.shapes import ShapeBlock
-from slideviz.baselines.stiffness import OPTIONS, POISSON, _jacobian, cell_volumes
+from slideviz.baselines.stiffness import OPTIONS, POISSON, _gather, _jacobian, cell_volumes
 from slideviz.mesh.caching import njit
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, sealed
 
 MU = 1.0 / (2.0 * (1.0 + POISSON))
 LAM = POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))
@@ -43,7 +43,7 @@ class Forces:
 
     def of(self, moved: FloatArray) -> FloatArray:
         """Return the forces (n, d) of a displacement (n, d)."""
-        out = np.zeros_like(self.points)
+        out, moved = np.zeros_like(self.points), np.ascontiguousarray(moved)
         for part in self.parts:
             add_forces(self._elements(part), self._modulus(part), moved, out)
         return out
@@ -74,7 +74,9 @@ class Forces:
         return out
 
     def _elements(self, part: ShapeBlock) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
-        return self.points, part.nodes, part.shape.gradients, part.shape.weights
+        # As those of a mesh are, which they are no more when they were sent to another process.
+        points, nodes = sealed(self.points), sealed(part.nodes)
+        return points, nodes, part.shape.gradients, part.shape.weights
 
     def _modulus(self, part: ShapeBlock) -> FloatArray:
         return np.asarray(part.share / self.volume[part.cell])
@@ -85,8 +87,7 @@ def _at(elements, e, q, x, inverse, slopes):  # type: ignore[no-untyped-def]
     """Write grad N_a (a, d) at an integration point of an element; return |det J| w."""
     points, nodes, gradients, weights = elements
     n, d = x.shape
-    for a in range(n):
-        x[a] = points[nodes[e, a]]
+    _gather(points, nodes, e, x)
     size = abs(_jacobian(x, gradients, q, inverse)) * weights[q]
     for a in range(n):
         for i in range(d):

@@ -22,7 +22,7 @@ from scipy.sparse import bsr_array, csr_array
 from slideviz.baselines.shapes import ShapeBlock
 from slideviz.errors import DeformError
 from slideviz.mesh.caching import njit
-from slideviz.mesh.model import FloatArray, IntArray, frozen_array
+from slideviz.mesh.model import FloatArray, IntArray, frozen_array, sealed
 from slideviz.rbf.evaluate import Tick, no_tick
 
 CHUNK = 20_000
@@ -88,7 +88,8 @@ def assemble(
             rows = slice(start, start + CHUNK)
             with np.errstate(divide="ignore"):  # found below
                 modulus = part.share / volume[part.cell[rows]]
-            elements = points, part.nodes[rows], part.shape.gradients, part.shape.weights
+            nodes = sealed(part.nodes[rows])
+            elements = points, nodes, part.shape.gradients, part.shape.weights
             bad = add(elements, modulus, entry, (indptr, indices), data, right)
             if bad >= 0:
                 raise DeformError(
@@ -107,7 +108,8 @@ def cell_volumes(points: FloatArray, parts: list[ShapeBlock]) -> FloatArray:
     out = np.zeros(max((int(p.cell.max(initial=-1)) + 1 for p in parts), default=0))
     for part in parts:
         each = np.empty(len(part.nodes))
-        volumes(points, part.nodes, part.shape.gradients, part.shape.weights, each)
+        shape = part.shape
+        volumes(sealed(points), sealed(part.nodes), shape.gradients, shape.weights, each)
         np.add.at(out, part.cell, part.share * each)
     return out
 
@@ -170,13 +172,20 @@ def _jacobian(x, gradients, q, inverse):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
+def _gather(points, nodes, e, x):  # type: ignore[no-untyped-def]
+    """Write the corners (a, d) of an element; number by number, as rows take seconds to compile."""
+    for a in range(x.shape[0]):
+        for i in range(x.shape[1]):
+            x[a, i] = points[nodes[e, a], i]
+
+
+@njit(**OPTIONS)
 def volumes(points, nodes, gradients, weights, out):  # type: ignore[no-untyped-def]
     """Write the volumes (areas) of elements, without regard to orientation."""
     inverse = np.empty((3, 3))
     x = np.empty((nodes.shape[1], points.shape[1]))
     for e in range(len(nodes)):
-        for a in range(nodes.shape[1]):
-            x[a] = points[nodes[e, a]]
+        _gather(points, nodes, e, x)
         out[e] = 0.0
         for q in range(len(weights)):
             out[e] += weights[q] * abs(_jacobian(x, gradients, q, inverse))
@@ -219,8 +228,7 @@ def add(elements, modulus, conditions, pattern, data, right):  # type: ignore[no
     g, m = np.empty(n * d), np.empty((n * d, n * d))
     block, half = np.empty((d, d)), np.empty((d, d))
     for e in range(len(nodes)):
-        for a in range(n):
-            x[a] = points[nodes[e, a]]
+        _gather(points, nodes, e, x)
         if not (modulus[e] < np.inf and _products(x, gradients, weights, inverse, g, m)):
             return e
         mu = modulus[e] / (2.0 * (1.0 + POISSON))
@@ -256,7 +264,9 @@ def add(elements, modulus, conditions, pattern, data, right):  # type: ignore[no
                         low = middle + 1
                     else:
                         high = middle
-                data[low] += block
+                for i in range(d):
+                    for j in range(d):
+                        data[low, i, j] += block[i, j]
     return -1
 
 
@@ -270,4 +280,6 @@ def _into(turn, block, half, left):  # type: ignore[no-untyped-def]
             for k in range(d):
                 total += turn[k, i] * block[k, j] if left else block[i, k] * turn[k, j]
             half[i, j] = total
-    block[:] = half
+    for i in range(d):
+        for j in range(d):
+            block[i, j] = half[i, j]

@@ -14,7 +14,7 @@ from slideviz.mesh.caching import njit
 from slideviz.mesh.crossing import Crossing, first_crossing, self_crossing, swept_crossing
 from slideviz.mesh.fans import components
 from slideviz.mesh.jacobians import cross3, dot3
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.threads import PART, in_parts
 from slideviz.mesh.topology import facet_vectors, unit
@@ -258,7 +258,7 @@ def _space(points: FloatArray, facets: IntArray, p: FloatArray) -> float:
     sums = np.zeros(-(-len(facets) // PART))
 
     def add(part: slice) -> None:
-        sums[part.start // PART] = _solid_angles(points, facets[part], p)
+        sums[part.start // PART] = _solid_angles(sealed(points), sealed(facets[part]), p)
 
     in_parts(add, len(facets))
     return float(sums.sum() / (4.0 * np.pi))

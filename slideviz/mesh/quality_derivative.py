@@ -30,7 +30,7 @@ from slideviz.mesh.jacobians import (
     prism_coefficients,
 )
 from slideviz.mesh.metrics import EXPONENTS
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, sealed
 from slideviz.mesh.threads import PART, cores, in_parts
 
 if TYPE_CHECKING:
@@ -186,7 +186,8 @@ def _add_slopes(
                 going_on()
                 here, of_these = ids[first : first + batch], nodes[first : first + batch]
                 slopes = _slopes(mesh, found, sums, vtk, here, of_these)
-                add = partial(add_to_points, of_these, weights[:, here], slopes)
+                part = np.ascontiguousarray(weights[:, here])
+                add = partial(add_to_points, sealed(of_these), part, slopes)
                 list(pool.map(add, range(lanes), [lanes] * lanes, [gradients] * lanes))
 
 

@@ -127,6 +127,13 @@ def _on_segment(x, a, b, out):  # type: ignore[no-untyped-def]
     return gap
 
 
+@njit(inline="always", **_OPTIONS)
+def _copy(point, out):  # type: ignore[no-untyped-def]
+    """Write a point to ``out``, number by number: whole rows take long to compile."""
+    for i in range(3):
+        out[i] = point[i]
+
+
 @njit(**_OPTIONS)
 def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
     """Write the closest point of a triangle to ``out``; returns the squared distance."""
@@ -152,7 +159,7 @@ def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
         gap = _on_segment(x, b, c, trial) if side == 0 else _on_segment(x, c, a, trial)
         if gap < best:
             best = gap
-            out[:] = trial
+            _copy(trial, out)
     return best
 
 
@@ -206,7 +213,8 @@ def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignor
         if len(guess):
             _load(guess[i], corners, shifts, t)
             best = held = _on_triangle(x[i], t[0], t[1], t[2], point, trial)
-            out[i], which[i] = point, guess[i]
+            _copy(point, out[i])
+            which[i] = guess[i]
             if best <= ON * (x[i, 0] ** 2 + x[i, 1] ** 2 + x[i, 2] ** 2):
                 continue
         while top > 0:
@@ -225,8 +233,8 @@ def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignor
                         else:
                             nearer = _before(point, out[i])
                     if nearer:
-                        held, out[i] = gap, point
-                        which[i] = order[j]
+                        held, which[i] = gap, order[j]
+                        _copy(point, out[i])
                     best = min(best, gap)
                 continue
             half = a + (b - a + 1) // 2

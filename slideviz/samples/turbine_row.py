@@ -156,7 +156,8 @@ def front_points(
     # Room for as many as fit when all are at the least distance, at two triangles to a point.
     most = int(triangles / (2 * NEAREST**2)) + len(fixed)
     starts = np.column_stack([apexes, angles])
-    return _fill(fixed, starts, (sizing.low, sizing.step, sizing.table), most, _TURNS)
+    given = sizing.low, sizing.step, sizing.table, float(np.median(sizing.table))
+    return _fill(fixed, starts, given, most, _TURNS)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -191,10 +192,9 @@ def _is_free(x, y, reach, points, buckets):  # type: ignore[no-untyped-def]
 @njit(nogil=True, cache=True, error_model="numpy")
 def _fill(fixed, starts, sizing, most, turns):  # type: ignore[no-untyped-def]
     """Return the accepted points (k, 2), in the order of acceptance."""
-    low, step, table = sizing
+    low, step, table, width = sizing
     n = len(fixed)
     points, angles = np.empty((n + most, 2)), np.empty(n + most)
-    width = np.median(table)
     nx, ny = int(table.shape[0] * step[0] / width) + 1, int(table.shape[1] * step[1] / width) + 1
     heads, following = np.full((nx, ny), -1), np.full(n + most, -1)
     buckets = (heads, following, low, width)

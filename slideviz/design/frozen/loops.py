@@ -44,7 +44,8 @@ def _rest(at, moved, start, before):  # type: ignore[no-untyped-def]
                 for j in range(at.shape[2]):
                     rests = rests and moved[k, i, j] == start[i, j]
                 if rests:
-                    at[k, i] = before[i]
+                    for j in range(at.shape[2]):
+                        at[k, i, j] = before[i, j]
 
 
 @njit(**_OPTIONS)
@@ -166,6 +167,7 @@ def take_over(
     lacking : (k, b, d)
     """
     with one_at_a_time(len(out) * means.nnz * out.shape[-1]):
+        lacking = np.ascontiguousarray(lacking)
         _taken(out, targets, means.indptr, means.indices, means.data, part, lacking)
 
 
