@@ -88,7 +88,7 @@ def weighted_means(
         result = np.empty_like(part[:3])
         with compiled.one_at_a_time(part.shape[1] * c.shape[1]):
             if basis.period > 0:
-                weigh_rotational(part, c, v, g, power, basis.half, result)
+                weigh_rotational(part, c, v, g, power, basis.period_over_pi, result)
             else:
                 weigh(part, c, v, g, power, result)
         out[:, start : start + size] = result
@@ -216,14 +216,14 @@ def weigh(x, c, w, g, power, out):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _squares(x, c, start, count, half, q):  # type: ignore[no-untyped-def]
+def _squares(x, c, start, count, period_over_pi, q):  # type: ignore[no-untyped-def]
     """Write the squares of Eq. 2.15 from one target x (4,) to ``count`` sources from ``start``."""
     c0, c1 = c[0, start : start + count], c[1, start : start + count]
     c2, c3 = c[2, start : start + count], c[3, start : start + count]
     r, sine, cosine, z = x[0], x[1], x[2], x[3]
     for j in range(count):
         dr, dz = r - c0[j], z - c3[j]
-        chord = 2.0 * r * c0[j] * one_minus_cos(half * (sine * c2[j] - cosine * c1[j]))
+        chord = 2.0 * r * c0[j] * one_minus_cos(period_over_pi * (sine * c2[j] - cosine * c1[j]))
         q[j] = max(dr * dr + chord + dz * dz, TINY)
 
 
@@ -242,11 +242,12 @@ def _weigh(q, count, power):  # type: ignore[no-untyped-def]
 
 
 @njit(parallel=True, **OPTIONS)
-def weigh_rotational(x, c, w, g, power, half, out):  # type: ignore[no-untyped-def]
+def weigh_rotational(x, c, w, g, power, period_over_pi, out):  # type: ignore[no-untyped-def]
     """Write the means as ``weigh`` does, for features (r, sin, cos, z) and Eq. 2.15's distance.
 
-    ``half`` is theta_p / pi. Sources are walked in blocks that stay in the first-level cache:
-    with the longer distance the choice of the power would keep one loop from being vectorised.
+    ``period_over_pi`` is theta_p / pi. Sources are walked in blocks that stay in the first-level
+    cache: with the longer distance the choice of the power would keep one loop from being
+    vectorised.
     """
     tasks = (x.shape[1] + TARGETS_PER_TASK - 1) // TARGETS_PER_TASK
     for task in prange(tasks):
@@ -256,7 +257,7 @@ def weigh_rotational(x, c, w, g, power, half, out):  # type: ignore[no-untyped-d
             s0, s1, s2, total = 0.0, 0.0, 0.0, 0.0
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
-                _squares(x[:, i], c, start, count, half, q)
+                _squares(x[:, i], c, start, count, period_over_pi, q)
                 _weigh(q, count, power)
                 for j in range(count):
                     p = g[start + j] * q[j]

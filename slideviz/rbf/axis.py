@@ -16,18 +16,18 @@ ON_AXIS = 1e-9
 """Nodes nearer to the axis than this part of the reference radius stay on it."""
 
 TILT = 0.02
-"""A surface whose normal has this component along the axis holds a node on both in place."""
+"""A surface whose unit normal has a larger component along the axis fixes its nodes on the axis."""
 
 
 def on_axis(frame: Frame, coords: FloatArray) -> np.ndarray:
-    """Tell which nodes (n,) are on the axis; none in a Cartesian frame."""
+    """Return a mask (n,) of the nodes on the axis; none in a Cartesian frame."""
     if not frame.cylindrical:
         return np.zeros(len(coords), bool)
     return coords[:, 0] <= ON_AXIS * frame.radius
 
 
 def corners(coords: FloatArray, facets: IntArray, axis: np.ndarray) -> FloatArray:
-    """Return the corners (f, k, d) of facets or segments (f, k), right also at the axis.
+    """Return the corners (f, k, d) of facets or segments (f, k), with angles for those on the axis.
 
     Parameters
     ----------
@@ -41,12 +41,18 @@ def corners(coords: FloatArray, facets: IntArray, axis: np.ndarray) -> FloatArra
     x = coords[facets]
     touching = axis[facets]
     for row in np.flatnonzero(touching.any(axis=1) & ~touching.all(axis=1)):
-        x[row] = _opened(x[row], touching[row], facets[row])
+        x[row] = _corners_at_axis(x[row], touching[row], facets[row])
     return x
 
 
-def _opened(x: FloatArray, touching: np.ndarray, nodes: IntArray) -> FloatArray:
-    """Return the corners (k, d) of one facet that touches the axis."""
+def _corners_at_axis(x: FloatArray, touching: np.ndarray, nodes: IntArray) -> FloatArray:
+    """Return the corners (k, d) of one facet; those on the axis get the angle of their neighbours.
+
+    Parameters
+    ----------
+    x, touching, nodes : (k, d), (k,) bool, (k,)
+        The facet's corners, which of them are on the axis, and its nodes.
+    """
     width = len(nodes)
     size = 3 if width == 4 and nodes[2] == nodes[3] else width
     x, touching = x[:size], touching[:size]
@@ -67,12 +73,19 @@ def _opened(x: FloatArray, touching: np.ndarray, nodes: IntArray) -> FloatArray:
 def hold_on_axis(
     nodes: IntArray, normals: FloatArray, axis: np.ndarray
 ) -> tuple[IntArray, FloatArray, IntArray]:
-    """Return constraints that let nodes on the axis move along it only, and nodes it holds.
+    """Return the constraints with those of nodes on the axis replaced, so that they move along it.
 
     Parameters
     ----------
     nodes, normals : (q,), (q, d)
         Constraints of sliding nodes, rows of one node together.
+
+    Returns
+    -------
+    nodes, normals : (p,), (p, d)
+        The constraints; those of nodes on the axis are the last rows.
+    fixed : (h,)
+        Nodes on the axis that cannot move along it either (`TILT`; in 2D all of them).
     """
     there = axis[nodes]
     if not there.any():

@@ -1,11 +1,10 @@
 """Classes of nodes: the constraints of each, from topology and roles (thesis 2.4 and 4).
 
-Every boundary node collects the normals of its fans. Their rank decides: 1, it slides on the
-surface (3D) or the curve (2D); 2, it slides along an edge (3D) or is fixed (2D); 3, it is fixed.
-A moving marker wins over a fixed one, and both over all others, at shared nodes.
+Every boundary node collects the normals of its fans. The rank of the normals decides: 1, the node
+slides on the surface (3D) or the curve (2D); 2, it slides along an edge (3D) or is fixed (2D);
+3, it is fixed. A moving marker wins over a fixed one, and both over all others, at shared nodes.
 
-Periodic images are one node: it has the fans of all of them, is classified once, and what it may
-do holds for each.
+Periodic images are classified as one node, with the fans of all of them.
 """
 
 from __future__ import annotations
@@ -23,7 +22,9 @@ from slideviz.rbf.slide_rows import FansAround, nodes_with, slide_rows
 MERGE_FRACTION = 0.25
 """Boundaries that meet at a smaller angle than this part of the feature angle are one surface
 for a node between them (a circular far field in two markers); the full feature angle would
-round off true corners of the domain."""
+round off true corners of the domain. Which boundaries are one surface is also decided in
+`slideviz.mesh.fans.smooth_joints`, `slideviz.rbf.slide_rows` and ``projection._surface_labels``:
+change them together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +38,15 @@ class Classes:
     edge, surface : (c,), (e,) int64
         Nodes that slide along a curve (in 2D all sliding nodes), and on a surface.
     cluster_node : (q,) int64
-        The node of each independent normal of a sliding node, sorted.
+        The node of each cluster, sorted. A cluster is the fans of a sliding node that share a
+        normal; a node has as many clusters as different normals.
     row_fan, row_cluster : (p,) int64
-        The fans whose normals add up to each cluster's.
+        Pairs of a fan and the cluster that it belongs to.
     stands : (n,) int64
-        For each node of the mesh the one of its periodic images that stands for all of them.
+        For each node of the mesh, the number of the periodic image that represents it (itself,
+        if it has none).
     beyond : int
-        Number of nodes that lie beyond its sides (in a halo), and are counted nowhere.
+        Number of nodes beyond the periodic sides (in a halo), which `counts` leaves out.
     """
 
     moving: IntArray
@@ -67,7 +70,7 @@ class Classes:
         return np.sort(np.concatenate([self.edge, self.surface]))
 
     def counts(self) -> dict[str, int]:
-        """Return the number of nodes of each kind, under the report's names."""
+        """Return the number of nodes of each class, by its name in the report."""
         known = {
             "moving": len(self.moving),
             "fixed": len(self.fixed),
@@ -100,10 +103,10 @@ def classify(
     fan_role : (m,)
         ``moving``, ``fixed``, ``sliding``, ``periodic`` or ``internal``.
     normals : (m, d)
-        Unit normals of the undeformed fans, with true angles between those of one node and its
-        images (``Frame.turned_back``).
+        Unit normals of the undeformed fans, turned about the axis so that those of a node and of
+        its images can be compared (``Frame.turned_back``).
     stands : (n,)
-        For each node the one of its periodic images that stands for all of them.
+        For each node, the number of the periodic image that represents it.
     sliding
         ``none``, ``ps`` or ``ds``.
     periodic
@@ -130,7 +133,10 @@ def classify(
 
 
 def _effects(fan_role: np.ndarray, at: IntArray, sliding: str, periodic: str) -> np.ndarray:
-    """Return what each fan does to its node: moving, fixed, slide or free."""
+    """Return the effect of each fan on its node, (m,): ``moving``, ``fixed``, ``slide``, ``free``.
+
+    ``at`` (m,) is the node of each fan, with images as their representative.
+    """
     effect = fan_role.copy()
     slide = "fixed" if sliding == "none" else "slide"
     effect[fan_role == "sliding"] = slide
@@ -151,7 +157,17 @@ def _collect(
     stands: IntArray,
     dim: int,
 ) -> Classes:
-    """Return the classes, with clusters numbered over all sliding nodes, images included."""
+    """Return the classes, with clusters numbered over all sliding nodes, images included.
+
+    Parameters
+    ----------
+    moving, fixed : (n,) bool
+    rows : (p, 2)
+        What `slide_rows` returns: fan, and cluster within its node.
+    at : (m,)
+        The node of each fan, with images as their representative.
+    stands : (n,)
+    """
     order = np.argsort(at[rows[:, 0]], kind="stable")
     rows = rows[order]
     # Every image has the rows of the node that stands for it.
@@ -186,9 +202,9 @@ def _collect(
 def directions(classes: Classes, normals: FloatArray) -> tuple[IntArray, FloatArray]:
     """Return the constraints of the sliding nodes: nodes (q,) and unit directions (q, d).
 
-    The directions of one node are orthonormal and span the clusters' normals. Periodic images
-    have the same ones, of the fans of all of them, because surfaces go on beyond the periodic
-    boundary.
+    The directions of one node are orthonormal and span the normals of its clusters. Periodic
+    images have the same directions, from the fans of all of them, because surfaces continue beyond
+    the periodic boundary.
 
     Parameters
     ----------

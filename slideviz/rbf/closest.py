@@ -1,8 +1,8 @@
 """Closest points on triangles and segments, by a tree of bounding boxes.
 
-Boundary layers make facets a thousand times longer than wide, so the nearest centres say little
-about the nearest facets; boxes do not mind. Segments are triangles with their last corner
-repeated, and two dimensions are three with z = 0.
+Boundary layers make facets a thousand times longer than wide, so the facet with the nearest centre
+is often not the nearest facet; a tree of boxes finds it in any case. Segments are triangles with
+their last corner repeated, and two dimensions are three with z = 0.
 """
 
 from __future__ import annotations
@@ -15,18 +15,20 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.compiled import one_at_a_time
 
 LEAF = 4
+"""Triangles in a leaf of the tree, at most."""
 TIE = 1e-12
-"""Squares of distances that differ by less than this part are equal but for rounding."""
+"""Squared distances with a smaller relative difference are equal but for rounding."""
 ON = 1e-30
-"""Square of a distance, in parts of that from the origin, of a point on its guessed triangle."""
+"""A point is on its guessed triangle when its squared distance from it is at most this part of its
+squared distance from the origin."""
 _OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy"}
 
 
 @njit(**_OPTIONS)
 def _part(keys, items, start, half, stop):  # type: ignore[no-untyped-def]
-    """Order keys and items from ``start`` to ``stop`` until the lowest are before ``half``.
+    """Reorder keys and items ``start`` to ``stop``, so that the lowest keys are before ``half``.
 
-    Quickselect (C. A. R. Hoare, Algorithm 65: Find, 1961): of a sort no more than is needed.
+    Quickselect (C. A. R. Hoare, Algorithm 65: Find, 1961): a sort that stops as soon as that holds.
     """
     left, right = start, stop - 1
     while left < right:
@@ -50,18 +52,20 @@ def _part(keys, items, start, half, stop):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _image(item, count):  # type: ignore[no-untyped-def]
-    """Return which image of one of ``count`` triangles an item is; faster than to divide."""
+    """Return ``item // count``: 0 for a triangle, 1 or 2 for an image; faster than dividing."""
     return 0 if item < count else 1 if item < 2 * count else 2
 
 
 @njit(**_OPTIONS)
 def _build(corners, shifts, order, bounds):  # type: ignore[no-untyped-def]
-    """Part ``order`` (q,) into the leaves of a balanced tree and fill ``bounds`` (m, 6).
+    """Build a balanced tree of boxes: reorder ``order`` (q,) and fill ``bounds`` (m, 6).
 
-    Item k is the image k // n of the triangle k % n, moved by ``shifts`` (3, 3).
+    Item k, an entry of ``order``, is the triangle k % n of ``corners`` (n, 3, 3), moved by the row
+    k // n of ``shifts`` (3, 3). A row of ``bounds`` is the lowest and the highest corner of a
+    node's box.
 
-    Node k has the children 2 k + 1 and 2 k + 2; the range of a node follows from halving its
-    parent's, so no ranges are stored.
+    Node k has the children 2 k + 1 and 2 k + 2. Its items are a range of ``order``: half of its
+    parent's range, so no ranges are stored.
     """
     nodes = bounds.shape[0]
     starts = np.zeros(nodes, np.int64)
@@ -103,7 +107,7 @@ def _build(corners, shifts, order, bounds):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _box_gap(bounds, k, x):  # type: ignore[no-untyped-def]
-    """Return the squared distance from x to box k."""
+    """Return the squared distance from x (3,) to box k; 0 inside."""
     total = 0.0
     for axis in range(3):
         gap = max(bounds[k, axis] - x[axis], x[axis] - bounds[k, 3 + axis], 0.0)
@@ -113,7 +117,7 @@ def _box_gap(bounds, k, x):  # type: ignore[no-untyped-def]
 
 @njit(**_OPTIONS)
 def _on_segment(x, a, b, out):  # type: ignore[no-untyped-def]
-    """Write the closest point of a segment to ``out``; returns the squared distance."""
+    """Write the point of segment a, b closest to x to ``out``; return the squared distance."""
     length = 0.0
     along = 0.0
     for i in range(3):
@@ -136,7 +140,10 @@ def _copy(point, out):  # type: ignore[no-untyped-def]
 
 @njit(**_OPTIONS)
 def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
-    """Write the closest point of a triangle to ``out``; returns the squared distance."""
+    """Write the point of triangle a, b, c closest to x to ``out``; return the squared distance.
+
+    ``trial`` (3,) is scratch.
+    """
     uu, uv, vv, wu, wv = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         u, v, w = b[i] - a[i], c[i] - a[i], x[i] - a[i]
@@ -165,16 +172,16 @@ def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _before(a, b):  # type: ignore[no-untyped-def]
-    """Tell whether point a comes before b along a direction of no symmetry."""
+    """Tell whether point a comes before b along a direction that no symmetry of a mesh has."""
     return (a[0] - b[0]) + 0.6180339887 * (a[1] - b[1]) + 0.4142135624 * (a[2] - b[2]) < 0.0
 
 
 @njit(inline="always", **_OPTIONS)
 def _is_beside(a, b, gap):  # type: ignore[no-untyped-def]
-    """Tell whether points a and b, that are equally near at a squared distance, are one place.
+    """Tell whether a and b, both at squared distance ``gap`` from a node, are one place.
 
-    Where facets meet, the end of one ties with a point of the next that is 1e-6 of the distance
-    away: there the nearer one is right, however little it is nearer.
+    Where facets meet, the end of one facet ties with a point of the next facet that is 1e-6 of the
+    distance away: there the nearer point is taken, however little it is nearer.
     """
     apart = (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
     return apart <= 4.0 * TIE * gap
@@ -182,7 +189,7 @@ def _is_beside(a, b, gap):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _load(item, corners, shifts, out):  # type: ignore[no-untyped-def]
-    """Write the corners of an item to ``out`` (3, 3)."""
+    """Write the corners of an item, numbered as for ``_build``, to ``out`` (3, 3)."""
     image = _image(item, len(corners))
     one = item - image * len(corners)
     for corner in range(3):
@@ -194,12 +201,12 @@ def _load(item, corners, shifts, out):  # type: ignore[no-untyped-def]
 
 @njit(parallel=True, **_OPTIONS)
 def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignore[no-untyped-def]
-    """Write the closest points of all triangles (n, 3, 3) to x (m, 3) into out (m, 3).
+    """Write the points of the triangles ``corners`` (n, 3, 3) closest to x (m, 3) into out (m, 3).
 
-    And into ``which`` (m,) the items that they are on, numbered as for ``_build``. They are looked
-    for from the items ``guess`` (m,) on, where there are any.
+    Into ``which`` (m,) goes the item that each is on, numbered as for ``_build``. The search for
+    each begins with its item in ``guess``, (m,) or empty.
 
-    Of several equally near ones the position decides, not the order of the triangles.
+    Of several equally near points the position decides, not the order of the triangles.
     """
     nodes = bounds.shape[0]
     inner = nodes // 2
@@ -250,12 +257,12 @@ def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignor
 
 
 class ClosestPoints:
-    """A tree over simplices, and their images one period before and after, for closest points.
+    """Finds the closest points on simplices and on their images one period before and after.
 
     Attributes
     ----------
     corners : (n, c, d) float64
-        The simplices, without their images: these are found when they are needed, for the memory.
+        The simplices. Their images are not stored, to save memory.
     """
 
     def __init__(self, corners: FloatArray, shift: FloatArray | None = None) -> None:
@@ -285,7 +292,7 @@ class ClosestPoints:
         _build(self._corners, self._shifts, self._order, self._bounds)
 
     def simplices(self, which: IntArray) -> FloatArray:
-        """Return the simplices (k, c, d) of numbers as `nearest` gives them, images too."""
+        """Return the corners (k, c, d) of simplices (k,), numbered as `nearest` returns them."""
         image, one = np.divmod(which, len(self.corners))
         moved = self.corners[one]
         there = image > 0
@@ -297,15 +304,15 @@ class ClosestPoints:
         return self.nearest(x)[0]
 
     def nearest(self, x: FloatArray, guess: IntArray | None = None) -> tuple[FloatArray, IntArray]:
-        """Return the closest point for each x, (m, d), and the simplex that it is on, (m,).
+        """Return the closest point for each x (m, d), (m, d), and the number of its simplex, (m,).
 
-        For its corners see `simplices`.
+        Numbers from n on are images; `simplices` returns the corners.
 
         Parameters
         ----------
         guess : (m,), optional
-            Simplices that are probably the closest, for speed. One that a point is on is taken,
-            also where it is on others too.
+            Numbers of simplices that are probably the closest, for speed. Where x is on its
+            guessed simplex, that one is taken, even if x is on others too.
         """
         begin = np.empty(0, np.int64) if guess is None else guess
         dim = x.shape[1]

@@ -23,6 +23,7 @@ from slideviz.mesh.caching import njit
 from slideviz.rbf.kernels import SHAPE
 
 LOCK = threading.Lock()
+"""Held by `one_at_a_time` while a compiled loop runs."""
 
 SMALL = 2_000_000
 """Pairs below which waking other threads costs more than it saves."""
@@ -30,7 +31,7 @@ SMALL = 2_000_000
 
 @contextmanager
 def one_at_a_time(pairs: int) -> Iterator[None]:
-    """Hold the lock, and keep small work on one thread."""
+    """Context that holds ``LOCK``, with one thread for work of fewer than ``SMALL`` pairs."""
     with LOCK:
         threads = get_num_threads()
         if pairs < SMALL:
@@ -56,7 +57,7 @@ _K0, _K1, _K2, _K3, _K4, _K5, _K6, _K7, _K8 = _K
 
 @njit(inline="always", **OPTIONS)
 def _wendland_c2(squared, scale):  # type: ignore[no-untyped-def]
-    """Return (1 - q)^4 (4 q + 1) with q = distance * scale, and 0 from q = 1 on."""
+    """Return (1 - q)^4 (4 q + 1) with q = sqrt(squared) * scale, and 0 from q = 1 on."""
     q = np.sqrt(squared) * scale
     u = max(1.0 - q, 0.0)
     u = u * u
@@ -74,7 +75,10 @@ def one_minus_cos(g):  # type: ignore[no-untyped-def]
 
 @njit(parallel=True, **OPTIONS)
 def sum_three(x, c, w, scale, out):  # type: ignore[no-untyped-def]
-    """Write s at targets x (3, N) from controls c (3, n), weights w (3, n), to out (3, N)."""
+    """Write s at targets x (3, N) to out (3, N), for Wendland C2 and three Euclidean features.
+
+    From controls c (3, n) and weights w (3, n); ``scale`` is 1 / R, here and below.
+    """
     c0, c1, c2 = c[0], c[1], c[2]
     w0, w1, w2 = w[0], w[1], w[2]
     for i in prange(x.shape[1]):
@@ -107,8 +111,11 @@ def sum_four(x, c, w, scale, out):  # type: ignore[no-untyped-def]
 
 
 @njit(parallel=True, **OPTIONS)
-def sum_rotational(x, c, w, half, scale, out):  # type: ignore[no-untyped-def]
-    """Write s for rotational features (r, sin, cos, z); ``half`` is theta_p / pi (Eq. 2.15)."""
+def sum_rotational(x, c, w, period_over_pi, scale, out):  # type: ignore[no-untyped-def]
+    """Write s as ``sum_three`` does, for rotational features (r, sin, cos, z).
+
+    ``period_over_pi`` is theta_p / pi. The distance is that of ``distances``.
+    """
     c0, c1, c2, c3 = c[0], c[1], c[2], c[3]
     w0, w1, w2 = w[0], w[1], w[2]
     for i in prange(x.shape[1]):
@@ -116,7 +123,9 @@ def sum_rotational(x, c, w, half, scale, out):  # type: ignore[no-untyped-def]
         s0, s1, s2 = 0.0, 0.0, 0.0
         for j in range(c.shape[1]):
             dr, dz = r - c0[j], z - c3[j]
-            chord = 2.0 * r * c0[j] * one_minus_cos(half * (sine * c2[j] - cosine * c1[j]))
+            chord = (
+                2.0 * r * c0[j] * one_minus_cos(period_over_pi * (sine * c2[j] - cosine * c1[j]))
+            )
             p = _wendland_c2(dr * dr + chord + dz * dz, scale)
             s0 += w0[j] * p
             s1 += w1[j] * p
@@ -126,12 +135,16 @@ def sum_rotational(x, c, w, half, scale, out):  # type: ignore[no-untyped-def]
 
 A2 = SHAPE * SHAPE
 BLOCK = 256
+"""Control nodes in a block of ``sum_any``, whose distances stay in the first-level cache."""
 TARGETS_PER_TASK = 64
 
 
 @njit(**OPTIONS)
 def _apply(kind, q, count):  # type: ignore[no-untyped-def]
-    """Replace xi by phi(xi) in the first ``count`` entries of q, for any kernel but the first."""
+    """Replace xi by phi(xi) in the first ``count`` entries of q.
+
+    ``kind`` is the kernel's code; that of Wendland C2, 0, is in none of the branches.
+    """
     if kind == 1:
         for j in range(count):
             u = max(1.0 - q[j], 0.0)
@@ -179,15 +192,21 @@ def _apply(kind, q, count):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def distances(x, c, start, count, half, scale, q):  # type: ignore[no-untyped-def]
-    """Write xi of one target x (4,) to ``count`` controls from ``start`` on."""
+def distances(x, c, start, count, period_over_pi, scale, q):  # type: ignore[no-untyped-def]
+    """Write xi, distance over R, from one target x (4,) to ``count`` controls from ``start`` on.
+
+    With a rotational period the square of the distance is (r - r')^2 + (z - z')^2 +
+    2 r r' (1 - cos g), g = theta_p / pi sin(pi (theta - theta') / theta_p) (Eq. 2.15), the sine by
+    the addition theorem. The same formula is in ``sum_rotational``, ``twofold._distances``,
+    ``slopes`` and ``idw._squares``.
+    """
     c0, c1 = c[0, start : start + count], c[1, start : start + count]
     c2, c3 = c[2, start : start + count], c[3, start : start + count]
     x0, x1, x2, x3 = x[0], x[1], x[2], x[3]
-    if half > 0.0:
+    if period_over_pi > 0.0:
         for j in range(count):
             d0, d3 = x0 - c0[j], x3 - c3[j]
-            chord = 2.0 * x0 * c0[j] * one_minus_cos(half * (x1 * c2[j] - x2 * c1[j]))
+            chord = 2.0 * x0 * c0[j] * one_minus_cos(period_over_pi * (x1 * c2[j] - x2 * c1[j]))
             q[j] = np.sqrt(d0 * d0 + chord + d3 * d3) * scale
     else:
         for j in range(count):
@@ -196,8 +215,8 @@ def distances(x, c, start, count, half, scale, q):  # type: ignore[no-untyped-de
 
 
 @njit(parallel=True, **OPTIONS)
-def sum_any(x, c, w, half, scale, kind, out):  # type: ignore[no-untyped-def]
-    """Write s for any kernel and four features.
+def sum_any(x, c, w, period_over_pi, scale, kind, out):  # type: ignore[no-untyped-def]
+    """Write s at targets x (4, N) to out (3, N), for any kernel and four features.
 
     Control nodes are walked in blocks that stay in the first-level cache: distances go to a
     small buffer, the function is applied to the buffer, and it is summed up. So the choice of
@@ -211,7 +230,7 @@ def sum_any(x, c, w, half, scale, kind, out):  # type: ignore[no-untyped-def]
             s0, s1, s2 = 0.0, 0.0, 0.0
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
-                distances(x[:, i], c, start, count, half, scale, q)
+                distances(x[:, i], c, start, count, period_over_pi, scale, q)
                 _apply(kind, q, count)
                 for j in range(count):
                     s0 += w[0, start + j] * q[j]
@@ -221,17 +240,17 @@ def sum_any(x, c, w, half, scale, kind, out):  # type: ignore[no-untyped-def]
 
 
 @njit(parallel=True, **OPTIONS)
-def fill_matrix(x, c, across, along, half, scale, kind, out):  # type: ignore[no-untyped-def]
+def fill_matrix(x, c, across, along, period_over_pi, scale, kind, out):  # type: ignore[no-untyped-def]
     """Write G_ab = phi(|x_a - c_b|) (m_a . n_b) to out (N, n).
 
     ``x`` (4, N) and ``c`` (4, n) have the features of each constraint's node, ``across`` (d, N)
-    and ``along`` (d, n) its unit direction; d = 0 leaves the dot product out. ``half`` is 0 for
-    Euclidean features.
+    and ``along`` (d, n) its unit direction; d = 0 leaves the dot product out. ``kind`` is the
+    kernel's code; ``period_over_pi`` is 0 for Euclidean features.
     """
     d, n = across.shape[0], c.shape[1]
     for a in prange(x.shape[1]):
         row = out[a]
-        distances(x[:, a], c, 0, n, half, scale, row)
+        distances(x[:, a], c, 0, n, period_over_pi, scale, row)
         if kind == 0:
             for b in range(n):
                 u = max(1.0 - row[b], 0.0)

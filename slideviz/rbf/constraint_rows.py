@@ -13,13 +13,15 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.problem import Problem
 
 AGREE = 1e-7
-"""Largest difference of the data of coinciding nodes, as a fraction of the support radius."""
+"""Displacements of coinciding nodes agree when they differ by at most this part of the support
+radius."""
 
 INDEPENDENT = 1e-6
-"""Length of what remains of a unit direction, from which it counts as a further one."""
+"""A unit direction is independent of others when what remains of it, orthogonal to them, is
+longer."""
 
 ALIGNED = 1e-10
-"""Components of unit directions below this are rounding: far above that of normals of flat
+"""Components of unit directions below this are rounding: far above the rounding of normals of flat
 boundaries, far below any angle that a mesh could mean."""
 
 
@@ -42,7 +44,7 @@ class ConstraintRows:
     right: FloatArray
 
     def followed_by(self, more: ConstraintRows) -> ConstraintRows:
-        """Return these rows and then others, both without normals."""
+        """Return these rows followed by ``more``; neither may have normals."""
         nodes = np.concatenate([self.nodes, more.nodes])
         return ConstraintRows(nodes, None, np.concatenate([self.right, more.right]))
 
@@ -55,13 +57,19 @@ class ConstraintRows:
 
 
 def full_rows(problem: Problem, nodes: IntArray, values: FloatArray) -> ConstraintRows:
-    """Return the rows of nodes with known displacement, coinciding ones merged."""
+    """Return the rows of nodes (m,) with displacements ``values`` (m, d), coinciding nodes merged.
+
+    What the interpolants of earlier steps lack there is added to ``values``.
+    """
     merged, data = merge(problem, nodes, values + problem.behind(nodes))
     return ConstraintRows(merged, None, data)
 
 
 def sliding_rows(problem: Problem) -> ConstraintRows:
-    """Return the rows of direct sliding: all axes of known nodes, normals of sliding ones."""
+    """Return the rows of direct sliding: all axes of known nodes, normals of sliding nodes.
+
+    Those of coinciding nodes are merged. Raises DeformError where they contradict each other.
+    """
     d = problem.values.shape[1]
     nodes = np.concatenate([np.repeat(problem.known, d), problem.normal_nodes])
     normals = np.concatenate([np.tile(np.eye(d), (len(problem.known), 1)), problem.normals])
@@ -82,7 +90,7 @@ def sliding_rows(problem: Problem) -> ConstraintRows:
 
 
 def blocks(rows: ConstraintRows) -> IntArray:
-    """Return the block of each row, (r,): rows of different blocks are perpendicular.
+    """Return the block of each row, (r,); directions of different blocks are perpendicular.
 
     G_ab = phi_ab (n_a . n_b) is zero between them. Known nodes have a row for each axis of the
     frame, and where the sliding boundaries lie along axes too (the walls of a box; hub, inflow
@@ -105,7 +113,9 @@ def _orthonormalise(
     rows: IntArray,
     keep: np.ndarray,
 ) -> None:
-    """Orthonormalise the constraints of coinciding nodes in place, and mark those to leave out.
+    """Orthonormalise the constraints of coinciding nodes in place; mark dependent ones in ``keep``.
+
+    Raises DeformError where the right-hand sides of dependent constraints contradict each other.
 
     Parameters
     ----------
@@ -114,6 +124,7 @@ def _orthonormalise(
     rows : (g, k)
         The k rows of each group of coinciding nodes.
     keep : (r,) bool
+        Set to False where a constraint follows from others of its group.
     """
     for k, row in enumerate(rows.T):
         n, b = normals[row], right[row]
@@ -132,7 +143,12 @@ def _orthonormalise(
 
 
 def merge(problem: Problem, nodes: IntArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return nodes (m,) and values (m, d), those of coinciding nodes as their mean.
+    """Return one node (c,) for each group of coinciding nodes (m,), and the mean of its values.
+
+    Parameters
+    ----------
+    nodes, values : (m,), (m, d)
+        Nodes, and their displacements in the frame.
 
     Raises
     ------
@@ -154,14 +170,14 @@ def merge(problem: Problem, nodes: IntArray, values: FloatArray) -> tuple[IntArr
 
 
 def disagree(problem: Problem, nodes: IntArray, row: int, gap: float) -> NoReturn:
-    """Raise the error for two coinciding nodes that are asked to move differently."""
+    """Raise DeformError for node ``nodes[row]`` and one that coincides with it, ``gap`` apart."""
     node = int(nodes[row])
     group = nodes[problem.same_as[nodes] == problem.same_as[node]]
     refuse(node, next((int(n) for n in group if n != node), node), gap)
 
 
 def refuse(node: int, other: int, gap: float) -> NoReturn:
-    """Raise the error for two nodes that coincide but are asked to move differently."""
+    """Raise DeformError for two coinciding nodes whose displacements differ by ``gap``."""
     raise NodeError(
         "nodes {} and {} coincide (in the same place, or one period apart) but are "
         f"asked to move differently, by {gap:.3g}; a moving boundary must move alike at both "

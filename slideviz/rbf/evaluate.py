@@ -15,15 +15,16 @@ CHUNK = 25_000_000
 """Pairs between two calls of ``tick``: some tens of milliseconds."""
 
 Tick = Callable[[float], None]
+"""A progress callback: takes the fraction done, and may raise to stop the work."""
 
 
 def no_tick(fraction: float) -> None:
-    """Do nothing: the progress callback of those who want none."""
+    """Do nothing: a progress callback that reports nothing."""
 
 
 @dataclass(frozen=True)
 class Basis:
-    """The radial function with its support and its distance rule.
+    """A radial function: kernel, support radius and rule of distance.
 
     Attributes
     ----------
@@ -40,7 +41,7 @@ class Basis:
     kernel: str = "wendland-c2"
 
     @property
-    def half(self) -> float:
+    def period_over_pi(self) -> float:
         """Return theta_p / pi, the factor of the inner sine; 0 for Euclidean features."""
         return self.period / np.pi
 
@@ -76,9 +77,9 @@ def evaluate(
         result = np.empty_like(part[:3])
         with compiled.one_at_a_time(part.shape[1] * c.shape[1]):
             if kind:
-                compiled.sum_any(part, c, w, basis.half, scale, kind, result)
+                compiled.sum_any(part, c, w, basis.period_over_pi, scale, kind, result)
             elif rotational:
-                compiled.sum_rotational(part, c, w, basis.half, scale, result)
+                compiled.sum_rotational(part, c, w, basis.period_over_pi, scale, result)
             elif rows == 4:
                 compiled.sum_four(part, c, w, scale, result)
             else:
@@ -117,7 +118,7 @@ def matrix(
                 c,
                 np.ascontiguousarray(across[:, part]),
                 along,
-                basis.half,
+                basis.period_over_pi,
                 1.0 / basis.radius,
                 KERNELS[basis.kernel].code,
                 out[part],
@@ -134,10 +135,10 @@ def _directions(features: FloatArray, directions: FloatArray | None) -> FloatArr
 
 
 def padded_rows(values: FloatArray, rows: int) -> FloatArray:
-    """Return the array (k, n) with zero rows added up to ``rows``, contiguous.
+    """Return ``values`` (k, n) as a contiguous, writeable array (rows, n), with zero rows added.
 
-    One that is so already is not copied: the loops only read. They are compiled for arrays that
-    can be written.
+    ``values`` itself, where it is one already: the compiled loops only read it, but they are
+    compiled for writeable arrays.
     """
     flags = values.flags
     if values.shape[0] == rows and flags.c_contiguous and flags.writeable and values.dtype == float:

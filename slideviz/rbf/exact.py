@@ -16,18 +16,19 @@ from slideviz.rbf.solve import NOTHING, Factor, condition, enough_threads, exten
 from slideviz.rbf.twofold import usable
 
 BETTER = 0.1
-"""A refined solution counts where it is so much less wrong than the first."""
+"""A refined solution is taken where its error is below this part of the first solution's."""
 
 
 class ExactFit:
-    """Solves ``G w = b`` with G_ab = phi_ab (n_a . n_b) whenever rows are added.
+    """The interpolant that meets all rows: solves ``G w = b``, G_ab = phi_ab (n_a . n_b).
 
-    Rows are sorted by position, so that the pivot guard leaves out the same ones however nodes
-    are numbered. The systems of pseudo sliding are leading blocks of each other: one factor grows.
+    Rows are sorted by position, so that the pivot guard leaves out the same rows however nodes
+    are numbered. Each system of pseudo sliding is the leading block of the next: one factor grows.
 
     Attributes
     ----------
     found : Interpolant
+        Of all rows added so far.
     dropped : (m,) int64
         Nodes of which the pivot guard left out a constraint.
     short : str
@@ -52,7 +53,7 @@ class ExactFit:
         self.doubt = self.refined = 0.0
 
     def add(self, rows: ConstraintRows) -> None:
-        """Solve with these rows and all before them."""
+        """Add rows, solve with all rows added so far, and set ``found``."""
         rows, done = rows.by_position(self._problem.coords), 0
         if self._rows is not None:
             done, rows = len(self._rows.nodes), self._rows.followed_by(rows)
@@ -75,9 +76,10 @@ class ExactFit:
     def _solve(
         self, rows: ConstraintRows, part: IntArray, done: int, weights: FloatArray, tick: Tick
     ) -> IntArray:
-        """Write the weights of one block of rows, of which those below ``done`` are factorised.
+        """Write the weights of the rows ``part``, one block, to ``weights`` (r, m).
 
-        Returns the rows that are not met because the pivot guard left them out.
+        Rows below ``done`` are in the block's factor already. Returns the rows that the solution
+        does not meet because the pivot guard left them out.
         """
         problem, new, right = self._problem, part[part >= done], rows.right[part]
 
@@ -99,9 +101,17 @@ class ExactFit:
     def _checked(
         self, system: System, right: FloatArray, found: FloatArray, largest: float, tick: Tick
     ) -> tuple[FloatArray, bool]:
-        """Return weights that can be trusted, as far as there are any, and whether they are others.
+        """Return ``found``, or refined weights where they are much better, and whether refined.
 
-        Others meet all rows, those too that the pivot guard left out.
+        Refined weights meet all rows, also those that the pivot guard left out. Sets ``doubt`` and
+        ``refined``.
+
+        Parameters
+        ----------
+        right, found : (n, m)
+            Right-hand sides, and the weights that the factor gives.
+        largest
+            Largest component of the data of all blocks, by which errors are judged.
         """
         trials = [(right, found, largest)]
         if self._problem.lasting:
@@ -124,7 +134,7 @@ class ExactFit:
         return found, False
 
     def condition(self) -> float:
-        """Return an estimate of the condition number of the last system."""
+        """Return an estimate of the condition number of the last system; 1.0 before any."""
         if self._factors:
             factors = [factor.lower for factor in self._factors.values()]
             with enough_threads(20.0 * max(len(lower) for lower in factors) ** 2):
@@ -138,15 +148,15 @@ class ExactFit:
 
 
 def parts(rows: ConstraintRows) -> list[IntArray]:
-    """Return the rows of each block of the system."""
+    """Return the indices (p,) of the rows of each block of the system."""
     block = blocks(rows)
     return [np.flatnonzero(block == k) for k in np.unique(block)]
 
 
 def row_names(rows: ConstraintRows) -> IntArray:
-    """Return what tells rows apart however they are ordered, (r, 2): node, and which of its rows.
+    """Return a name for each row, (r, 2), that no reordering of nodes changes.
 
-    Rows of one node are neighbours.
+    The row's node, and its place among the rows of that node, from 0.
     """
     place = np.arange(len(rows.nodes))
     starts = np.r_[True, rows.nodes[1:] != rows.nodes[:-1]][: len(place)]
@@ -157,7 +167,10 @@ def row_names(rows: ConstraintRows) -> IntArray:
 def gathered(
     rows: ConstraintRows, weights: FloatArray, tail: FloatArray | None = None
 ) -> Interpolant:
-    """Return the interpolant of one weight for each row, (r, m)."""
+    """Return the interpolant with a weight for each row, (r, m), summed up for each node.
+
+    ``tail`` (q, d) are the coefficients of the polynomial's terms.
+    """
     if rows.normals is None:
         return Interpolant(rows.nodes, weights, tail)
     nodes, first, group = np.unique(rows.nodes, return_index=True, return_inverse=True)
@@ -168,7 +181,7 @@ def gathered(
 
 
 def row_terms(problem: Problem, rows: ConstraintRows) -> FloatArray:
-    """Return the polynomial's terms in each row, (r, q), or (r, q d) with normals."""
+    """Return the values of the polynomial's terms in each row, (r, q), or (r, q d) with normals."""
     terms = linear_terms(problem.basis, problem.features[:, rows.nodes])
     if rows.normals is None:
         return terms
@@ -184,7 +197,10 @@ def saddle_fit(problem: Problem, rows: ConstraintRows) -> tuple[Interpolant, boo
 
 
 def saddle_doubt(problem: Problem, rows: ConstraintRows, found: Interpolant) -> float:
-    """Return by how much the field of a solved system with polynomial is wrong (`refine`)."""
+    """Return the error of the field of a system with polynomial between control nodes (`refine`).
+
+    As a part of the largest displacement; 0 where it is below `TRUSTED`.
+    """
     largest = float(np.abs(rows.right).max(initial=0.0))
     met = found.at(problem, rows.nodes)
     if rows.normals is not None:

@@ -1,8 +1,8 @@
-"""The continuation of the boundary on which nodes slide, beyond the rim of what moves along it.
+"""The continuation of a sliding boundary beyond the rim of a moving boundary that stands on it.
 
-A blade that moves along its hub leaves the place where it stood, and nodes of the hub follow into
-it; but the hub has no facets there. So at the rim of a moving boundary a surface is extended
-flat, in the plane of its last facet, as far as the boundary moves.
+A blade that moves along its hub leaves the place where it stood, and nodes of the hub slide into
+that place; but the hub has no facets there. So at the rim of a moving boundary a sliding surface
+is extended flat, in the plane of its last facet, as far as the moving boundary moves.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import Boundary, unit
 
 Place = Callable[[IntArray], FloatArray]
-"""Returns the corners of facets, segments or single nodes (m, k) in the undeformed frame."""
+"""Returns the corners (m, k, d) of facets or segments (m, k), undeformed and in the frame."""
 
 
 def surface_extension(
     boundary: Boundary, member: np.ndarray, moving: np.ndarray, place: Place, reach: float
 ) -> FloatArray:
-    """Return simplices (s, c, d) beyond the moving rim of a surface (3D) or curve (2D).
+    """Return simplices (s, d, d) that continue a surface (3D) or curve (2D) beyond its moving rim.
 
     Parameters
     ----------
     member : (f,) bool
-        Facets of the surface.
+        Facets of the surface (3D) or curve (2D).
     moving : (n,) bool
         Nodes of the moving boundaries.
     reach : float
-        How far the extension goes.
+        Length of the extension, in the mesh's length unit.
     """
     one, two = boundary.joints.T
     rim = np.flatnonzero(member[one] != member[two])
@@ -54,7 +54,15 @@ def surface_extension(
 def edge_extension(
     segments: IntArray, moving: np.ndarray, place: Place, reach: float
 ) -> FloatArray:
-    """Return segments (s, 2, d) beyond the moving ends of a chain of segments (m, 2)."""
+    """Return segments (s, 2, d) that continue a chain of segments (m, 2) beyond its moving ends.
+
+    Parameters
+    ----------
+    moving : (n,) bool
+        Nodes of the moving boundaries.
+    reach : float
+        Length of each segment, in the mesh's length unit.
+    """
     node, count = np.unique(segments, return_counts=True)
     last = node[(count == 1) & moving[node]]
     corners = place(segments)

@@ -1,7 +1,7 @@
-"""The displacement field of one step, at any point: what the nodes that are no boundary do.
+"""The displacement field of one step, at any point: it displaces the nodes inside the mesh.
 
-Control nodes, weights and what the boundary lacks are all that it needs, so nodes can be displaced
-some at a time, and in whatever order.
+It needs control nodes, weights and the errors at the boundary only, so nodes can be displaced in
+parts, and in any order.
 """
 
 from __future__ import annotations
@@ -19,38 +19,43 @@ if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
 TIE = 1e-4
-"""Boundary nodes farther than the nearest one by less than this part of its distance count too:
-far above rounding, far below any difference of distances that a mesh could mean."""
+"""Boundary nodes count as equally near when their distances differ by less than this part: far
+above rounding, far below any difference of distances that a mesh could mean."""
 
 
 class Field(Protocol):
     """The displacement of one step, in the frame."""
 
     def at(self, features: FloatArray, points: FloatArray, /, tick: Tick = no_tick) -> FloatArray:
-        """Return the displacement (m, d) at features (k, m), points (m, d) in the step before."""
+        """Return the displacement (m, d) at Cartesian ``points`` (m, d) with ``features`` (k, m).
+
+        Both as they are before this step.
+        """
 
 
 def share(q: FloatArray) -> FloatArray:
-    """Return which share of an error is taken over at q radii from it: Wendland's C2 function."""
+    """Return the share of an error that a node takes over, q = distance / radius: Wendland C2."""
     return (1.0 - q) ** 4 * (4.0 * q + 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """Spreads what boundary nodes lack to the nodes near them (section 2.5.1, Eq. 2.30).
+    """The boundary correction: spreads errors at boundary nodes to the nodes near them (Eq. 2.30).
 
     Each node takes over the error of its nearest boundary node, weighted with Wendland's C2
-    function of the distance over the radius. The search is bounded by that radius, which is what
-    makes it cheap, and goes on beyond periodic boundaries. Where several are equally near, as on
-    symmetric meshes, it is the mean of their errors: one of them would be chosen by its number.
+    function of the distance over the radius. The search is bounded by the radius, which makes it
+    cheap, and continues beyond periodic boundaries. Where several boundary nodes are equally near,
+    as on symmetric meshes, the node takes over the mean of their errors, for the nearest one would
+    be chosen by its number.
 
     Attributes
     ----------
     tree : cKDTree
-        The boundary nodes and their periodic images.
+        The sources: Cartesian positions of the boundary nodes and of their periodic images.
     lacking : (s, d) float64
-        What each lacks.
+        The error of each source: prescribed less interpolated displacement, in the frame.
     radius : float
+        Distance at which the correction ends, in the mesh's length unit (Eq. 2.31).
     """
 
     tree: cKDTree
@@ -58,7 +63,10 @@ class Correction:
     radius: float
 
     def near(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Return which of points (m, d) take over something, (h,), and what, (h, d)."""
+        """Return which points (m, d) are within reach of a source, (h,), and their part, (h, d).
+
+        ``points[hit]`` take over the returned parts; the correction of the others is zero.
+        """
         hit, distance, nearest, tied = self._nearest(points)
         taken = self.lacking[nearest]
         if len(tied):
@@ -68,17 +76,17 @@ class Correction:
     def sources(
         self, points: FloatArray
     ) -> tuple[IntArray, IntArray, IntArray, IntArray, FloatArray]:
-        """Return which sources points (m, d) take over from, in all detail.
+        """Return which points (m, d) are within reach, and the sources and weights of each.
 
         Returns
         -------
         hit : (h,)
-            The points that take over something.
+            The points within reach of a source.
         nearest : (h,)
             The source that is nearest to each.
         row, source, weight : (k,)
-            For each of them, by its place in ``hit``, all its sources, and their weights in the
-            mean of their errors.
+            One entry, k >= h, for each pair of a point, by its place in ``hit``, and a source, with
+            its weight in the mean of the sources' errors. Weights of a point add up to 1.
         """
         hit, distance, nearest, tied = self._nearest(points)
         single = np.ones(len(hit), bool)
@@ -95,7 +103,10 @@ class Correction:
         )
 
     def _nearest(self, points: FloatArray) -> tuple[IntArray, FloatArray, IntArray, IntArray]:
-        """Return points within reach (h,), distance and number of the nearest source, and ties."""
+        """Return points within reach (h,), distance and number of their nearest source, and ties.
+
+        Ties (t,) are places among the h points where the second source is equally near (`TIE`).
+        """
         near = self.tree.query(points, k=2, distance_upper_bound=self.radius)
         distance, index = (np.asarray(found) for found in near)
         hit = np.flatnonzero(np.isfinite(distance[:, 0]))
@@ -104,7 +115,7 @@ class Correction:
         return hit, distance[:, 0], index[hit, 0], tied
 
     def _means(self, points: FloatArray, distance: FloatArray) -> FloatArray:
-        """Return the mean (m, d) of the errors of the sources that are nearest to points (m, d)."""
+        """Return the mean (m, d) of the errors of all sources equally near to points (m, d)."""
         row, source, weight = self._ties(points, distance)
         total = np.zeros((len(points), self.lacking.shape[1] + 1))
         np.add.at(total, row, weight[:, None] * np.c_[self.lacking[source], np.ones(len(source))])
@@ -113,10 +124,11 @@ class Correction:
     def _ties(
         self, points: FloatArray, distance: FloatArray
     ) -> tuple[IntArray, IntArray, FloatArray]:
-        """Return rows, sources and weights (k,) of the sources that are nearest to points (m, d).
+        """Return row of the point, source and weight, (k,) each, of sources equally near to points.
 
-        The weight of each falls to zero at ``TIE`` beyond the nearest, so that rounding, which
-        moves the nodes of a symmetric mesh a little, changes the mean little.
+        The weight of a source falls linearly, from 1 at ``distance`` (m,), that of the nearest one,
+        to 0 where it is farther by the part ``TIE``: so rounding, which moves the nodes of a
+        symmetric mesh a little, changes the mean little.
         """
         if not len(points):
             return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
@@ -139,8 +151,9 @@ class RadialField:
         Features of the control nodes.
     weights : (c, d) float64
     tail : (q, d) float64 or None
-        Coefficients of the polynomial's terms.
+        Coefficients of the polynomial's terms (`linear_terms`).
     correction : Correction or None
+        None: errors at the boundary are not spread.
     """
 
     basis: Basis
@@ -150,7 +163,7 @@ class RadialField:
     correction: Correction | None = None
 
     def at(self, features: FloatArray, points: FloatArray, /, tick: Tick = no_tick) -> FloatArray:
-        """Return the displacement (m, d) at features (k, m), points (m, d) in the step before."""
+        """Return the displacement (m, d) at Cartesian points (m, d) with features (k, m)."""
         found = self.interpolated(features, tick)
         correction = self.correction
         if correction is not None:
@@ -173,10 +186,10 @@ class RadialField:
 
 
 def linear_terms(basis: Basis, features: FloatArray) -> FloatArray:
-    """Return the terms of the linear polynomial at nodes, (n, q), periodic where the case is.
+    """Return the terms of the linear polynomial at features (k, n), (n, q).
 
-    1 and the features: with a translational period these include the circle's cosine and sine;
-    with a rotational one the angle enters by the cosine and sine of its full period.
+    1 and the features: with a translational period these include the cosine and sine of the
+    coordinate along it. With a rotational period 1, r, cos and sin(2 pi theta / theta_p), and z.
     """
     rows = [np.ones(features.shape[1])]
     if basis.period > 0:

@@ -1,4 +1,4 @@
-"""Derivatives of the maps of a frame: between points, coordinates and features."""
+"""Derivatives of the maps of a frame (`slideviz.rbf.frames`): points, coordinates and features."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.threads import in_parts
 from slideviz.rbf.axis import ON_AXIS
-from slideviz.rbf.frames import Frame, _across
+from slideviz.rbf.frames import Frame, _perpendicular
 
 
 def coords_slopes(frame: Frame, points: FloatArray) -> FloatArray:
     """Return the derivative (n, d, d) of ``frame.coords`` at Cartesian points (n, d).
 
-    On the axis, where the angle has no meaning, those of radius and angle are zero: nodes there
-    may move along it only.
+    ``[i, a, b]`` is the derivative of coordinate a with respect to point component b. On the axis,
+    where the angle has no meaning, the rows of radius and angle are zero: nodes on the axis may
+    move along it only.
     """
     n, d = points.shape
     if frame.axis is None or frame.origin is None:
@@ -58,10 +59,10 @@ def features_slopes(frame: Frame, coords: FloatArray) -> FloatArray:
     n, d = coords.shape
     if frame.cylindrical and frame.period:
         rate = np.pi / frame.period / frame.radius
-        half = rate * coords[:, 1]
+        phase = rate * coords[:, 1]
         out = np.zeros((n, 4, d))
         out[:, 0, 0] = 1.0
-        out[:, 1, 1], out[:, 2, 1] = rate * np.cos(half), -rate * np.sin(half)
+        out[:, 1, 1], out[:, 2, 1] = rate * np.cos(phase), -rate * np.sin(phase)
         if d == 3:
             out[:, 3, 2] = 1.0
         return out
@@ -71,5 +72,5 @@ def features_slopes(frame: Frame, coords: FloatArray) -> FloatArray:
     out = np.empty((n, d + 1, d))
     out[:, 0] = -np.sin(angle)[:, None] * frame.direction
     out[:, 1] = np.cos(angle)[:, None] * frame.direction
-    out[:, 2:] = _across(frame.direction)
+    out[:, 2:] = _perpendicular(frame.direction)
     return out

@@ -10,7 +10,10 @@ Distances are computed from *features*, a few numbers for each node:
 * Translational period lambda along u (thesis Eq. 2.13): ``(lambda/pi) sin(pi D/lambda)`` is the
   chord of a circle of circumference lambda, so the component s along u is replaced by
   ``lambda/(2 pi) (cos, sin)(2 pi s/lambda)`` and the distance is Euclidean again.
-* Rotational period (Eq. 2.15): ``(r, sin(pi theta/theta_p), cos(pi theta/theta_p)[, z])``.
+* Rotational period (Eq. 2.15): ``(r, sin(pi theta/theta_p), cos(pi theta/theta_p), z)``, z = 0 in
+  2D. The distance is not Euclidean in these features: its square is
+  ``(r - r')^2 + 2 r r' (1 - cos(theta_p/pi sin(pi (theta - theta')/theta_p))) + (z - z')^2``
+  (``compiled.distances``, which names the copies of this formula).
 """
 
 from __future__ import annotations
@@ -26,19 +29,19 @@ from slideviz.mesh.periodic import Pair
 from slideviz.mesh.threads import PART, in_parts
 
 SECTORS = 1 << 12
-"""Into how many the circle is divided to find the largest empty one."""
+"""Number of sectors into which the circle is divided to find the largest one without nodes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A working frame.
+    """The coordinates and the distance of the interpolation, and the maps from and to points.
 
     Attributes
     ----------
     dim : int
         2 or 3.
     direction : (d,) float64 or None
-        Unit vector of a translational period.
+        Unit vector of a translational period; None: there is none.
     period : float
         Translational: length. Rotational: angle in radians. 0: not periodic.
     axis, origin : (3,) float64 or None
@@ -69,7 +72,10 @@ class Frame:
         return self.of_polar(polar(points, self.axis, self.origin))
 
     def of_polar(self, polar: FloatArray) -> FloatArray:
-        """Return coordinates in a cylindrical frame of what `polar` returns, in its place."""
+        """Turn polar coordinates (n, d), as `polar` returns them, into frame coordinates, in place.
+
+        Only in a cylindrical frame. Returns the same array.
+        """
 
         def turn(part: slice) -> None:
             angle = polar[part, 1] - self.theta0
@@ -118,7 +124,8 @@ class Frame:
     def turned_back(self, coords: FloatArray, vectors: FloatArray) -> FloatArray:
         """Return Cartesian vectors (n, d) of nodes turned about the axis to one angle.
 
-        Those of periodic images become alike; lengths, and angles at one node, are kept.
+        Equal vectors of periodic images, one period apart, become equal. Lengths, and angles
+        between vectors of one node, are kept.
         """
         if self.axis is None:
             return np.array(vectors, float)
@@ -131,7 +138,7 @@ class Frame:
         return local[:, : self.dim]
 
     def features(self, coords: FloatArray) -> FloatArray:
-        """Return the numbers that distances are computed from: (k, n), rows contiguous."""
+        """Return the features (k, n) of nodes at ``coords`` (n, d), rows contiguous."""
         out = np.empty((len(self._features(coords[:1])), len(coords)))
 
         def fill(part: slice) -> None:
@@ -143,8 +150,8 @@ class Frame:
     def _features(self, coords: FloatArray) -> FloatArray:
         """Return features (k, n) of nodes at ``coords`` (n, d)."""
         if self.cylindrical and self.period:
-            half = np.pi / self.period * coords[:, 1] / self.radius
-            rows = [coords[:, 0], np.sin(half), np.cos(half)]
+            phase = np.pi / self.period * coords[:, 1] / self.radius
+            rows = [coords[:, 0], np.sin(phase), np.cos(phase)]
             rows.append(coords[:, 2] if self.dim == 3 else np.zeros(len(coords)))
             return np.stack(rows)
         x = self.points(coords)
@@ -153,7 +160,7 @@ class Frame:
         angle = 2 * np.pi / self.period * along(self.direction[None], x)[:, 0]
         size = self.period / (2 * np.pi)
         rows = [size * np.cos(angle), size * np.sin(angle)]
-        rows.extend(along(_across(self.direction), x).T)
+        rows.extend(along(_perpendicular(self.direction), x).T)
         return np.stack(rows)
 
     def shift(self) -> FloatArray:
@@ -166,8 +173,8 @@ class Frame:
         return step
 
 
-def _across(direction: FloatArray) -> FloatArray:
-    """Return unit rows (d - 1, d) that span what is perpendicular to a unit vector (d,)."""
+def _perpendicular(direction: FloatArray) -> FloatArray:
+    """Return orthonormal rows (d - 1, d), perpendicular to a unit vector (d,)."""
     if len(direction) == 2:
         return np.array([[-direction[1], direction[0]]])
     return axis_basis(direction)[:2]
@@ -226,8 +233,12 @@ def make_frame(
 
 
 def _middle_angle(radii: FloatArray, angles: FloatArray) -> float:
-    """Return the angle opposite the middle of the largest empty sector; the axis is in none."""
-    # Of each of many narrow sectors the ends: nothing else borders on an empty sector.
+    """Return the angle, in radians, opposite the middle of the largest sector without nodes.
+
+    Nodes on the axis do not count. The lowest and highest angle in each of `SECTORS` narrow
+    sectors suffice, for the largest gap is between two of these unless it is narrower than two
+    sectors.
+    """
     least, parts = 1e-9 * radii.max(), -(-len(radii) // PART)
     lows, highs = np.full((parts, SECTORS), np.inf), np.full((parts, SECTORS), -np.inf)
 
@@ -249,5 +260,5 @@ def _middle_angle(radii: FloatArray, angles: FloatArray) -> float:
 
 
 def _gaps(ordered: FloatArray) -> FloatArray:
-    """Return how far it is from each of ascending angles to the next, (k,), around the circle."""
+    """Return the gap (k,) from each of ascending angles (k,) to the next around the circle."""
     return np.diff(np.r_[ordered, ordered[0] + 2 * np.pi])

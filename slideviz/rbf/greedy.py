@@ -9,19 +9,20 @@ two triangular solves, and the residual of all candidates is recomputed by the f
 is also the exact error. So nothing is factorised twice and no candidates-by-controls matrix
 exists; picking one or two nodes in a cycle, as the thesis does, is the same with a small pool.
 
-Steps after the first begin with the control nodes of the one before, and have to make up for
-what these lacked (``Problem.lag``), so that the tolerance holds for the whole displacement.
+Steps after the first begin with the control nodes of the step before, and have to make up for
+the errors that it left (``Problem.behind``), so that the tolerance holds for the whole
+displacement.
 
-Candidates are sorted by position, and every number depends on one candidate and the order of
-the control nodes alone: neither numbering nor threads change the selection. Where errors are
+Candidates are sorted by position, and the error of each depends on nothing but the candidate and
+the order of the control nodes: neither numbering nor threads change the selection. Where errors are
 equal but for rounding, as on symmetric meshes, the position decides (`selection.favour`), so that
 another processor chooses the same nodes.
 
 Every selection ends: a cycle without a new row is the last, and levels, which may choose the
 same rows again, are given up when the error no longer falls from one to the next, or when they
-have chosen as many rows as there are (`selection.LevelLimit`). Then one last level takes all it
-needs. If an error stays above the tolerance, ``short`` says why, and what was found at the lowest
-error is kept where that is clearly better.
+have chosen as many rows as there are (`selection.LevelLimit`). Then one last level goes on without
+a limit. If an error stays above the tolerance, ``short`` says why, and the interpolant of lowest
+error is taken where it is clearly better than the last one (`WORSE`).
 """
 
 from __future__ import annotations
@@ -40,10 +41,11 @@ from slideviz.rbf.selection import LevelLimit, pool
 from slideviz.rbf.solve import enough_threads
 
 STALE = 0.3
-"""A block ends when the pool's largest error is below this part of the largest of all."""
+"""Picking from a pool ends when its largest error is below this part of that of all candidates."""
 
 WORSE = 2.0
-"""A selection that fails goes back to its lowest error where the last is this much larger."""
+"""A selection that fails returns its interpolant of lowest error where the last error is more than
+this many times as large."""
 
 
 class GreedyFit:
@@ -66,12 +68,13 @@ class GreedyFit:
     def __init__(
         self, problem: Problem, watch: Watch, history: tuple[Cycle, ...] = (), *, done: int = 0
     ) -> None:
-        """Begin without rows.
+        """Begin without rows; ``problem`` must have a reduction.
 
         Parameters
         ----------
         history, done
-            Cycles and calls of ``add`` of another fit of the same step, before this one.
+            Cycles, and number of calls of ``add``, of an earlier fit in the same step (the first
+            of the two of direct sliding).
         """
         assert problem.reduction is not None
         self._problem, self._watch, self._settings = problem, watch, problem.reduction
@@ -92,7 +95,7 @@ class GreedyFit:
         self._one_level = self._settings.level == "none"
 
     def _new_level(self) -> None:
-        """Begin a level, for what those before left."""
+        """Begin a level, which has to meet what the levels before it lack."""
         self._level = GreedyLevel(self._problem, self._among, self.found)
 
     def add(self, rows: ConstraintRows) -> None:
@@ -172,26 +175,32 @@ class GreedyFit:
         )
 
     def _level_goal(self, errors: FloatArray) -> float:
+        """Return the error at which a level is complete that begins with ``errors`` (c,)."""
         return float(errors.max(initial=0.0)) * self._settings.level_ratio
 
     def _level_done(self, errors: FloatArray, goal: float) -> bool:
-        """Tell whether the level is complete (section 2.5.2, 5.3.2)."""
+        """Tell whether the level is complete (section 2.5.2, 5.3.2); never for a single level."""
         if self._settings.level == "size":
             return self._level.nodes >= self._settings.level_size
         some = len(self._level.chosen) > 0
         return self._settings.level == "ratio" and some and errors.max() < goal
 
     def _full(self) -> bool:
+        """Tell whether as many nodes as MAX_CONTROL_NODES allows are chosen."""
         limit = self._settings.max_nodes
         return limit is not None and len(self.found.nodes) >= limit
 
     def _fraction(self, errors: FloatArray) -> float:
-        """Return how far the error has fallen from its first value, on a logarithmic scale."""
+        """Return the progress, 0 to 1: how far the error has fallen towards the tolerance.
+
+        On a logarithmic scale, from the first cycle's error.
+        """
         first, now = self.history[0].error, float(errors.max(initial=0.0))
         span = np.log(max(first, 1e-300) / max(self._settings.tolerance, 1e-300))
         return float(np.clip(np.log(max(first, 1e-300) / max(now, 1e-300)) / max(span, 1e-9), 0, 1))
 
     def _record(self, errors: FloatArray) -> None:
+        """Append a cycle with the largest of ``errors`` (c,) to ``history``."""
         cycle = Cycle(
             len(self.history) + 1,
             self._number,
@@ -202,7 +211,7 @@ class GreedyFit:
         self.history = (*self.history, cycle)
 
     def _note_dropped(self, errors: FloatArray) -> None:
-        """Remember the candidates that are barred although their error is too large."""
+        """Set ``dropped``: nodes the guard left out although their error is above the tolerance."""
         level, among = self._level, self._among
         chosen = np.zeros(len(level.barred), bool)
         chosen[level.chosen] = True
@@ -211,7 +220,15 @@ class GreedyFit:
         self.dropped = np.unique(among.rows.nodes[among.first[over & barred]])
 
     def _grow(self, target: FloatArray, residual: FloatArray, errors: FloatArray) -> bool:
-        """Pick nodes, extend the factor and the weights; tell whether any could be picked."""
+        """Pick nodes and solve with them, which sets ``found``; tell whether any could be picked.
+
+        Parameters
+        ----------
+        target, residual : (r, m)
+            What the level has to meet, and what it still lacks.
+        errors : (c,)
+            Error of each candidate.
+        """
         level, among = self._level, self._among
         open_ = among.has_row(~level.barred)
         favoured, largest = errors * among.favour, float(errors.max())
@@ -232,7 +249,11 @@ class GreedyFit:
             open_[pooled] = False
 
     def _pool(self, errors: FloatArray, residual: FloatArray) -> tuple[int, IntArray]:
-        """Return how many nodes to pick, and the candidates to pick them from."""
+        """Return how many nodes to pick, and the candidates to pick them from (`selection.pool`).
+
+        ``errors`` (c,) are multiplied with the candidates' ``favour``, and negative where one
+        cannot be picked; ``residual`` (r, m).
+        """
         among, d = self._among, self._problem.values.shape[1]
         normals, vectors = among.rows.normals, residual
         if normals is not None:
@@ -248,12 +269,15 @@ class GreedyFit:
         )
 
     def _take(self, rows: IntArray, target: FloatArray) -> None:
-        """Take rows chosen in the step before, or for other data, into the level."""
+        """Add rows that were chosen in the step before, or for other data, to the level."""
         self._level.take(rows, target)
         self.found = self._level.found
 
     def _take_given(self) -> bool:
-        """Take the levels that were chosen for other data; tell whether there were any."""
+        """Add the levels that were chosen for other data (``Problem.stages``) to the fit.
+
+        Returns whether any row was added; never for a single level.
+        """
         stage = len(self.stages)
         if self._one_level or stage >= len(self._given):
             return False

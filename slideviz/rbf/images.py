@@ -1,10 +1,9 @@
-"""Periodic images: one node stands for all of them, and all move alike.
+"""Periodic images: one node represents all images of it, and all move alike.
 
-Whatever a node one period away would find for itself differs by rounding at least, and by more
-where only one of them sees a corner, a normal or the end of a curve. So one of them stands for
-all, its displacement in the frame is copied to the others, and every step measures on the mesh
-that it made whether they moved alike. Which markers are pairs is found in
-`slideviz.mesh.periodic`.
+The displacement of an image, computed by itself, would differ by rounding at least, and by more
+where only one image is at a corner, a normal or the end of a curve. So one image represents all,
+its displacement in the frame is copied to the others, and after every step the deformed mesh is
+checked: images must have moved alike. Periodic pairs are found in `slideviz.mesh.periodic`.
 """
 
 from __future__ import annotations
@@ -32,17 +31,18 @@ ROUNDING = 1e-12
 rounding of a coordinate, and a millionth of the first cells of a fine boundary layer."""
 
 FAR = 1e-14
-"""The same as a part of the largest coordinate: some tens of roundings, for meshes far from 0."""
+"""Part of the largest coordinate that is added to `ROUNDING`, for meshes far from the origin."""
 
 
 def find_images(
     pairs: Sequence[Pair], frame: Frame, coords: FloatArray, nodes: IntArray, extent: float
 ) -> IntArray:
-    """Return for each node the one of its periodic images that stands for all, (n,).
+    """Return for each node, (n,), the number of the periodic image that represents all its images.
 
-    It is the first along the period, on a periodic boundary where there is one. Images are those
-    of the pairs, and boundary nodes that coincide with others after one period without being on
-    a periodic boundary, as in layers of cells beyond it.
+    The first image along the period, of those on a periodic boundary if any is. Images are the
+    nodes of the pairs, and boundary nodes that coincide with another one after one period without
+    being on a periodic boundary, as in layers of cells beyond it. A node without images represents
+    itself.
 
     Parameters
     ----------
@@ -50,6 +50,8 @@ def find_images(
         Undeformed, in the frame.
     nodes : (b,)
         All nodes of the boundary.
+    extent
+        Of the mesh, in its length unit.
     """
     count = len(coords)
     if not pairs:
@@ -58,7 +60,7 @@ def find_images(
     paired = np.zeros(count, bool)
     paired[links] = True
     near = COINCIDENT * extent + 2.0 * max(pair.mismatch for pair in pairs)
-    # Nearly all have none one period away, and a search without bound takes long to find that out.
+    # Nearly all nodes have no image, which a search without bound takes long to find out.
     gap, at = nearest(coords[nodes], coords[nodes] + frame.shift(), 2.0 * near, 2.0 * near)
     found = np.flatnonzero(gap <= near)
     twins = np.stack([nodes[found], nodes[at[found]]], axis=1)
@@ -73,16 +75,16 @@ def find_images(
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """The displacements of given nodes, at all their images.
+    """Copies the displacements of given nodes to their periodic images.
 
     Attributes
     ----------
     given : (k,) int64
         Sorted, each once.
     vectors : (k, d) float64
-        Their displacements in the frame.
+        The displacements of the given nodes in the frame.
     stands : (n,) int64
-        For each node the one of its periodic images that stands for all of them.
+        For each node, the number of the periodic image that represents it.
     """
 
     given: IntArray
@@ -91,23 +93,26 @@ class Spread:
 
     @cached_property
     def _row(self) -> IntArray:
-        """Where the first given image of a node stands in ``given``, from 1; 0 for none."""
+        """For each representative (n,) the place of its first image in ``given``, from 1; or 0."""
         # Memory for zeros is taken only where something is written.
         row = np.zeros(len(self.stands), np.int64)
         row[self.stands[self.given[::-1]]] = np.arange(len(self.given), 0, -1)
         return row
 
     def source(self, nodes: IntArray) -> IntArray:
-        """Return the given node that nodes (m,) have their displacements from; -1 for none."""
+        """Return the given node whose displacement each of nodes (m,) has, (m,); -1 if none."""
         return np.r_[-1, self.given][self._row[self.stands[nodes]]]
 
     def at(self, nodes: IntArray) -> FloatArray:
-        """Return the displacements (m, d) of nodes (m,), zero for those without a source."""
+        """Return the displacements (m, d) of nodes (m,); zero for nodes without a given image."""
         row = self._row[self.stands[nodes]]
         return np.concatenate([np.zeros((1, self.vectors.shape[1])), self.vectors])[row]
 
     def require_alike(self, allowed: float) -> None:
-        """Raise DeformError when given displacements of images differ by more than ``allowed``."""
+        """Raise DeformError when given displacements of images differ by more than ``allowed``.
+
+        In any component, in the mesh's length unit.
+        """
         gap = np.abs(self.vectors - self.at(self.given)).max(axis=1, initial=0.0)
         if gap.max(initial=0.0) > allowed:
             worst = int(np.argmax(gap))
@@ -122,16 +127,18 @@ def require_free(
     normals: FloatArray,
     allowed: float,
 ) -> None:
-    """Raise DeformError when nodes may not move as the images that they follow.
+    """Raise DeformError when the boundary does not let nodes move as their given images do.
 
     Parameters
     ----------
     nodes : (m,)
-        Those that move only because an image does.
+        Nodes that move only because an image is given.
     classes
-        As if there were no images.
-    normals : (m, d)
+        The classes of all nodes, found as if there were no images.
+    normals : (f, d)
         Of all fans, in the frame.
+    allowed
+        Largest displacement across the constraints, in the mesh's length unit.
     """
     off = np.zeros(classes.total)
     held = classes.fixed[np.isin(classes.fixed, nodes)]
@@ -144,7 +151,7 @@ def require_free(
 
 
 def misfits(frame: Frame, coords: FloatArray, points: FloatArray, images: IntArray) -> FloatArray:
-    """Return how far images have moved differently, (k,), in the mesh's length unit.
+    """Return the difference of the displacements of images, (k,), in the mesh's length unit.
 
     Parameters
     ----------
@@ -167,12 +174,12 @@ def misfits(frame: Frame, coords: FloatArray, points: FloatArray, images: IntArr
 def largest_misfit(
     frame: Frame, coords: FloatArray, points: FloatArray, images: IntArray
 ) -> float | None:
-    """Return the largest of ``misfits``; None where there are no images.
+    """Return the largest of `misfits`, in the mesh's length unit; None where there are no images.
 
     Raises
     ------
     DeformError
-        It is more than rounding.
+        Images moved differently by more than rounding.
     """
     if not len(images):
         return None

@@ -32,7 +32,7 @@ class Kernel:
     code : int
         Its number in the compiled loops.
     compact : bool
-        Whether it is 0 from xi = 1 on.
+        Whether it has compact support: is 0 from xi = 1 on.
     polynomial : bool
         Whether it needs the linear polynomial of Eq. 2.1.
     function : callable
@@ -46,7 +46,7 @@ class Kernel:
     function: Callable[[FloatArray], FloatArray]
 
     def __call__(self, xi: FloatArray) -> FloatArray:
-        """Return phi(xi) for an array of xi >= 0."""
+        """Return phi(xi) for an array of xi >= 0; at 0 its limit."""
         xi = np.asarray(xi, float)
         with np.errstate(divide="ignore", invalid="ignore"):
             value = np.where(xi > 0, self.function(xi), self.function(np.full_like(xi, 1e-300)))
@@ -84,7 +84,7 @@ _FUNCTIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
 """phi(xi) by the value of RBF_KERNEL; the order gives the numbers in the compiled loops."""
 
 PLAIN = "wendland-c2"
-"""The default."""
+"""The default kernel."""
 
 KERNELS: dict[str, Kernel] = {
     name: Kernel(name, code, terms.KERNELS[name].compact, terms.KERNELS[name].polynomial, function)

@@ -1,4 +1,7 @@
-"""A level of the greedy selection: the rows it has chosen, and the factor that grows with them."""
+"""A level of the greedy selection: the rows it has chosen, and the factor that grows with them.
+
+Shapes: r rows of c candidates, m right-hand sides.
+"""
 
 from __future__ import annotations
 
@@ -18,20 +21,20 @@ from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """The nodes that may be chosen: their constraint rows, those of one node side by side.
+    """The nodes that may be chosen, with their constraint rows; rows of one node are neighbours.
 
     Attributes
     ----------
     rows : ConstraintRows
         Sorted by position, so that the numbering of the mesh changes no choice.
     block : (r,) int64
-        The block of the system of each row.
+        The block of the system that each row is in.
     candidate : (r,) int64
-        The candidate of each row.
+        The candidate, from 0 to c - 1, that each row belongs to.
     first : (c,) int64
         The first row of each candidate.
     favour : (c,) float64
-        Decides where errors are equal but for rounding.
+        Factor of each candidate's error, which decides between equal errors (`selection.favour`).
     """
 
     rows: ConstraintRows
@@ -42,19 +45,19 @@ class Candidates:
 
     @classmethod
     def of(cls, problem: Problem, rows: ConstraintRows) -> Candidates:
-        """Return the candidates that rows sorted by position have."""
+        """Return the candidates of ``rows``, which must be sorted by position."""
         new = np.r_[True, rows.nodes[1:] != rows.nodes[:-1]] if len(rows.nodes) else []
         first = np.flatnonzero(new)
         ranked = favour(problem.coords[rows.nodes[first]])
         return cls(rows, blocks(rows), np.cumsum(new, dtype=np.int64) - 1, first, ranked)
 
     def with_rows(self, problem: Problem, more: ConstraintRows) -> Candidates:
-        """Return these and others behind them; what is chosen keeps its number."""
+        """Return these candidates followed by those of ``more``; rows keep their numbers."""
         rows = self.rows.followed_by(more) if len(self.rows.nodes) else more
         return self.of(problem, rows)
 
     def values(self, problem: Problem, sum_: Interpolant) -> FloatArray:
-        """Return an interpolant in each row, (r, m)."""
+        """Return the left-hand side of each row, (r, m), for the interpolant ``sum_``."""
         rows = self.rows
         s = sum_.at(problem, rows.nodes[self.first])[self.candidate]
         return s if rows.normals is None else np.einsum("rd,rd->r", s, rows.normals)[:, None]
@@ -65,34 +68,36 @@ class Candidates:
         return np.sqrt(np.add.reduceat(squares, self.first)) if len(squares) else squares
 
     def has_row(self, which: np.ndarray) -> np.ndarray:
-        """Tell which candidates have one of some rows, given as a mask (r,), (c,) bool."""
+        """Return a mask (c,) of the candidates that have a row in the mask ``which`` (r,)."""
         found = np.zeros(len(self.first), bool)
         found[self.candidate[which]] = True
         return found
 
 
 class GrowingFactor:
-    """The Cholesky factor of one block of the system, L L^T = G, and ``half`` = L^-1 b.
+    """The Cholesky factor L of one block of the system, L L^T = G, to which rows are appended.
 
     Attributes
     ----------
     rows : (k,) int64
-        The chosen rows of the problem.
+        The chosen rows, as indices of the candidates' rows.
     turn : (k,) int64
-        When each was chosen, counted over all blocks.
+        The place of each in the order of choice over all blocks.
     lower : (k, k) float64
-    half : (k, m) float64
+        L.
+    forward : (k, m) float64
+        L^-1 b; shorter than L between `append` and `follow`.
     """
 
     def __init__(self, width: int) -> None:
         self.rows = self.turn = np.empty(0, np.int64)
         self.lower = self._store = np.empty((0, 0))
-        self.half = np.empty((0, width))
+        self.forward = np.empty((0, width))
 
     def append(
         self, rows: IntArray, turn: IntArray, *, beside: FloatArray, corner: FloatArray
     ) -> None:
-        """Append rows to the factor: L21 is ``beside`` what it has, L22 the new ``corner``."""
+        """Append p rows to the factor: L21 is ``beside`` (p, k), L22 is ``corner`` (p, p)."""
         n, more = len(self.rows), len(rows)
         if n + more > len(self._store):
             # Room for twice as much: copying the factor in every cycle would cost as much as
@@ -106,23 +111,23 @@ class GrowingFactor:
         self.turn = np.concatenate([self.turn, turn])
 
     def follow(self, target: FloatArray) -> None:
-        """Bring ``half`` up to date with the rows appended; ``target`` (r, m) is b."""
-        n = len(self.half)
-        rest = target[self.rows[n:]] - self.lower[n:, :n] @ self.half
-        self.half = np.concatenate([self.half, solve_lower(self.lower[n:, n:], rest)])
+        """Bring ``forward`` up to date with the rows appended; ``target`` (r, m) is b."""
+        n = len(self.forward)
+        rest = target[self.rows[n:]] - self.lower[n:, :n] @ self.forward
+        self.forward = np.concatenate([self.forward, solve_lower(self.lower[n:, n:], rest)])
 
     def weights(self) -> FloatArray:
         """Return the weights (k, m) that solve G w = b."""
-        return solve_lower(self.lower, self.half, transposed=True)
+        return solve_lower(self.lower, self.forward, transposed=True)
 
 
 class GreedyLevel:
-    """An interpolant of rows that are chosen one block after the other.
+    """The interpolant of one level, and the rows chosen for it so far.
 
     Attributes
     ----------
     settled, now : Interpolant
-        The levels before this one, and what this one adds to them.
+        The sum of the levels before, and what this level adds to it.
     chosen : (k,) int64
         The chosen rows, in the order of their choice.
     barred : (r,) bool
@@ -132,7 +137,7 @@ class GreedyLevel:
     """
 
     def __init__(self, problem: Problem, candidates: Candidates, settled: Interpolant) -> None:
-        """Begin without rows, with an empty factor for what the levels before left."""
+        """Begin without rows, after levels whose sum is ``settled``."""
         self._problem, self._among, self.settled = problem, candidates, settled
         # Only positive definite functions have pivots. For the others the default one tells
         # which nodes add most, and the weights come from the system with the polynomial.
@@ -156,11 +161,11 @@ class GreedyLevel:
 
     @property
     def depth(self) -> float:
-        """How many rows each block has, on average."""
+        """How many rows each block of the system has, on average."""
         return len(self.chosen) / len(self._grown)
 
     def go_on_with(self, candidates: Candidates) -> None:
-        """Choose among more candidates from here on: these, and those there were before."""
+        """Choose among ``candidates`` from here on, which begin with those there were before."""
         more = np.zeros(len(candidates.rows.nodes) - len(self.barred), bool)
         self._among, self.barred = candidates, np.concatenate([self.barred, more])
 
@@ -199,11 +204,17 @@ class GreedyLevel:
         Parameters
         ----------
         rows, residual : (p,), (p, m)
-            The pool, and what it still lacks.
+            The rows of the pool, and what the interpolant still lacks in each.
         count, floor
-            How many nodes to pick at most, and the error below which none is.
+            How many nodes to pick at most, and the error below which to stop (the first is
+            always picked).
         target : (r, m)
-            What the level has to meet.
+            What the level has to meet, in all rows of the candidates.
+
+        Returns
+        -------
+        bool
+            Whether any was picked. ``now`` is not solved for yet: call `solve`.
         """
         among = self._among
         order = np.argsort(among.block[rows], kind="stable")
@@ -237,7 +248,10 @@ class GreedyLevel:
         return len(picked) > 0
 
     def take(self, rows: IntArray, target: FloatArray) -> None:
-        """Append rows that were chosen before, as by the step before, and meet the target."""
+        """Append ``rows``, chosen before (as by the step before), and solve for the target (r, m).
+
+        Rows that the pivot guard leaves out are barred.
+        """
         with enough_threads(len(rows) ** 3 / 3.0):
             for k, factor in enumerate(self._grown):
                 part = rows[self._among.block[rows] == k]
@@ -251,7 +265,7 @@ class GreedyLevel:
             self.solve(target)
 
     def _remaining(self, factor: GrowingFactor, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return L^-1 G of rows of a block, (k, p), and their Schur complement, (p, p)."""
+        """Return L^-1 G of p rows of the factor's block, (k, p), and their Schur complement."""
         nodes, normals = self._among.rows.nodes, self._among.rows.normals
 
         def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
@@ -265,7 +279,7 @@ class GreedyLevel:
         return left, schur - left.T @ left
 
     def condition(self) -> float:
-        """Return an estimate of the condition number of the system."""
+        """Return an estimate of the condition number of the system of all blocks."""
         factors = [factor.lower for factor in self._grown]
         with enough_threads(20.0 * max(len(lower) for lower in factors) ** 2):
             return condition(*factors)

@@ -3,9 +3,9 @@
 Every condition is a scalar constraint "the displacement of node i along n is b" (see
 `ConstraintRows`). Regular interpolation has all axes of all boundary nodes as constraints,
 direct sliding only the normals of the nodes that slide (thesis section 2.4.1), and pseudo
-sliding (2.4.2) finds their displacement by projection first. How the constraints are met, by
-all of them at once or by a greedy selection, is the business of the fit. What boundary nodes then
-lack is spread to the nodes near them (section 2.5.1, Eq. 2.30 and 2.31).
+sliding (2.4.2) finds the displacement of these by projection first. The fit meets the
+constraints: `ExactFit` all at once, `GreedyFit` by a selection of them. The errors that are left
+at boundary nodes are spread to the nodes near them (section 2.5.1, Eq. 2.30 and 2.31).
 """
 
 from __future__ import annotations
@@ -23,24 +23,22 @@ from slideviz.rbf.evaluate import Tick
 from slideviz.rbf.exact import ExactFit
 from slideviz.rbf.field import Correction
 from slideviz.rbf.greedy import GreedyFit
-from slideviz.rbf.problem import Cycle, Interpolant, Lag, Levels, Problem, Solution, Watch
+from slideviz.rbf.problem import GAMMA, Cycle, Interpolant, Lag, Levels, Problem, Solution, Watch
 
 ROUNDING = 1e-14
-"""Part of the largest coordinate by which projecting a point of a flat boundary may move it."""
-
+"""Projection moves a point of a flat boundary by at most this part of the largest coordinate."""
 
 LOST = 1e-9
-"""Errors at control nodes above this part of the largest displacement are spread around them:
-badly conditioned systems have weights so large that their sum loses digits, which no refinement
-of the weights brings back."""
+"""Errors of an exact solution at control nodes above this part of the largest displacement are
+spread around the nodes: badly conditioned systems have weights so large that their sum loses
+digits, which no refinement of the weights brings back."""
 
-GAMMA = 25.0
 NEGLIGIBLE = 1e-14
 """Errors below this part of the support radius are rounding, and are not spread."""
 
 
 class Fit(Protocol):
-    """An interpolant that grows with the constraints it is given."""
+    """An interpolant to which constraints are added: `ExactFit` or `GreedyFit`, with attributes."""
 
     found: Interpolant
     dropped: IntArray
@@ -51,7 +49,7 @@ class Fit(Protocol):
     refined: float
 
     def add(self, rows: ConstraintRows) -> None:
-        """Meet further constraints, exactly or to the tolerance."""
+        """Add constraints, and meet all of them, exactly or to the tolerance."""
 
     def condition(self) -> float:
         """Return an estimate of the condition number of the system."""
@@ -65,7 +63,10 @@ def regular(problem: Problem, watch: Watch) -> Solution:
 
 
 def pseudo_sliding(problem: Problem, watch: Watch) -> Solution:
-    """Displace sliding nodes freely, project, and interpolate: edges first, then surfaces."""
+    """Displace sliding nodes by interpolation, project them, and add them to the known nodes.
+
+    Edges first, then surfaces; then interpolate with all of them (section 2.4.2).
+    """
     fit = _fit(problem, watch)
     fit.add(full_rows(problem, problem.known, problem.values))
     nodes, values = problem.known, problem.values
@@ -84,7 +85,7 @@ def direct_sliding(problem: Problem, watch: Watch) -> Solution:
     """Let sliding nodes move within their boundary by the system itself (section 2.4.1).
 
     Where the boundary is curved, or a node slid past the end of its piece, the slid nodes are
-    projected, and interpolated like known ones.
+    projected, and a second system interpolates with them as known nodes.
     """
     if not len(problem.normal_nodes):
         return regular(problem, watch)
@@ -116,7 +117,7 @@ def direct_sliding(problem: Problem, watch: Watch) -> Solution:
 
 
 def within(problem: Problem, nodes: IntArray, free: FloatArray) -> FloatArray:
-    """Return the displacements (m, d) of sliding nodes without their part along the normals."""
+    """Return displacements ``free`` (m, d) of sliding nodes without their part along normals."""
     row = np.full(len(problem.features[0]), -1)
     row[nodes] = np.arange(len(nodes))
     at = row[problem.normal_nodes]
@@ -136,6 +137,7 @@ SLIDING_METHODS: dict[str, Callable[[Problem, Watch], Solution]] = {
 
 
 def _fit(problem: Problem, watch: Watch, first: Fit | None = None) -> Fit:
+    """Return a fit without rows, greedy with data reduction; ``first``: the fit before, if any."""
     if problem.reduction is None:
         return ExactFit(problem, watch)
     if first is None:
@@ -150,10 +152,10 @@ def _at(problem: Problem, watch: Watch, fit: Fit, nodes: IntArray | slice) -> Fl
 
 
 def _slide(problem: Problem, watch: Watch, fit: Fit, level: IntArray) -> FloatArray:
-    """Return the interpolated displacements (m, d) of sliding nodes, projected.
+    """Return the interpolated displacements (m, d) of sliding nodes ``level`` (m,), projected.
 
-    On curved boundaries the part along the normals goes first: the point that is closest to a
-    node pushed through a thin profile is on the profile's other side.
+    On curved boundaries the part along the normals is removed before the projection: the point
+    closest to a node that was pushed through a thin profile is on the profile's other side.
     """
     free = _at(problem, watch, fit, level) - problem.behind(level)
     if problem.curved:
@@ -165,7 +167,10 @@ def _slide(problem: Problem, watch: Watch, fit: Fit, level: IntArray) -> FloatAr
 def _finish(
     problem: Problem, watch: Watch, fit: Fit, nodes: IntArray, values: FloatArray
 ) -> Solution:
-    """Evaluate at all nodes; boundary nodes are set exactly, and what they lack is spread."""
+    """Return the solution: evaluate at all nodes, set boundary nodes exactly, spread their errors.
+
+    ``values`` (b, d) are the exact displacements of the boundary nodes ``nodes`` (b,).
+    """
     displacement = _at(problem, watch, fit, slice(None))
     errors = values - displacement[nodes]
     total, lag = problem.behind(nodes) + errors, None
@@ -211,14 +216,15 @@ def _in_system(fit: Fit) -> IntArray:
 
 
 def correction_of(problem: Problem, nodes: IntArray, errors: FloatArray) -> Correction | None:
-    """Return what spreads what boundary nodes lack; None where that is rounding.
+    """Return the correction that spreads errors at boundary nodes; None where they are rounding.
 
-    It reaches ``gamma`` times the largest error (Eq. 2.31).
+    Its radius is ``gamma`` times the largest error (Eq. 2.31), as in
+    ``slideviz.design.frozen.spread.chosen_spread``.
 
     Parameters
     ----------
-    nodes : (b,)
-        Boundary nodes with known displacement, and ``errors`` (b, d): what they lack.
+    nodes, errors : (b,), (b, d)
+        Boundary nodes with known displacement, and the errors there, in the frame.
     """
     largest = float(np.linalg.norm(errors, axis=1).max(initial=0.0))
     if largest <= NEGLIGIBLE * problem.basis.radius:
@@ -243,7 +249,7 @@ def correct(
     correction: Correction,
     tick: Tick,
 ) -> None:
-    """Spread what boundary nodes ``nodes`` (b,) lack to all others, in place."""
+    """Add the correction to ``displacement`` (n, d), except at boundary nodes ``nodes`` (b,)."""
     free = np.ones(len(displacement), bool)
     free[nodes] = False
 

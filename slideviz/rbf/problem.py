@@ -16,9 +16,17 @@ from slideviz.rbf.evaluate import Basis, Tick, no_tick
 from slideviz.rbf.field import Field, RadialField
 from slideviz.terms import Selection
 
+GAMMA = 25.0
+"""Radius of the boundary correction over the largest error (Eq. 2.31), where nothing else is set;
+``slideviz.case.model.Reduction.gamma`` has the same default."""
+
 Project = Callable[[IntArray, FloatArray], FloatArray]
+"""Takes nodes (m,) and displacements (m, d); returns those that bring the nodes back on their
+boundary, (m, d)."""
+
 Levels = tuple[IntArray, ...]
-"""The rows (r, 2) of each level of an interpolant: node, and which of the rows of that node."""
+"""The rows of each level of an interpolant, (r, 2), as ``exact.row_names`` gives them: the node,
+and the row's place among the rows of that node."""
 
 
 @dataclass(eq=False)
@@ -30,7 +38,7 @@ class Watch:
 
     @contextmanager
     def phase(self, name: str) -> Iterator[Tick]:
-        """Time a phase; gives the callback to call with the fraction done."""
+        """Context that adds its seconds to phase ``name``; gives the callback for its progress."""
         start = perf_counter()
         self.report(name, 0.0)
         try:
@@ -46,8 +54,8 @@ class GreedySettings:
     Attributes
     ----------
     tolerance : float
-        Largest error at the boundary, in the mesh's length unit, that may remain for the
-        correction, summed over the steps.
+        Largest error at the boundary, of all steps together, that is left to the correction; in
+        the mesh's length unit.
     pick : "block", "double" or "one"
         Nodes added in a cycle: a growing number of them, the worst and the worst with an error
         in an opposite direction, or the worst one.
@@ -66,12 +74,24 @@ class GreedySettings:
     level_size: int = 16
     level_ratio: float = 0.5
     max_nodes: int | None = None
-    gamma: float = 25.0
+    gamma: float = GAMMA
 
 
 @dataclass(frozen=True)
 class Cycle:
-    """One cycle of the selection: its level, the largest error, control nodes, seconds."""
+    """One cycle of the selection: its number, its level, and what it found.
+
+    Attributes
+    ----------
+    cycle, level : int
+        Numbers from 1.
+    error : float
+        Largest error at the candidates, in the mesh's length unit.
+    control_nodes : int
+        Nodes chosen so far.
+    seconds : float
+        Since the selection began.
+    """
 
     cycle: int
     level: int
@@ -82,7 +102,10 @@ class Cycle:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """One step in the working frame.
+    """What the interpolation of one step needs, in the working frame.
+
+    Of periodic images, ``known``, ``edge``, ``surface`` and ``normal_nodes`` have the one that
+    represents them.
 
     Attributes
     ----------
@@ -90,30 +113,32 @@ class Problem:
     features : (k, n) float64
         Of all nodes, at their current positions.
     known : (a,) int64
-        Nodes whose displacement is given, by ``values`` (a, d). Of periodic images, here and
-        below, the one that stands for them.
+        Nodes whose displacement is given, by ``values`` (a, d).
     edge, surface : (c,), (e,) int64
         Sliding nodes, in the order in which pseudo sliding projects them.
     normal_nodes, normals : (q,) int64, (q, d) float64
         The constraints of the sliding nodes: unit directions of no displacement.
     same_as : (n,) int64
-        A node that stands for all that coincide with it (periodic images), itself included.
+        For each node, the node that represents all that coincide with it under the periodic
+        distance (its images); itself, if there are none.
     project : callable
-        Displacements of nodes brought back on their boundary.
+        Projects displacements of sliding nodes (`Project`).
     curved : bool
         Whether slid nodes must be projected after direct sliding.
+    cartesian : callable
+        Returns the Cartesian points (m, d) of coordinates (m, d).
     coords, shift : (n, d), (d,) float64
         Current positions in the frame, and one period in it (zero: none), for the correction.
     reduction : GreedySettings or None
         None: all candidates are control nodes.
     before : Solution or None
-        That of the step before.
+        Of the step before; None in the first step.
     stages : tuple of Levels
-        Rows of each system that was chosen for other data, in levels: a selection in levels takes
+        The rows that were chosen for other data, of each system: a selection in levels takes
         them first.
     lasting : bool
-        Whether the system is to be solved for other data too, so that these alone do not tell
-        whether its solutions can be trusted.
+        Whether the factor will be used for other data too (as for gradients). Then its accuracy
+        is tested with other data, too.
     """
 
     basis: Basis
@@ -136,16 +161,16 @@ class Problem:
     lasting: bool = False
 
     def behind(self, nodes: IntArray) -> FloatArray:
-        """Return how much the interpolants of all steps before lack at nodes, (m, d)."""
+        """Return the errors (m, d) that the interpolants of all steps before left at nodes (m,)."""
         if self.before is None or self.before.lag is None:
             return np.zeros((len(nodes), self.values.shape[1]))
         return self.before.lag.at(nodes)
 
     def beginning(self) -> IntArray:
-        """Return the control nodes with which a selection begins.
+        """Return the control nodes (c,) with which the selection of this step begins.
 
-        Those of the step before, where one level is made; not if their number reached its
-        limit, for then they could not follow a changing error.
+        Those of the step before, in a selection with one level. None if they are as many as
+        ``max_nodes`` allows, for then no node could be added where the error changes.
         """
         settings, before = self.reduction, self.before
         if settings is None or before is None or settings.level != "none":
@@ -156,13 +181,21 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Lag:
-    """What interpolants lack at some nodes, (b,), each once and sorted: (b, d); zero elsewhere."""
+    """The errors that the interpolants of all steps so far left at boundary nodes.
+
+    Attributes
+    ----------
+    nodes : (b,) int64
+        Sorted, each once.
+    values : (b, d) float64
+        Prescribed less interpolated displacement, in the frame.
+    """
 
     nodes: IntArray
     values: FloatArray
 
     def at(self, nodes: IntArray) -> FloatArray:
-        """Return what they lack at nodes, (m, d)."""
+        """Return the errors at nodes (m,), (m, d); zero at nodes that are not in ``nodes``."""
         row = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
         return np.where((self.nodes[row] == nodes)[:, None], self.values[row], 0.0)
 
@@ -191,24 +224,24 @@ class Solution:
     control : (c,) int64
         The nodes in the final system; empty where a method has no such system.
     lag : Lag or None
-        How much less than the boundary nodes the interpolants of all steps so far have moved
-        there; None without data reduction.
+        The errors that the interpolants of all steps so far left at boundary nodes; None without
+        data reduction.
     dropped_error : float
         Largest misfit of this step at the nodes that the pivot guard left out.
     short : str
         Why the selection ended above its tolerance, and a remedy; empty where it did not.
     lost : float
-        By how much the solution of an exact system misses its own control nodes, before they
-        are set.
+        Largest error of an exact solution at its own control nodes, before they are set exactly;
+        in the mesh's length unit.
     doubt : float
-        By how much the field of an exact system may be wrong between its control nodes, measured
-        at some points, as a part of the largest displacement. Where the system is to last, for a
-        wave over the whole mesh too.
+        Estimated error of an exact solution between its control nodes, as a part of the largest
+        displacement (`slideviz.rbf.refine`). With ``Problem.lasting``, also that for a wave over
+        the whole mesh.
     refined : float
-        The same of the ordinary solution, where it was too much and a refined one was found; else
-        0.
+        The same estimate for the solution before refinement, where refinement was needed and
+        helped; else 0.
     field : Field or None
-        What displaced the nodes that are no boundary; None where a method has no such thing.
+        The field that displaced the nodes inside the mesh; None where a method has no such field.
     stages : tuple of Levels
         The rows of each system that was solved, in order: pseudo sliding has up to three, direct
         sliding one or two; empty where a method has no such systems.
@@ -245,7 +278,7 @@ class Interpolant:
     tail : (q, d) float64 or None
         Coefficients beta of the polynomial's terms.
     levels : Levels
-        The rows that it meets.
+        The rows that it meets, of each level.
     """
 
     nodes: IntArray
@@ -258,12 +291,12 @@ class Interpolant:
         return self.field(problem).interpolated(problem.features[:, nodes], tick)
 
     def field(self, problem: Problem) -> RadialField:
-        """Return what gives it anywhere, without a correction."""
+        """Return the field of this interpolant, without a correction."""
         controls = problem.features[:, self.nodes]
         return RadialField(problem.basis, controls, self.weights, self.tail)
 
     def plus(self, other: Interpolant) -> Interpolant:
-        """Return the sum of both, each node once, in the order of first occurrence."""
+        """Return the sum of two interpolants, each node once, in the order of first occurrence."""
         nodes = np.concatenate([self.nodes, other.nodes])
         weights = np.concatenate([self.weights, other.weights])
         unique, first, group = np.unique(nodes, return_index=True, return_inverse=True)

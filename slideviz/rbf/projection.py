@@ -4,7 +4,10 @@ The exact closest point on the node's own piece, not the thesis's nearest-midpoi
 (section 2.4.3), which approximates it and can cycle for ever. Pieces are taken at the
 undeformed boundary, in the working frame, so an arc about the axis stays an arc, and a slid
 node never leaves its curve or surface however many steps are made. With periodic displacement
-they go on beyond the periodic boundaries: on what begins at the other one.
+pieces are continued beyond the periodic boundaries by their own images.
+
+The derivative of a projection is in `slideviz.rbf.projection_matrices`, which
+`slideviz.design.frozen.method` uses.
 """
 
 from __future__ import annotations
@@ -25,11 +28,12 @@ from slideviz.rbf.extension import Place, edge_extension, surface_extension
 from slideviz.terms import ROLES
 
 ROLE_NUMBER: dict[str, int] = {role: number for number, role in enumerate(ROLES)}
+"""A number for each role of a marker, to compare arrays of roles."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
-    """The tracks, curves and surfaces on which nodes slide, and the one of each sliding node.
+    """The tracks (curves and surfaces on which nodes slide), and the track of each sliding node.
 
     Attributes
     ----------
@@ -47,7 +51,7 @@ class Tracks:
     curved: bool
 
     def project(self, coords: FloatArray, nodes: IntArray, free: FloatArray) -> FloatArray:
-        """Return the displacements (m, d) that bring the nodes back on their tracks.
+        """Return the displacements (m, d) from ``coords`` to the closest points on the tracks.
 
         Parameters
         ----------
@@ -55,8 +59,8 @@ class Tracks:
             Current positions in the frame, on the tracks.
         nodes : (m,)
         free : (m, d)
-            Displacements as interpolated. Zero ones stay exactly zero, and so do nodes that have
-            no track.
+            Displacements as interpolated. Zero displacements stay exactly zero. Those of nodes
+            without a track become zero.
         """
         out = np.zeros_like(free)
         label = self.of_node[nodes]
@@ -86,18 +90,18 @@ def find_tracks(
     place : callable
         Corners (f, k, d) of facets or segments (f, k) in the undeformed working frame.
     roles
-        By marker.
+        Role of each marker, by its name.
     shift : (d,) or None
         One period, by which tracks are continued beyond periodic boundaries; None: they end there.
     reach
-        How far tracks are continued where moving boundaries stand on them.
+        How far tracks are continued at the rims of moving boundaries, in the mesh's length unit.
     """
     of_node = np.full(classes.total, -1, np.int64)
     simplices: list[FloatArray] = []
     curved = False
     moving = np.zeros(classes.total, bool)
     moving[classes.moving] = reach > 0
-    across = _across(boundary, classes.stands, roles) if shift is not None else None
+    across = _across_period(boundary, classes.stands, roles) if shift is not None else None
     vectors = corner_vectors(place(boundary.facets))
     labels = _surface_labels(boundary, vectors, roles, feature_angle_deg, across)
     on_surface = classes.edge if boundary.dim == 2 else classes.surface
@@ -123,8 +127,11 @@ def find_tracks(
     return Tracks(tracks, of_node, bool(curved))
 
 
-def _across(boundary: Boundary, stands: IntArray, roles: Mapping[str, str]) -> IntArray:
-    """Return pairs (j, 2) of facets that share a joint when periodic images are one node."""
+def _across_period(boundary: Boundary, stands: IntArray, roles: Mapping[str, str]) -> IntArray:
+    """Return pairs (j, 2) of facets that meet only where periodic images are taken as one node.
+
+    Without the facets of periodic markers.
+    """
     glued = np.zeros(len(stands), bool)
     glued[stands[stands != np.arange(len(stands))]] = True
     across = glued[stands[boundary.facets]].any(axis=1)
@@ -150,12 +157,18 @@ def _surface_labels(
     angle_deg: float,
     across: IntArray | None,
 ) -> IntArray:
-    """Return labels (f,) of facets joined smoothly, also across markers of one role.
+    """Return a label for each facet, (f,), equal for facets of one smooth surface.
+
+    Surfaces continue over markers of one role (`slideviz.rbf.classify.MERGE_FRACTION`).
 
     Parameters
     ----------
-    across : (j, 2)
-        Facets that meet across a periodic boundary, None where surfaces end there.
+    vectors : (f, d)
+        Normals of the facets, of any length.
+    angle_deg
+        The feature angle.
+    across : (j, 2) or None
+        Pairs of facets that meet across a periodic boundary; None: surfaces end there.
     """
     normal = unit(vectors)
     a, b = boundary.joints.T
@@ -179,9 +192,17 @@ def _surface_labels(
 def _by_surfaces(
     wanted: IntArray, row_node: IntArray, row_label: IntArray
 ) -> list[tuple[IntArray, IntArray]]:
-    """Return nodes (m,) that slide on the same surfaces, and the labels of these (k,).
+    """Return groups of nodes (m,) that slide on the same surfaces, and the surfaces' labels (k,).
 
-    Most slide on one. Where surfaces of two roles meet in one plane it is both of them.
+    Most nodes slide on one surface. Where surfaces of two roles meet in one plane, the nodes
+    between slide on both.
+
+    Parameters
+    ----------
+    wanted
+        The nodes to be grouped.
+    row_node, row_label : (p,)
+        Pairs of a node and the label of a surface that it slides on.
     """
     rows = np.isin(row_node, wanted)
     pairs = np.unique(np.stack([row_node[rows], row_label[rows]], axis=1), axis=0)
@@ -197,7 +218,7 @@ def _by_surfaces(
 
 
 def _simplices(sides: FloatArray) -> FloatArray:
-    """Return segments (2D) or triangles (3D, quadrilaterals as two) of facets' corners."""
+    """Return segments (s, 2, 2) or triangles (s, 3, 3) of corners (f, k, d); 4 corners give two."""
     if sides.shape[1] == 2:
         return sides
     quad = sides[np.any(sides[:, 2] != sides[:, 3], axis=1)]
@@ -205,7 +226,7 @@ def _simplices(sides: FloatArray) -> FloatArray:
 
 
 def _bends(vectors: FloatArray, either_way: bool = False) -> bool:
-    """Tell whether the directions of vectors (m, d) differ."""
+    """Tell whether vectors (m, d) have different directions; ``either_way``: up to their sign."""
     directions = unit(vectors)
     along = directions @ directions[0]
     return bool(np.min(np.abs(along) if either_way else along) < 1.0 - 1e-12)
@@ -217,8 +238,8 @@ def _edge_chains(
     """Return for each chain of feature edges its sliding nodes (m,) and its segments (s, 2).
 
     A segment belongs to a sliding node when the two facets that meet in it are in different
-    clusters of that node's constraints. Chains end at nodes that do not slide along edges, and
-    go on where the image of their last node goes on.
+    clusters of that node. Chains end at nodes that do not slide along edges. A chain that ends at
+    a periodic boundary includes the one that begins at the image of its last node.
     """
     cluster = np.full(len(fans.fan_node), -1, np.int64)
     stands = classes.stands

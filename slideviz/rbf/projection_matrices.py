@@ -1,7 +1,8 @@
-"""The facet, edge or vertex of a track that a closest point is on, as an affine map.
+"""Derivatives of projections: a closest point as an affine map of the node.
 
-With the primitive kept, the closest point is ``a + P (x - a)``: P removes the normal of a facet,
-keeps the direction of an edge, and is zero at a vertex. P is its own derivative.
+While the primitive that it is on (facet, edge or vertex) stays the same, the closest point of x is
+``a + P (x - a)``: P is I - n n^T on a facet, t t^T on an edge and zero at a vertex, and is the
+derivative of the projection. The projection itself is in `slideviz.rbf.projection`.
 """
 
 from __future__ import annotations
@@ -11,24 +12,24 @@ import numpy as np
 from slideviz.mesh.model import FloatArray
 
 CLOSE = 2e-6
-"""A closest point of the plane of a facet, or the line of an edge, is that of the facet or edge
-when it is not farther from it than this part of its distance from the node: so a node that slides
-along a line of the mesh on a flat boundary is on a facet, whatever rounding says, and ties that
-the search did not tell apart do not matter."""
+"""A closest point is on a facet (or an edge) when the foot of the node on its plane (or line) is
+within this part of the node's distance from it. So a node that slides along a line of the mesh on
+a flat boundary is on a facet, whatever rounding says, and the choice of the search among equally
+near facets does not matter."""
 
 ROUNDING = 1e-9
-"""The same as a part of the size of the facet."""
+"""Part of the facet's size by which that limit is increased."""
 
 
 def projection_matrices(corners: FloatArray, x: FloatArray, closest: FloatArray) -> FloatArray:
-    """Return the projections P (m, d, d) of the primitives that closest points are on.
+    """Return the derivatives P (m, d, d) of closest points with respect to their nodes.
 
     Parameters
     ----------
     corners : (m, c, d)
         Of the segment (c = 2) or triangle (c = 3) that each closest point is on.
     x, closest : (m, d)
-        Nodes, and their closest points on these simplices, which are points of the primitives.
+        Nodes, and their closest points on the simplices.
     """
     m, count, d = corners.shape
     size = np.ptp(corners, axis=1).max(axis=1)
@@ -53,7 +54,11 @@ def projection_matrices(corners: FloatArray, x: FloatArray, closest: FloatArray)
 def _facets(
     corners: FloatArray, x: FloatArray, closest: FloatArray, near: FloatArray
 ) -> tuple[FloatArray, np.ndarray]:
-    """Return projections on the planes of triangles, and which nodes' closest points are theirs."""
+    """Return projections on planes of triangles (m, 3, 3), and a mask (m,) where these apply.
+
+    They apply where the foot on the plane is within ``near`` (m,) of the closest point; elsewhere
+    the matrix is zero.
+    """
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(one, two)
     area = np.linalg.norm(normal, axis=1)

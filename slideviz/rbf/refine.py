@@ -1,16 +1,15 @@
-"""How far the field of a solved system can be trusted, and solutions of nearly singular systems.
+"""Error estimates of solved systems, and refined solutions of nearly singular systems.
 
-What a solution w lacks, r = b - G w, makes the field between the control nodes wrong by the
-interpolant of r, which can be thousands of times as large as r: between the nodes of a small
-profile and a wide far field, for example. So neither r nor the condition number tells. One
-step of refinement does: its field at some points between control nodes is what the solution is
-wrong by there. Rows that the pivot guard left out count too, for what the field lacks at them
-spreads in the same way.
+A solution w with the residual r = b - G w has an error between the control nodes: the interpolant
+of r. It can be thousands of times as large as r, between the nodes of a small profile and a wide
+far field, for example. So neither r nor the condition number shows it. One step of refinement
+does: its field, at some points between control nodes, is the error of the solution there. Rows
+that the pivot guard left out are included, for the error at their nodes spreads in the same way.
 
-Where that is too much, the system is solved again, by conjugate gradients with the factor as
-preconditioner, and with residuals of twice the digits (`twofold`): ordinary residuals lose as
-many digits as the weights are larger than the data, at each right-hand side others, so that
-refinement with them adds noise. The rows that the guard left out are met too.
+Where the error is too large, the system is solved again, by conjugate gradients with the factor
+as preconditioner, and with residuals of twice the precision (`twofold`): ordinary residuals lose
+as many digits as the weights are larger than the data, so that refinement with them adds noise.
+The refined solution meets the rows that the guard left out, too.
 """
 
 from __future__ import annotations
@@ -27,29 +26,41 @@ from slideviz.rbf.solve import Factor, enough_threads, solve_lower
 from slideviz.rbf.twofold import Residuals
 
 TRUSTED = 1e-5
-"""Part of the largest displacement by which a field may be wrong between control nodes: above, the
-system is refined, and where that does not help the user is told."""
+"""Largest error of a field between control nodes, as a part of the largest displacement. Above it
+the solution is refined, and where refinement does not help the user is warned."""
 
 SETTLED, VERIFIED = 1e-4 * TRUSTED, 1e-3 * TRUSTED
-"""Parts of it that the last step of a refinement may change, and that it may be wrong by then."""
+"""Conjugate gradients end when a step changes the field by less than the first part of the largest
+displacement; refinement ends when the field's error is below the second."""
 
 SHIFT = 1e-14
-"""What is added to the pivots of rows that the guard left out, for they are little but rounding."""
+"""Added to the diagonal of the rows that the guard (``solve.PIVOT_GUARD``) left out, whose pivots
+are little but rounding; the diagonal of a system is 1."""
 
 ROUNDING = 4.0 * float(np.finfo(float).eps)
-"""Error of the field of weights whose sizes add up to 1: a few times what was measured."""
+"""Rounding error of a field, over the sum of the absolute weights: a few times the one measured."""
 
 SLOW = 0.3
-"""A round that leaves more than this part of what the one before found wrong is the last."""
+"""Refinement ends after a round whose error is above this part of the error of the round before."""
 
 ROUNDS, STEPS = 4, 40
+"""Most rounds of a refinement, each with a new residual, and most conjugate gradient steps of a
+round."""
+
 CHECKS = 60
-"""Points between control nodes of each kind of neighbours."""
+"""Number of points between control nodes at each of four distances (`between`)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """Weights (n, m), and by how much their field may be wrong, as a part of the data, (m,)."""
+    """A refined solution.
+
+    Attributes
+    ----------
+    weights : (n, m) float64
+    doubt : (m,) float64
+        Estimated error of each column's field, as a part of its largest data.
+    """
 
     weights: FloatArray
     doubt: FloatArray
@@ -57,7 +68,7 @@ class Refined:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """A system with its factor.
+    """An interpolation system with its factor, to estimate errors and to refine solutions.
 
     Attributes
     ----------
@@ -65,7 +76,7 @@ class System:
     place : tuple
         Features (k, n) of the node of each row, and its unit direction (n, d) or None.
     factor : Factor
-        Some rows may be left out of it.
+        Without the rows that the pivot guard left out.
     """
 
     basis: Basis
@@ -74,7 +85,10 @@ class System:
     _kept: dict[str, Any] = made_by(default_factory=dict)
 
     def rough_data(self) -> FloatArray:
-        """Return data (n, m) with a wave along each axis, for data that are not yet known."""
+        """Return test data: a sine wave along each axis, over the extent of the nodes.
+
+        (n, 3), or (n, 1) with directions: the waves along these.
+        """
         features, normals = self.place
         count = 3 if normals is None else normals.shape[1]
         at = features[:count] - features[:count].min(axis=1, keepdims=True)
@@ -83,12 +97,12 @@ class System:
         return waves if normals is None else (waves * normals).sum(axis=1, keepdims=True)
 
     def wrong(self, right: FloatArray, weights: FloatArray) -> FloatArray:
-        """Return by how much the field of weights (n, m) is wrong, measured at some points, (m,).
+        """Return the largest error of the field of weights (n, m) at some points (`between`), (m,).
 
         Parameters
         ----------
         right : (n, m)
-            The data; m = 1 with directions.
+            Right-hand sides that the weights solve for; m = 1 with directions.
         """
         features, normals = self.place
         along = weights if normals is None else normals * weights
@@ -107,18 +121,18 @@ class System:
         *,
         settle: bool = False,
     ) -> Refined:
-        """Return the weights that meet all rows, those that the guard left out too.
+        """Return the weights that meet all rows, also those that the guard left out.
 
         Parameters
         ----------
         right, start : (n, m)
-            The data, and weights to begin with.
+            Right-hand sides, and weights to begin with.
         largest : (m,)
-            The size of the data of each column, by which its field is judged.
+            The largest data of each column, relative to which errors of its field are.
         settle
-            Whether the weights themselves are the result, as of an adjoint system, where no field
-            tells of the weights of nodes that nearly coincide. The doubt is then by how much the
-            last round changed them, as a part of the largest.
+            Whether the weights themselves are the result, as of an adjoint system, where the field
+            does not show errors in the weights of nodes that nearly coincide. The doubt is then
+            the largest change of a weight in the last round, as a part of the largest weight.
         """
         weights, low = start.copy(), np.zeros_like(start)
         residuals = self._residuals()
@@ -152,9 +166,10 @@ class System:
         *,
         settle: bool,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return what is to be added to weights (n, m), and by how much their field is wrong, (m,).
+        """Return the change of weights (n, m) in a round, and the error of their field before it.
 
-        Columns end by themselves: what one does must not depend on the others.
+        By conjugate gradients for the residual ``lacking`` (n, m). Each column ends by itself, so
+        that its result does not depend on the others.
         """
         whole, residuals, r = self._whole(), self._residuals(), lacking.copy()
         total, z = np.zeros_like(r), whole.solve(r)
@@ -182,7 +197,10 @@ class System:
         return total, wrong
 
     def _field(self, weights: FloatArray) -> FloatArray:
-        """Return the largest component of the field of each column of weights (n, m), (m,)."""
+        """Return the largest absolute component of each column's field, (m,), of weights (n, m).
+
+        At the points `between` the nodes.
+        """
         features, normals = self.place
         if "checks" not in self._kept:
             points = between(features)
@@ -193,7 +211,7 @@ class System:
         return np.asarray(np.max(found, axis=0))
 
     def _whole(self) -> Factor:
-        """Return a factor of all rows, which is not exact for those that were left out."""
+        """Return a factor of all rows; for those that were left out it is not exact (`SHIFT`)."""
         if not len(self.factor.dropped):
             return self.factor
         if "whole" not in self._kept:
@@ -202,6 +220,7 @@ class System:
         return whole
 
     def _residuals(self) -> Residuals:
+        """Return what computes residuals of this system with twice the precision."""
         if "residuals" not in self._kept:
             self._kept["residuals"] = Residuals(self.basis, self.place)
         residuals: Residuals = self._kept["residuals"]
@@ -211,7 +230,10 @@ class System:
 def with_dropped_rows(
     basis: Basis, place: tuple[FloatArray, FloatArray | None], factor: Factor
 ) -> Factor:
-    """Return a factor with the rows that another left out, whose pivots are a little too large."""
+    """Return ``factor`` with the rows appended that it left out, with `SHIFT` on their diagonal.
+
+    Ten times `SHIFT`, and so on, where the rows are not positive definite with that.
+    """
     kept, dropped = factor.kept, factor.dropped
     features, normals = place
     outside = features[:, dropped], None if normals is None else normals[dropped]
@@ -234,7 +256,10 @@ def with_dropped_rows(
 
 
 def between(features: FloatArray) -> FloatArray:
-    """Return points (k, m) halfway between the features (k, n) of nodes, near and far ones."""
+    """Return points (k, m) halfway between nodes with features (k, n), adjacent and distant ones.
+
+    Adjacent in the order of the nodes, or a sixteenth, a quarter and a half of all nodes apart.
+    """
     n = features.shape[1]
     ends = np.arange(0, n, max(1, n // CHECKS))
     others = [(ends + apart) % n for apart in (1, n // 16, n // 4, n // 2)]

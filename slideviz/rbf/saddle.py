@@ -1,4 +1,4 @@
-"""Symmetric indefinite systems: saddle points, of functions that need a polynomial."""
+"""Saddle-point systems: symmetric indefinite, of radial functions that need a polynomial."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.solve import PIVOT_GUARD, require_finite
 
 RANK = 1e-10
-"""Relative size below which a polynomial term adds nothing at the control nodes."""
+"""A polynomial term depends on the others at the control nodes when its diagonal entry in a pivoted
+QR is at most this part of the largest one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +76,15 @@ def _regular(system: FloatArray, right: FloatArray) -> FloatArray | None:
 
 
 def is_singular(system: FloatArray) -> bool:
-    """Tell whether a system with a polynomial (n, n) is solved by least squares."""
+    """Tell whether a symmetric system (n, n) is singular, so that least squares solve it."""
     return _regular(system, np.zeros((len(system), 1))) is None
 
 
 def pseudo_inverse(system: FloatArray, rank: int | None = None) -> tuple[FloatArray, FloatArray]:
-    """Return the eigenvalues (k,) and eigenvectors (n, k) of a singular symmetric system.
+    """Return the k largest eigenvalues (k,), by absolute value, and eigenvectors (n, k).
 
-    As many as its rank, by the same threshold as the least squares solution if not given.
+    Of a singular symmetric system; k is its ``rank``, found with the threshold of the least-squares
+    solution if not given.
     """
     values, vectors = np.linalg.eigh(system)
     order = np.argsort(-np.abs(values), kind="stable")
@@ -98,7 +100,7 @@ def saddle_condition(matrix: FloatArray, terms: FloatArray) -> float:
 
 
 def saddle_system(matrix: FloatArray, terms: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return ``[[G, P], [P^T, 0]]`` with the independent terms, and which ones these are."""
+    """Return ``[[G, P], [P^T, 0]]`` with P the independent columns of terms, and their indices."""
     scale = np.maximum(np.abs(terms).max(axis=0), 1e-300)
     r, order = qr(terms / scale, pivoting=True, mode="r")
     size = np.abs(np.diag(r))

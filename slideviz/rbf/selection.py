@@ -16,22 +16,24 @@ POOL = 768
 """Largest number of rows in the pool of a block."""
 
 POOL_START = 192
+"""Number of candidates in the first pools, at least."""
+
 POOL_SHARE = 6
-"""The pool begins small and has this many candidates for each node to pick: as good, measured
-by the number of control nodes, and cheaper than the largest one from the start."""
+"""Candidates in the pool for each node to pick: as good, measured by the number of control nodes,
+as the largest pool from the start, and cheaper."""
 
 BLOCK_LIMIT = 128
 """Largest number of nodes picked in a cycle."""
 
 TIE = 1e-4
-"""Errors that differ by less than this part may count as equal: far above their rounding, far
-below what matters for the choice."""
+"""Errors with a smaller relative difference may count as equal: far above their rounding, far
+below what matters for the choice. `favour` decides between them."""
 
 FALL = 0.9
-"""An error has fallen when it is below this part of what it was."""
+"""An error has fallen when it is below this part of the lowest one before."""
 
 LOSSES = 8
-"""How often in a row an error may fail to fall."""
+"""Number of levels in a row without a fall of the error that end a selection in levels."""
 
 
 def newton(
@@ -52,17 +54,17 @@ def newton(
     residual : (p, m)
         Of all rows of the pool, those of a block together, p the sum of all p_k.
     nodes, factor : (p,), (p,)
-        The node of each row; all rows of a node are picked together. And what its error is
-        multiplied with, to decide between equal ones (`favour`).
+        The node of each row (all rows of a node are picked together), and the node's factor
+        (`favour`), with which its error is multiplied to decide between equal errors.
     count, floor
         Number of nodes, and the error below which to stop (the first is always taken).
 
     Returns
     -------
     picked : (q,) int64
-        In the order of choice.
-    basis : list of (p_k, p_k)
-        A column for each picked row of the block, in that order; the rest is zero.
+        Places of rows among the p, in the order of choice.
+    basis : list of (p_k, q_k)
+        A column for each picked row of the block, in the same order.
     """
     stops = np.cumsum([len(s) for s in schur])
     block = np.repeat(np.arange(len(schur)), [len(s) for s in schur])
@@ -99,14 +101,15 @@ def newton(
 
 
 def favour(coords: FloatArray) -> FloatArray:
-    """Return a factor for the error of each candidate, (c,), that decides between equal ones.
+    """Return a factor for the error of each candidate, (c,), that decides between equal errors.
 
-    From 1 to 1 + TIE, along a direction that no symmetry of a mesh is likely to have: no sum of
-    whole multiples of its components is zero, so no two points of a grid are alike.
+    It grows from 1 to 1 + TIE along a direction that no symmetry of a mesh is likely to have: no
+    sum of whole multiples of its components is zero, so no two points of a grid get the same.
 
     Parameters
     ----------
     coords : (c, d)
+        Positions of the candidates in the frame.
     """
     if not len(coords):
         return np.empty(0)
@@ -124,7 +127,9 @@ def pool(
     chosen_in_level: int,
     per_node: int,
 ) -> tuple[int, IntArray]:
-    """Return how many nodes to pick, and the candidates to pick them from.
+    """Return how many nodes to pick, and the candidates (k,) to pick them from.
+
+    0 and none where no error is above the tolerance.
 
     Parameters
     ----------
@@ -135,7 +140,7 @@ def pool(
     chosen, chosen_in_level
         Nodes picked so far: in all levels, and in this one.
     per_node
-        Rows of a candidate.
+        Rows of a candidate, on average.
     """
     eligible = np.count_nonzero(errors > settings.tolerance)
     if not eligible:
@@ -158,7 +163,10 @@ def pool(
 def _double(
     errors: FloatArray, vectors: FloatArray, worst: int, tolerance: float
 ) -> tuple[int, IntArray]:
-    """Return the worst candidate and the worst one whose error is more than 90° from its."""
+    """Return a count and as many candidates: ``worst``, and the worst of opposite error, if any.
+
+    An error is opposite when it is at more than 90° to that of ``worst``.
+    """
     lengths = np.linalg.norm(vectors, axis=1)
     cosine = vectors @ vectors[worst] / np.maximum(lengths * lengths[worst], 1e-300)
     # Errors along different axes are perpendicular but for rounding.
@@ -170,9 +178,9 @@ def _double(
 
 
 class LevelLimit:
-    """When a selection in levels gives up: its error no longer falls, or it chose too many nodes.
+    """Decides when a selection in levels gives up: no falling error, or too many rows chosen.
 
-    What ends a selection otherwise (tolerance, number of nodes, a singular system) is in
+    The other ends of a selection (tolerance, number of nodes, a singular system) are in
     `slideviz.rbf.greedy.GreedyFit`.
 
     Attributes

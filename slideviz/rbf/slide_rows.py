@@ -1,4 +1,7 @@
-"""The surfaces that meet at each sliding node, and how many directions they hold."""
+"""The surfaces that meet at each sliding node, and the rank of their normals.
+
+Rules of smoothness elsewhere: see `slideviz.rbf.classify.MERGE_FRACTION`.
+"""
 
 from __future__ import annotations
 
@@ -14,19 +17,25 @@ RANK_TOLERANCE = 0.02
 """Sine of the angle (about one degree) from which a further normal counts as independent."""
 
 IN_PLANE = np.sqrt(1.0 - RANK_TOLERANCE**2)
-"""Cosine of that angle: fans whose normals differ by less are in one plane."""
+"""Cosine of that angle: fans at a smaller angle are in one plane."""
 
 
 @dataclass(frozen=True, eq=False)
 class FansAround:
-    """All fans: the node each counts for, its own node, role and normal, and two cosines.
+    """All fans, with what decides which of them are one surface.
 
     Attributes
     ----------
+    node, own : (m,) int64
+        The node that represents the fan's node and its periodic images, and the fan's node itself.
+    role : (m,) str
+        Role of the fan's marker.
+    normals : (m, d) float64
+        Unit normals.
     smooth, merge : float
-        Fans of one role are one surface when their normals differ by less than these angles:
-        the first for those of two periodic images, where the surface goes on beyond the
-        periodic boundary, the second for those of one node.
+        Fans of one role are one surface when the cosine of the angle between their normals is
+        above these: ``smooth`` for fans of two periodic images, where a surface may continue
+        beyond the periodic boundary, ``merge`` for fans of one node.
     """
 
     node: IntArray
@@ -45,7 +54,10 @@ def nodes_with(at: IntArray, chosen: np.ndarray, total: int) -> np.ndarray:
 
 
 def slide_rows(around: FansAround, active: np.ndarray) -> tuple[IntArray, IntArray]:
-    """Return rows (fan, cluster within its node) of active fans, and the nodes of full rank."""
+    """Return rows (r, 2) of a fan and its cluster within its node, and the nodes of full rank (f,).
+
+    For the fans in the mask ``active`` (m,); nodes are representatives of periodic images.
+    """
     chosen = np.flatnonzero(active)
     if not len(chosen):
         return np.empty((0, 2), np.int64), np.empty(0, np.int64)
@@ -70,10 +82,10 @@ def slide_rows(around: FansAround, active: np.ndarray) -> tuple[IntArray, IntArr
 
 
 def _one_sided(around: FansAround, chosen: IntArray) -> IntArray:
-    """Return the fans ordered by node, without those that are another's other side.
+    """Return the fans ``chosen`` (k,) ordered by node, without the opposite sides of others.
 
     A periodic boundary and its image are one surface, seen from both sides: of its two opposite
-    normals that at the node which stands for both is kept.
+    fans the one at the representative node is kept.
     """
     image = around.own[chosen] != around.node[chosen]
     chosen = chosen[np.lexsort([chosen, image, around.node[chosen]])]
@@ -92,10 +104,11 @@ def _one_sided(around: FansAround, chosen: IntArray) -> IntArray:
 
 
 def _clusters(around: FansAround, local: IntArray, size: IntArray) -> IntArray:
-    """Return labels (m,) that join fans of one node and role whose normals differ by a small angle.
+    """Return the cluster of each fan, (m,): equal for fans of one node that are one surface.
 
-    Also over others between them, so that the order of the fans does not matter. Fans in one
-    plane are one whatever their roles: no edge is between them. Labels are 0, 1, ... at each node.
+    Fans of one role at a small angle are one surface, and fans in one plane whatever their roles.
+    So are fans connected by others between them: the order of the fans does not matter. Clusters
+    are numbered 0, 1, ... at each node.
 
     Parameters
     ----------
@@ -113,7 +126,7 @@ def _clusters(around: FansAround, local: IntArray, size: IntArray) -> IntArray:
 
 @njit(nogil=True, cache=True)
 def _join(size, normals, role, own, smooth, merge, label):  # type: ignore[no-untyped-def]
-    """Write what `_clusters` returns into ``label`` (m,); of each fan role and own node (m,)."""
+    """Write what `_clusters` returns to ``label`` (m,); ``role`` (m,) are numbers."""
     start = 0
     for count in size:
         stop = start + count
@@ -145,9 +158,9 @@ def _cosines(normals):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True, cache=True)
 def _continuations(alike, roles, nodes, smooth):  # type: ignore[no-untyped-def]
-    """Return whether the surface of fan i goes on in fan j of an image, (c, c).
+    """Return a mask (c, c): whether the surface of fan i continues in fan j of an image.
 
-    That is the one of each image that is most like it, and no other.
+    At each image at most in one fan: of the same role, and at the smallest angle.
     """
     count = len(roles)
     goes_on = np.zeros((count, count), np.bool_)
@@ -164,7 +177,7 @@ def _continuations(alike, roles, nodes, smooth):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True, cache=True)
 def _replace(labels, old, new):  # type: ignore[no-untyped-def]
-    """Give what has one label another."""
+    """Replace label ``old`` by ``new``, in place."""
     for k in range(len(labels)):
         if labels[k] == old:
             labels[k] = new
@@ -172,7 +185,7 @@ def _replace(labels, old, new):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True, cache=True)
 def _close_gaps(labels):  # type: ignore[no-untyped-def]
-    """Make labels 0, 1, ... in their order; by loops, as loading anything else takes long."""
+    """Renumber labels 0, 1, ... in place, in order; `np.unique` would take long to compile."""
     number = np.zeros(len(labels), np.int64)
     for label in labels:
         number[label] = 1
@@ -183,7 +196,9 @@ def _close_gaps(labels):  # type: ignore[no-untyped-def]
 
 
 def _ranks(normals: FloatArray, group: IntArray, label: IntArray) -> IntArray:
-    """Return the rank of each node's clusters, (g,); opposite ones (a thin tip) count as full.
+    """Return the rank of the mean normals of each node's clusters, (g,).
+
+    Where two are opposite (a thin tip) it counts as full, d.
 
     Parameters
     ----------

@@ -2,12 +2,13 @@
 
     s(x_i) = sum_j w_j phi(|x_i - c_j| / R)
 
-A radial function changes with the square of the distance by phi'(xi) / (2 xi R^2), which needs no
-square root and has no 0/0 for the smooth ones. A node that is a control node itself stays at
-distance zero from itself, so that pair adds nothing, whatever the function.
+The derivative of phi with respect to the square of the distance is phi'(xi) / (2 xi R^2), which
+needs no square root and has no 0/0 for smooth functions. A node that is a control node itself
+stays at distance zero from itself, so that pair adds nothing, whatever the function. The distance
+is that of ``compiled.distances``.
 
-Both loops run over targets; the part of the control nodes in the reverse pass is the same loop
-with targets and controls exchanged, because the square of the distance is symmetric.
+Both loops run over targets; the gradient with respect to control nodes is the same loop with
+targets and controls exchanged, because the square of the distance is symmetric.
 """
 
 from __future__ import annotations
@@ -23,19 +24,19 @@ from slideviz.rbf.evaluate import Basis, padded_rows
 from slideviz.rbf.kernels import KERNELS, SHAPE
 
 NEAR = 1e-12
-"""Parts of R below which two nodes are one."""
+"""Nodes coincide when their distance over R is at most this."""
 
 INVERSE = len(KERNELS)
-"""The number of xi^-power, the weight of inverse distance weighting."""
+"""The code of xi^-power, the weight of inverse distance weighting, among those of kernels."""
 
 TINY = 1e-24
-"""Square of xi below which nodes coincide: there that weight is so large that no other node
-counts."""
+"""Smallest square of xi in inverse distance weighting: the weight of a coinciding node is then so
+large that no other node counts."""
 
 
 @njit(**OPTIONS)
 def _slope(kind, power, q, count):  # type: ignore[no-untyped-def]
-    """Replace xi by phi'(xi) / (2 xi) in the first ``count`` entries of q."""
+    """Replace xi by phi'(xi) / (2 xi) in the first ``count`` entries of q; ``kind`` is a code."""
     for j in range(count):
         x = q[j]
         u = max(1.0 - x, 0.0)
@@ -86,8 +87,11 @@ def _sine(g):  # type: ignore[no-untyped-def]
 
 
 @njit(parallel=True, **OPTIONS)
-def _reverse(x, c, wx, wc, half, scale, kind, power, out):  # type: ignore[no-untyped-def]
-    """Write sum_j (wx_i . wc_j) dphi_ij/dx_i to out (4, N)."""
+def _reverse(x, c, wx, wc, period_over_pi, scale, kind, power, out):  # type: ignore[no-untyped-def]
+    """Write sum_j (wx_i . wc_j) dphi_ij/dx_i to out (4, N).
+
+    Features x (4, N) and c (4, n), vectors wx (3, N) and wc (3, n) at targets and controls.
+    """
     tasks = (x.shape[1] + TARGETS_PER_TASK - 1) // TARGETS_PER_TASK
     twice = 2.0 * scale * scale
     for task in prange(tasks):
@@ -99,13 +103,13 @@ def _reverse(x, c, wx, wc, half, scale, kind, power, out):  # type: ignore[no-un
             s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
-                distances(x[:, i], c, start, count, half, scale, q)
+                distances(x[:, i], c, start, count, period_over_pi, scale, q)
                 _slope(kind, power, q, count)
                 for j in range(start, start + count):
                     p = (a0 * wc[0, j] + a1 * wc[1, j] + a2 * wc[2, j]) * q[j - start]
-                    if half > 0.0:
-                        g = half * (x1 * c[2, j] - x2 * c[1, j])
-                        turn = x0 * c[0, j] * _sine(g) * half
+                    if period_over_pi > 0.0:
+                        g = period_over_pi * (x1 * c[2, j] - x2 * c[1, j])
+                        turn = x0 * c[0, j] * _sine(g) * period_over_pi
                         s0 += p * (x0 - c[0, j] + c[0, j] * one_minus_cos(g))
                         s1 += p * turn * c[2, j]
                         s2 -= p * turn * c[1, j]
@@ -119,8 +123,8 @@ def _reverse(x, c, wx, wc, half, scale, kind, power, out):  # type: ignore[no-un
 
 
 @njit(parallel=True, **OPTIONS)
-def _forward(x, c, w, dx, dc, half, scale, kind, power, out):  # type: ignore[no-untyped-def]
-    """Write the change of s as x and c change by dx and dc, to out (3, N)."""
+def _forward(x, c, w, dx, dc, period_over_pi, scale, kind, power, out):  # type: ignore[no-untyped-def]
+    """Write the derivative of s as x (4, N) and c (4, n) change by dx and dc, to out (3, N)."""
     tasks = (x.shape[1] + TARGETS_PER_TASK - 1) // TARGETS_PER_TASK
     twice = 2.0 * scale * scale
     for task in prange(tasks):
@@ -132,15 +136,15 @@ def _forward(x, c, w, dx, dc, half, scale, kind, power, out):  # type: ignore[no
             s0, s1, s2 = 0.0, 0.0, 0.0
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
-                distances(x[:, i], c, start, count, half, scale, q)
+                distances(x[:, i], c, start, count, period_over_pi, scale, q)
                 _slope(kind, power, q, count)
                 for j in range(start, start + count):
                     change = (x3 - c[3, j]) * (d3 - dc[3, j]) + (x0 - c[0, j]) * (d0 - dc[0, j])
-                    if half > 0.0:
-                        g = half * (x1 * c[2, j] - x2 * c[1, j])
+                    if period_over_pi > 0.0:
+                        g = period_over_pi * (x1 * c[2, j] - x2 * c[1, j])
                         change += (d0 * c[0, j] + x0 * dc[0, j]) * one_minus_cos(g)
                         turn = d1 * c[2, j] + x1 * dc[2, j] - d2 * c[1, j] - x2 * dc[1, j]
-                        change += x0 * c[0, j] * _sine(g) * half * turn
+                        change += x0 * c[0, j] * _sine(g) * period_over_pi * turn
                     else:
                         change += (x1 - c[1, j]) * (d1 - dc[1, j])
                         change += (x2 - c[2, j]) * (d2 - dc[2, j])
@@ -152,7 +156,7 @@ def _forward(x, c, w, dx, dc, half, scale, kind, power, out):  # type: ignore[no
 
 
 @njit(parallel=True, **OPTIONS)
-def _sum_powers(x, c, w, half, scale, power, out):  # type: ignore[no-untyped-def]
+def _sum_powers(x, c, w, period_over_pi, scale, power, out):  # type: ignore[no-untyped-def]
     """Write sum_j w_j xi_ij^-power to out (3, N)."""
     tasks = (x.shape[1] + TARGETS_PER_TASK - 1) // TARGETS_PER_TASK
     for task in prange(tasks):
@@ -162,7 +166,7 @@ def _sum_powers(x, c, w, half, scale, power, out):  # type: ignore[no-untyped-de
             s0, s1, s2 = 0.0, 0.0, 0.0
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
-                distances(x[:, i], c, start, count, half, scale, q)
+                distances(x[:, i], c, start, count, period_over_pi, scale, q)
                 for j in range(count):
                     p = max(q[j] * q[j], TINY) ** (-0.5 * power)
                     s0 += w[0, start + j] * p
@@ -174,11 +178,16 @@ def _sum_powers(x, c, w, half, scale, power, out):  # type: ignore[no-untyped-de
 def sum_powers(
     basis: Basis, targets: FloatArray, controls: FloatArray, weights: FloatArray, power: float
 ) -> FloatArray:
-    """Return sum_j w_j (|x_i - c_j| / R)^-power at the targets, (N, d)."""
+    """Return sum_j w_j (|x_i - c_j| / R)^-power at targets (k, N), (N, d).
+
+    Of controls (k, n) with weights w (n, d); all features.
+    """
     x, c = padded_rows(targets, 4), padded_rows(controls, 4)
     out = np.empty((3, x.shape[1]))
     with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
-        _sum_powers(x, c, padded_rows(weights.T, 3), basis.half, 1.0 / basis.radius, power, out)
+        _sum_powers(
+            x, c, padded_rows(weights.T, 3), basis.period_over_pi, 1.0 / basis.radius, power, out
+        )
     return np.ascontiguousarray(out[: weights.shape[1]].T)
 
 
@@ -192,7 +201,8 @@ def pull_positions(
 ) -> FloatArray:
     """Return the gradient of sum_i adjoint_i . s(x_i) with respect to the targets, (k, N).
 
-    With targets and controls, and adjoint and weights, exchanged: that with respect to controls.
+    For the gradient with respect to the controls, exchange targets with controls and adjoint with
+    weights.
 
     Parameters
     ----------
@@ -200,7 +210,7 @@ def pull_positions(
         Features, as ``Frame.features`` gives them.
     adjoint, weights : (N, d), (n, d)
     power
-        That of inverse distance weighting, in place of the radial function; 0: none.
+        Not 0: the power of inverse distance weighting, xi^-power in place of the radial function.
     """
     x, c = padded_rows(targets, 4), padded_rows(controls, 4)
     out = np.empty((4, x.shape[1]))
@@ -220,7 +230,7 @@ def push_positions(
     moved_controls: FloatArray | None = None,
     power: float = 0.0,
 ) -> FloatArray:
-    """Return the change (N, d) of s as features of targets and controls change.
+    """Return the derivative (N, d) of s as the features of targets and controls change.
 
     Parameters
     ----------
@@ -239,6 +249,6 @@ def push_positions(
 
 
 def _settings(basis: Basis, power: float) -> tuple[float, float, int, float]:
-    """Return what the loops take: half, scale, kind of function and power."""
+    """Return ``period_over_pi``, 1 / R, code of the function and power, as the loops take them."""
     kind = INVERSE if power else KERNELS[basis.kernel].code
-    return basis.half, 1.0 / basis.radius, kind, power
+    return basis.period_over_pi, 1.0 / basis.radius, kind, power

@@ -24,12 +24,18 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import Tick, no_tick
 
 PIVOT_GUARD = 1e-12
+"""A row whose pivot is smaller is left out. Absolute, for the diagonal of every factorised system
+is 1: phi(0) = 1 for all kernels that need no polynomial, and directions are unit vectors. `saddle`
+has it as a part of the largest eigenvalue; ``refine.SHIFT`` is added to the rows left out."""
+
 BLOCK = 512
+"""Columns of the matrix factorised between two calls of ``tick``."""
+
 TRIANGLE = 512
 """Rows of a triangular solve that hold the interpreter lock: some milliseconds."""
 
 NORM_CYCLES = 5
-"""The estimate of a norm is mostly done after two."""
+"""Most cycles of the estimate of a norm, which is mostly done after two."""
 
 SMALL_FLOPS = 50_000_000
 """Work below which the threads of the linear algebra library wait longer than they work."""
@@ -37,11 +43,12 @@ SMALL_FLOPS = 50_000_000
 
 @cache
 def _libraries() -> ThreadpoolController:
+    """Return the controller of the threads of loaded libraries; finding these takes long."""
     return ThreadpoolController()
 
 
 def enough_threads(flops: float) -> AbstractContextManager[object]:
-    """Return a context in which small dense work is done by one thread."""
+    """Return a context in which BLAS has one thread for work of at most `SMALL_FLOPS`."""
     if flops > SMALL_FLOPS:
         return nullcontext()
     return _libraries().limit(limits=1, user_api="blas")
@@ -49,11 +56,12 @@ def enough_threads(flops: float) -> AbstractContextManager[object]:
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """A Cholesky factor L L^T = G[kept][:, kept].
+    """The Cholesky factor L of a system G (n, n) without some rows: L L^T = G[kept][:, kept].
 
     Attributes
     ----------
     lower : (k, k) float64
+        L.
     kept : (k,) int64
         The rows of G that are in the system, in order.
     dropped : (n - k,) int64
@@ -98,7 +106,10 @@ def solve_lower(lower: FloatArray, right: FloatArray, transposed: bool = False) 
 
 
 def condition(*factors: FloatArray) -> float:
-    """Return an estimate of the condition number (1-norm, Higham and Tisseur) of blocks L L^T."""
+    """Return an estimate of the condition number of a block-diagonal matrix of blocks L L^T.
+
+    In the 1-norm, after Higham and Tisseur (`_norm`); 1.0 without rows.
+    """
     sizes = np.array([_norms(lower) for lower in factors if len(lower)])
     return float(np.prod(sizes.max(axis=0))) if len(sizes) else 1.0
 
@@ -120,12 +131,12 @@ def _norms(lower: FloatArray) -> tuple[float, float]:
 
 
 def _norm(apply: Callable[[FloatArray], FloatArray], n: int) -> float:
-    """Return a lower bound, mostly sharp, of the 1-norm of a symmetric operator on columns (n, 1).
+    """Return a mostly sharp lower bound of the 1-norm of a symmetric operator on columns (n, 1).
 
     Algorithm 2.4 of N. J. Higham and F. Tisseur, A block algorithm for matrix 1-norm estimation
-    (SIAM J. Matrix Anal. Appl. 21, 2000), with one column: more start from random ones, and equal
-    runs would tell unequal numbers. It gives what SciPy's ``onenormest`` does, which takes long
-    to load.
+    (SIAM J. Matrix Anal. Appl. 21, 2000), with one column: further columns would be random, and
+    equal runs would report different numbers. The result is that of SciPy's ``onenormest``, which
+    takes long to load.
     """
     x, signs, norm, at = np.full((n, 1), 1.0) / n, np.zeros((n, 1)), 0.0, -1
     for cycle in range(NORM_CYCLES + 1):
@@ -157,7 +168,7 @@ def factorise(matrix: FloatArray, tick: Tick = no_tick) -> Factor:
 
 
 def extend(before: Factor, rows: FloatArray, tick: Tick = no_tick) -> Factor:
-    """Return the factor of a matrix of which the leading block has the factor ``before``.
+    """Return the factor of a matrix whose leading block has the factor ``before``.
 
     Left-looking by blocks of columns, so that ``tick`` is called, and may stop the work, every
     few tens of milliseconds even for 10,000 unknowns.
@@ -202,7 +213,10 @@ def extend(before: Factor, rows: FloatArray, tick: Tick = no_tick) -> Factor:
 
 
 def _cholesky(block: FloatArray, dropped: NDArray[np.bool_]) -> FloatArray:
-    """Return the factor of a diagonal block; marks the rows that the guard leaves out."""
+    """Return the factor of a diagonal block; set ``dropped`` for rows that the guard leaves out.
+
+    These are rows of the identity in the factor.
+    """
     try:
         head = np.asarray(np.linalg.cholesky(block), np.float64)
         if np.min(np.diag(head)) ** 2 >= PIVOT_GUARD:
@@ -216,7 +230,10 @@ def _cholesky(block: FloatArray, dropped: NDArray[np.bool_]) -> FloatArray:
 
 @njit(nogil=True, cache=True)
 def _guarded_cholesky(a, guard, dropped):  # type: ignore[no-untyped-def]
-    """Factorise a block in place; rows with a small pivot become rows of the identity."""
+    """Factorise a block in place; rows with a pivot below ``guard`` become rows of the identity.
+
+    And are set True in ``dropped``.
+    """
     n = len(a)
     for j in range(n):
         for i in range(j):
@@ -240,7 +257,7 @@ def _guarded_cholesky(a, guard, dropped):  # type: ignore[no-untyped-def]
 
 
 def require_finite(matrix: FloatArray) -> None:
-    """Raise DeformError where a matrix has a number that is not finite."""
+    """Raise DeformError if any entry of a matrix is not finite."""
     if not np.all(np.isfinite(matrix)):
         raise DeformError(
             "the interpolation system has numbers that are not finite; check the coordinates "

@@ -1,9 +1,9 @@
-"""Residuals of interpolation systems with twice the digits of a float64.
+"""Residuals of interpolation systems in double-double arithmetic, twice the digits of a float64.
 
-A number is the unevaluated sum of two: its rounding to a float64, and what that leaves (Dekker
-1971). Distances and radial functions of the given features, products and sums are made so, to about
-1e-31, and only what a system lacks is rounded. Where weights are 1e9 times as large as the
-data, the sum of ordinary products has lost nine digits; this one has not.
+A number is the unevaluated sum of two float64: its rounding, and the rest (Dekker 1971); arguments
+``a, al`` are the two of one number. Distances, radial functions, products and sums are computed so,
+to about 1e-31, and only the final residual is rounded. Where weights are 1e9 times as large as
+the data, a sum of ordinary products has lost nine digits; this one has not.
 """
 
 from __future__ import annotations
@@ -31,17 +31,19 @@ FUNCTIONS: dict[str, tuple[int, tuple[float, ...]]] = {
     "wendland-c6": (8, (1.0, 8.0, 25.0, 32.0)),
     "ctps-c0": (5, (1.0,)),
 }
-"""The radial functions that are (1 - xi)^p times a polynomial: p and the polynomial's terms."""
+"""The radial functions that are (1 - xi)^p times a polynomial: p, and the polynomial's coefficients
+from the constant on. The same functions are in `kernels` and `compiled`."""
 
 PAIRS = 1_000_000
 """Pairs between two calls of ``tick``: some tens of milliseconds."""
 
 KEPT = 2000
-"""Rows of the largest system that is kept: 64 MB."""
+"""Rows of the largest system whose matrix is kept for further residuals: 64 MB."""
 
 
 @njit(inline="always", **_OPTIONS)
 def _sum(a, b):  # type: ignore[no-untyped-def]
+    """Return a + b, rounded, and its rounding error."""
     s = a + b
     t = s - a
     return s, (a - (s - t)) + (b - t)
@@ -49,6 +51,7 @@ def _sum(a, b):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _product(a, b):  # type: ignore[no-untyped-def]
+    """Return a b, rounded, and its rounding error."""
     t, u = 134217729.0 * a, 134217729.0 * b
     a1, b1 = t - (t - a), u - (u - b)
     a2, b2 = a - a1, b - b1
@@ -58,13 +61,14 @@ def _product(a, b):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _joined(a, b):  # type: ignore[no-untyped-def]
-    """Return a + b for |a| >= |b|."""
+    """Return a + b, rounded, and its rounding error, for |a| >= |b|."""
     s = a + b
     return s, b - (s - a)
 
 
 @njit(inline="always", **_OPTIONS)
 def _plus(a, al, b, bl):  # type: ignore[no-untyped-def]
+    """Return the sum of two double-double numbers."""
     s, e = _sum(a, b)
     t, f = _sum(al, bl)
     s, e = _joined(s, e + t)
@@ -73,12 +77,14 @@ def _plus(a, al, b, bl):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _times(a, al, b, bl):  # type: ignore[no-untyped-def]
+    """Return the product of two double-double numbers."""
     p, e = _product(a, b)
     return _joined(p, e + (a * bl + al * b))
 
 
 @njit(inline="always", **_OPTIONS)
 def _root(a, al):  # type: ignore[no-untyped-def]
+    """Return the square root of a double-double number."""
     first = np.sqrt(max(a, 1e-300))
     p, e = _product(first, first)
     rest, lost = _plus(a, al, -p, -e)
@@ -86,7 +92,7 @@ def _root(a, al):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", **_OPTIONS)
-def _half_chord(g, gl):  # type: ignore[no-untyped-def]
+def _one_minus_cos(g, gl):  # type: ignore[no-untyped-def]
     """Return 1 - cos g by the terms of ``compiled.one_minus_cos``."""
     t, tl = _times(g, gl, g, gl)
     p, pl = _K[8], 0.0
@@ -98,25 +104,26 @@ def _half_chord(g, gl):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _plus_square(s, sl, a, b):  # type: ignore[no-untyped-def]
+    """Return s + sl + (a - b)^2."""
     d, dl = _sum(a, -b)
     p, pl = _times(d, dl, d, dl)
     return _plus(s, sl, p, pl)
 
 
 @njit(**_OPTIONS)
-def _distances(x, i, half, scale, q, ql):  # type: ignore[no-untyped-def]
-    """Write xi of node i to all nodes x (4, n) to q + ql."""
+def _distances(x, i, period_over_pi, scale, q, ql):  # type: ignore[no-untyped-def]
+    """Write xi from node i to all nodes x (4, n) to q + ql, as ``compiled.distances`` does."""
     c0, c1, c2, c3 = x[0], x[1], x[2], x[3]
     x0, x1, x2, x3 = x[0, i], x[1, i], x[2, i], x[3, i]
     for j in range(x.shape[1]):
         s, sl = _plus_square(0.0, 0.0, x0, c0[j])
         s, sl = _plus_square(s, sl, x3, c3[j])
-        if half > 0.0:
+        if period_over_pi > 0.0:
             a, al = _product(x1, c2[j])
             b, bl = _product(x2, c1[j])
             g, gl = _plus(a, al, -b, -bl)
-            g, gl = _times(g, gl, half, 0.0)
-            h, hl = _half_chord(g, gl)
+            g, gl = _times(g, gl, period_over_pi, 0.0)
+            h, hl = _one_minus_cos(g, gl)
             r, rl = _product(2.0 * x0, c0[j])
             h, hl = _times(h, hl, r, rl)
             s, sl = _plus(s, sl, h, hl)
@@ -129,7 +136,7 @@ def _distances(x, i, half, scale, q, ql):  # type: ignore[no-untyped-def]
 
 @njit(**_OPTIONS)
 def _apply(power, terms, q, ql, v, vl):  # type: ignore[no-untyped-def]
-    """Write the radial function of xi = q + ql to v + vl."""
+    """Write the radial function of xi = q + ql (n,) to v + vl (n,); overwrites q and ql."""
     n = len(q)
     v[:], vl[:] = terms[-1], 0.0
     for k in range(len(terms) - 2, -1, -1):
@@ -157,11 +164,12 @@ def _turn(across, i, v, vl):  # type: ignore[no-untyped-def]
 
 
 @njit(parallel=True, **_OPTIONS)
-def _fill(x, across, first, half, scale, power, terms, v, vl):  # type: ignore[no-untyped-def]
+def _fill(x, across, first, period_over_pi, scale, power, terms, v, vl):  # type: ignore[no-untyped-def]
+    """Write rows of G from row ``first`` on to v + vl (p, n), of features x and directions."""
     n = x.shape[1]
     for row in prange(len(v)):
         q, ql = np.empty(n), np.empty(n)
-        _distances(x, first + row, half, scale, q, ql)
+        _distances(x, first + row, period_over_pi, scale, q, ql)
         _apply(power, terms, q, ql, v[row], vl[row])
         if across.shape[0] > 0:
             _turn(across, first + row, v[row], vl[row])
@@ -169,6 +177,7 @@ def _fill(x, across, first, half, scale, power, terms, v, vl):  # type: ignore[n
 
 @njit(parallel=True, **_OPTIONS)
 def _lacking(v, vl, right, weights, low, out):  # type: ignore[no-untyped-def]
+    """Write ``right - (v + vl) (weights + low)`` to out (p, m); weights and low are (m, n)."""
     for i in prange(len(v)):
         for k in range(len(weights)):
             total, lost = right[i, k], 0.0
@@ -181,7 +190,7 @@ def _lacking(v, vl, right, weights, low, out):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """A system whose residuals have twice the digits.
+    """Computes residuals of an interpolation system with twice the digits of a float64.
 
     Attributes
     ----------
@@ -198,12 +207,12 @@ class Residuals:
     def __call__(
         self, right: FloatArray, weights: FloatArray, low: FloatArray, tick: Tick = no_tick
     ) -> FloatArray:
-        """Return what the system lacks, ``right - G (weights + low)`` (n, m), rounded once.
+        """Return the residual ``right - G (weights + low)`` (n, m), rounded once.
 
         Parameters
         ----------
         right, weights, low : (n, m)
-            ``low`` is far smaller than ``weights``.
+            ``low`` is the rest of weights beyond the digits of a float64.
         """
         out, n = np.empty_like(right), len(right)
         w, wl = np.ascontiguousarray(weights.T), np.ascontiguousarray(low.T)
@@ -217,7 +226,10 @@ class Residuals:
         return out
 
     def _rows(self, part: slice, n: int) -> tuple[FloatArray, FloatArray]:
-        """Return some rows of G, and what their rounding leaves; kept where they are few."""
+        """Return the rows ``part`` of G (p, n), rounded, and their rounding errors.
+
+        Kept for the next call where G has at most `KEPT` rows.
+        """
         if part.start in self._kept:
             return self._kept[part.start]
         features, normals = self.place
@@ -226,14 +238,14 @@ class Residuals:
         across = np.zeros((0, n)) if normals is None else np.ascontiguousarray(normals.T)
         power, terms = FUNCTIONS[self.basis.kernel]
         found, rest = np.empty((2, part.stop - part.start, n))
-        scale, half = 1.0 / self.basis.radius, self.basis.half
+        scale, period_over_pi = 1.0 / self.basis.radius, self.basis.period_over_pi
         with one_at_a_time(100 * found.size):
-            _fill(x, across, part.start, half, scale, power, np.array(terms), found, rest)
+            _fill(x, across, part.start, period_over_pi, scale, power, np.array(terms), found, rest)
         if n <= KEPT:
             self._kept[part.start] = found, rest
         return found, rest
 
 
 def usable(basis: Basis) -> bool:
-    """Tell whether a kernel has these residuals."""
+    """Tell whether `Residuals` can be computed for the kernel of ``basis``."""
     return basis.kernel in FUNCTIONS and not KERNELS[basis.kernel].polynomial

@@ -1,4 +1,4 @@
-"""Who takes over what boundary nodes lack, kept: the correction of a frozen step."""
+"""The boundary correction of a frozen step: its radius, and the sources of each node, are kept."""
 
 from __future__ import annotations
 
@@ -19,21 +19,26 @@ from slideviz.design.frozen.tape import (
 )
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.field import Correction, share
-from slideviz.rbf.methods import GAMMA, NEGLIGIBLE
+from slideviz.rbf.methods import NEGLIGIBLE
+from slideviz.rbf.problem import GAMMA
 
 
 @dataclass(frozen=True, eq=False)
 class FrozenSpread:
-    """Who takes over what boundary nodes lack.
+    """Which nodes take over the errors of which boundary nodes.
 
     Attributes
     ----------
     targets : (h,) int64
+        The nodes that take over an error.
     row, source, weight : (k,)
-        For targets, by their place, the boundary nodes, by theirs, and their weights.
+        One entry for each pair of a target, by its place in ``targets``, and a boundary node, by
+        its place in ``nodes`` of `chosen_spread`, with its weight in the mean of their errors.
     radius : float
+        Distance at which the correction ends, in the mesh's length unit.
     nearest, turn : (h,) int64
-        The boundary node that is nearest to each target, and in which period it is.
+        The boundary node nearest to each target, and the number of periods, -1, 0 or 1, by which
+        it is shifted.
     """
 
     targets: IntArray
@@ -45,7 +50,7 @@ class FrozenSpread:
     turn: IntArray
 
     def mixing(self, count: int) -> csr_array:
-        """Return the matrix (h, count) that gives targets their means of boundary nodes."""
+        """Return the matrix (h, count) from values at boundary nodes to their means at targets."""
         shape = len(self.targets), count
         return csr_array((self.weight, (self.row, self.source)), shape=shape)
 
@@ -58,14 +63,18 @@ def chosen_spread(
     *,
     needed: bool,
 ) -> FrozenSpread | None:
-    """Return who takes over what boundary nodes lack (`slideviz.rbf.methods.correction_of`).
+    """Return the correction of errors at boundary nodes; None where they are not spread.
+
+    The radius and the sources are those of `slideviz.rbf.methods.correction_of`.
 
     Parameters
     ----------
+    coords : (n, d)
+        Of all nodes before the step, in the frame.
     nodes, errors : (b,), (b, d)
-        Boundary nodes, and what they lack.
+        Boundary nodes, and the errors there, in the frame.
     needed
-        Whether it is spread without data reduction too.
+        Whether errors are spread without data reduction, too.
     """
     largest = float(np.linalg.norm(errors, axis=1).max(initial=0.0))
     if setup.reduction is None and not needed:
@@ -95,7 +104,10 @@ def chosen_spread(
 
 
 def shares(setup: Setup, coords: Array, spread: FrozenSpread) -> Array:
-    """Return the share that each target takes over, by its distance from the nearest node."""
+    """Return the share (h,) of the error that each target takes over (`slideviz.rbf.field.share`).
+
+    It depends on the target's distance from its nearest boundary node.
+    """
     frame = setup.frame
     own = points(frame, take(coords, spread.targets))
     other = take(coords, spread.nearest) + spread.turn[:, None] * frame.shift()
