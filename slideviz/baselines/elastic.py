@@ -104,14 +104,14 @@ def _warnings(found: LinearSolution) -> tuple[str, ...]:
     """
     if found.converged:
         return ()
-    if not found.fall <= HOPELESS:
+    if not found.residual_ratio <= HOPELESS:
         raise DeformError(
             f"the equations of linear elasticity were not solved: after {found.iterations} "
-            f"iterations the residual is {found.fall:.2g} of what it was; cells much smaller or "
-            "flatter than their neighbours do this, so use more STEPS, or METHOD= rbf"
+            f"iterations the residual is {found.residual_ratio:.2g} of what it was; cells much "
+            "smaller or flatter than their neighbours do this, so use more STEPS, or METHOD= rbf"
         )
     sentence = (
-        f"the equations of linear elasticity were solved to {found.fall:.1g} only, in "
+        f"the equations of linear elasticity were solved to {found.residual_ratio:.1g} only, in "
         f"{found.iterations} iterations; look at the result with care, or use more STEPS"
     )
     return (sentence,)

@@ -50,12 +50,12 @@ class LinearSolution:
 
     x: FloatArray
     iterations: int
-    fall: float
+    residual_ratio: float
 
     @property
     def converged(self) -> bool:
         """Tell whether the residual fell to the tolerance."""
-        return self.fall <= TOLERANCE
+        return self.residual_ratio <= TOLERANCE
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,12 +216,12 @@ def conjugate_gradients(
     x = np.array(start, float)
     left = right - _product(matrix, x) if np.any(start) else right.copy()
     z = _cycle(levels, left)
-    energy, along, fall = float(left @ z), z, np.inf
+    energy, along, ratio = float(left @ z), z, np.inf
     for count in range(MAX_ITERATIONS + 1):
-        fall = float(np.sqrt(max(energy, 0.0) / first)) if first > 0 else np.nan
-        if not fall > tolerance or count == MAX_ITERATIONS:
-            return LinearSolution(x, count, fall)
-        tick(MAKING + (1.0 - MAKING) * min(1.0, np.log(min(fall, 1.0)) / np.log(tolerance)))
+        ratio = float(np.sqrt(max(energy, 0.0) / first)) if first > 0 else np.nan
+        if not ratio > tolerance or count == MAX_ITERATIONS:
+            return LinearSolution(x, count, ratio)
+        tick(MAKING + (1.0 - MAKING) * min(1.0, np.log(min(ratio, 1.0)) / np.log(tolerance)))
         image = _product(matrix, along)
         size = energy / float(along @ image)
         x += size * along

@@ -134,11 +134,11 @@ class Equilibrium:
         start = np.zeros(right.size)
         with enough_threads(0.0):
             found = conjugate_gradients(self._levels, right.ravel(), start, tolerance=EXACT)
-        if not found.fall <= ENOUGH:
+        if not found.residual_ratio <= ENOUGH:
             raise DeformError(
-                f"the equations of linear elasticity were solved to {found.fall:.1g} only, in "
-                f"{found.iterations} iterations, so that derivatives would not be exact; use more "
-                "STEPS, or METHOD= rbf"
+                f"the equations of linear elasticity were solved to {found.residual_ratio:.1g} "
+                f"only, in {found.iterations} iterations, so that derivatives would not be exact; "
+                "use more STEPS, or METHOD= rbf"
             )
         return found.x.reshape(right.shape)
 
