@@ -22,10 +22,11 @@ class TitleBar(QFrame):
     Parameters
     ----------
     name : str
+        The widget's object name.
     closing : str
-        The tooltip of the button.
+        The tooltip of the button that closes the view.
     fill : callable, optional
-        Puts into a menu what the view can show instead; the title is a drop-down then.
+        Fills a menu with what the view can show instead; the title is then a drop-down button.
     """
 
     closed = Signal()
@@ -50,7 +51,7 @@ class TitleBar(QFrame):
         self.hide()
 
     def add_button(self, image: str, tip: str, do: Callable[[], None]) -> QToolButton:
-        """Return a new button before that which closes the view."""
+        """Return a new button, put to the left of the close button."""
         button = tool_button(tip, do, image=image)
         button.setAutoRaise(True)
         self._row.insertWidget(1, button)
@@ -94,10 +95,10 @@ class TitleBar(QFrame):
 
 
 class CameraLink:
-    """The link between the cameras of two views, which keeps them alike whichever is moved.
+    """The link between the cameras of two views: moving one moves the other.
 
-    Each has a camera of its own: what is near and far enough to be drawn differs between two
-    meshes, and the strip of the legend is kept free in one of them only.
+    The views do not share one camera: the near and far clipping planes differ between two meshes,
+    and only one view leaves a strip free for the legend.
     """
 
     def __init__(self, views: tuple[View3D, View3D], scenes: tuple[Scene, Scene]) -> None:
@@ -115,8 +116,8 @@ class CameraLink:
 
     def _follow(self, leader: Scene, follower: Scene, view: View3D) -> Callable[..., None]:
         def follow(*_: object) -> None:
-            # Drawing sets near and far planes, which is no movement: without the second
-            # condition the views would make each other draw for ever.
+            # Drawing sets the clipping planes, which modifies a camera but does not move it:
+            # without the second condition the views would make each other draw for ever.
             if self._following or leader.camera.looks_like(follower.camera):
                 return
             self._following = True

@@ -19,7 +19,7 @@ from slideviz.gui.responsiveness.repaint import RepaintCoalescer
 from slideviz.session.pieces import PART_CELLS, portions
 
 ONE_LIGHT = 0.95
-"""How bright one light is that stands for five."""
+"""The intensity of the one light that replaces pyvista's five."""
 
 
 def one_light() -> pv.Light:
@@ -30,20 +30,19 @@ def one_light() -> pv.Light:
 
 
 class ViewSignals(QObject):
-    """The signals of a view, in an object of their own: a view inherits several hundred names.
+    """The signals of a `View3D`, in an object of their own: the view inherits hundreds of names.
 
     Signals
     -------
     clicked(QPoint, KeyboardModifier), cell_clicked(QPoint), menu_wanted(QPoint)
-        A click, in pixels of the widget; one that means a cell (a double click, or with Alt); one
-        with the right button.
+        A left click, at a position in pixels of the widget; a double click or one with Alt, which
+        is about a cell; a right click.
     zoomed(QPoint, float)
-        The wheel was turned at a place, by a factor.
+        The wheel was turned: the position of the mouse, and the factor to zoom by.
     resized(), unveiled()
-        The view has another size; all that is new in the scene is drawn.
+        The size of the view changed; the last new actor was drawn (see `View3D.unveil`).
     moving(), released()
-        The mouse, or its wheel, moves the camera or something else in the scene; the button that
-        did so is up again.
+        The mouse or its wheel moves the camera, or a handle; the mouse button was released.
     """
 
     clicked = Signal(QPoint, Qt.KeyboardModifier)
@@ -57,7 +56,15 @@ class ViewSignals(QObject):
 
 
 class View3D(QtInteractor):
-    """A 3D view: pyvistaqt's widget, painted only when something changed."""
+    """A 3D view: pyvistaqt's widget, repainted only when something changed.
+
+    Attributes
+    ----------
+    flat : bool
+        Whether dragging moves the camera (2D mesh) rather than turns it.
+    frame_s : float
+        How long the last frame took to draw, in seconds.
+    """
 
     def __init__(self, parent: QWidget | None = None, multi_samples: int = 4) -> None:
         super().__init__(parent, auto_update=False, multi_samples=multi_samples)
@@ -80,7 +87,7 @@ class View3D(QtInteractor):
             self.render()
 
     def render(self) -> None:  # type: ignore[override]  # pyvista's, not Qt's
-        """Schedule one repaint; pyvista calls this everywhere."""
+        """Schedule one repaint; pyvista calls this after almost every change of the scene."""
         if hasattr(self, "_repaints") and not self._closed:
             self._rendered = True
             self._repaints.ask()
@@ -88,10 +95,10 @@ class View3D(QtInteractor):
     render_soon = render
 
     def unveil(self) -> None:
-        """Draw what is new in the scene part by part, one in each turn of the event loop.
+        """Show the scene's actors a portion at a time, one more in each turn of the event loop.
 
-        To hand a large mesh to the graphics takes longer than to draw it, and the window must
-        answer meanwhile.
+        The upload of a large mesh to the graphics card takes longer than drawing it, and the
+        window must respond meanwhile.
         """
         while self._veiled:
             self._unveil_next()
@@ -100,7 +107,7 @@ class View3D(QtInteractor):
 
     @property
     def veiled(self) -> bool:
-        """Tell whether something new is still to be drawn."""
+        """Return whether actors still wait for their first drawing (see `unveil`)."""
         return bool(self._veiled)
 
     def _veil(self) -> None:
@@ -113,14 +120,14 @@ class View3D(QtInteractor):
         for actor in self._veiled.pop(0):
             actor.SetVisibility(True)
         if not self._veiled:
-            # Perhaps something was hidden meanwhile.
+            # Whoever listens updates the scene: the session may hide some of these actors.
             self.signals.unveiled.emit()
         self.render()
 
     def paintGL(self) -> None:
         if self._resizing:
             return
-        # What changed the scene meanwhile knows nothing of the veil.
+        # A change of the scene meanwhile may have shown veiled actors.
         self._veil()
         self._Iren.EnableRenderOn()
         try:
@@ -132,26 +139,26 @@ class View3D(QtInteractor):
             QTimer.singleShot(0, self._unveil_next)
 
     def close(self) -> None:  # type: ignore[override]  # pyvista's, not Qt's
-        """Release the graphics; nothing is painted any more."""
-        # Its parent may be gone already, and have closed it.
+        """Release the graphics resources; the view is never painted again."""
+        # Qt may have destroyed the repaint timer already, with the parent.
         with contextlib.suppress(RuntimeError):
             self._repaints.end()
         super().close()
-        # Of Qt's surface, which ends now, PySide knows the address only: as long as it is named
-        # here, whatever has that address later is taken for it, an action for example.
+        # Qt destroys the surface now, but PySide's wrapper keeps its address: a later object at
+        # that address, an action for example, would be taken for the surface.
         self._surface = None
 
     def snapshot(self) -> np.ndarray:
-        """Return the pixels (height, width, 3) of the view as it is now."""
+        """Return a screenshot (height, width, 3), drawn now with all actors."""
         while self._veiled:
             self._unveil_next()
         self._render()  # type: ignore[call-arg]  # pyvistaqt's decorator hides it
         return np.asarray(self.screenshot(return_img=True))
 
     def spare_software(self) -> None:
-        """Switch off effects that are hardly seen but slow where no graphics card draws.
+        """Switch off costly effects if the CPU draws: a software OpenGL, no graphics card.
 
-        These are smooth edges, order of what is seen through, and four of five lights.
+        They are antialiasing, order-independent transparency, and four of five lights.
         """
         drawn_by = self.render_window.ReportCapabilities().lower()
         if not any(name in drawn_by for name in ("llvmpipe", "softpipe", "swrast")):
@@ -163,7 +170,7 @@ class View3D(QtInteractor):
             self.renderer.add_light(one_light())
 
     def set_flat(self, flat: bool) -> None:
-        """Choose the mouse for a 2D mesh (drag moves it) or a 3D one (drag turns it)."""
+        """Set what dragging does: move the camera (2D mesh) or turn it (3D mesh)."""
         self.flat = flat
         self.enable_custom_trackball_style(  # type: ignore[call-arg]  # the decorator loses self
             left="pan" if flat else "rotate", shift_left="pan"
@@ -215,6 +222,7 @@ class View3D(QtInteractor):
             self.signals.cell_clicked.emit(event.position().toPoint())
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        # The menu comes at the button's release, if the mouse stayed: see `menu_wanted`.
         event.accept()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
@@ -225,8 +233,8 @@ class View3D(QtInteractor):
         event.accept()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        # Qt paints at once, and again when the widgets around have their places: on the way there
-        # a view has several sizes that nobody sees.
+        # Qt paints at once, and again when the layout is settled: the sizes in between are not
+        # worth a drawing.
         self._resizing = True
         try:
             super().resizeEvent(event)
@@ -237,6 +245,9 @@ class View3D(QtInteractor):
             self.signals.resized.emit()
 
     def to_pixels(self, where: QPoint) -> tuple[float, float]:
-        """Return a position in the widget as VTK counts it: device pixels from the lower left."""
+        """Return a position in the widget in VTK's display coordinates.
+
+        They are device pixels from the lower left corner.
+        """
         ratio = self.devicePixelRatioF()
         return where.x() * ratio, (self.height() - 1 - where.y()) * ratio

@@ -1,4 +1,4 @@
-"""A coarser picture while the mouse moves something, where all facets would take too long."""
+"""Coarse boundaries while the mouse moves something, if a whole frame takes too long to draw."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from slideviz.scene.scene import Scene
 
 
 class CoarseWhileMoving(QObject):
-    """Switches a scene to coarse boundaries while something is moved, and back when it rests.
+    """Switches a slow scene to coarse boundaries while something is moved, and back afterwards.
 
-    That is the camera, or whatever else the mouse drags: a section, for example.
+    The mouse may move the camera or, for example, the handle of a section.
 
     Parameters
     ----------
     view : View3D
     scene : Scene
-        What it draws.
+        The scene drawn in the view.
     """
 
     def __init__(self, view: View3D, scene: Scene) -> None:
@@ -30,14 +30,14 @@ class CoarseWhileMoving(QObject):
         view.signals.released.connect(self._rest)
 
     def _moving(self) -> None:
-        """Draw less from now on, if the last whole picture took long."""
+        """Draw coarse boundaries from now on, if the last frame in full detail was slow."""
         if self.view.veiled or not (self.scene.coarse or self.view.frame_s > SLOW_FRAME_S):
             return
         self.scene.draw_coarse(True)
         self._timer.start()
 
     def _rest(self) -> None:
-        """Draw everything again."""
+        """Draw the boundaries in full detail again."""
         self._timer.stop()
         if self.scene.draw_coarse(False):
             self.view.render_soon()

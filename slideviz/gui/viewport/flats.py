@@ -15,23 +15,25 @@ from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Session
 
 FRAME_PX = 110
-"""Height of title, rulers and air around a flat section."""
+"""Height of the title, the ruler and the margins around a flat section, in pixels."""
 
 
 class Flats(QWidget):
-    """A flat view for each view of a 3D mesh, linked; or the curves along a line through a 2D one.
+    """The flat views of one section: one per 3D view, linked; of a 2D mesh, the curves along it.
 
     Parameters
     ----------
     viewing : Viewing
-        The views, with what they have cut already.
+        The 3D views, whose cuts are shown here too.
     scheme : ColorScheme
     multi_samples : int
+        Samples per pixel for antialiasing; 0 for none.
 
     Attributes
     ----------
     first, second
-        The flat views of the first and the second view; the curve is the first. None: none.
+        The flat views of the first and the second 3D view, each None if there is none. The curves
+        of a 2D mesh are one view, ``first``.
     """
 
     closed = Signal()
@@ -48,7 +50,7 @@ class Flats(QWidget):
         self._row.setSpacing(2)
 
     def show_section(self, session: Session, section: Section) -> None:
-        """Show a section of the meshes in all views."""
+        """Show a section of the mesh of each 3D view, the views made or dropped as needed."""
         assert session.mesh is not None
         other = beside(session)
         own = session, self.viewing.scene.sections.cuts
@@ -74,7 +76,10 @@ class Flats(QWidget):
 
     @property
     def extent(self) -> tuple[float, float] | None:
-        """Return width and height of the flat section; None of a curve, or where nothing is cut."""
+        """Return width and height of the flat section, in the mesh's length unit.
+
+        None for a curve, and where the section cuts no cell.
+        """
         box = self.first.scene.bounds() if isinstance(self.first, FlatView) else None
         if box is None:
             return None
@@ -113,14 +118,14 @@ class Flats(QWidget):
                 view.set_scheme(scheme)
 
     def close_views(self) -> None:
-        """Release the graphics."""
+        """Release the graphics resources of the flat views."""
         self._drop_second()
         if self.first is not None:
             self.first.close_view()
 
 
 def beside(session: Session) -> Session | None:
-    """Return the session as the second view shows it; None while there is one view."""
+    """Return the session as the second 3D view shows it; None while there is only one view."""
     other = session.view.beside
     if other is None or (other != UNDEFORMED and session.run(other) is None):
         return None
@@ -128,19 +133,19 @@ def beside(session: Session) -> Session | None:
 
 
 def called(session: Session) -> str:
-    """Return the run that a view shows, in a few words."""
+    """Return the name of what a view shows: ``Run 3``, or ``Undeformed``."""
     return f"Run {session.shown}" if session.view.frame and session.shown else "Undeformed"
 
 
 def stack(extent: tuple[float, float], room: tuple[int, int]) -> bool:
-    """Tell whether two flat sections are larger one above the other than side by side.
+    """Return whether two equal flat sections are drawn larger one above the other than in a row.
 
     Parameters
     ----------
     extent : (float, float)
-        Width and height of one, in the mesh's length unit.
+        Width and height of one section, in the mesh's length unit.
     room : (int, int)
-        Those of both views together, in pixels.
+        Width and height of both views together, in pixels.
     """
     wide, high = (max(length, 1e-300) for length in extent)
     width, height = room
@@ -150,7 +155,7 @@ def stack(extent: tuple[float, float], room: tuple[int, int]) -> bool:
 
 
 def _direction(swapped: bool, stacked: bool) -> QHBoxLayout.Direction:
-    """Return the direction from the first view to the second."""
+    """Return the layout direction from the first flat view to the second."""
     ways = QHBoxLayout.Direction
     if stacked:
         return ways.BottomToTop if swapped else ways.TopToBottom

@@ -20,7 +20,7 @@ from slideviz.sections.model import Section, Triple
 Handle = PlaneHandle | Handle2D | RoundHandle
 
 _ROOM = 0.03
-"""The plane's frame is so much larger than the mesh, as a part of its length."""
+"""Margin between the mesh and the frame of a plane handle, relative to the mesh's length."""
 
 
 class Handles:
@@ -29,9 +29,9 @@ class Handles:
     Parameters
     ----------
     moved : callable
-        Gets the section while it is dragged.
+        Called with the new section while it is dragged.
     dragging : callable
-        Gets whether the mouse begins to drag, or ends it.
+        Called with True when a drag begins and with False when it ends.
     """
 
     def __init__(self, moved: Callable[[Section], None], dragging: Callable[[bool], None]) -> None:
@@ -40,7 +40,7 @@ class Handles:
         self._of: dict[View3D, Handle] = {}
 
     def of(self, view: View3D) -> Handle | None:
-        """Return the handle in a view, if it has one."""
+        """Return the handle in a view; None if it has none."""
         return self._of.get(view)
 
     def __bool__(self) -> bool:
@@ -58,10 +58,10 @@ class Handles:
         Parameters
         ----------
         views : list of (View3D, Scene, Mesh)
-            Each with the mesh as it is shown there.
+            Each view, its scene, and the mesh as deformed in the step it shows.
         section : Section
         mesh : Mesh
-            As it was opened.
+            The undeformed mesh.
         scheme : ColorScheme
         """
         self._section = section
@@ -111,14 +111,14 @@ class Handles:
 
 
 def kind_of(section: Section, mesh: Mesh) -> type[Handle]:
-    """Return the class of the handle of a section of a mesh."""
+    """Return the class of the handle for a section: by the mesh's dimension, then by its shape."""
     if mesh.dim == 2:
         return Handle2D
     return {"push": PlaneHandle, "pull": RoundHandle}[section.shape.handle]
 
 
 def _around(mesh: Mesh) -> Bounds:
-    """Return a box around a 3D mesh."""
+    """Return the bounding box of a 3D mesh, with a margin."""
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     room = _ROOM * (high - low).max()
     x, y, z = np.stack([low - room, high + room], axis=1).tolist()

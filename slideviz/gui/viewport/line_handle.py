@@ -1,4 +1,4 @@
-"""The handle of a section of a 2D mesh: a line with points to move and turn it, or a circle."""
+"""The handle of a section of a 2D mesh: points to drag on a line or a circle."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ NAMES = ("handle:rim", "handle:points", "handle:held")
 
 
 class Handle2D(MouseHandle[tuple[Section, Box]]):
-    """The handle of a line or circle: points that the mouse drags.
+    """The handle of a line or circle: points to drag; its curve itself can be dragged too.
 
     Parameters
     ----------
@@ -46,11 +46,11 @@ class Handle2D(MouseHandle[tuple[Section, Box]]):
         self._placed: tuple[object, ...] = ()
 
     def watched(self) -> tuple[vtkObject, str]:
-        """Return the camera: the handle stays in the part of the plane that it shows."""
+        """Return the camera and its event: the handle stays in the visible part of the plane."""
         return self.view.camera, "ModifiedEvent"
 
     def show(self, section: Section, lift: float, scheme: ColorScheme) -> None:
-        """Show the handle of a section, lifted above the mesh."""
+        """Show the handle of a section, lifted above the mesh by a length in mesh units."""
         self.section, self._lift, self._scheme = section, lift, scheme
         self.put()
 
@@ -63,7 +63,10 @@ class Handle2D(MouseHandle[tuple[Section, Box]]):
     # Drawing ---------------------------------------------------------------------------
 
     def seen(self) -> Box:
-        """Return the part of the mesh's plane that the view shows, without its edges."""
+        """Return the lower and upper corner of the part of the mesh's plane that the view shows.
+
+        A margin at the edges, and the strip of the legend, are not part of it.
+        """
         wide, high = self.view.window_size
         corners = (
             on_plane(self.view, EDGE_PX, EDGE_PX),
@@ -72,11 +75,11 @@ class Handle2D(MouseHandle[tuple[Section, Box]]):
         return np.min(corners, axis=0), np.max(corners, axis=0)
 
     def put(self) -> None:
-        """Put the points where they are in reach."""
+        """Draw the handle's points in the visible part of the plane, where the mouse can reach."""
         if self.section is None:
             return
         seen = self.seen()
-        # To draw moves the near and far planes of the camera, too.
+        # The camera's event comes after each drawing too, which sets the clipping planes.
         key = (self.section, self._lift, self._scheme, self._part, *seen[0], *seen[1])
         if key == self._placed:
             return
@@ -88,7 +91,7 @@ class Handle2D(MouseHandle[tuple[Section, Box]]):
             held = {"middle": parts.middle, "end": parts.ends}.get(self._part or "", held)
         scheme = self._scheme
         assert scheme is not None
-        # Points are balls to VTK: one above another must be more than its radius higher.
+        # VTK draws points as balls: to cover another, one must be higher by more than its radius.
         ball = RIM_PX * float((seen[1] - seen[0]).max()) / max(self.view.window_size)
         self._draw(NAMES[0], points, ball, colour=scheme.text, size=RIM_PX)
         self._draw(NAMES[1], points, 2.0 * ball, colour=HANDLE_COLOUR, size=POINT_PX)
@@ -122,7 +125,7 @@ class Handle2D(MouseHandle[tuple[Section, Box]]):
     # Mouse -----------------------------------------------------------------------------
 
     def part_at(self, where: QPoint) -> str | None:
-        """Return the part that the mouse would take at a position of the widget."""
+        """Return the part of the handle at a position in the widget; None if none is in reach."""
         if self._handle_parts is None or self.section is None:
             return None
         shown: list[tuple[Part, FloatArray]] = [
@@ -139,15 +142,15 @@ class Handle2D(MouseHandle[tuple[Section, Box]]):
         return to_display(self.view, np.column_stack([points, np.zeros(len(points))]))
 
     def place_of(self, where: QPoint) -> FloatArray:
-        """Return a position of the widget in the plane of the mesh, (2,)."""
+        """Return the point (2,) in the mesh's plane at a position in the widget."""
         return np.array(on_plane(self.view, *self.view.to_pixels(where)))
 
     def grasp(self) -> tuple[Section, Box]:
-        """Return the section, and the part of the plane that the view shows."""
+        """Return the section and the visible box, as they are when a drag begins."""
         assert self.section is not None
         return self.section, self.seen()
 
     def pulled(self, grasp: tuple[Section, Box], start: FloatArray, end: FloatArray) -> Section:
-        """Return the line or circle moved, turned or widened."""
+        """Return the line or circle moved, turned, or with another radius, after a drag."""
         section, box = grasp
         return dragged(section, cast("Part", self._part), (start, end), box)

@@ -18,27 +18,30 @@ from slideviz.sections.model import Section
 
 HANDLE_COLOUR = "#2f6fb5"
 POINT_PX, RIM_PX = 11.0, 15.0
-"""Sizes of what is pulled, and of what sets it off."""
+"""Diameters of a handle's point and of the rim around it, in pixels."""
+
 REACH_PX = 10.0
+"""Distance from a point up to which the mouse takes it, in pixels."""
+
 EDGE_PX = 22.0
-"""What is pulled keeps so far from the edges of the view, and from the legend."""
+"""Distance that a handle's points keep from the view's edges and the legend, in pixels."""
 
 Grasp = TypeVar("Grasp")
-"""What was when the mouse took it, the section first."""
+"""The state in which the mouse took a handle: a tuple whose first item is the section."""
 
 
 class MouseHandle(QObject, Generic[Grasp]):
-    """A handle of a section in a view; a subclass draws it and says what dragging does.
+    """The base of a section's handle in a view; subclasses draw it and apply drags to the section.
 
     Parameters
     ----------
     view : View3D
     strip : callable
-        Returns the pixels at the right that are the legend's.
+        Returns the width of the legend at the right of the view, in pixels.
     moved : callable
-        Gets the section while it is dragged, at most once per turn of the event loop.
+        Called with the new section while it is dragged, at most once per turn of the event loop.
     dragging : callable
-        Gets whether the mouse begins to drag, or ends it.
+        Called with True when a drag begins and with False when it ends.
     """
 
     def __init__(
@@ -64,7 +67,7 @@ class MouseHandle(QObject, Generic[Grasp]):
 
     @property
     def dragging(self) -> bool:
-        """Tell whether the mouse drags the handle."""
+        """Return whether the mouse is dragging the handle."""
         return self._start is not None
 
     def close(self) -> None:
@@ -79,27 +82,38 @@ class MouseHandle(QObject, Generic[Grasp]):
     # What differs ----------------------------------------------------------------------
 
     def watched(self) -> tuple[vtkObject, str]:
-        """Return the VTK object and its event after which the handle is drawn again."""
+        """Return a VTK object and the name of its event after which the handle is redrawn."""
         raise NotImplementedError
 
     def part_at(self, where: QPoint) -> str | None:
-        """Return the part that the mouse would take at a position of the widget."""
+        """Return the part of the handle at a position in the widget; None if none is in reach."""
         raise NotImplementedError
 
     def place_of(self, where: QPoint) -> FloatArray:
-        """Return a position of the widget in the coordinates of the handle."""
+        """Return a position in the widget, (2,), in the handle's coordinates.
+
+        They are the mesh's length unit in its plane (line, circle), or pixels (about an axis).
+        """
         raise NotImplementedError
 
     def grasp(self) -> Grasp:
-        """Return the state at the moment when the mouse takes the handle, the section first."""
+        """Return the present state, kept while the mouse drags: a tuple, the section first."""
         raise NotImplementedError
 
     def put(self) -> None:
-        """Draw the handle at its place, and the part that the mouse would take."""
+        """Draw the handle at its place, with the part under the mouse highlighted."""
         raise NotImplementedError
 
     def pulled(self, grasp: Grasp, start: FloatArray, end: FloatArray) -> Section:
-        """Return the section dragged from one place to another."""
+        """Return the section after a drag.
+
+        Parameters
+        ----------
+        grasp : tuple
+            What `grasp` returned when the drag began.
+        start, end : (2,) float64
+            Where the drag began and where the mouse is now, as `place_of` returns them.
+        """
         raise NotImplementedError
 
     # Mouse -----------------------------------------------------------------------------
@@ -150,7 +164,7 @@ class MouseHandle(QObject, Generic[Grasp]):
         return True
 
     def _point_at(self, part: str | None) -> None:
-        """Show what the mouse would take, or has taken."""
+        """Highlight the part under the mouse, and set the cursor; None for no part."""
         if part == self._part:
             return
         self._part = part
@@ -162,6 +176,6 @@ class MouseHandle(QObject, Generic[Grasp]):
         self.view.render_soon()
 
     def tell(self) -> None:
-        """Hand over the dragged section."""
+        """Call ``moved`` with the section as dragged so far."""
         if self._start is not None and self._at is not None:
             self._moved(self.pulled(*self._start, self._at))

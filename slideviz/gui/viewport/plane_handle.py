@@ -18,21 +18,23 @@ from slideviz.gui.viewport.mouse_handle import HANDLE_COLOUR
 from slideviz.sections.model import Section, Triple
 
 HANDLE_PX = 11.0
-"""Size of the ball and of the arrow's tips."""
+"""Size of the ball and of the arrow's tips, in pixels."""
+
 
 Bounds = tuple[float, float, float, float, float, float]
 
 
 class PlaneHandle:
-    """The handle of a plane: a frame, an arrow and a ball.
+    """The handle of a plane section: VTK's plane widget, with frame, normal arrow and ball.
 
     Parameters
     ----------
     view : View3D
     moved : callable
-        Gets origin and normal while they are dragged, at most once per turn of the event loop.
+        Called with origin and normal while they are dragged, at most once per turn of the event
+        loop.
     dragging : callable
-        Gets whether the mouse begins to drag, or ends it.
+        Called with True when a drag begins and with False when it ends.
     """
 
     def __init__(
@@ -64,7 +66,7 @@ class PlaneHandle:
             self.widget.AddObserver(event, call)  # type: ignore[arg-type]  # a name is taken, too
 
     def show(self, section: Section, bounds: Bounds, scheme: ColorScheme) -> None:
-        """Show the handle of a section; while it is dragged, only its colours change."""
+        """Show the handle of a section, its frame in a box; during a drag the plane stays."""
         self._colour(scheme)
         if bounds != self._bounds:
             self._bounds = bounds
@@ -84,9 +86,9 @@ class PlaneHandle:
         self.widget.SetInteractor(None)  # type: ignore[arg-type]  # None is taken, too
 
     def tell(self) -> None:
-        """Hand over origin and normal of the dragged plane."""
+        """Call ``moved`` with origin and normal of the dragged plane."""
         origin, normal = np.array(self.shape.GetOrigin()), np.array(self.shape.GetNormal())
-        # More digits than anybody can aim for would be all one reads.
+        # Nobody aims at more decimals, and they would fill the fields of the normal.
         normal = normal.round(4) + 0.0
         self._moved(tuple(origin.tolist()), tuple(normal.tolist()))
 
@@ -96,7 +98,7 @@ class PlaneHandle:
             dragging
             and self.shape.GetInteractionState() == vtkImplicitPlaneRepresentation.MovingOrigin
         ):
-            # The ball would be dragged within the plane, and nothing would be seen to change.
+            # VTK drags the ball within the plane, which changes nothing visible: push instead.
             self.shape.SetInteractionState(vtkImplicitPlaneRepresentation.Pushing)
         if not dragging:
             self._soon.stop()

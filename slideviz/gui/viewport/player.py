@@ -20,16 +20,20 @@ from slideviz.session.state import Session
 from slideviz.session.store import Store
 
 PLAY_MS = 3000
-"""What all steps take together at the usual speed, where no limit for one step is reached."""
+"""Duration of all steps together at speed 1, in milliseconds, unless `STEP_MS` limits it."""
+
 STEP_MS = (50, 500)
-"""The shortest and the longest time that a step is seen at the usual speed."""
+"""The shortest and the longest time that one step is shown at speed 1, in milliseconds."""
+
 SPEEDS = (0.5, 1.0, 2.0, 4.0)
+"""The speeds in the player's menu, as multiples of the usual one."""
+
 NARROW = 540
-"""Pixels; a player with less leaves out speed and loop, and words."""
+"""Width in pixels below which the player hides speed and loop and shortens its text."""
 
 
 def step_ms(steps: int, speed: float = 1.0) -> float:
-    """Return the time for which each of ``steps`` is shown, in milliseconds."""
+    """Return how long each of ``steps`` steps is shown, in milliseconds."""
     shortest, longest = STEP_MS
     return min(max(PLAY_MS / max(steps, 1), shortest), longest) / speed
 
@@ -114,7 +118,7 @@ class Player(QWidget):
         return max(round(self._step_ms()), TICK_MS)
 
     def sync(self, session: Session) -> None:
-        """Show the session."""
+        """Show the session's step and its number of steps, with the numbers of the step."""
         last = max(len(session.frames) - 1, 0)
         at = min(session.view.frame, last)
         with QSignalBlocker(self.slider):
@@ -140,7 +144,7 @@ class Player(QWidget):
             self.stop()
 
     def _step_words(self, step: int, last: int) -> str:
-        """Return which step is shown, in as many words as there is room for."""
+        """Return the text for a step of ``last``, shortened where the player is narrow."""
         if self._narrow and last:
             return f"{step}/{last}"
         return f"Step {step} of {last}" if step else "Undeformed"
@@ -156,7 +160,7 @@ class Player(QWidget):
 
     @property
     def playing(self) -> bool:
-        """Tell whether the steps are played now."""
+        """Return whether the steps are being played."""
         return self._timer.isActive()
 
     def go(self, index: int) -> None:
@@ -164,7 +168,7 @@ class Player(QWidget):
         self.store.change(changes.show_frame, index)
 
     def step(self, by: int) -> None:
-        """Show the step before or after."""
+        """Show the step that is ``by`` steps ahead (behind, if negative)."""
         self.go(self.store.session.view.frame + by)
 
     def toggle(self) -> None:
@@ -187,7 +191,7 @@ class Player(QWidget):
     def _tick(self) -> None:
         last = len(self.store.session.frames) - 1
         if self.store.session.view.frame >= last:
-            # The last step, too, was seen for its time.
+            # The last step was shown for its full time.
             if self.loop.isChecked():
                 self._clock.restart()
                 self._owed = 0.0
@@ -195,7 +199,7 @@ class Player(QWidget):
             else:
                 self.stop()
             return
-        # A timer that comes a little early or late may not change the speed.
+        # Skip steps where the timer is late, so that the speed is right on average.
         self._owed += self._clock.restart() / self._step_ms()
         by = max(1, round(self._owed))
         self._owed -= by
@@ -209,10 +213,10 @@ SEPARATOR = "&nbsp;· "
 
 
 class ResultsLabel(QLabel):
-    """The label with the numbers of a step, the most important first.
+    """The label with the numbers of the shown step, the most important first.
 
-    In little room words and numbers are shorter; where even that is too long, the last are left
-    out.
+    It shows the longest form that fits; where none does, it drops numbers from the end of the
+    shortest form.
     """
 
     def __init__(self) -> None:
@@ -225,7 +229,7 @@ class ResultsLabel(QLabel):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
 
     def show_parts(self, forms: list[list[str]]) -> None:
-        """Show numbers, given as rich text in full and in shorter forms."""
+        """Show numbers as rich text, given as a list of forms: each a list, the longest first."""
         if forms != self._forms:
             self._forms = forms
             self._fit()
@@ -255,7 +259,7 @@ class ResultsLabel(QLabel):
         self.setToolTip("" if shown == full else "<br>".join(full))
 
     def _width_of(self, parts: list[str]) -> float:
-        """Return how wide the parts are in a row, in pixels."""
+        """Return the width of the parts in a row with their separators, in pixels."""
         document = QTextDocument()
         document.setDefaultFont(self.font())
         document.setDocumentMargin(0.0)
@@ -264,16 +268,17 @@ class ResultsLabel(QLabel):
 
 
 def plain(rich: str) -> str:
-    """Return rich text as plain text."""
+    """Return rich text (HTML) as plain text."""
     document = QTextDocument()
     document.setHtml(rich)
     return document.toPlainText()
 
 
 def result_parts(session: Session) -> list[list[str]]:
-    """Return the numbers of the step that is shown, the most important first, as rich text.
+    """Return three forms of the shown step's numbers, as rich text, the longest form first.
 
-    In full, with a shorter word, and with fewer digits.
+    Each form is the list of inverted cells, minimum and mean quality: in full, with a shorter
+    word, and with fewer decimals too. Empty if no mesh is open.
     """
     frame = session.frame
     if frame is None:

@@ -31,9 +31,9 @@ from slideviz.sections.model import Section
 
 
 class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
-    """A ball on a section about an axis, by which the mouse changes the size of the section.
+    """The handle of a section about an axis: a ball by which the mouse changes its radius or angle.
 
-    It lies on what is cut of the mesh, where that is seen, and in front of everything.
+    The ball lies on the cut cells, at a visible place, and is drawn in front of everything.
 
     Parameters
     ----------
@@ -48,11 +48,11 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
         self._drawn = HandleActors(view)
 
     def watched(self) -> tuple[vtkObject, str]:
-        """Return the renderer: before each drawing the camera or the view's size may differ."""
+        """Return the renderer and its event: each drawing may have another camera or size."""
         return self.view.renderer, "StartEvent"
 
     def show(self, section: Section, patch: Patch, scheme: ColorScheme) -> None:
-        """Show the handle of a section, around a part of it."""
+        """Show the handle of a section, its frame around the patch that is cut of the mesh."""
         self.section, self._patch = section, patch
         self._drawn.colour(scheme, self._part is not None)
         self._drawn.draw_frame(frame_of(section, patch))
@@ -65,11 +65,11 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
         super().close()
 
     def seen(self, points: FloatArray) -> FloatArray:
-        """Return the pixels (n, 2) of points (n, 3), from the lower left of the view."""
+        """Return the display coordinates (n, 2) of points (n, 3), in pixels from the lower left."""
         return to_display(self.view, points)
 
     def put(self) -> None:
-        """Put the ball where it is in reach, with arrows to where it can be dragged."""
+        """Draw the ball at a visible place, with arrows in the directions of a drag."""
         if self.section is None or self._patch is None:
             return
         self.place = self._start[0][1] if self._start is not None else self._in_reach(self._patch)
@@ -77,11 +77,11 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
         self._drawn.draw_ball(at, way / np.linalg.norm(way))
         self._drawn.highlight(self._part is not None)
         if self._part is not None and not self.dragging and self.part_at(self._mouse) is None:
-            # It went from below the mouse, which stayed.
+            # The ball moved away from under the mouse.
             self._point_at(None)
 
     def _in_reach(self, patch: Patch) -> PlaceOnSection:
-        """Return where the ball lies: in the middle, or beside it in a detail of the view."""
+        """Return the ball's place: the patch's middle, or if that is out of view, a visible one."""
         assert self.section is not None
         places = np.concatenate([np.array([patch.middle]), patch.places])
         pixels = self.seen(
@@ -99,11 +99,11 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
     # Mouse -----------------------------------------------------------------------------
 
     def place_of(self, where: QPoint) -> FloatArray:
-        """Return a position of the widget in pixels from the lower left, (2,)."""
+        """Return a position in the widget, (2,), in pixels from the lower left."""
         return np.array(self.view.to_pixels(where))
 
     def part_at(self, where: QPoint) -> str | None:
-        """Return ``ball`` where the mouse would take it at a position of the widget, or None."""
+        """Return ``"ball"`` if it is in reach of a position in the widget, else None."""
         if self.section is None or self.place is None:
             return None
         at, *_ = drag(self.seen, self.section, self.place, self.section.size)
@@ -111,7 +111,7 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
         return "ball" if np.linalg.norm(at - self.place_of(where)) <= reach else None
 
     def grasp(self) -> tuple[Section, PlaceOnSection]:
-        """Return the section, and the place of the ball."""
+        """Return the section and the place of the ball, as they are when a drag begins."""
         assert self.section is not None
         assert self.place is not None
         return self.section, self.place
@@ -119,7 +119,7 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
     def pulled(
         self, grasp: tuple[Section, PlaceOnSection], start: FloatArray, end: FloatArray
     ) -> Section:
-        """Return the section with another size."""
+        """Return the section with the radius or angle to which the ball was dragged."""
         section, place = grasp
         size = dragged_size(self.seen, section, place, start=start, now=end)
         return section.sized(rounded(size, section.size))
@@ -128,19 +128,21 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
 FRAME, RIM, BALL = "handle:frame", "handle:rim", "handle:ball"
 _WIDTH = 1.5
 _CORNERS = 32
-"""Of the ball."""
+"""Number of corners of the polygon that is drawn as the ball."""
+
 _FAR_PX, _HEAD_PX, _SHAFT_PX = 25.0, 8.0, 2.5
-"""How far the arrows reach from the middle, length of a head, thickness of the shaft."""
+"""Of an arrow, in pixels: distance of its tip from the middle, head length, shaft thickness."""
+
 _NECK_PX = _FAR_PX - _HEAD_PX
 _ARROW = (
     np.array([(0.0, -0.5), (_NECK_PX, -0.5), (_NECK_PX, 0.5), (0.0, 0.5)]) * (1.0, _SHAFT_PX),
     np.array([(_FAR_PX, 0.0), (_NECK_PX, 0.5), (_NECK_PX, -0.5)]) * (1.0, _HEAD_PX),
 )
-"""Shaft and head of one that points to the right."""
+"""Shaft and head of an arrow that points right: polygons (k, 2) in pixels from the middle."""
 
 
 class HandleActors:
-    """The actors of the handle: in front of all else, of one size wherever the camera is.
+    """The actors of a round handle: the frame in space, ball and arrows in pixels over everything.
 
     Parameters
     ----------
@@ -153,7 +155,7 @@ class HandleActors:
         self._actors = {name: _overlay(shape) for name, shape in self._shapes.items()}
         for name, actor in self._actors.items():
             view.add_actor(actor, name=name, reset_camera=False, render=False, pickable=False)  # type: ignore[arg-type]
-        # The ball is drawn after what sets it off.
+        # The ball is drawn after its rim.
         self._actors[BALL].SetLayerNumber(1)
         self._placed: tuple[float, ...] = ()
         self._text = "black"
@@ -164,20 +166,20 @@ class HandleActors:
             self.view.remove_actor(name, reset_camera=False, render=False)  # type: ignore[arg-type]
 
     def colour(self, scheme: ColorScheme, held: bool) -> None:
-        """Set the colours of a color scheme, and that of a held ball."""
+        """Set the colours from a color scheme; ``held``: the mouse is over the ball or drags it."""
         self._text = scheme.text
         self._actors[RIM].GetProperty().SetColor(*pv.Color(scheme.text).float_rgb)
         self.highlight(held)
 
     def highlight(self, held: bool) -> None:
-        """Show whether the mouse would take the ball, or has taken it."""
+        """Colour the ball as selected if the mouse is over it or drags it."""
         name = SELECTED_COLOUR if held else HANDLE_COLOUR
         self._actors[BALL].GetProperty().SetColor(*pv.Color(name).float_rgb)
 
     def draw_frame(self, lines: list[FloatArray]) -> None:
-        """Draw the frame: lines of points (k, 3) each."""
+        """Draw the frame: polylines of points (k, 3)."""
         shape = pv.PolyData()
-        # Given at once, points would be drawn as such.
+        # Given to the constructor, the points would become vertex cells and be drawn.
         shape.points = np.concatenate(lines)
         shape.SetLines(_cells(lines))
         actor = self.view.actors.get(FRAME)
@@ -194,12 +196,12 @@ class HandleActors:
             mapper = actor.mapper
             mapper.SetResolveCoincidentTopologyToPolygonOffset()
             mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, IN_FRONT)
-        # Kept here: a data set that only VTK holds may come back from a mapper without points.
+        # A reference in Python: a data set that only VTK holds may come back without points.
         self._frame = actor.mapper.dataset = shape
         actor.prop.color = self._text
 
     def draw_ball(self, at: FloatArray, way: FloatArray) -> None:
-        """Draw the ball at a pixel (2,), and arrows along and against a unit vector (2,)."""
+        """Draw the ball at pixel ``at`` (2,), and arrows along and against unit vector ``way``."""
         ratio = self.view.devicePixelRatioF()
         key = (*at.round(2).tolist(), *way.round(4).tolist(), ratio)
         if key == self._placed:
@@ -219,7 +221,7 @@ def _disc(radius: float) -> FloatArray:
 
 
 def _fill(shape: pv.PolyData, polygons: list[FloatArray]) -> None:
-    """Put convex polygons (k, 2) into a data set, in pixels."""
+    """Replace the cells of a data set by convex polygons (k, 2), in pixels."""
     points = np.concatenate(polygons)
     shape.points = np.column_stack([points, np.zeros(len(points))])
     shape.SetPolys(_cells(polygons))
@@ -227,13 +229,13 @@ def _fill(shape: pv.PolyData, polygons: list[FloatArray]) -> None:
 
 
 def _cells(parts: list[FloatArray]) -> pv.CellArray:
-    """Return a cell for each of so many rows of points, one after the other."""
+    """Return cells for points in a row, one per part: as many points as the part is long."""
     offsets = np.concatenate([[0], np.cumsum([len(part) for part in parts])])
     return pv.CellArray.from_arrays(offsets, np.arange(offsets[-1]))
 
 
 def _overlay(shape: pv.PolyData) -> vtkActor2D:
-    """Return what draws a data set in pixels of the view, above all that is in space."""
+    """Return an actor that draws a data set given in pixels of the view, over the 3D scene."""
     mapper = vtkPolyDataMapper2D()
     mapper.SetInputData(shape)
     actor = vtkActor2D()

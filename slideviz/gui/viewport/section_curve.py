@@ -1,4 +1,4 @@
-"""The curve of a line or circle through a 2D mesh, beside the view: quality along it."""
+"""The plot beside the view of a 2D mesh: the coloured quantity along a line or circle."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ NOTHING = "The section cuts no cell."
 
 
 class CurveView(QWidget):
-    """The curves along a section, of all shown runs and of the undeformed mesh.
+    """The plot of the curves along a section of a 2D mesh, one per mesh that is compared.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class CurveView(QWidget):
         self.set_scheme(scheme)
 
     def show_section(self, shown: Sequence[tuple[Session, Cuts]], section: Section) -> None:
-        """Show a section of the meshes in the views, that of the first view first."""
+        """Show the curves along a section, given each view's session and cuts, the first first."""
         session, cuts = shown[0]
         self.rows = self._made.of(shown, section)
         self._labels, self._colours = labels_of(session, section), colours_of(session)
@@ -77,7 +77,7 @@ class CurveView(QWidget):
             self.area.say(NOTHING)
 
     def drawing(self) -> Draw:
-        """Return the function that draws the present curves."""
+        """Return a function that draws the present curves into a figure."""
         return partial(_draw, self.rows, self._labels, self._colours)
 
     def set_scheme(self, scheme: ColorScheme) -> None:
@@ -85,11 +85,11 @@ class CurveView(QWidget):
         self.area.canvas.set_scheme(scheme)
 
     def close_view(self) -> None:
-        """Forget the curves."""
+        """Drop the curves."""
         self.rows = ()
 
     def _picked(self, position: float) -> None:
-        """Mark the cell at a position of the curve that is looked at; beside it: none."""
+        """Mark the cell at a position along the last curve, of the shown run; none beside it."""
         if self.rows and not self.area.empty:
             self.store.change(changes.mark_cell, self.rows[-1].curve.cell_at(position))
 

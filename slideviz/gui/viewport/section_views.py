@@ -22,11 +22,13 @@ from slideviz.session.section_cuts import can_cut
 from slideviz.session.state import Session
 
 BESIDE_PX = 1000
-"""Width from which on the flat view is put beside the 3D view; below it otherwise."""
+"""Width of the splitter, in pixels, below which the flat view is always below the 3D view."""
+
 _SHARE = 9 / 20
-"""Part of the window's middle that the flat view gets."""
+"""Largest part of the splitter's length that the flat view gets."""
+
 _LONG = 1.5
-"""A section that is so many times larger below the view than beside it is put there."""
+"""Ratio of the drawn sizes, below to beside, from which the flat view goes below the 3D view."""
 
 
 class SectionViews(QSplitter):
@@ -35,11 +37,11 @@ class SectionViews(QSplitter):
     Attributes
     ----------
     handles
-        Of the section, one in each view while they are wanted.
+        The handles of the selected section, one in each 3D view while they are switched on.
     flats
-        None while nobody wants them.
+        The flat views; None while no section is laid flat.
     scheme : ColorScheme
-        Their colours.
+        The colours of handles and flat views.
     """
 
     def __init__(self, viewing: Viewing, multi_samples: int, parent: QWidget | None = None) -> None:
@@ -65,27 +67,27 @@ class SectionViews(QSplitter):
 
     @property
     def section(self) -> Section | None:
-        """Return the selected section."""
+        """Return the selected section, or None."""
         return self.store.session.view.section
 
     @property
     def flat(self) -> FlatView | CurveView | None:
-        """Return the flat view of the first view, if there is one; of a 2D mesh the curve."""
+        """Return the flat view of the first 3D view (of a 2D mesh the curve), or None."""
         return None if self.flats is None else self.flats.first
 
     @property
     def is_flat(self) -> bool:
-        """Tell whether the selected section is laid flat."""
+        """Return whether the selected section is laid flat."""
         return self.section is not None and self.section.flat
 
     def want_flat(self, wanted: bool) -> None:
-        """Lay the selected section flat beside the 3D view, or end that."""
+        """Lay the selected section flat beside the 3D view; False: lay none flat."""
         if wanted != self.is_flat or not wanted:
             at = self.store.session.view.section_index if wanted else None
             self.store.change(changes.lay_flat, at)
 
     def look_along(self) -> None:
-        """Look along the normal of the selected plane, or from outside if it is about an axis."""
+        """Turn the camera to face the selected section, from outside if it is about an axis."""
         section, session = self.section, self.store.session
         if section is None or session.frame is None or session.frame.mesh.dim == 2:
             return
@@ -101,14 +103,14 @@ class SectionViews(QSplitter):
 
     def _session_changed(self, old: Session, new: Session) -> None:
         if old.mesh is not new.mesh:
-            # What a 3D mesh needs is of another kind than what a 2D one does.
+            # A 2D mesh has a curve where a 3D one has flat views.
             self._drop_flats()
         idle = self.flats is None and not self.handles and not new.view.handle
         if not idle or old.mesh is not new.mesh or old.view.sections != new.view.sections:
             self._sync()
 
     def redraw(self) -> None:
-        """Draw sections again, of which cells were read from the mesh's file."""
+        """Draw the sections again, after their cells were read from the mesh's file."""
         session = self.store.session
         self.viewing.sync(session, session)
         self._sync()
@@ -128,7 +130,7 @@ class SectionViews(QSplitter):
             self.handles.clear()
 
     def _shown(self, session: Session) -> list[tuple[View3D, Scene, Mesh]]:
-        """Return the views, each with what it draws and the mesh it shows."""
+        """Return the 3D views, each with its scene and the mesh of the frame it shows."""
         sessions = (session, beside(session) or session)
         pairs = zip(self.viewing.views_and_scenes(), sessions, strict=False)
         return [(view, scene, one.frame.mesh) for (view, scene), one in pairs if one.frame]
@@ -152,7 +154,7 @@ class SectionViews(QSplitter):
         if made:
             self.addWidget(self.flats)
         self.flats.show_section(session, section)
-        # Another radius may not make the views change places.
+        # A change of the radius must not rearrange the views.
         compared = beside(session) is not None
         kind = (session.mesh, compared, section.kind, section.direction, session.view.passages)
         if made or kind != self._kind:
@@ -162,7 +164,10 @@ class SectionViews(QSplitter):
                 self.viewing.fit()
 
     def _arrange(self, extent: tuple[float, float] | None, compared: bool) -> None:
-        """Put the flat view where its section is large; below two views, and so a curve."""
+        """Put the flat view beside or below the 3D view, whichever draws its section larger.
+
+        It is always below if two views are compared, and for a curve (``extent`` None).
+        """
         wide, share = False, _SHARE
         if extent is not None and not compared:
             wide, share = place_for(extent, (self.width(), self.height()))
@@ -190,7 +195,7 @@ class SectionViews(QSplitter):
         self._sync()
 
     def close_views(self) -> None:
-        """Release the graphics, before those of the 3D view."""
+        """Release the graphics resources; call this before the 3D views are closed."""
         self.handles.clear()
         if self.flats is not None:
             self.flats.close_views()
@@ -199,20 +204,20 @@ class SectionViews(QSplitter):
 
 
 def place_for(extent: tuple[float, float], room: tuple[int, int]) -> tuple[bool, float]:
-    """Tell whether a flat section goes beside the 3D view, else below, and its part of the room.
+    """Return whether a flat section goes beside the 3D view (else below), and its part of the room.
 
     Parameters
     ----------
     extent : (float, float)
         Width and height of the section, in the mesh's length unit.
     room : (int, int)
-        Those of both views together, in pixels.
+        Width and height of the 3D view and the flat view together, in pixels.
     """
     (wide, high), (width, height) = np.maximum(extent, 1e-300), np.maximum(room, 1)
     beside_scale = min(_SHARE * width / wide, height / high)
     below_scale = min(width / wide, _SHARE * height / high)
     if width >= BESIDE_PX and below_scale < _LONG * beside_scale:
         return True, _SHARE
-    # What a strip cannot fill is left to the view.
+    # A long, low section does not fill the share: the 3D view gets the rest.
     needed = (high / wide * width + FRAME_PX) / height
     return False, float(np.clip(needed, 0.6 * _SHARE, _SHARE))

@@ -21,15 +21,16 @@ from slideviz.session.store import Store
 
 
 class FlatView(QWidget):
-    """A flat view: a section laid flat, with rulers, facts, and buttons to fit and close.
+    """The view of a section laid flat, with rulers, a line of facts, and buttons to fit and close.
 
     Parameters
     ----------
     store : Store
     cuts : Cuts
-        Those of the 3D view.
+        The cuts of the 3D view, shared with it.
     scheme : ColorScheme
     multi_samples : int
+        Samples per pixel for antialiasing; 0 for none.
     """
 
     closed = Signal()
@@ -73,18 +74,21 @@ class FlatView(QWidget):
         self.view.signals.resized.connect(self._resized)
         self._refit = later(self, self.fit)
         CellMouse(self.view, self.scene, store)
-        # The camera moves by the mouse too: the rulers follow whatever moves it.
+        # The rulers follow the camera, whether the mouse or the program moves it.
         self._watching = self.view.camera.AddObserver("ModifiedEvent", lambda *_: self._looked())
 
     def link(self, other: FlatView | None) -> None:
-        """Link the camera with that of another flat view; None ends that."""
+        """Link the camera with that of another flat view; None ends the link."""
         for one, partner in ((self._partner, None), (self, other), (other, self)):
             if one is not None:
                 one._partner = partner
                 one.scene.beside = partner.scene if partner is not None else None
 
     def show_section(self, session: Session, section: Section, called: str = "") -> None:
-        """Show a section of the frame that is shown; another one fills the view."""
+        """Show a section of the session's shown frame, titled with ``called``.
+
+        The camera stays for a section that was only moved; another section is fitted to the view.
+        """
         self.scene.update(session, section)
         words = section.describe()
         self.title.set_text(f"{called}: {words}" if called else words)
@@ -96,7 +100,7 @@ class FlatView(QWidget):
             self._fitted = kind
             self._refit.start()
         elif self.scene.ranges() == self._ranges:
-            # Nobody has chosen a detail: what grows with the radius is still seen whole.
+            # The camera was not moved since the last fit: a larger radius is fitted again.
             self._fit()
         self._sync_rulers()
         self.view.render_soon()
@@ -108,7 +112,7 @@ class FlatView(QWidget):
         self.view.render()
 
     def refit(self) -> None:
-        """Make the section fill the view, unless a detail of it is shown."""
+        """Make the section fill the view, unless the camera was moved since the last fit."""
         if self.scene.ranges() == self._ranges:
             self.fit()
 
@@ -119,10 +123,10 @@ class FlatView(QWidget):
                 one._ranges = one.scene.ranges()
 
     def _looked(self) -> None:
-        """Follow the camera, whatever moves it."""
+        """Update the rulers and the linked view after the camera changed."""
         self._sync_rulers()
         partner = self._partner
-        # Drawing moves the near and far planes, which is no movement.
+        # Drawing sets the clipping planes, which modifies the camera but does not move it.
         if partner is not None and not partner.scene.camera.looks_like(self.scene.camera):
             partner.scene.camera.take(self.scene.camera)
             partner.view.render_soon()
@@ -133,7 +137,7 @@ class FlatView(QWidget):
         self.view.render()
 
     def close_view(self) -> None:
-        """Release the graphics."""
+        """Release the graphics resources."""
         self._refit.stop()
         self.view.camera.RemoveObserver(self._watching)
         self.view.close()

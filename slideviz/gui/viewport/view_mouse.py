@@ -18,7 +18,7 @@ from slideviz.session.store import Store
 
 
 class CellMouse(QObject):
-    """The cell under the mouse, in one view: its tooltip, and its mark.
+    """The mouse over the cells of one view: shows tooltips, and marks the cell that is clicked.
 
     Parameters
     ----------
@@ -51,13 +51,13 @@ class CellMouse(QObject):
             QToolTip.showText(event.globalPos(), info_text(self.scene.session, cell), self.view)
 
     def mark(self, where: QPoint) -> None:
-        """Mark the cell at a place of the view; none beside the mesh, or if it is marked."""
+        """Mark the cell at a position in the view; take the mark away beside the mesh or on it."""
         cell = self.scene.pick_cell(*self.view.to_pixels(where))
         marked = self.store.session.view.marked_cell
         self.store.change(changes.mark_cell, None if cell == marked else cell)
 
     def _escape(self) -> bool:
-        """Take away the mark, then the choice of cells; tell whether there was any."""
+        """Remove the mark of a cell, or else the threshold; return whether there was either."""
         view = self.store.session.view
         if view.marked_cell is not None:
             self.store.change(changes.mark_cell, None)
@@ -69,7 +69,7 @@ class CellMouse(QObject):
 
 
 class BoundaryMouse(QObject):
-    """The boundary under the mouse, in one view: a click selects it, the right button has its menu.
+    """The mouse over the boundaries of one view: a click selects one, a right click opens its menu.
 
     Parameters
     ----------

@@ -27,21 +27,21 @@ from slideviz.session.store import Store
 
 
 class Viewing(QWidget):
-    """The 3D views: one, or two side by side with one camera and one range of colours.
+    """The 3D views: one, or two side by side with linked cameras and the same range of colours.
 
     Attributes
     ----------
     view, scene
-        The first view and what it draws.
+        The first view and its scene.
     second, second_scene
-        The other, None while one is enough.
+        The second view and its scene; None while there is one view.
     titles
-        What stands above each while there are two.
+        The title bar above each view, visible while there are two.
 
     Signals
     -------
     second_made(), second_leaves()
-        The second view is there; it is still there, but will be closed.
+        The second view was made; it is about to be closed.
     """
 
     second_made = Signal()
@@ -64,7 +64,7 @@ class Viewing(QWidget):
         self._connect(self.view, self.scene)
         self.second: View3D | None = None
         self.second_scene: Scene | None = None
-        # For whoever shows the same beside it.
+        # Shared with the second flat view.
         self.second_cuts = Cuts()
         self._before: tuple[float, ...] | None = None
         self._link: CameraLink | None = None
@@ -85,7 +85,7 @@ class Viewing(QWidget):
     def _make_view(self) -> View3D:
         view = View3D(self, multi_samples=self._multi_samples)
         view.setMinimumSize(160, 120)
-        # Of two, each gets half, whatever sizes they had before.
+        # Two views get the same width, whatever their size hints are.
         view.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
         return view
 
@@ -98,7 +98,7 @@ class Viewing(QWidget):
         view.signals.zoomed.connect(lambda where, factor: self._zoomed(view, scene, where, factor))
 
     def _make_second(self, session: Session) -> None:
-        """Make the second view; from now on what moves one camera moves the other."""
+        """Make the second view, and link its camera with that of the first."""
         detail = self._before is not None or self.scene.camera.sees_detail()
         self.second = self._make_view()
         self._place(session.view.swapped)
@@ -119,7 +119,7 @@ class Viewing(QWidget):
         self.second_made.emit()
 
     def _swap(self, swapped: bool) -> None:
-        """Let the two views change places where they stand the other way round."""
+        """Put the second view to the left if ``swapped``, else to the right."""
         if (self._grid.itemAtPosition(1, 0).widget() is self.second) == swapped:
             return
         fitted = self._leader.camera.fitted
@@ -129,13 +129,13 @@ class Viewing(QWidget):
             self.fit()
 
     def _share_legend(self, swapped: bool) -> None:
-        """Draw the legend in the view to the right only, which is wider by its strip."""
+        """Draw the legend in the right view only, and make that view wider by the legend's strip."""
         self.scene.set_legend(swapped)
         self.second_scene.set_legend(not swapped)
         self._share_width()
 
     def _share_width(self) -> None:
-        """Give both meshes the same room, beside the legend."""
+        """Set the columns' widths so that both meshes get the same room beside the legend."""
         if self.second is None:
             return
         rest = max(self.width() - self._grid.spacing() - STRIP, 2)
@@ -143,7 +143,7 @@ class Viewing(QWidget):
             self._grid.setColumnStretch(column, width)
 
     def _place(self, swapped: bool) -> None:
-        """Put the second view to the right of the first, or to the left."""
+        """Put both views into the grid: the second to the left if ``swapped``."""
         assert self.second is not None
         pair = (self.second, self.view) if swapped else (self.view, self.second)
         for view in pair:
@@ -152,7 +152,7 @@ class Viewing(QWidget):
             self._grid.addWidget(view, 1, column)
 
     def _resized(self, scene: Scene) -> None:
-        """Draw a view of another size; where everything filled it, everything does again."""
+        """Draw a view after its size changed; fit the mesh again if it was fitted before."""
         fitted = self._leader.camera.fitted
         scene.resized()
         if fitted:
@@ -160,12 +160,12 @@ class Viewing(QWidget):
 
     @property
     def _leader(self) -> Scene:
-        """Return what is fitted: of two views the one with the legend."""
+        """Return the scene whose camera is fitted: of two, the one with the legend."""
         having = (scene for scene in reversed(self._scenes()) if scene.stage.has_legend)
         return next(having, self.scene)
 
     def _rearranged(self, whole: bool) -> None:
-        """Draw views of another width; who saw the whole mesh still does, who a detail too."""
+        """Draw the views after their number changed; fit the mesh if it was seen whole before."""
         self._grid.activate()
         if whole:
             self.fit()
@@ -194,7 +194,7 @@ class Viewing(QWidget):
     # The session -----------------------------------------------------------------------
 
     def open(self, opened: jobs.Opened, session: Session) -> None:
-        """Show another mesh, from where its case was looked at if that is known."""
+        """Show a mesh that was opened, with the camera stored for its case if there is one."""
         self._drop_second()
         self._before = None
         self.surfaces = opened.surfaces
@@ -210,7 +210,7 @@ class Viewing(QWidget):
         self.view.unveil()
 
     def sync(self, old: Session, new: Session) -> None:
-        """Show the changes of the session."""
+        """Update the views to a changed session; another mesh is shown by `open` instead."""
         if old.case != new.case and self._ghosts is not None and self._ghosts.mesh is new.mesh:
             moved = self._ghosts.moved(new.case)
             for scene in self._scenes():
@@ -223,11 +223,11 @@ class Viewing(QWidget):
         try:
             self.scene.update(new)
         finally:
-            # What can be drawn is drawn.
+            # An error in one view must not keep the rest from being drawn.
             self.view.render_soon()
             self._sync_beside(new)
         if old.view.passages != new.view.passages:
-            # Neighbours that were asked for should be seen, and the mesh again when they go.
+            # Periodic copies that come or go change the extent of the scene.
             self.fit()
 
     def _sync_beside(self, session: Session) -> None:
@@ -253,7 +253,7 @@ class Viewing(QWidget):
         return list(zip(views, self._scenes(), strict=True))
 
     def _scenes(self) -> tuple[Scene, ...]:
-        """Return what is drawn, of one view or two."""
+        """Return the scenes of the views, one or two."""
         return (self.scene,) if self.second_scene is None else (self.scene, self.second_scene)
 
     # Mouse -----------------------------------------------------------------------------
@@ -275,16 +275,17 @@ class Viewing(QWidget):
             self.second.render()
 
     def fit(self, names: Sequence[str] = ()) -> None:
-        """Make the whole mesh fill the view, or some boundaries."""
+        """Make the whole mesh fill the view, or the boundaries with these names."""
         self._before = None
         self._leader.fit(names)
         self.render()
 
     def refit(self) -> None:
-        """Show the whole mesh again, where a part left a view whose camera nobody has moved.
+        """Fit the mesh again if a step moved it out of a view.
 
-        Also where all of it left a view. While everything is seen the camera stays: a jump would
-        look like a motion of the mesh.
+        A camera that is still fitted is fitted again as soon as a part of the mesh is out of view,
+        another one only if all of it is. Otherwise the camera stays: a jump would look like a
+        motion of the mesh.
         """
         cameras = [scene.camera for scene in self._scenes()]
         fitted = self._leader.camera.fitted
@@ -308,7 +309,7 @@ class Viewing(QWidget):
             self.render()
 
     def look_from(self, side: str) -> None:
-        """Look at the mesh from a side."""
+        """Look at the mesh from a side, as `slideviz.scene.scene.Scene.look_from` names it."""
         self._leader.look_from(side)
         self.render()
 
@@ -319,6 +320,6 @@ class Viewing(QWidget):
         self.render()
 
     def close_views(self) -> None:
-        """Release the graphics of the views."""
+        """Release the graphics resources of the views."""
         self._drop_second()
         self.view.close()
