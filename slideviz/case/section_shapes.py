@@ -125,6 +125,11 @@ class ShapeTerms:
         """Return how many numbers a shape has in a case file: size, direction and point."""
         return 6 if self.size is None else 7
 
+    @property
+    def letter(self) -> str:
+        """Return the letter of its first number."""
+        return self.numbers.partition(",")[0]
+
     def point_tip(self, dim: int) -> str:
         """Return the tip of the point."""
         name = self.words[dim].name.lower()
@@ -193,12 +198,12 @@ SECTION_SHAPES = {
                 "radius",
                 unit="the mesh's length unit",
                 remedy="give the distance of the section from its axis",
-                example="a radius, as in 0.25 or 0.25,x",
+                example="a radius, as in 0.25, r=0.25 or 0.25,x",
             ),
             flat="unrolled",
             numbers="r, ax, ay, az, x, y, z",
             meaning="radius, axis and a point on it",
-            option="radius, " + _AXIS.format(point="a point on it"),
+            option="radius, as in 0.25 or r=0.25, " + _AXIS.format(point="a point on it"),
             key="Shift+C",
             tip_to_add="Show the cells that a cylinder about the axis cuts, and unroll it; in 2D a "
             "circle.",
@@ -235,14 +240,14 @@ SECTION_SHAPES = {
                 "half angle",
                 unit="degrees",
                 remedy="give the angle in degrees between its axis and its lines",
-                example="a half angle in degrees, as in 15 or 15,0,0,1,0,0,-2",
+                example="a half angle in degrees, as in 15, a=15 or 15,0,0,1,0,0,-2",
                 high=90.0,
                 usual=20.0,
             ),
             flat="unrolled",
             numbers="a, ax, ay, az, x, y, z",
             meaning="half angle in degrees, axis along which it opens and apex",
-            option="half angle in degrees, "
+            option="half angle in degrees, as in 15 or a=15, "
             + _AXIS.format(point="the apex")
             + "; it opens along the axis",
             one_way=True,

@@ -67,9 +67,14 @@ def plane(text: str) -> Asked:
 
 
 def about_axis(row: ShapeTerms, text: str) -> Asked:
-    """Return the section that a text like ``0.25``, ``0.25,x`` or ``0.25,0,0,1`` means."""
+    """Return the section that a text like ``0.25``, ``r=0.25,x`` or ``0.25,0,0,1`` means."""
     assert row.size is not None
     number, _, axis = text.partition(",")
+    word, sign, value = number.partition("=")
+    if sign:
+        if word.strip() not in (row.letter, row.size.word):
+            raise argparse.ArgumentTypeError(f"{text!r} is not {row.size.example}")
+        number = value
     (size,) = _numbers(number, (1,), row.size.example)
     if not axis:
         return Asked(_section(row.value, (), AXES["z"], size), False)
