@@ -125,9 +125,11 @@ def _joined(text: str, problems: list[Problem], signs: str) -> Iterator[tuple[in
 def listed(path: Path, problems: list[Problem]) -> str:
     """Return the problems in the order of their lines, one ``file:line: sentence`` each.
 
-    Of a file with very many (it may be no case file at all) the first are listed.
+    Of a file with very many (it may be no case file at all) the first are listed. Line 0 is what
+    is not in the file, but was given beside it.
     """
-    lines = [f"{path}:{line}: {sentence}" for line, sentence in sorted(problems)]
+    places = ((f"{path}:{line}" if line else f"{path}", said) for line, said in sorted(problems))
+    lines = [f"{place}: {sentence}" for place, sentence in places]
     if len(lines) > _LISTED:
         lines[_LISTED:] = [f"{path}: and {len(lines) - _LISTED} more problems"]
     return "\n".join(lines)

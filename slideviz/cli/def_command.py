@@ -33,7 +33,7 @@ def add_def(calls: argparse._SubParsersAction) -> None:
 def add_config(call: argparse.ArgumentParser) -> None:
     """Add the arguments that ``def`` and ``dot`` share."""
     call.add_argument("case", type=Path, metavar="CONFIG", help="the configuration of SU2 (.cfg)")
-    add_shared(call, "set", help="change one of slideviz's keys for this run; may be repeated")
+    add_shared(call, "set", help="change a key for this run; may be repeated")
     add_shared(call, "quiet")
 
 
@@ -41,12 +41,13 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     """Return the configuration, with the changes of ``--set``, as it fits its mesh, and that."""
     from slideviz import read
     from slideviz.cli.places import note_case
-    from slideviz.design.su2.config import read_config
+    from slideviz.design.su2.config import own_changes, read_config
     from slideviz.design.su2.markers import on_mesh
     from slideviz.errors import CaseError
 
-    config = read_config(arguments.case)
-    config = replace(config, case=changed(config.case, arguments.set))
+    own, others = own_changes(arguments.set)
+    config = read_config(arguments.case, own)
+    config = replace(config, case=changed(config.case, others))
     note_case(arguments, config.case)
     if config.variables[0].kind == "SURFACE_FILE":
         arguments.inputs.setdefault(config.files["DV_FILENAME"], "the surface file")

@@ -571,6 +571,25 @@ def test_set_changes_our_keys(here):
     assert json.loads(Path("a.json").read_text())["steps"] == 2
 
 
+def test_set_changes_su2s_keys(here, capsys):
+    text = "DV_KIND= TRANSLATION\nDV_PARAM= (0, 1, 0)\n"
+    config(f"{text}DV_VALUE= 0.05\n")
+    assert run(["def", "a.cfg", "-q"]) == 0
+    expected = Path("out.su2").read_bytes()
+    config(f"{text}DV_VALUE= 0.01\n")
+    call = ["def", "a.cfg", "-q", "--set"]
+    assert run([*call, "dv_value = 0.05"]) == 0
+    assert Path("out.su2").read_bytes() == expected
+    for given, said in (
+        ("DV_VALUE=1, 2", "a.cfg: DV_VALUE has 2 values for 1 variables; give one each"),
+        ("DV_VALU=1", "unknown key 'DV_VALU'; did you mean DV_VALUE?"),
+        ("MACH_NUMBER=1", "unknown key 'MACH_NUMBER'; `slideviz keys` lists those of slideviz"),
+        ("DV_VALUE", "--set 'DV_VALUE' is not of the form KEY=VALUE"),
+    ):
+        assert run([*call, given]) == 1
+        assert f"slideviz: {said}" in capsys.readouterr().err.replace(f"--set {given}: unk", "unk")
+
+
 def test_ffd_setting_without_definition_is_told(here, capsys):
     config("DV_KIND= FFD_SETTING\n")
     assert run(["def", "a.cfg", "-q"]) == 1
@@ -581,7 +600,7 @@ def test_binary_mesh_is_written_without_boxes_and_says_so(here, capsys):
     config(f"{BOXED}DV_KIND= FFD_SETTING\nMESH_OUT_FORMAT= SU2B\n".replace("out.su2", "out.su2b"))
     assert run(["def", "a.cfg"]) == 0
     assert sv.read("out.su2", file_format="su2b").points.shape == (49, 2)
-    assert "an SU2 binary mesh" in capsys.readouterr().err
+    assert "out.su2 will not have its FFD boxes" in capsys.readouterr().err
 
 
 def test_values_of_other_keys_may_hold_any_signs(here):

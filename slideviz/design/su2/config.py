@@ -5,6 +5,7 @@ Such a file has hundreds of keys; those that concern other things are counted an
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -102,8 +103,32 @@ class Su2Config:
         return self.case.source
 
 
-def read_config(path: Path) -> Su2Config:
+def own_changes(texts: Iterable[str]) -> tuple[dict[str, str], list[str]]:
+    """Return the values of SU2's keys among texts KEY=VALUE, and the texts of slideviz's keys.
+
+    Raises
+    ------
+    CaseError
+        A key is none of them.
+    """
+    found, others, known = {}, [], _read_keys()
+    for text in texts:
+        name, sign, value = text.partition("=")
+        key = name.strip().upper()
+        if sign and key in known - set(KEYS):
+            found[key] = value.strip()
+            continue
+        if sign and key not in {*known, *KEYS}:
+            hint = nearest(key, (*known, *KEYS)) or "; `slideviz keys` lists those of slideviz"
+            raise CaseError(f"--set {text}: unknown key {shown(key)}{hint}")
+        others.append(text)
+    return found, others
+
+
+def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Config:
     """Return what of a configuration concerns a deformation. Paths are those of the working folder.
+
+    ``changes`` are values of SU2's keys that stand in place of those in the file.
 
     Raises
     ------
@@ -118,6 +143,7 @@ def read_config(path: Path) -> Su2Config:
         if rows[entry.key] is not entry:
             sentence = f"{entry.key} is given again in line {rows[entry.key].line}; keep one"
             problems.append((entry.line, sentence))
+    rows |= {key: Entry(key, value, 0) for key, value in (changes or {}).items()}
     reader = _Reader(rows, problems)
     case, markers = reader.case()
     variables = read_variables(rows, problems)
