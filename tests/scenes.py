@@ -6,7 +6,7 @@ import pyvista as pv
 
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import quality
-from slideviz.samples.table import sample
+from slideviz.samples.table import sample, write_sample
 from slideviz.scene.scene import Scene
 from slideviz.session.changes import open_mesh
 from slideviz.session.state import StepFrame
@@ -67,3 +67,11 @@ def cube():
 @pytest.fixture(scope="session")
 def passage():
     return sample("passage", size=12)
+
+
+@pytest.fixture(scope="session")
+def kept_passage(tmp_path_factory):
+    """The folder of that passage; nobody writes to it."""
+    folder = tmp_path_factory.mktemp("kept") / "passage"
+    write_sample("passage", folder, 12)
+    return folder

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pty
+import shutil
 import signal
 import subprocess
 import sys
@@ -21,9 +22,9 @@ from slideviz.session.changes import seen_beside
 
 
 @pytest.fixture
-def case(tmp_path: Path) -> Path:
+def case(kept_passage: Path, tmp_path: Path) -> Path:
     """A small case of three steps."""
-    write_sample("passage", tmp_path / "case", 12)
+    shutil.copytree(kept_passage, tmp_path / "case")
     return tmp_path / "case" / "passage.cfg"
 
 
@@ -198,6 +199,7 @@ def test_a_detail_may_lie_where_coordinates_are_negative(case, tmp_path):
     assert parse(words).zoom == Detail((-0.5, 0.25, -1e-3), 2.0)
 
 
+@pytest.mark.slow
 def test_interrupted_it_leaves_nothing_and_says_so(case, tmp_path):
     """Ctrl+C while images are drawn, told by the progress on a terminal."""
     reader, terminal = pty.openpty()

@@ -14,7 +14,6 @@ from slideviz.cli import run
 from slideviz.cli.parser import parse
 from slideviz.cli.section_options import about_axis, glued, plane
 from slideviz.plots import section_picture
-from slideviz.samples.table import sample, write_sample
 from slideviz.terms import COLOUR_MAPS, QUANTITIES
 from tests.builders import cube, passage, square
 
@@ -121,7 +120,7 @@ def title_of(folder, monkeypatch, mesh, *options):
     monkeypatch.setattr(
         section_picture, "draw_section", lambda *given: seen.append(real(*given)) or seen[-1]
     )
-    assert call(folder, mesh, "--plane", "z=0.55", *options) in (0, 3)
+    assert call(folder, mesh, "--plane", "z=0.55", "--size", "640x400", *options) in (0, 3)
     (figure,) = seen
     monkeypatch.undo()
     return figure.get_suptitle().replace("\n", " ")
@@ -221,12 +220,10 @@ def test_a_2d_mesh_shows_the_cells_whole_unless_they_are_to_be_cut(folder, capsy
 
 
 def test_displacement_is_coloured_up_to_its_largest(folder, capsys):
-    write_sample("stator", folder / "stator", size=5000)
-    made = sample("stator", size=5000)
-    moved = made.mesh.with_points(made.mesh.points + np.array([0.0, 0.0, 0.002]))
-    sv.write(folder / "moved.su2", moved)
-    options = ("--color", "displacement", "--reference", str(folder / "stator" / "mesh.su2"))
-    code, found = report(capsys, folder, "moved.su2", "--cylinder", "0.275", *options)
+    mesh = passage()
+    sv.write(folder / "moved.su2", mesh.with_points(mesh.points + np.array([0.0, 0.0, 0.002])))
+    options = ("--color", "displacement", "--reference", str(folder / "passage.su2"))
+    code, found = report(capsys, folder, "moved.su2", "--cylinder", "0.7,z", *options)
     assert code == 0
     assert found["max"] == pytest.approx(0.002)
 
@@ -316,7 +313,8 @@ def test_the_help_has_an_example(capsys):
 
 def test_another_colour_map(folder):
     for name in ("viridis", "gray"):
-        assert call(folder, "cube.su2", "--plane", "z=0.4", "--map", name, out=f"{name}.png") == 0
+        options = ("--plane", "z=0.4", "--map", name, "--size", "400x300")
+        assert call(folder, "cube.su2", *options, out=f"{name}.png") == 0
     viridis, gray = (
         np.asarray(Image.open(folder / f"{name}.png").convert("RGB")).astype(int)
         for name in ("viridis", "gray")

@@ -93,8 +93,8 @@ COMMANDS = {
 MOMENTS = [
     ("info", signal.SIGINT, 0.0),
     ("section", signal.SIGINT, 0.1),
-    ("section", signal.SIGINT, 0.5),
-    ("run", signal.SIGINT, 0.9),
+    pytest.param("section", signal.SIGINT, 0.5, marks=pytest.mark.slow),
+    pytest.param("run", signal.SIGINT, 0.9, marks=pytest.mark.slow),
     ("film", signal.SIGTERM, 0.3),
 ]
 MORE = [
@@ -140,8 +140,12 @@ def test_nothing_is_left_of_a_film_that_is_ended(square, start):
     wait_for(lambda: not any(map(is_running, programs)))
 
 
-def test_what_a_killed_run_left_is_removed_by_the_next(square, start):
-    child = start(*COMMANDS["film"][:-2], "--between", "50")
+def test_what_a_killed_run_left_is_removed_by_the_next(square):
+    code = (
+        "import time; from pathlib import Path; from slideviz.mesh.io.cleanup import draft\n"
+        "with draft(Path()) as file: file.touch(); time.sleep(300)"
+    )
+    child = subprocess.Popen([sys.executable, "-c", code], cwd=square)
     wait_for(lambda: drafts(square))
     child.kill()
     child.wait()

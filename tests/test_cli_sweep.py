@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,12 +14,11 @@ import pytest
 
 from slideviz.cli import run
 from slideviz.design.sweeps import sweep as sweeping
-from slideviz.samples.table import write_sample
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    write_sample("passage", tmp_path, 12)
+def folder(kept_passage, tmp_path, monkeypatch):
+    shutil.copytree(kept_passage, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "designs.csv").write_text("airfoil.translate.dy,STEPS\n0.01,1\n0.1,2\n3,1\n")
     return tmp_path

@@ -77,8 +77,8 @@ def test_a_full_disk_under_the_output_is_told_and_under_the_errors_not():
 @pytest.mark.parametrize(
     ("end", "code", "said"),
     [
-        (">&-", 0, ""),
-        ("2>&-", 0, "cells by quality"),
+        pytest.param(">&-", 0, "", marks=pytest.mark.slow),
+        pytest.param("2>&-", 0, "cells by quality", marks=pytest.mark.slow),
         (">&- 2>&- <&-", 0, ""),
         (">/dev/full", 1, "slideviz: the standard output cannot be written: No space left on "),
         ("| head -c 1", 0, "m"),
@@ -110,6 +110,7 @@ def test_a_screen_that_is_not_there_is_told(square, monkeypatch, capsys):
     assert "slideviz run CASE" in err
 
 
+@pytest.mark.slow
 def test_pictures_are_drawn_without_the_screen_that_is_named(square):
     call = [sys.executable, "-m", "slideviz", "run", "square.cfg", "--steps", "1", "-q"]
     done = subprocess.run(

@@ -180,7 +180,8 @@ def test_walls_go_on_beyond_a_moving_end(sliding):
     assert last.mesh.points[followed, 1].min() < -0.05
 
 
-@pytest.mark.parametrize("sliding", ["ps", pytest.param("ds", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("sliding", ["ps", "ds"])
 def test_a_blade_may_leave_its_place_on_the_hub(tmp_path, sliding):
     """Nodes of the hub follow the blade into the place where it stood, which has no facets."""
     write_sample("stator", tmp_path, 5000)

@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ELSEWHERE = """
 import importlib, pkgutil, signal, sys
 
@@ -28,6 +30,7 @@ print(len(names))
 """What Windows and macOS lack is taken away before anything is imported."""
 
 
+@pytest.mark.slow
 def test_modules_import_without_what_only_linux_has():
     done = subprocess.run(
         [sys.executable, "-c", ELSEWHERE], capture_output=True, text=True, timeout=120, check=False

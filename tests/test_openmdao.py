@@ -102,8 +102,8 @@ def test_two_scenarios_in_one_model_have_exact_partials_forward_and_reverse(step
 
 
 def test_partials_can_be_checked_at_the_undeformed_mesh(tmp_path):
-    write_sample("passage", tmp_path, 12)
-    mesh, case = sv.read(tmp_path / "mesh.su2"), sv.Case.read(tmp_path / "passage.cfg")
+    write_sample("square", tmp_path, 8)
+    mesh, case = sv.read(tmp_path / "mesh.su2"), sv.Case.read(tmp_path / "square.cfg")
     model = om.Group()
     model.add_subsystem("mesh", MeshDeformation(deformer=sv.Deformer(mesh, case.change(steps=1))))
     problem = problem_of(model)

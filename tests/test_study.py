@@ -13,7 +13,7 @@ from slideviz.samples.table import SAMPLES
 from slideviz.study.combinations import COMPARED_METHODS
 from slideviz.terms import PERIODIC_MODES
 from tools.study import __main__ as study
-from tools.study.__main__ import FIGURES, WIDTH
+from tools.study.__main__ import FIGURES
 from tools.study.cases import CALLS, GREEDY
 from tools.study.dense import dense
 from tools.study.sections import SECTIONS
@@ -154,18 +154,19 @@ def test_the_dense_square_gives_its_figures_and_counts(tmp_path, monkeypatch):
     assert all(few < many for few, many in zip(counts[::2], counts[1::2], strict=True))
 
 
-def test_main_figures_are_published_small(tmp_path, capsys):
+def test_main_figures_are_published_small(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(study, "WIDTH", 100)
     for figure in FIGURES.values():
         path = tmp_path / "study" / figure
         path.parent.mkdir(parents=True, exist_ok=True)
-        Image.new("RGB", (2 * WIDTH, 1000), "white").save(path)
+        Image.new("RGB", (200, 100), "white").save(path)
     (tmp_path / "pictures").mkdir()
     argv = ["-o", str(tmp_path / "study"), "--publish", str(tmp_path / "pictures")]
     assert study.main(argv) == 0
     assert len(capsys.readouterr().out.splitlines()) == len(FIGURES)
     for name in FIGURES:
         with Image.open(tmp_path / "pictures" / name) as image:
-            assert image.size == (WIDTH, 500)
+            assert image.size == (100, 50)
 
 
 def test_what_is_published_are_figures_that_calls_write():

@@ -13,6 +13,7 @@ from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
 from slideviz.rbf.kernels import KERNELS
 from tests import builders
+from tests.slow import one_of_each_fast
 
 TEXTS = ("1e300", "1.7e308", "1e30", "1e-30", "1e-300", "1e-320", "5e-324")
 FIELDS = [key for key in KEYS.values() if key.group in (METHOD, REDUCTION)]
@@ -56,8 +57,7 @@ def test_the_real_keys_are_found():
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("sliding", ["none", "ps", "ds"])
-@pytest.mark.parametrize("text", TEXTS)
+@pytest.mark.parametrize(("text", "sliding"), one_of_each_fast(TEXTS, ["none", "ps", "ds"]))
 @pytest.mark.parametrize("name", REALS)
 def test_an_absurd_number_is_refused_or_works(name, text, sliding):
     if name in REFUSED["small" if float(text) < 1 else "large"]:
@@ -70,9 +70,9 @@ def test_an_absurd_number_is_refused_or_works(name, text, sliding):
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("sliding", ["none", "ps", "ds"])
-@pytest.mark.parametrize(("name", "text", "kernel"), ENDS)
-def test_the_ends_of_what_is_allowed_work(name, text, kernel, sliding):
+@pytest.mark.parametrize(("end", "sliding"), one_of_each_fast(ENDS, ["none", "ps", "ds"]))
+def test_the_ends_of_what_is_allowed_work(end, sliding):
+    name, text, kernel = end
     case, mesh = case_with(name, text, sliding, kernel or "wendland-c2")
     *_, last = sv.deform(case, mesh)
     assert np.all(np.isfinite(last.mesh.points))

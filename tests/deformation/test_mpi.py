@@ -112,13 +112,16 @@ def alone(tmp_path_factory):
 
 
 @needs_mpi
-@pytest.mark.parametrize("count", [1, 3])
+@pytest.mark.parametrize(
+    "count", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)]
+)
 def test_bits_are_those_of_one_process(square, alone, count):
     assert done(started(square, count, *WORDS)) == (0, "", "")
     assert results(square) == alone
     assert [path.name for path in square.glob(".*")] == [".out.su2b.finished"]
 
 
+@pytest.mark.slow
 @needs_mpi
 def test_a_text_is_that_of_a_run_in_memory(tmp_path):
     write_sample("square", tmp_path, 25)
@@ -218,6 +221,7 @@ def test_errors_of_other_ranks_can_be_raised():
     assert str(sent(node)) == "nodes 3 and 4"
 
 
+@pytest.mark.slow
 @needs_mpi
 def test_a_killed_rank_ends_all_and_others_go_on_with_what_is_done(square, alone):
     """From one process to two ranks, and back: parts are the same."""

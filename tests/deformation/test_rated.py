@@ -55,19 +55,20 @@ def meshes(folder, kind):
         (folder / "two.su2").replace(folder / f"{name}.su2")
 
 
+SMALL = ("-o", "a.png", "--size", "640x400")
 WORDS = [
     ("info", "base.su2b"),
     ("info", "base.su2b", "--json", "-", "--zone", "2"),
     ("quality", "base.su2b", "--zone", "2", "--metric", "rbf-slide"),
     ("quality", "moved.su2b", "--reference", "base.su2b"),
     ("quality", "moved.su2b", "--reference", "base.su2b", "--json", "-"),
-    ("section", "moved.su2b", "--reference", "base.su2b", "--plane", "z=0.5", "-o", "a.png"),
-    ("section", "base.su2b", "--plane", "1,1,1,0.5,0.5,0.5", "--whole", "-o", "a.png"),
+    ("section", "moved.su2b", "--reference", "base.su2b", "--plane", "z=0.5", *SMALL),
+    ("section", "base.su2b", "--plane", "1,1,1,0.5,0.5,0.5", "--whole", *SMALL),
     (
         *("section", "moved.su2b", "--reference", "base.su2b", "--color", "displacement"),
-        *("--plane", "x=0.41", "-o", "a.png", "--json", "-"),
+        *("--plane", "x=0.41", *SMALL, "--json", "-"),
     ),
-    ("section", "base.su2b", "--plane", "z=99", "-o", "a.png"),
+    ("section", "base.su2b", "--plane", "z=99", *SMALL),
 ]
 KINDS = [("su2b", "mixed"), ("su2", "mixed"), ("su2b", "tetrahedron"), ("su2", "tetrahedron")]
 
@@ -83,13 +84,16 @@ def test_what_is_told_is_the_same(small, capsys, words, kind):
     assert bool(one[3]) == (words[0] == "section" and "z=99" not in words)
 
 
-def test_passages_are_those_of_the_mesh_in_memory(small, capsys):
+@pytest.mark.parametrize(
+    "where",
+    [("--cylinder", "0.275"), pytest.param(("--plane", "z=0.05"), marks=pytest.mark.slow)],
+)
+def test_passages_are_those_of_the_mesh_in_memory(small, capsys, where):
     write_sample("stator", small, 5000, file_format="su2b")
-    call = ["section", "mesh.su2b", "--case", "stator.cfg", "--copies", "1", "-o", "a.png"]
-    for where in (("--plane", "z=0.05"), ("--cylinder", "0.275")):
-        one, other = both(capsys, *call, *where, "--json", "-")
-        assert one == other
-        assert one[0] == 0
+    call = ["section", "mesh.su2b", "--case", "stator.cfg", "--copies", "1", *SMALL]
+    one, other = both(capsys, *call, *where, "--json", "-")
+    assert one == other
+    assert one[0] == 0
 
 
 def test_what_cannot_be_streamed_is_told(small, capsys):

@@ -19,6 +19,7 @@ from slideviz.mesh.axis_frame import axis_basis
 from slideviz.rbf.methods import SLIDING_METHODS
 from slideviz.terms import SLIDING
 from tests import builders
+from tests.slow import one_of_each_fast
 from tests.test_halo import MESHES, both, case_of
 from tests.test_laws import METHODS, box, box_case, sector, sector_case
 
@@ -270,8 +271,9 @@ def test_dropped_nodes_of_a_boundary_layer():
 
 
 @pytest.mark.skipif(not SHARED.exists(), reason="needs meshes that are not in the repository")
-@pytest.mark.parametrize("reduction", [None, Reduction(relative=1e-6)], ids=["exact", "reduced"])
-@pytest.mark.parametrize("sliding", ["ps", "ds"])
+@pytest.mark.parametrize(
+    ("sliding", "reduction"), one_of_each_fast(["ps", "ds"], [Reduction(relative=1e-6), None])
+)
 def test_a_step_along_the_gradient_changes_a_real_objective_as_predicted(
     tmp_path, sliding, reduction
 ):

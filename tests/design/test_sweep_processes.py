@@ -40,6 +40,7 @@ def wait_until(what):
         time.sleep(0.02)
 
 
+@pytest.mark.slow
 def test_killed_workers_lose_one_design_each_and_none_is_left(passage, monkeypatch):
     made = []
 

@@ -110,7 +110,9 @@ def test_curves_along_a_line_are_in_one_plot(save):
     "section",
     [
         Section("cylinder", radius=0.75),
-        Section("cone", (0.0, 0.0, -2.0), half_angle_deg=16.0),
+        pytest.param(
+            Section("cone", (0.0, 0.0, -2.0), half_angle_deg=16.0), marks=pytest.mark.slow
+        ),
     ],
 )
 def test_what_goes_around_an_axis_lies_flat_in_the_same_place(save, section):

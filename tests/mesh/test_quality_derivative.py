@@ -242,7 +242,7 @@ def test_climbing_the_slope_unfolds_a_mesh(kind, dim):
     assert found.derivative.minimum > 0
 
 
-@pytest.mark.parametrize("vtk", [5, 9, 10, 14])
+@pytest.mark.parametrize("vtk", [5, pytest.param(9, marks=pytest.mark.slow), 10, 14])
 def test_the_minimum_passes_zero_without_a_jump_where_a_corner_folds(vtk):
     cell = np.array(oracle.IDEAL[vtk], float)
     top = cell[-1].copy()

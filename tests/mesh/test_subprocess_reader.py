@@ -104,7 +104,7 @@ def test_stopping_ends_the_process(vtu, started):
 
 
 def test_a_reader_that_takes_too_long(tmp_path, monkeypatch):
-    monkeypatch.setattr(subprocess_reader, "_SECONDS", 2)
+    monkeypatch.setattr(subprocess_reader, "_SECONDS", 1)
     path = save(tmp_path, NETGEN.format(count=10**12), "a.vol")
     with pytest.raises(
         MeshError, match=r"a.vol: cannot be read: it takes longer than a file of th"

@@ -17,6 +17,7 @@ from slideviz.rbf.level import GrowingFactor
 from slideviz.rbf.selection import newton
 from slideviz.rbf.solve import NOTHING, extend, factorise
 from slideviz.samples.table import write_sample
+from tests.slow import one_of_each_fast
 
 
 def rows_along(*normals):
@@ -65,8 +66,12 @@ def counted(monkeypatch, together):
 
 
 @pytest.mark.parametrize("reduction", [None, Reduction(tolerance=1e-4)])
-@pytest.mark.parametrize("periodic", ["none", "periodic", "fixed", "moving"])
-@pytest.mark.parametrize("name", ["square", "polar", "hexahedron", "cylindrical"])
+@pytest.mark.parametrize(
+    ("name", "periodic"),
+    one_of_each_fast(
+        ["square", "polar", "hexahedron", "cylindrical"], ["none", "periodic", "fixed", "moving"]
+    ),
+)
 def test_blocks_change_no_result(tmp_path, monkeypatch, name, periodic, reduction):
     write_sample(name, tmp_path, 12 if name in ("square", "polar") else 9)
     mesh = sv.read(tmp_path / "mesh.su2")

@@ -32,7 +32,7 @@ def cylindrical(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return np.hypot(x, y), np.arctan2(y, x), z
 
 
-@pytest.mark.parametrize("size", [5_000, 7_777, 20_000])
+@pytest.mark.parametrize("size", [5_000, 7_777, pytest.param(20_000, marks=pytest.mark.slow)])
 def test_size_is_the_number_of_cells_and_all_are_good(size):
     mesh = stator(size).mesh
     assert len(mesh.cells) == pytest.approx(size, rel=0.1)
@@ -53,7 +53,7 @@ def test_default_size_is_near_that_of_the_thesis():
     assert sv.quality(mesh).min > 0.7
 
 
-@pytest.mark.parametrize("size", [5_000, 20_000])
+@pytest.mark.parametrize("size", [5_000, pytest.param(20_000, marks=pytest.mark.slow)])
 def test_extents_are_those_of_the_thesis(size):
     mesh = stator(size).mesh
     radius, _, z = cylindrical(mesh.points)
@@ -86,7 +86,7 @@ def test_markers_are_the_sides_and_every_node_is_used():
     assert len(mesh.cells.nodes) == len(mesh.points)
 
 
-@pytest.mark.parametrize("size", [5_000, 20_000])
+@pytest.mark.parametrize("size", [5_000, pytest.param(20_000, marks=pytest.mark.slow)])
 def test_second_periodic_side_is_the_first_one_turned_by_a_41st(size):
     mesh = stator(size).mesh
     (pair,) = pair_up(mesh, ("PER1", "PER2"), "rotational", (0, 0, 1), (0, 0, 0))
@@ -186,7 +186,7 @@ def test_sample_meshes_folder_holds_a_small_stator():
     assert case.change(**paths) == fresh.case.change(**paths)
 
 
-@pytest.mark.parametrize("block", [1000, 1 << 18])
+@pytest.mark.parametrize("block", [1000, pytest.param(1 << 18, marks=pytest.mark.slow)])
 def test_a_stream_writes_what_memory_holds(tmp_path, monkeypatch, block):
     from slideviz.mesh.io.su2b import write as su2b_write
 

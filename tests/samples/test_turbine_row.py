@@ -44,7 +44,7 @@ def even(length: float) -> Sizing:
     return Sizing(np.zeros(2), np.full(2, 0.1), np.full((11, 11), length))
 
 
-@pytest.mark.parametrize("size", [5_000, 7_777, 20_000])
+@pytest.mark.parametrize("size", [5_000, 7_777, pytest.param(20_000, marks=pytest.mark.slow)])
 def test_size_is_the_number_of_cells_and_all_are_good(size):
     mesh = made(size)
     assert len(mesh.cells) == pytest.approx(size, rel=0.05)

@@ -4,7 +4,6 @@ import pytest
 from slideviz import read
 from slideviz.case.model import Case, FromFile, Translate
 from slideviz.errors import Cancelled, CaseError, MeshError
-from slideviz.samples.table import write_sample
 from slideviz.session import jobs
 from slideviz.session.motions import Ghosts
 from slideviz.session.state import StepFrame
@@ -14,10 +13,9 @@ def never():
     return False
 
 
-def test_opening_a_case_gives_mesh_roles_pairs_and_quality(tmp_path):
-    write_sample("passage", tmp_path, size=12)
+def test_opening_a_case_gives_mesh_roles_pairs_and_quality(kept_passage):
     heard = []
-    opened = jobs.open_file(tmp_path / "passage.cfg", None, heard.append, never)
+    opened = jobs.open_file(kept_passage / "passage.cfg", None, heard.append, never)
     session = opened.session
     assert session.role("airfoil") == "moving"
     assert session.path == session.case.mesh_file
@@ -29,10 +27,9 @@ def test_opening_a_case_gives_mesh_roles_pairs_and_quality(tmp_path):
     assert fractions
 
 
-def test_opening_can_be_stopped(tmp_path):
-    write_sample("passage", tmp_path, size=12)
+def test_opening_can_be_stopped(kept_passage):
     with pytest.raises(Cancelled, match="as you asked"):
-        jobs.open_file(tmp_path / "mesh.su2", None, lambda _: None, lambda: True)
+        jobs.open_file(kept_passage / "mesh.su2", None, lambda _: None, lambda: True)
 
 
 def test_a_case_without_a_mesh_is_refused(tmp_path):
@@ -42,9 +39,8 @@ def test_a_case_without_a_mesh_is_refused(tmp_path):
         jobs.open_file(file, None, lambda _: None, never)
 
 
-def test_computing_reports_every_step_with_its_quality(tmp_path):
-    write_sample("passage", tmp_path, size=12)
-    case = Case.read(tmp_path / "passage.cfg").change(steps=3)
+def test_computing_reports_every_step_with_its_quality(kept_passage):
+    case = Case.read(kept_passage / "passage.cfg").change(steps=3)
     mesh, heard = read(case.mesh_file), []
     jobs.compute(case, mesh, heard.append, never)
     frames = [item for item in heard if isinstance(item, StepFrame)]
@@ -55,9 +51,8 @@ def test_computing_reports_every_step_with_its_quality(tmp_path):
     assert fractions == sorted(fractions)
 
 
-def test_automatic_steps_tell_what_is_tried_and_claim_no_fraction(tmp_path):
-    write_sample("passage", tmp_path, size=12)
-    case = Case.read(tmp_path / "passage.cfg").change(steps=0)
+def test_automatic_steps_tell_what_is_tried_and_claim_no_fraction(kept_passage):
+    case = Case.read(kept_passage / "passage.cfg").change(steps=0)
     heard = []
     jobs.compute(case, read(case.mesh_file), heard.append, never)
     frames = [item for item in heard if isinstance(item, StepFrame)]
@@ -69,9 +64,8 @@ def test_automatic_steps_tell_what_is_tried_and_claim_no_fraction(tmp_path):
     assert {doing.fraction for doing in trying} == {None}
 
 
-def test_computing_stops_when_asked_and_keeps_what_was_reported(tmp_path):
-    write_sample("passage", tmp_path, size=12)
-    case = Case.read(tmp_path / "passage.cfg").change(steps=50)
+def test_computing_stops_when_asked_and_keeps_what_was_reported(kept_passage):
+    case = Case.read(kept_passage / "passage.cfg").change(steps=50)
     frames = []
 
     def report(item):
@@ -141,6 +135,7 @@ def test_a_displacement_file_of_all_moving_boundaries_moves_each_ghost(tmp_path,
         assert np.allclose(moved[name][0], mesh.points[nodes[name][0]])
 
 
+@pytest.mark.slow
 def test_the_view_needs_no_qt():
     import subprocess
     import sys

@@ -181,7 +181,20 @@ def overlaps(figure):
     ]
 
 
-def test_the_montage_shows_every_mesh_and_why_one_is_missing(rows, square, tmp_path):
+@pytest.fixture
+def plain_pictures(monkeypatch):
+    """Grey squares instead of pictures of meshes, where words and places are what matters."""
+
+    def draw(frames, base, side):
+        picture = np.full((side, side, 3), 255, np.uint8)
+        picture[side // 10 : -side // 10, side // 10 : -side // 10] = 120
+        return [picture] * len(frames)
+
+    monkeypatch.setattr("slideviz.study.montage.pictures_alike", draw)
+
+
+def test_the_montage_shows_every_mesh_and_why_one_is_missing(rows, square, tmp_path, monkeypatch):
+    monkeypatch.setattr("slideviz.study.montage.DPI", 100)
     group = [row for row in rows if row.combination.steps == 4]
     figure = montage(group, square.mesh)
     assert figure is not None
@@ -202,6 +215,7 @@ def test_the_montage_shows_every_mesh_and_why_one_is_missing(rows, square, tmp_p
     assert montage([row for row in rows if row.result is None], square.mesh) is None
 
 
+@pytest.mark.usefixtures("plain_pictures")
 def test_what_cannot_be_at_all_has_no_place_but_a_note(rows, square):
     long = "the motion puts BLADE through PER1; " * 6 + "the end"
     group = [
@@ -220,25 +234,28 @@ def test_what_cannot_be_at_all_has_no_place_but_a_note(rows, square):
     assert overlaps(figure) == []
 
 
-def test_many_methods_stand_beside_each_other(rows, square):
+@pytest.mark.parametrize(
+    "modes", [("moving",), pytest.param(("fixed", "moving"), marks=pytest.mark.slow)]
+)
+def test_many_methods_stand_beside_each_other(rows, square, monkeypatch, modes):
+    monkeypatch.setattr("slideviz.study.montage.DPI", 100)
     (row,) = [
         r
         for r in rows
         if r.combination == replace(r.combination, method="ps", periodic="moving", steps=4)
     ]
-    for modes, rising in ((("moving",), "columns"), (("fixed", "moving"), "columns")):
-        group = [
-            replace(row, combination=replace(row.combination, method=method, periodic=mode))
-            for method in COMPARED_METHODS
-            for mode in modes
-        ]
-        figure = montage(group, square.mesh)
-        assert overlaps(figure) == [], rising
-        spots = {text.get_text(): text.get_window_extent() for text in texts_of(figure)}
-        heights = [spots[title].y0 for title, _ in COMPARED_METHODS.values()]
-        assert np.ptp(heights) < 1.0, "in one line"
-        width, height = figure.get_size_inches()
-        assert height < width
+    group = [
+        replace(row, combination=replace(row.combination, method=method, periodic=mode))
+        for method in COMPARED_METHODS
+        for mode in modes
+    ]
+    figure = montage(group, square.mesh)
+    assert overlaps(figure) == []
+    spots = {text.get_text(): text.get_window_extent() for text in texts_of(figure)}
+    heights = [spots[title].y0 for title, _ in COMPARED_METHODS.values()]
+    assert np.ptp(heights) < 1.0, "in one line"
+    width, height = figure.get_size_inches()
+    assert height < width
 
 
 def test_a_figure_that_cannot_be_written_is_told(rows, tmp_path):
@@ -252,8 +269,9 @@ def test_names_of_files_sort_by_steps():
     assert [steps_name(n) for n in (0, 1, 20)] == ["auto_steps", "01_steps", "20_steps"]
 
 
-@pytest.mark.parametrize(("cells", "edges"), [(6, True), (240, False)])
-def test_edges_that_would_hide_the_colours_are_left_out(cells, edges):
+@pytest.mark.parametrize(("cells", "edges"), [(6, True), (80, False)])
+def test_edges_that_would_hide_the_colours_are_left_out(monkeypatch, cells, edges):
+    monkeypatch.setattr("slideviz.study.montage.DPI", 100)
     made = sample("square", cells, "motion")
     (block,) = made.case.markers_with("moving")
     case = made.case.change(motions=(Translate(block, (1e-9, 0.0)),))
@@ -266,6 +284,7 @@ def test_edges_that_would_hide_the_colours_are_left_out(cells, edges):
     assert (len(np.unique(middle.reshape(-1, 3), axis=0)) > 3) == edges
 
 
+@pytest.mark.usefixtures("plain_pictures")
 def test_a_mesh_that_was_not_kept_leaves_its_numbers_and_the_reason(rows, square):
     group = [row for row in rows if row.combination.steps == 4 and row.result]
     first, *others = group
