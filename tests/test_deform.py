@@ -15,6 +15,7 @@ from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf import exact as solve
 from slideviz.terms import SLIDING
 from tests import builders
+from tests.slow import one_of_each_fast
 
 METHODS = list(SLIDING)
 BOX = dict.fromkeys(("x_m", "x_p", "y_m", "y_p", "z_m", "z_p"), "sliding")
@@ -491,8 +492,9 @@ def test_a_turning_sphere_keeps_the_box_and_the_box_the_sphere(method):
     assert np.abs(found.mesh.points[slid] - mesh.points[slid]).max() > 1e-3
 
 
-@pytest.mark.parametrize("periodic", ["none", "periodic", "fixed", "moving"])
-@pytest.mark.parametrize("method", ["ps", "ds"])
+@pytest.mark.parametrize(
+    ("periodic", "method"), one_of_each_fast(["none", "periodic", "fixed", "moving"], ["ps", "ds"])
+)
 @pytest.mark.parametrize("rim", ["sliding", "internal"])
 @pytest.mark.parametrize("kind", ["plain", "simplex", "prism"])
 def test_the_rims_of_a_passage_stay_circles(kind, rim, method, periodic):

@@ -11,6 +11,7 @@ import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
+from tests.slow import one_of_each_fast
 
 UP = np.array([[0.0, 0, 0], [0, 0, 0], [0, -1.0, 0]])
 TURN = np.array([[0.0, 0, 0], [0, 0, -np.radians(30.0)], [0, 0, 0]])
@@ -87,9 +88,9 @@ def test_a_halo_is_found_and_told_apart(tmp_path):
     assert found.histogram()[0].sum() == found.cells == found.valid
 
 
-@pytest.mark.parametrize("name", MESHES)
-@pytest.mark.parametrize(("sliding", "periodic"), MODES)
-def test_copies_follow_their_donors(tmp_path, name, sliding, periodic):
+@pytest.mark.parametrize(("name", "mode"), one_of_each_fast(list(MESHES), MODES))
+def test_copies_follow_their_donors(tmp_path, name, mode):
+    sliding, periodic = mode
     # Before, the ends of inflow and outflow in the halo were corners, and stayed where they were.
     mesh, plain, roles = both(name, tmp_path)
     case = case_of(mesh, roles, 0.05, sliding=sliding, periodic=periodic, steps=2)

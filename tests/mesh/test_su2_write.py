@@ -220,7 +220,13 @@ def test_points_that_are_not_finite_are_not_written(tmp_path, bad, anew):
     assert not (tmp_path / "out.su2").exists()
 
 
-@pytest.mark.parametrize("path", shared_meshes(), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * (path.stat().st_size > 1.4e6))
+        for path in shared_meshes()
+    ],
+)
 def test_real_meshes(tmp_path, path):
     raw = path.read_bytes()
     if "nPoly3" in path.name:

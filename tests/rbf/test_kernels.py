@@ -16,6 +16,7 @@ from slideviz.rbf.saddle import saddle_condition, solve_saddle
 from slideviz.rbf.solve import _norm, condition
 from slideviz.samples.table import sample, write_sample
 from tests import builders
+from tests.slow import one_of_each_fast
 
 COMPACT = [name for name, kernel in KERNELS.items() if kernel.compact]
 TAILED = [name for name, kernel in KERNELS.items() if kernel.polynomial]
@@ -147,8 +148,7 @@ def test_condition_is_that_of_numpy():
 
 
 @pytest.mark.parametrize("reduction", [None, Reduction(tolerance=1e-4)])
-@pytest.mark.parametrize("sliding", ["none", "ps", "ds"])
-@pytest.mark.parametrize("name", USABLE)
+@pytest.mark.parametrize(("name", "sliding"), one_of_each_fast(USABLE, ["none", "ps", "ds"]))
 def test_every_function_moves_the_block(tmp_path, name, sliding, reduction):
     write_sample("square", tmp_path, 9)
     mesh = sv.read(tmp_path / "mesh.su2")

@@ -7,6 +7,7 @@ import pyvista as pv
 from slideviz.color_scheme import DARK, LIGHT, VALUE_EDGE
 from slideviz.scene.actors import VALUES
 from slideviz.scene.stage import Stage
+from tests.slow import one_of_each_fast
 
 SIZE = 240
 
@@ -34,8 +35,10 @@ def light_of(stage, cells, values, width=1.0):
     return image @ (0.30, 0.59, 0.11), actor
 
 
-@pytest.mark.parametrize("scheme", [LIGHT, DARK])
-@pytest.mark.parametrize("value", [0.0, 0.2, 0.3, 0.35, 0.4, 0.5, 0.75, 1.0])
+@pytest.mark.parametrize(
+    ("value", "scheme"),
+    one_of_each_fast([0.0, 0.2, 0.3, 0.35, 0.4, 0.5, 0.75, 1.0], [LIGHT, DARK]),
+)
 def test_edges_are_dark_on_low_and_on_high_values(value, scheme, stage):
     stage.scheme = scheme
     light, _ = light_of(stage, (4, 4), np.full(16, value), 3.0)

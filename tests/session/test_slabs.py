@@ -13,6 +13,7 @@ from slideviz.sections.model import Section
 from slideviz.session import slabs
 from slideviz.session.results import StepFrame
 from slideviz.session.slabs import Groups, keep_slab, read_slab, slab_of
+from tests.slow import one_of_each_fast
 
 
 @pytest.fixture(scope="module", params=["stator", "hexahedron", "mixed"])
@@ -65,8 +66,7 @@ def framed(path, moved):
     return StepFrame(skin, quality(skin), file=moved)
 
 
-@pytest.mark.parametrize("group", [1, 7, 4096])
-@pytest.mark.parametrize("kind", range(8))
+@pytest.mark.parametrize(("kind", "group"), one_of_each_fast(range(8), [1, 7, 4096]))
 def test_the_same_cells_and_polygons_as_in_memory(files, kind, group, monkeypatch):
     mesh, moved, path, file = files
     monkeypatch.setattr(slabs, "GROUP", group)
