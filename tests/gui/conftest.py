@@ -11,10 +11,13 @@ else:
     from qtpy.QtTest import QTest
     from qtpy.QtWidgets import QApplication
 
+    from slideviz.gui.viewport.canvas import View3D
     from slideviz.gui.widgets import plot_canvas, questions
     from slideviz.gui.window import MainWindow
     from slideviz.samples.table import write_sample
     from slideviz.scene.pick import to_display
+    from slideviz.session import changes, jobs
+    from slideviz.session.state import StepFrame
     from slideviz.session.store import Store
 
 
@@ -88,6 +91,21 @@ def settings(tmp_path):
 
 
 @pytest.fixture
+def painted():
+    """Paint the 3D views of a test whose module has them unpainted."""
+
+
+@pytest.fixture
+def unpainted(request, monkeypatch):
+    """Leave 3D views unpainted where a test does not look at them: it took a fourth of its time.
+
+    What is in the scene is as ever, and a snapshot draws it.
+    """
+    if "painted" not in request.fixturenames:
+        monkeypatch.setattr(View3D, "paintGL", lambda self: None)
+
+
+@pytest.fixture
 def window(qtbot, settings, monkeypatch):
     made = MainWindow(settings, multi_samples=0)
 
@@ -129,6 +147,53 @@ def sample_folder(tmp_path_factory):
     write_sample("passage", folder / "passage", size=12)
     write_sample("hexahedron", folder / "hexahedron", size=6)
     return folder
+
+
+@pytest.fixture(scope="session")
+def computed(sample_folder):
+    """The case of the passage, opened, and what returns the steps of a case: read only."""
+    path = sample_folder / "passage" / "passage.cfg"
+    opened = jobs.open_file(path, None, lambda _: None, lambda: False)
+    mesh = opened.session.mesh
+    mesh.points.flags.writeable = False
+
+    known = {}
+
+    def frames(case):
+        if (key := repr(case)) in known:
+            return known[key]
+        found = []
+        jobs.compute(case, mesh, found.append, lambda: False)
+        known[key] = [one for one in found if isinstance(one, StepFrame)]
+        for step in known[key]:
+            step.mesh.points.flags.writeable = False
+        return known[key]
+
+    return opened, frames
+
+
+@pytest.fixture
+def with_runs(driver, computed):
+    """Open the case of the passage with runs that are done: ``with_runs({"steps": 2})``.
+
+    Each has the settings of the one before, but for those given. What a run looks like while it
+    goes on takes the window much longer than these steps took to compute.
+    """
+
+    def show(*runs):
+        opened, frames = computed
+
+        def run(session, settings):
+            session = changes.start_run(changes.set_case(session, **settings))
+            session = changes.set_view(session, colour_by="size-skew")
+            return changes.end_run(changes.add_frames(session, frames(session.case)), "done")
+
+        driver.window.show_opened(opened)
+        for settings in runs:
+            driver.window.store.change(run, settings)
+        return driver
+
+    return show
 
 
 @pytest.fixture

@@ -18,16 +18,14 @@ from slideviz.scene.pick import to_display
 from slideviz.session import changes
 from slideviz.session.panes import run_title
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 @pytest.fixture
-def ran(driver, sample_folder):
+def ran(driver, with_runs):
     """Two runs of the passage: pseudo sliding in its steps, direct sliding in three."""
-    driver.open(sample_folder / "passage" / "passage.cfg")
+    with_runs({"sliding": "ps", "steps": 2}, {"sliding": "ds", "steps": 3})
     window = driver.window
-    for settings in ({"sliding": "ps", "steps": 2}, {"sliding": "ds", "steps": 3}):
-        window.store.change(changes.set_case, **settings)
-        window.start_run()
-        driver.settle()
     window.docks["runs"].raise_()
     driver.qtbot.waitUntil(lambda: window.docks_.panels["runs"].tree.isVisible())
     return driver
@@ -71,7 +69,9 @@ def test_without_runs_the_panel_says_what_will_be_there(driver, passage_file):
     assert not any(button.isEnabled() for button in panel(driver).buttons.values())
 
 
-def test_each_run_has_a_row_with_its_quality_and_the_best_is_bold(ran):
+def test_each_run_has_a_row_with_its_quality_that_playing_leaves_and_the_best_is_bold(
+    ran, monkeypatch
+):
     runs = ran.session.runs
     best = max(runs, key=lambda run: run.last.quality.min).number
     for run in runs:
@@ -85,6 +85,11 @@ def test_each_run_has_a_row_with_its_quality_and_the_best_is_bold(ran):
     assert row(ran, 1).text(RUN) == "1  pseudo sliding"
     assert row(ran, 2).text(RUN) == "2  direct sliding"
     assert panel(ran).tree.currentItem() is row(ran, 2)
+    filled = []
+    monkeypatch.setattr(panel(ran), "_fill", lambda session: filled.append(session))
+    for frame in (0, 1, 2, 3):
+        ran.window.store.change(changes.show_frame, frame)
+    assert not filled
 
 
 def test_runs_of_other_motions_say_which_and_none_is_best(ran):
@@ -134,16 +139,13 @@ def legend_of(canvas):
     return [text.get_text() for text in legend.get_texts()] if legend is not None else []
 
 
-def test_a_click_and_the_arrow_keys_show_a_run(ran):
+def test_a_click_and_the_arrow_keys_show_a_run_with_ctrl_or_twice_one_beside(ran):
     click(ran, 1)
     assert ran.session.shown == 1
     assert ran.session.view.frame == 2
     QTest.keyClick(panel(ran).tree, Qt.Key.Key_Down)
     assert ran.session.shown == 2
     assert ran.session.view.frame == 3
-
-
-def test_a_double_click_compares_with_the_run_that_was_shown(ran):
     ran.window.store.change(changes.show_frame, 1)
     click(ran, 1, double=True)
     session = ran.session
@@ -153,9 +155,6 @@ def test_a_double_click_compares_with_the_run_that_was_shown(ran):
     click(ran, 1, double=True)
     assert (ran.session.shown, ran.session.view.beside) == (2, None)
     assert ran.window.viewing.second is None
-
-
-def test_a_click_with_ctrl_shows_a_run_beside_and_again_ends_that(ran):
     ctrl = Qt.KeyboardModifier.ControlModifier
     ran.window.store.change(changes.show_frame, 2)
     click(ran, 1, keys=ctrl)
@@ -232,6 +231,7 @@ def test_the_button_compares_with_the_undeformed_mesh_or_a_run(ran):
     assert [act.text() for act in compare.actions()] == texts
 
 
+@pytest.mark.usefixtures("painted")
 def test_each_title_chooses_what_its_view_shows(ran):
     viewing = compare(ran)
     left, right = viewing.titles
@@ -269,7 +269,7 @@ def test_a_row_grows_while_its_run_goes_on(ran):
     assert panel(ran).buttons["remove"].isEnabled()
 
 
-def test_settings_are_put_back_and_that_can_be_undone(ran):
+def test_settings_are_put_back_and_undo_does_that_and_removing_a_run_again(ran):
     assert ran.session.case.sliding == "ds"
     click(ran, 1)
     ran.click(panel(ran).buttons["settings"])
@@ -277,6 +277,17 @@ def test_settings_are_put_back_and_that_can_be_undone(ran):
     assert ran.window.method.sliding.currentData() == "ps"
     ran.window.actions_.by_name["undo"].trigger()
     assert (ran.session.case.sliding, ran.session.case.steps) == ("ds", 3)
+    click(ran, 2)
+    frames = ran.session.run(2).frames
+    ran.click(panel(ran).buttons["remove"])
+    assert [run.number for run in ran.session.runs] == [1]
+    said = ran.window.statusBar().currentMessage()
+    assert said == "Run 2 removed (Ctrl+Z brings it back)"
+    assert "removing a run" in ran.window.actions_.by_name["undo"].text()
+    ran.window.actions_.by_name["undo"].trigger()
+    assert ran.session.run(2).frames is frames
+    assert ran.session.shown == 2
+    assert panel(ran).tree.topLevelItemCount() == 2
 
 
 def test_the_menu_removes_shows_beside_and_saves(ran, answers, tmp_path):
@@ -297,20 +308,7 @@ def test_the_menu_removes_shows_beside_and_saves(ran, answers, tmp_path):
     assert panel(ran).tree.topLevelItemCount() == 1
 
 
-def test_a_removed_run_comes_back_with_undo(ran):
-    frames = ran.session.run(2).frames
-    ran.click(panel(ran).buttons["remove"])
-    assert [run.number for run in ran.session.runs] == [1]
-    said = ran.window.statusBar().currentMessage()
-    assert said == "Run 2 removed (Ctrl+Z brings it back)"
-    assert "removing a run" in ran.window.actions_.by_name["undo"].text()
-    ran.window.actions_.by_name["undo"].trigger()
-    assert ran.session.run(2).frames is frames
-    assert ran.session.shown == 2
-    assert panel(ran).tree.topLevelItemCount() == 2
-
-
-def test_the_table_is_exported_and_copied(ran, answers, tmp_path):
+def test_the_table_is_exported_and_copied_or_it_is_told_why_not(ran, answers, tmp_path):
     answers("ask_save", tmp_path / "runs.csv")
     ran.click(panel(ran).buttons["export"])
     with (tmp_path / "runs.csv").open() as file:
@@ -321,22 +319,11 @@ def test_the_table_is_exported_and_copied(ran, answers, tmp_path):
     lines = QApplication.clipboard().text().splitlines()
     assert len(lines) == 3
     assert "pseudo sliding" in lines[1].split("\t")
-
-
-def test_a_table_that_cannot_be_written_is_told(ran, answers, tmp_path):
     answers("ask_save", tmp_path / "nowhere" / "runs.csv")
     ran.click(panel(ran).buttons["export"])
     assert "the folder does not exist" in ran.window.banner.text.text()
     answers("ask_save", None)
     ran.click(panel(ran).buttons["export"])
-
-
-def test_playing_does_not_touch_the_rows(ran, monkeypatch):
-    filled = []
-    monkeypatch.setattr(panel(ran), "_fill", lambda session: filled.append(session))
-    for frame in (0, 1, 2, 3):
-        ran.window.store.change(changes.show_frame, frame)
-    assert not filled
 
 
 # Side by side -----------------------------------------------------------------------------
@@ -349,7 +336,7 @@ def compare(driver, number=1):
     return viewing
 
 
-def test_both_meshes_have_the_same_room_beside_the_legend_and_a_title(ran):
+def test_both_meshes_have_the_same_room_beside_one_legend_and_a_title(ran):
     viewing = compare(ran)
     QApplication.processEvents()
     ratio = viewing.second.devicePixelRatioF()
@@ -362,9 +349,6 @@ def test_both_meshes_have_the_same_room_beside_the_legend_and_a_title(ran):
     assert ran.session.view.beside is None
     assert viewing.second is None
     assert not viewing.titles[0].isVisible()
-
-
-def test_one_legend_and_one_range_serve_both(ran):
     viewing = compare(ran)
     ran.window.store.change(changes.set_view, colour_by="displacement")
     assert not viewing.view.scalar_bars.keys()
@@ -407,7 +391,8 @@ def test_entering_the_comparison_shows_all_of_both_unless_a_detail_is_looked_at(
     assert viewing.scene.camera.place == place
 
 
-@pytest.mark.parametrize("leads", [0, 1])
+@pytest.mark.usefixtures("painted")
+@pytest.mark.parametrize("leads", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_moving_one_camera_moves_the_other_and_both_are_drawn(ran, leads):
     viewing = compare(ran)
     views = (viewing.view, viewing.second)
@@ -456,6 +441,7 @@ def test_what_fills_the_view_does_so_at_another_size_unless_the_camera_was_moved
     assert lead.camera.place == place
 
 
+@pytest.mark.usefixtures("painted")
 def test_linked_views_come_to_rest(ran, qtbot):
     viewing = compare(ran)
     drawn = []
@@ -491,7 +477,7 @@ def test_look_from_and_rotation_of_a_solid_mesh_are_shared(driver, sample_folder
     assert not np.allclose(block["a"], block["b"])
 
 
-def test_steps_hiding_and_selection_act_on_both(ran):
+def test_steps_hiding_selection_and_clicks_act_on_both(ran):
     viewing = compare(ran)
     store = ran.window.store
     shown = {step: (0, 1, 1, 2)[step] for step in range(4)}
@@ -508,9 +494,7 @@ def test_steps_hiding_and_selection_act_on_both(ran):
     store.change(changes.show, ("airfoil",))
     for scene in viewing._scenes():
         assert scene.drawn["airfoil"].actor.visibility
-
-
-def test_a_click_in_the_second_view_selects(ran):
+    store.change(changes.select, ())
     viewing = compare(ran)
     scene = viewing.second_scene
     viewing.second.snapshot()
@@ -530,6 +514,7 @@ def test_the_theme_reaches_both(ran):
     assert viewing.second.snapshot()[-3, 3].max() < 60
 
 
+@pytest.mark.usefixtures("painted")
 def test_comparing_twenty_times_leaves_nothing_behind(ran):
     viewing, gone = ran.window.viewing, []
     observed = viewing.view.camera.HasObserver
@@ -553,6 +538,7 @@ def test_another_mesh_ends_the_comparison(ran, passage_file, answers):
     assert ran.session.view.beside is None
 
 
+@pytest.mark.usefixtures("painted")
 def test_the_window_closes_during_a_comparison(ran, answers):
     compare(ran)
     answers("ask_unsaved", "discard")

@@ -21,6 +21,8 @@ from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.changes_view import followed
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 @pytest.fixture
 def panel(window, driver, sample_folder):
@@ -56,7 +58,9 @@ def drag(slider, to):
     QApplication.processEvents()
 
 
-def test_a_plane_is_added_moved_shown_whole_and_removed(window, driver, panel):
+def test_a_plane_is_added_moved_shown_whole_and_removed_and_each_drag_undone_as_one(
+    window, driver, panel
+):
     driver.click(panel.add["plane"])
     (plane,) = sections(window)
     assert plane.kind == "plane"
@@ -79,9 +83,6 @@ def test_a_plane_is_added_moved_shown_whole_and_removed(window, driver, panel):
     assert sections(window) == ()
     assert "section:0" not in window.scene.plotter.actors
     assert panel.hint.isVisible()
-
-
-def test_each_drag_of_the_slider_is_undone_as_one(window, driver, panel):
     driver.click(panel.add["plane"])
     first = sections(window)
     drag(panel.editor.slider, 0.2)
@@ -101,7 +102,7 @@ def test_each_drag_of_the_slider_is_undone_as_one(window, driver, panel):
     assert window.section_views.section == first[0]
 
 
-def test_numbers_are_typed(window, driver, panel):
+def test_numbers_are_typed_also_of_a_free_normal(window, driver, panel):
     driver.click(panel.add["cylinder"])
     (cylinder,) = sections(window)
     assert cylinder.kind == "cylinder"
@@ -113,28 +114,7 @@ def test_numbers_are_typed(window, driver, panel):
     assert sections(window)[0].origin == (0.5, 0.0, 0.0)
     driver.choose(panel.editor.axis, "x")
     assert sections(window)[0].direction == (1.0, 0.0, 0.0)
-
-
-def test_sections_are_added_by_keys_and_removed_by_delete(window, driver, panel):
-    window.docks_.bring_to_front("boundaries")
-    QTest.keyClick(window, Qt.Key.Key_C)
-    QTest.keyClick(window, Qt.Key.Key_C, Qt.KeyboardModifier.ShiftModifier)
-    assert [section.kind for section in sections(window)] == ["plane", "cylinder"]
-    assert panel.isVisible()
-    panel.list.setFocus()
-    QTest.keyClick(panel.list, Qt.Key.Key_Delete)
-    assert [section.kind for section in sections(window)] == ["plane"]
-
-
-def test_in_2d_the_menu_offers_a_line_and_a_circle(window, driver, flat_panel):
-    actions = window.actions_.by_name
-    assert actions["add_plane"].text().replace("&", "") == "Cut by a line"
-    assert actions["add_cylinder"].text().replace("&", "") == "Cut by a circle"
-    QTest.keyClick(window, Qt.Key.Key_C, Qt.KeyboardModifier.ShiftModifier)
-    assert [section.kind for section in sections(window)] == ["cylinder"]
-
-
-def test_a_free_normal(window, driver, panel):
+    driver.click(panel.remove)
     driver.click(panel.add["plane"])
     assert not panel.editor.direction.isVisible()
     driver.choose(panel.editor.axis, "free")
@@ -151,34 +131,41 @@ def test_a_free_normal(window, driver, panel):
     assert not panel.editor.direction.isVisible()
 
 
-def test_an_undone_tilt_is_no_free_normal_any_more(window, driver, panel):
-    editor = panel.editor
+def test_sections_are_added_by_keys_removed_by_delete_and_looked_at_along_their_normal(
+    window, driver, panel
+):
+    window.docks_.lead_to("boundaries")
+    QTest.keyClick(window, Qt.Key.Key_C)
+    QTest.keyClick(window, Qt.Key.Key_C, Qt.KeyboardModifier.ShiftModifier)
+    assert [section.kind for section in sections(window)] == ["plane", "cylinder"]
+    assert panel.isVisible()
+    panel.list.setFocus()
+    QTest.keyClick(panel.list, Qt.Key.Key_Delete)
+    assert [section.kind for section in sections(window)] == ["plane"]
     driver.click(panel.add["plane"])
-    driver.choose(editor.axis, "z")
-    panel.handle.click()
-    handle = window.section_views.handles.of(window.view)
-    handle.widget.InvokeEvent("StartInteractionEvent")
-    handle.shape.SetNormal(0.3, 0.0, 0.95)
-    handle.widget.InvokeEvent("EndInteractionEvent")
-    assert editor.axis.currentData() == "free"
-    assert editor.direction.isVisible()
-    window.store.undo()
-    assert sections(window)[0].direction == (0.0, 0.0, 1.0)
-    assert editor.axis.currentData() == "z"
-    assert not editor.direction.isVisible()
-    window.store.redo()
-    assert editor.axis.currentData() == "free"
-    # Who types numbers keeps their fields, though for a moment they are those of an axis.
-    driver.type(editor.direction.fields[0], "0")
-    assert editor.axis.currentData() == "free"
-    assert editor.direction.isVisible()
-    driver.click(panel.add["plane"])
-    assert editor.axis.currentData() != "free"
-    panel.list.setCurrentRow(0)
-    assert editor.axis.currentData() == "z"
+    driver.choose(panel.editor.axis, "x")
+    driver.click(panel.look)
+    assert abs(np.array(window.view.camera.direction)[0]) == pytest.approx(1.0)
 
 
-def test_a_hidden_section_has_no_flat_view_until_it_is_shown_again(window, driver, panel):
+def test_in_2d_the_menu_offers_a_line_and_a_circle_whose_curve_is_saved(
+    window, driver, flat_panel, answers, tmp_path
+):
+    actions = window.actions_.by_name
+    assert actions["add_plane"].text().replace("&", "") == "Cut by a line"
+    assert actions["add_cylinder"].text().replace("&", "") == "Cut by a circle"
+    QTest.keyClick(window, Qt.Key.Key_C, Qt.KeyboardModifier.ShiftModifier)
+    assert [section.kind for section in sections(window)] == ["cylinder"]
+    driver.click(flat_panel.add["cylinder"])
+    flat_panel.flat.click()
+    answers("ask_save", tmp_path / "along.svg")
+    driver.click(window.section_views.flat.save_button)
+    assert b"<svg" in (tmp_path / "along.svg").read_bytes()
+
+
+def test_a_hidden_section_has_no_flat_view_and_its_box_in_a_case(
+    window, driver, panel, passage_file, tmp_path
+):
     driver.click(panel.add["cylinder"])
     panel.flat.click()
     panel.list.item(0).setCheckState(Qt.CheckState.Unchecked)
@@ -188,6 +175,18 @@ def test_a_hidden_section_has_no_flat_view_until_it_is_shown_again(window, drive
     panel.list.item(0).setCheckState(Qt.CheckState.Checked)
     assert window.section_views.flat.scene.section.kind == "cylinder"
     assert panel.flat.isEnabled()
+    driver.click(panel.remove)
+    driver.click(panel.add["plane"])
+    panel.list.item(0).setCheckState(Qt.CheckState.Unchecked)
+    assert not sections(window)[0].shown
+    hidden = window.store.session.view.sections
+    driver.open(passage_file)
+    assert panel.list.count() == 0
+    window.store.change(changes.set_view, sections=hidden)
+    box = panel.list.item(0).data(Qt.ItemDataRole.CheckStateRole)
+    assert Qt.CheckState(box) == Qt.CheckState.Unchecked
+    panel.list.item(0).setCheckState(Qt.CheckState.Checked)
+    assert sections(window)[0].shown
 
 
 def test_several_are_listed_hidden_and_chosen(window, driver, panel):
@@ -258,6 +257,7 @@ def test_the_flat_view_comes_back_from_the_case_file(window, driver, panel, tmp_
     assert panel.flat.isChecked()
 
 
+@pytest.mark.usefixtures("painted")
 def test_a_cone_is_added_slid_typed_unrolled_and_kept(window, driver, wheel, tmp_path, answers):
     driver.open(wheel)
     window.docks_.bring_to_front("sections")
@@ -301,7 +301,9 @@ def test_a_cone_is_added_slid_typed_unrolled_and_kept(window, driver, wheel, tmp
     assert window.section_views.flat.scene.section == kept[0]
 
 
-def test_a_cone_that_opens_backwards_has_no_axis_of_the_list(window, driver, panel):
+def test_a_cone_that_opens_backwards_has_no_axis_of_the_list_and_a_2d_mesh_offers_none(
+    window, driver, panel, passage_file
+):
     driver.click(panel.add["cone"])
     editor = panel.editor
     editor.axis.setCurrentIndex(editor.axis.findData("free"))
@@ -312,9 +314,6 @@ def test_a_cone_that_opens_backwards_has_no_axis_of_the_list(window, driver, pan
     panel.list.setCurrentRow(0)
     assert editor.axis.currentData() == "free"
     assert "about -z" in panel.list.item(0).toolTip()
-
-
-def test_a_2d_mesh_offers_no_cone(window, driver, panel, passage_file):
     assert panel.add["cone"].isVisible()
     driver.open(passage_file)
     assert not panel.add["cone"].isVisible()
@@ -348,21 +347,8 @@ def test_what_is_chosen_and_its_handle_are_undone(window, driver, panel):
     assert isinstance(window.section_views.handles.of(view), PlaneHandle)
 
 
-def test_the_flat_view_shows_the_step(window, driver, panel):
-    driver.click(panel.add["plane"])
-    panel.flat.click()
-    flat = window.section_views.flat
-    window.start_run()
-    driver.settle()
-    assert len(window.store.session.frames) > 1
-    assert flat.scene.session.frame is window.store.session.frame
-    after = flat.facts.text()
-    window.store.change(changes.show_frame, 0)
-    assert flat.scene.session.frame is window.store.session.first
-    assert flat.facts.text() != after
-
-
-def test_a_cell_of_the_flat_view_is_marked(window, driver, panel):
+@pytest.mark.usefixtures("painted")
+def test_a_cell_of_the_flat_view_is_marked_and_it_shows_the_step(window, driver, panel):
     driver.click(panel.add["plane"])
     panel.flat.click()
     flat = window.section_views.flat
@@ -377,6 +363,19 @@ def test_a_cell_of_the_flat_view_is_marked(window, driver, panel):
     y = (above - corner[1]) / (above - below) * flat.view.height()
     QTest.mouseDClick(flat.view, Qt.MouseButton.LeftButton, pos=QPoint(round(x), round(y)))
     assert window.store.session.view.marked_cell == polygons.cells[3]
+    panel.flat.click()
+    driver.click(panel.remove)
+    driver.click(panel.add["plane"])
+    panel.flat.click()
+    flat = window.section_views.flat
+    window.start_run()
+    driver.settle()
+    assert len(window.store.session.frames) > 1
+    assert flat.scene.session.frame is window.store.session.frame
+    after = flat.facts.text()
+    window.store.change(changes.show_frame, 0)
+    assert flat.scene.session.frame is window.store.session.first
+    assert flat.facts.text() != after
 
 
 def test_the_handle_moves_the_plane_and_leaves_nothing(window, driver, panel):
@@ -404,7 +403,9 @@ def test_the_handle_moves_the_plane_and_leaves_nothing(window, driver, panel):
     assert interactor is window.view.iren.interactor
 
 
-def test_the_ball_of_the_handle_moves_the_plane_along_its_normal(window, driver, panel):
+def test_the_ball_of_the_handle_moves_the_plane_along_its_normal_and_a_tilt_is_undone(
+    window, driver, panel
+):
     driver.click(panel.add["plane"])
     panel.handle.click()
     handle = window.section_views.handles.of(window.view)
@@ -413,20 +414,32 @@ def test_the_ball_of_the_handle_moves_the_plane_along_its_normal(window, driver,
         handle.widget.InvokeEvent("StartInteractionEvent")
         assert handle.shape.GetInteractionState() == getattr(handle.shape, then)
         handle.widget.InvokeEvent("EndInteractionEvent")
-
-
-def test_a_hidden_section_of_a_case_has_its_box(window, driver, panel, passage_file, tmp_path):
+    panel.handle.click()
+    driver.click(panel.remove)
+    editor = panel.editor
     driver.click(panel.add["plane"])
-    panel.list.item(0).setCheckState(Qt.CheckState.Unchecked)
-    assert not sections(window)[0].shown
-    hidden = window.store.session.view.sections
-    driver.open(passage_file)
-    assert panel.list.count() == 0
-    window.store.change(changes.set_view, sections=hidden)
-    box = panel.list.item(0).data(Qt.ItemDataRole.CheckStateRole)
-    assert Qt.CheckState(box) == Qt.CheckState.Unchecked
-    panel.list.item(0).setCheckState(Qt.CheckState.Checked)
-    assert sections(window)[0].shown
+    driver.choose(editor.axis, "z")
+    panel.handle.click()
+    handle = window.section_views.handles.of(window.view)
+    handle.widget.InvokeEvent("StartInteractionEvent")
+    handle.shape.SetNormal(0.3, 0.0, 0.95)
+    handle.widget.InvokeEvent("EndInteractionEvent")
+    assert editor.axis.currentData() == "free"
+    assert editor.direction.isVisible()
+    window.store.undo()
+    assert sections(window)[0].direction == (0.0, 0.0, 1.0)
+    assert editor.axis.currentData() == "z"
+    assert not editor.direction.isVisible()
+    window.store.redo()
+    assert editor.axis.currentData() == "free"
+    # Who types numbers keeps their fields, though for a moment they are those of an axis.
+    driver.type(editor.direction.fields[0], "0")
+    assert editor.axis.currentData() == "free"
+    assert editor.direction.isVisible()
+    driver.click(panel.add["plane"])
+    assert editor.axis.currentData() != "free"
+    panel.list.setCurrentRow(0)
+    assert editor.axis.currentData() == "z"
 
 
 def test_two_strips_lie_one_above_the_other_where_they_are_larger_so():
@@ -435,7 +448,10 @@ def test_two_strips_lie_one_above_the_other_where_they_are_larger_so():
     assert not stack((0.35, 0.01), (600, 200)), "no room for two titles"
 
 
-def test_another_mesh_has_no_handle_and_no_flat_view(window, driver, panel, passage_file):
+@pytest.mark.usefixtures("painted")
+def test_another_mesh_and_a_closed_window_have_no_handle_and_no_flat_view(
+    window, driver, panel, passage_file, sample_folder, answers, monkeypatch
+):
     driver.click(panel.add["plane"])
     panel.handle.click()
     panel.flat.click()
@@ -449,8 +465,21 @@ def test_another_mesh_has_no_handle_and_no_flat_view(window, driver, panel, pass
     assert sections(window)[0].whole
     assert panel.list.item(0).text() == sections(window)[0].describe(2)
     assert window.scene.sections.drawn["section:0"].shown.shape.n_cells > 0
+    answers("ask_unsaved", "discard")
+    driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
+    driver.click(panel.add["plane"])
+    panel.handle.click()
+    panel.flat.click()
+    QApplication.processEvents()
+    section_views, handle = window.section_views, window.section_views.handles.of(window.view)
+    monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
+    window.close()
+    assert handle.widget.GetInteractor() is None
+    assert section_views.flat is None
+    QApplication.processEvents()
 
 
+@pytest.mark.usefixtures("painted")
 def test_two_runs_have_two_flat_views_that_show_the_same(window, driver, panel):
     driver.click(panel.add["plane"])
     panel.flat.click()
@@ -521,14 +550,6 @@ def test_the_curve_of_a_line_follows_step_run_and_line(window, driver, flat_pane
     assert not flat_panel.flat.isChecked()
 
 
-def test_the_curve_is_saved(window, driver, flat_panel, answers, tmp_path):
-    driver.click(flat_panel.add["cylinder"])
-    flat_panel.flat.click()
-    answers("ask_save", tmp_path / "along.svg")
-    driver.click(window.section_views.flat.save_button)
-    assert b"<svg" in (tmp_path / "along.svg").read_bytes()
-
-
 def test_a_flat_view_of_a_3d_mesh_becomes_a_curve_with_a_2d_one(
     window, driver, panel, passage_file, tmp_path, answers
 ):
@@ -568,7 +589,10 @@ def drag_in_view(view, start, end):
     QApplication.processEvents()
 
 
-def test_a_line_is_dragged_by_its_middle_and_turned_by_its_end(window, driver, flat_panel):
+@pytest.mark.usefixtures("painted")
+def test_a_line_is_dragged_by_its_middle_turned_by_its_end_and_its_handle_leaves_nothing(
+    window, driver, flat_panel
+):
     driver.click(flat_panel.add["plane"])
     flat_panel.handle.click()
     window.view.snapshot()
@@ -590,6 +614,24 @@ def test_a_line_is_dragged_by_its_middle_and_turned_by_its_end(window, driver, f
     assert sections(window) == (moved,)
     window.store.undo()
     assert sections(window) == (line,)
+    flat_panel.handle.click()
+    driver.click(flat_panel.remove)
+    driver.click(flat_panel.add["plane"])
+    flat_panel.handle.click()
+    assert any(name.startswith("handle:") for name in window.view.actors)
+    handle = window.section_views.handles.of(window.view)
+    # What is dragged beside it moves the view, as ever.
+    camera = window.scene.camera.place
+    beside = handle._handle_parts.ends[0] + 0.2
+    drag_in_view(window.view, beside, beside + 0.1)
+    assert window.scene.camera.place != camera
+    # Wherever one looks, it is in reach.
+    (x, y, _), half = sections(window)[0].origin, 0.02
+    window.scene.camera.aim((x, y + 0.3, 0.0), half, 1.0)
+    for point in (*handle._handle_parts.ends, *handle._handle_parts.middle):
+        assert abs(point[1] - y - 0.3) < half
+    flat_panel.handle.click()
+    assert not any(name.startswith("handle:") for name in window.view.actors)
 
 
 def test_a_circle_is_dragged_to_another_radius(window, driver, flat_panel):
@@ -612,38 +654,7 @@ def test_a_circle_is_dragged_to_another_radius(window, driver, flat_panel):
     assert sections(window)[0].origin[1:] == (0.05, 0.0)
 
 
-def test_the_handle_of_a_line_leaves_nothing(window, driver, flat_panel):
-    driver.click(flat_panel.add["plane"])
-    flat_panel.handle.click()
-    assert any(name.startswith("handle:") for name in window.view.actors)
-    handle = window.section_views.handles.of(window.view)
-    # What is dragged beside it moves the view, as ever.
-    camera = window.scene.camera.place
-    beside = handle._handle_parts.ends[0] + 0.2
-    drag_in_view(window.view, beside, beside + 0.1)
-    assert window.scene.camera.place != camera
-    # Wherever one looks, it is in reach.
-    (x, y, _), half = sections(window)[0].origin, 0.02
-    window.scene.camera.aim((x, y + 0.3, 0.0), half, 1.0)
-    for point in (*handle._handle_parts.ends, *handle._handle_parts.middle):
-        assert abs(point[1] - y - 0.3) < half
-    flat_panel.handle.click()
-    assert not any(name.startswith("handle:") for name in window.view.actors)
-
-
-def test_closing_with_handle_and_flat_view_leaves_nothing(window, driver, panel, monkeypatch):
-    driver.click(panel.add["plane"])
-    panel.handle.click()
-    panel.flat.click()
-    QApplication.processEvents()
-    section_views, handle = window.section_views, window.section_views.handles.of(window.view)
-    monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
-    window.close()
-    assert handle.widget.GetInteractor() is None
-    assert section_views.flat is None
-    QApplication.processEvents()
-
-
+@pytest.mark.usefixtures("painted")
 def test_a_closed_flat_view_is_freed(window, driver, panel):
     driver.click(panel.add["plane"])
     panel.flat.click()
@@ -658,13 +669,6 @@ def test_a_closed_flat_view_is_freed(window, driver, panel):
     gc.collect()
     assert view() is None
     assert scene() is None
-
-
-def test_look_along_the_normal(window, driver, panel):
-    driver.click(panel.add["plane"])
-    driver.choose(panel.editor.axis, "x")
-    driver.click(panel.look)
-    assert abs(np.array(window.view.camera.direction)[0]) == pytest.approx(1.0)
 
 
 def compare(window, driver):
@@ -711,7 +715,9 @@ def test_a_line_is_dragged_in_the_second_view(window, driver, flat_panel):
         assert not any(name.startswith("handle:") for name in view.actors)
 
 
-def test_a_picture_of_the_section_is_saved(window, driver, panel, answers, tmp_path):
+def test_a_picture_of_the_section_is_saved_or_it_is_told_why_not(
+    window, driver, panel, answers, tmp_path
+):
     driver.click(panel.add["plane"])
     asked = answers("ask_save", tmp_path / "cut.svg")
     assert panel.picture.menu() is panel.sizes
@@ -721,8 +727,15 @@ def test_a_picture_of_the_section_is_saved(window, driver, panel, answers, tmp_p
     assert b"<svg" in (tmp_path / "cut.svg").read_bytes()
     # 8.5 cm are 241 points.
     assert b'width="240.9' in (tmp_path / "cut.svg").read_bytes()
+    driver.click(panel.add["plane"])
+    answers("ask_save", tmp_path / "cut.bmp")
+    panel.sizes.actions()[3].trigger()
+    driver.settle()
+    assert window.banner.isVisible()
+    assert not (tmp_path / "cut.bmp").exists()
 
 
+@pytest.mark.slow
 def test_size_title_and_axes_of_the_picture_of_a_section_can_be_chosen(
     window, driver, panel, answers, tmp_path
 ):
@@ -749,15 +762,6 @@ def test_size_title_and_axes_of_the_picture_of_a_section_can_be_chosen(
     driver.settle()
     assert asked
     assert not (tmp_path / "cut.svg").exists()
-
-
-def test_a_picture_that_cannot_be_written_is_told(window, driver, panel, answers, tmp_path):
-    driver.click(panel.add["plane"])
-    answers("ask_save", tmp_path / "cut.bmp")
-    panel.sizes.actions()[3].trigger()
-    driver.settle()
-    assert window.banner.isVisible()
-    assert not (tmp_path / "cut.bmp").exists()
 
 
 def test_the_panel_fits_its_dock(window, panel, driver):

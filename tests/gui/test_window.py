@@ -39,6 +39,12 @@ def ready(driver, sample_folder):
     return driver
 
 
+@pytest.fixture
+def ran(with_runs):
+    """The case of the passage with a run of three steps."""
+    return with_runs({"steps": 3})
+
+
 def colours(window):
     picture = window.view.snapshot().astype(int)
     return {tuple(rgb) for rgb in picture[::3, ::3].reshape(-1, 3)}
@@ -54,7 +60,8 @@ def test_it_starts_with_a_page_that_offers_to_open_and_the_samples(window):
     assert "Open a mesh" in window.run_panel.text.text()
 
 
-def test_a_mesh_opens_with_rows_roles_and_guesses(opened):
+@pytest.mark.usefixtures("painted")
+def test_a_mesh_opens_with_rows_roles_and_guesses_that_keep_all_confirms(opened):
     window, session = opened.window, opened.session
     table = window.boundaries.table
     assert [table.item(row, 0).text() for row in range(5)] == list(session.mesh.marker_names)
@@ -65,22 +72,12 @@ def test_a_mesh_opens_with_rows_roles_and_guesses(opened):
     assert not window.start.isVisible()
     assert window.windowTitle() == "passage.su2 – slideviz"
     assert len(colours(window)) > 20
-
-
-def test_keep_all_confirms_the_guesses(opened):
     opened.click(opened.window.boundaries.keep)
     choice = opened.window.boundaries.table.cellWidget(0, 2)
     assert not opened.session.guesses
     assert "?" not in choice.currentText()
     assert not choice.font().italic()
     assert not opened.window.boundaries.keep.isVisible()
-
-
-def test_open_from_the_menu(driver, answers, passage_file):
-    answers("ask_open", Path(passage_file))
-    driver.window.actions_.by_name["open"].trigger()
-    driver.settle()
-    assert driver.session.path == Path(passage_file)
 
 
 def test_a_case_opens_with_mesh_roles_motions_and_settings(ready):
@@ -103,7 +100,7 @@ def test_files_are_remembered_and_the_newest_is_first(opened, sample_folder):
     assert len(opened.window.files.recent()) == 2
 
 
-def test_dropping_a_file_opens_it(driver, passage_file):
+def test_dropping_a_file_opens_it_and_so_does_the_menu(driver, passage_file, answers):
     data = QMimeData()
     data.setUrls([QUrl.fromLocalFile(str(passage_file))])
     buttons, keys = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
@@ -117,9 +114,16 @@ def test_dropping_a_file_opens_it(driver, passage_file):
     driver.qtbot.waitUntil(lambda: driver.session.mesh is not None, timeout=20_000)
     assert driver.session.path == Path(passage_file)
     assert not driver.window.view.acceptDrops(), "the view would read the file in its own way"
+    other = Path(passage_file).rename(Path(passage_file).with_name("other.su2"))
+    answers("ask_open", other)
+    driver.window.actions_.by_name["open"].trigger()
+    driver.settle()
+    assert driver.session.path == other
 
 
-def test_a_broken_file_is_told_and_the_window_goes_on(opened, tmp_path):
+def test_a_broken_file_and_an_unexpected_error_are_told_and_the_window_goes_on(
+    opened, tmp_path, monkeypatch
+):
     before = opened.session.mesh
     bad = tmp_path / "bad.su2"
     bad.write_text("NDIME= 2\nNELEM= 1\n5 0 1 oops\n")
@@ -131,8 +135,6 @@ def test_a_broken_file_is_told_and_the_window_goes_on(opened, tmp_path):
     opened.open(opened.session.path)
     assert not banner.isVisible()
 
-
-def test_an_unexpected_error_has_details_to_copy(opened, monkeypatch):
     def broken(*_):
         raise ZeroDivisionError("strange")
 
@@ -167,19 +169,20 @@ def test_zones_can_be_chosen(driver, tmp_path, passage_file):
 # Boundaries -------------------------------------------------------------------------------
 
 
-def test_a_role_is_chosen_in_the_table_and_shown_in_the_view(opened):
+def test_a_role_is_chosen_in_the_table_also_for_all_selected_rows_and_shown_in_the_view(opened):
     opened.role("inflow", "internal")
     assert opened.session.role("inflow") == "internal"
     assert (0xCC, 0x79, 0xA7) in colours(opened.window)
-
-
-def test_a_role_goes_to_all_selected_rows(opened):
     opened.click_row("inflow")
     opened.click_row("outflow", Qt.KeyboardModifier.ControlModifier)
     assert set(opened.session.view.selected) == {"inflow", "outflow"}
     opened.role("outflow", "fixed")
     assert opened.session.role("inflow") == opened.session.role("outflow") == "fixed"
     assert opened.session.role("airfoil") == "moving"
+    item = opened.window.boundaries.table.item(opened.row("airfoil"), 0)
+    item.setCheckState(Qt.CheckState.Unchecked)
+    assert opened.session.view.hidden == {"airfoil"}
+    assert not opened.window.scene.drawn["airfoil"].actor.visibility
 
 
 def test_a_click_in_the_view_selects_the_row_and_a_drag_does_not(opened):
@@ -235,13 +238,6 @@ def test_the_right_button_assigns_a_role_and_isolates(opened):
     assert opened.session.view.hidden == {"inflow"}
 
 
-def test_the_check_mark_hides_a_boundary(opened):
-    item = opened.window.boundaries.table.item(opened.row("airfoil"), 0)
-    item.setCheckState(Qt.CheckState.Unchecked)
-    assert opened.session.view.hidden == {"airfoil"}
-    assert not opened.window.scene.drawn["airfoil"].actor.visibility
-
-
 # Motions ----------------------------------------------------------------------------------
 
 
@@ -249,7 +245,7 @@ def ghost(driver):
     return driver.window.scene.motion_ghosts["airfoil"]
 
 
-def test_a_translation_is_typed_and_its_ghost_moves_at_once(opened):
+def test_a_translation_and_a_scaling_are_typed_and_the_ghost_moves_at_once(opened):
     opened.add_motion(Translate)
     editor = opened.window.motions.editor
     opened.type(editor.vector.fields[0], "0.1")
@@ -257,6 +253,17 @@ def test_a_translation_is_typed_and_its_ghost_moves_at_once(opened):
     assert opened.session.case.motions == (Translate("airfoil", (0.1, -0.02)),)
     nodes = opened.session.mesh.marker("airfoil").nodes
     assert np.allclose(ghost(opened), opened.session.mesh.points[nodes] + [0.1, -0.02])
+    opened.window.store.change(changes.set_case, motions=())
+    opened.add_motion(Scale)
+    editor = opened.window.motions.editor
+    opened.type(editor.factors.fields[0], "1.5")
+    assert opened.session.case.motions == (Scale("airfoil", (1.5, 1.0)),)
+    field = editor.factors.fields[1]
+    field.selectAll()
+    QTest.keyClicks(field, "0")
+    assert field.property("bad")
+    assert "flatten" in field.toolTip()
+    assert opened.session.case.motions == (Scale("airfoil", (1.5, 1.0)),)
 
 
 def test_a_rotation_about_the_centroid_and_about_a_point(opened):
@@ -288,19 +295,6 @@ def test_a_3d_rotation_has_an_axis(driver, sample_folder):
     assert driver.session.case.motions == (Rotate("BLOCK", 10.0, "centroid", (1.0, 0.0, 0.0)),)
     driver.type(editor.axis.fields[0], "0")
     assert driver.session.case.motions[0].axis == (1.0, 0.0, 0.0), "an axis has a direction"
-
-
-def test_a_scaling(opened):
-    opened.add_motion(Scale)
-    editor = opened.window.motions.editor
-    opened.type(editor.factors.fields[0], "1.5")
-    assert opened.session.case.motions == (Scale("airfoil", (1.5, 1.0)),)
-    field = editor.factors.fields[1]
-    field.selectAll()
-    QTest.keyClicks(field, "0")
-    assert field.property("bad")
-    assert "flatten" in field.toolTip()
-    assert opened.session.case.motions == (Scale("airfoil", (1.5, 1.0)),)
 
 
 def test_an_intersection_is_told_while_the_motion_is_typed(opened):
@@ -350,7 +344,7 @@ def test_typing_on_asks_for_the_last_motion_only(opened, monkeypatch):
     assert len(asked) <= 2
 
 
-def test_a_displacement_file(opened, tmp_path):
+def test_a_displacement_file_and_what_is_typed_are_checked_at_once(opened, tmp_path):
     node = int(opened.session.mesh.marker("airfoil").nodes[0])
     file = tmp_path / "d.txt"
     file.write_text(f"{node} 0.5 0.25\n")
@@ -360,9 +354,30 @@ def test_a_displacement_file(opened, tmp_path):
     assert np.allclose(ghost(opened)[0] - opened.session.mesh.points[node], [0.5, 0.25])
     opened.type(opened.window.motions.editor.path, str(file) + "x")
     assert "does not exist" in opened.window.run_panel.text.text()
+    opened.window.store.change(changes.set_case, motions=())
+    opened.add_motion(Translate)
+    field = opened.window.motions.editor.vector.fields[0]
+    opened.click(field)
+    field.selectAll()
+    QTest.keyClicks(field, "1.5e")
+    assert field.property("bad")
+    assert "not a number" in field.toolTip()
+    assert opened.session.case.motions[0].vector == (1.5, 0.0), "the last valid value counts"
+    QTest.keyClick(field, Qt.Key.Key_Tab)
+    assert field.text() == "0", "what was there before"
+    assert opened.session.case.motions[0].vector == (0.0, 0.0)
+    assert not field.property("bad")
+    opened.window.store.change(changes.set_case, motions=())
+    opened.add_motion(Translate)
+    field = next(f for f in opened.window.motions.findChildren(NumberField) if f.isVisible())
+    before = field.text()
+    opened.type(field, "1..5")
+    assert field.text() == before
+    said = opened.window.statusBar().currentMessage()
+    assert said == f"Not taken: “1..5” is not a number; {before} is there again."
 
 
-def test_motions_are_reordered_changed_and_removed(opened):
+def test_motions_are_reordered_changed_and_removed_and_need_a_moving_boundary(opened):
     panel = opened.window.motions
     opened.add_motion(Translate)
     opened.add_motion(Rotate)
@@ -377,24 +392,6 @@ def test_motions_are_reordered_changed_and_removed(opened):
     opened.click(panel.findChild(QToolButton, "motion_remove"))
     assert not opened.session.case.motions
     assert not panel.editor.isVisible()
-
-
-def test_what_is_typed_is_checked_at_once(opened):
-    opened.add_motion(Translate)
-    field = opened.window.motions.editor.vector.fields[0]
-    opened.click(field)
-    field.selectAll()
-    QTest.keyClicks(field, "1.5e")
-    assert field.property("bad")
-    assert "not a number" in field.toolTip()
-    assert opened.session.case.motions[0].vector == (1.5, 0.0), "the last valid value counts"
-    QTest.keyClick(field, Qt.Key.Key_Tab)
-    assert field.text() == "0", "what was there before"
-    assert opened.session.case.motions[0].vector == (0.0, 0.0)
-    assert not field.property("bad")
-
-
-def test_without_a_moving_boundary_motions_say_why_not(opened):
     opened.role("airfoil", "fixed")
     panel = opened.window.motions
     assert not panel.add.isEnabled()
@@ -405,7 +402,7 @@ def test_without_a_moving_boundary_motions_say_why_not(opened):
 # Method -----------------------------------------------------------------------------------
 
 
-def test_settings_reach_the_case(opened):
+def test_settings_reach_the_case_and_impossible_numbers_do_not(opened):
     method = opened.window.method
     opened.choose(method.sliding, "ds")
     opened.choose(method.periodic, "moving")
@@ -424,6 +421,16 @@ def test_settings_reach_the_case(opened):
     assert (case.steps, case.influence_factor, case.feature_angle_deg) == (12, 3.5, 35.0)
     assert (case.quality_metric, case.kernel) == ("rbf-slide", "wendland-c4")
     assert "λ =" in method.found.text()
+    field = opened.window.method.more.influence_factor
+    opened.window.store.change(changes.set_case, influence_factor=2.5)
+    field.selectAll()
+    QTest.keyClicks(field, "-1")
+    assert field.property("bad")
+    assert "-1 is out of range; needed is a number above 1e-06" in field.toolTip()
+    assert opened.session.case.influence_factor == 2.5
+    kernel = opened.window.method.more.kernel
+    assert kernel.count() == 14
+    assert {kernel.itemData(row) for row in range(14)} >= {"wendland-c2", "gaussian"}
 
 
 def test_what_is_not_available_says_why(opened):
@@ -439,18 +446,7 @@ def test_what_is_not_available_says_why(opened):
     assert "Whether" not in method.periodic.toolTip()
 
 
-def test_impossible_numbers_are_marked_and_not_taken(opened):
-    field = opened.window.method.more.influence_factor
-    opened.window.docks["method"].raise_()
-    opened.click(opened.window.method.more.button)
-    field.selectAll()
-    QTest.keyClicks(field, "-1")
-    assert field.property("bad")
-    assert "-1 is out of range; needed is a number above 1e-06" in field.toolTip()
-    assert opened.session.case.influence_factor == 2.5
-
-
-def test_data_reduction_has_a_tolerance_and_keeps_its_settings(opened):
+def test_data_reduction_has_a_tolerance_in_length_and_keeps_its_settings(opened):
     method, more = opened.window.method, opened.window.method.more
     opened.window.docks["method"].raise_()
     opened.click(more.button)
@@ -480,9 +476,6 @@ def test_data_reduction_has_a_tolerance_and_keeps_its_settings(opened):
     assert opened.session.case.reduction is None
     opened.choose(method.reduction, "YES")
     assert opened.session.case.reduction == wanted
-
-
-def test_a_relative_tolerance_is_shown_in_length_and_becomes_absolute_when_typed(opened):
     method, extent = opened.window.method, opened.session.mesh.extent
     opened.window.docks["method"].raise_()
     given = Reduction(relative=1e-4, gamma=20.0)
@@ -492,16 +485,10 @@ def test_a_relative_tolerance_is_shown_in_length_and_becomes_absolute_when_typed
     assert opened.session.case.reduction == Reduction(0.25, gamma=20.0)
 
 
-def test_all_kernels_can_be_chosen(opened):
-    kernel = opened.window.method.more.kernel
-    assert kernel.count() == 14
-    assert {kernel.itemData(row) for row in range(14)} >= {"wendland-c2", "gaussian"}
-
-
 # Running ----------------------------------------------------------------------------------
 
 
-def test_what_is_missing_leads_to_its_panel(opened):
+def test_what_is_missing_leads_to_its_panel_and_what_does_nothing_is_said(opened):
     panel = opened.window.run_panel
     assert "airfoil” has no motion" in panel.text.text()
     assert not panel.run.isEnabled()
@@ -510,6 +497,15 @@ def test_what_is_missing_leads_to_its_panel(opened):
     opened.qtbot.waitUntil(lambda: motions.visibleRegion().isEmpty())
     panel.text.linkActivated.emit("motion")
     opened.qtbot.waitUntil(lambda: not motions.visibleRegion().isEmpty())
+    said = opened.window.boundaries.idle_text
+    assert not said.isVisible()
+    opened.window.store.change(changes.set_case, sliding="none", periodic="none")
+    assert said.text().splitlines() == [
+        "Periodicity is “none”: periodic_1 and periodic_2 will not repeat.",
+        "Sliding is “none”: inflow and outflow will not slide.",
+    ]
+    opened.window.store.change(changes.set_view, colour_by="displacement")
+    assert "no displacement yet" in opened.window.statusBar().currentMessage()
 
 
 def run(driver, steps=3):
@@ -551,34 +547,46 @@ def test_an_automatic_run_says_how_many_steps_it_took(ready):
     assert len(frames[-1].step.tried) >= 2
 
 
-def test_the_slider_the_buttons_and_the_keys_show_steps(ready):
-    run(ready)
-    player, window = ready.window.player, ready.window
+def test_the_slider_the_buttons_and_the_keys_show_steps_and_playing_in_a_loop_begins_again(
+    ran, monkeypatch
+):
+    player, window = ran.window.player, ran.window
     shown = window.scene.drawn["airfoil"].shape
-    nodes = ready.session.mesh.marker("airfoil").nodes
+    nodes = ran.session.mesh.marker("airfoil").nodes
     for step, go in (
         (1, lambda: player.slider.setValue(1)),
-        (2, lambda: ready.click(player.buttons["next"])),
-        (0, lambda: ready.click(player.buttons["first"])),
-        (3, lambda: ready.click(player.buttons["last"])),
-        (2, lambda: ready.click(player.buttons["previous"])),
+        (2, lambda: ran.click(player.buttons["next"])),
+        (0, lambda: ran.click(player.buttons["first"])),
+        (3, lambda: ran.click(player.buttons["last"])),
+        (2, lambda: ran.click(player.buttons["previous"])),
         (0, lambda: QTest.keyClick(window, Qt.Key.Key_Home)),
     ):
         go()
-        assert ready.session.view.frame == step
-        wanted = ready.session.frames[step].mesh.points[nodes]
+        assert ran.session.view.frame == step
+        wanted = ran.session.frames[step].mesh.points[nodes]
         assert np.allclose(np.asarray(shown.points)[:, :2], wanted)
         assert player.slider.value() == step
+    player.go(3)
+    monkeypatch.setattr(player_module, "TICK_MS", 10**8)  # by itself it does not tick
+    player._clock = OneStepEachTick(player)
+    told = []
+    ran.window.store.listen(lambda _old, new: told.append(new.view.frame))
 
+    def tick():
+        QApplication.sendEvent(player._timer, QTimerEvent(player._timer.timerId()))
 
-def test_playing_ends_at_the_last_step(ready):
-    run(ready)
-    player = ready.window.player
-    player.set_speed(4.0)
-    ready.click(player.buttons["play"])
-    assert ready.session.view.frame == 0
-    ready.qtbot.waitUntil(lambda: ready.session.view.frame == 3)
-    ready.qtbot.waitUntil(lambda: not player.playing)
+    ran.click(player.buttons["loop"])
+    ran.click(player.buttons["play"])
+    for _ in range(5):
+        tick()
+    assert told == [0, 1, 2, 3, 0, 1]
+    assert player.playing
+    ran.click(player.buttons["loop"])
+    tick()
+    assert player.playing
+    tick()
+    assert not player.playing
+    assert told[-2:] == [2, 3]
 
 
 class OneStepEachTick:
@@ -594,31 +602,6 @@ class OneStepEachTick:
         return step_ms(len(self.player.store.session.frames) - 1, self.player.speed)
 
 
-def test_playing_in_a_loop_begins_again(ready, monkeypatch):
-    run(ready)
-    player = ready.window.player
-    monkeypatch.setattr(player_module, "TICK_MS", 10**8)  # by itself it does not tick
-    player._clock = OneStepEachTick(player)
-    told = []
-    ready.window.store.listen(lambda _old, new: told.append(new.view.frame))
-
-    def tick():
-        QApplication.sendEvent(player._timer, QTimerEvent(player._timer.timerId()))
-
-    ready.click(player.buttons["loop"])
-    ready.click(player.buttons["play"])
-    for _ in range(5):
-        tick()
-    assert told == [0, 1, 2, 3, 0, 1]
-    assert player.playing
-    ready.click(player.buttons["loop"])
-    tick()
-    assert player.playing
-    tick()
-    assert not player.playing
-    assert told[-2:] == [2, 3]
-
-
 @pytest.mark.parametrize(
     ("steps", "speed", "ms"), [(5, 1, 500), (5, 2, 250), (20, 1, 150), (20, 0.5, 300), (500, 1, 50)]
 )
@@ -626,25 +609,28 @@ def test_few_steps_are_played_slowly_and_a_film_takes_three_seconds(steps, speed
     assert step_ms(steps, speed) == ms
 
 
-def test_the_speed_is_chosen_also_while_it_plays(ready):
-    run(ready)
-    player = ready.window.player
-    ready.click(player.buttons["play"])
+def test_playing_ends_at_the_last_step_and_its_speed_is_chosen_also_meanwhile(ran):
+    player = ran.window.player
+    ran.click(player.buttons["play"])
     assert player._timer.interval() == 500
     player.speed_button.menu().actions()[0].trigger()
     assert (player.speed_button.text(), player._timer.interval()) == ("0.5×", 1000)
     player.stop()
+    player.set_speed(4.0)
+    ran.click(player.buttons["play"])
+    assert ran.session.view.frame == 0
+    ran.qtbot.waitUntil(lambda: ran.session.view.frame == 3)
+    ran.qtbot.waitUntil(lambda: not player.playing)
 
 
-def test_where_drawing_takes_long_steps_are_left_out(ready, monkeypatch):
-    run(ready)
-    player = ready.window.player
+def test_where_drawing_takes_long_steps_are_left_out(ran, monkeypatch):
+    player = ran.window.player
     player.set_speed(4.0)
     told = []
-    ready.window.store.listen(lambda _old, new: told.append(new.view.frame))
-    ready.click(player.buttons["play"])
+    ran.window.store.listen(lambda _old, new: told.append(new.view.frame))
+    ran.click(player.buttons["play"])
     monkeypatch.setattr(player, "_clock", SimpleNamespace(restart=lambda: 265))
-    ready.qtbot.waitUntil(lambda: not player.playing)
+    ran.qtbot.waitUntil(lambda: not player.playing)
     assert told == [0, 2, 3]
 
 
@@ -660,10 +646,27 @@ def test_neither_view_nor_slider_nor_panels_change_their_size_with_the_numbers(r
         assert [part.width() for part in parts] == widths
 
 
-def test_numbers_without_room_are_shorter_and_then_left_out_whole(ready):
-    run(ready)
-    result = ready.window.player.result
-    full, *short = [[plain(part) for part in form] for form in result_parts(ready.session)]
+def test_numbers_without_room_are_shorter_and_a_narrow_player_leaves_out_speed_before_them(ran):
+    ran.window.resize(1280, 800)
+    QApplication.processEvents()
+    shown = plain(ran.window.player.result.text())
+    for word in ("inv", "min", "mean"):
+        assert word in shown
+    player = ran.window.player
+    ran.window.resize(900, 620)
+    ran.qtbot.waitUntil(lambda: not player.speed_button.isVisible())
+    assert player.step_text.text() == "3/3"
+    ran.qtbot.waitUntil(lambda: player.step_text.x() > player.slider.geometry().right())
+    ran.qtbot.waitUntil(lambda: "inv" in plain(player.result.text()))
+    # Whatever was there before: a label without words would keep no room for any.
+    player.result.resize(0, player.result.height())
+    ran.window.resize(901, 620)
+    ran.qtbot.waitUntil(lambda: "inv" in plain(player.result.text()))
+    ran.window.resize(1280, 800)
+    ran.qtbot.waitUntil(player.speed_button.isVisible)
+    assert player.step_text.text() == "Step 3 of 3"
+    result = ran.window.player.result
+    full, *short = [[plain(part) for part in form] for form in result_parts(ran.session)]
     result.resize(5000, 20)
     assert [part.strip() for part in plain(result.text()).split("·")] == full
     assert not result.toolTip()
@@ -678,32 +681,6 @@ def test_numbers_without_room_are_shorter_and_then_left_out_whole(ready):
     assert {tuple(form) for form in (full, *short)} <= seen
     result.resize(120, 20)
     assert full[1] in plain(result.toolTip())
-
-
-def test_the_mean_is_read_in_a_window_of_the_usual_size(ready):
-    run(ready)
-    ready.window.resize(1280, 800)
-    QApplication.processEvents()
-    shown = plain(ready.window.player.result.text())
-    for word in ("inv", "min", "mean"):
-        assert word in shown
-
-
-def test_a_narrow_player_leaves_out_speed_and_words_before_numbers(ready):
-    run(ready)
-    player = ready.window.player
-    ready.window.resize(900, 620)
-    ready.qtbot.waitUntil(lambda: not player.speed_button.isVisible())
-    assert player.step_text.text() == "3/3"
-    ready.qtbot.waitUntil(lambda: player.step_text.x() > player.slider.geometry().right())
-    ready.qtbot.waitUntil(lambda: "inv" in plain(player.result.text()))
-    # Whatever was there before: a label without words would keep no room for any.
-    player.result.resize(0, player.result.height())
-    ready.window.resize(901, 620)
-    ready.qtbot.waitUntil(lambda: "inv" in plain(player.result.text()))
-    ready.window.resize(1280, 800)
-    ready.qtbot.waitUntil(player.speed_button.isVisible)
-    assert player.step_text.text() == "Step 3 of 3"
 
 
 def test_cancel_keeps_the_steps_that_are_done(ready):
@@ -855,26 +832,22 @@ def test_closing_while_running_ends_the_run(ready, answers):
 # Saving -----------------------------------------------------------------------------------
 
 
-def test_the_mesh_is_saved(ready, answers, tmp_path):
-    run(ready)
-    asked = answers("ask_save", tmp_path / "out.su2")
-    ready.window.actions_.by_name["save_mesh"].trigger()
-    ready.settle()
-    assert asked[0][1].name == "passage_deformed.su2"
-    saved = read(tmp_path / "out.su2")
-    assert np.array_equal(saved.points, ready.session.deformed.mesh.points)
-    assert not ready.session.unsaved_mesh
-
-
-def test_the_step_that_is_shown_is_the_one_saved(ready, answers, tmp_path):
-    run(ready)
-    ready.window.player.go(1)
+def test_the_mesh_is_saved_as_it_is_at_the_step_that_is_shown(ran, answers, tmp_path):
+    ran.window.player.go(1)
     asked = answers("ask_save", tmp_path / "out.vtu")
-    ready.window.actions_.by_name["save_mesh"].trigger()
-    ready.settle()
+    ran.window.actions_.by_name["save_mesh"].trigger()
+    ran.settle()
     assert asked[0][1].name == "passage_step1.su2"
     assert (tmp_path / "out.vtu").stat().st_size > 1000
-    assert ready.session.unsaved_mesh, "the last step is not on disk"
+    assert ran.session.unsaved_mesh, "the last step is not on disk"
+    ran.window.player.go(3)
+    asked = answers("ask_save", tmp_path / "out.su2")
+    ran.window.actions_.by_name["save_mesh"].trigger()
+    ran.settle()
+    assert asked[0][1].name == "passage_deformed.su2"
+    saved = read(tmp_path / "out.su2")
+    assert np.array_equal(saved.points, ran.session.deformed.mesh.points)
+    assert not ran.session.unsaved_mesh
 
 
 @pytest.mark.parametrize("sure", [False, True])
@@ -908,10 +881,13 @@ def test_a_case_is_saved_and_means_the_same(opened, answers, tmp_path):
     assert not opened.session.unsaved_case
 
 
-def test_a_case_that_cannot_be_written_is_told(opened, answers, tmp_path):
+def test_nothing_is_asked_when_nothing_changed_or_a_case_cannot_be_written(
+    opened, answers, tmp_path
+):
     answers("ask_save", tmp_path / "no" / "a.cfg")
     opened.window.actions_.by_name["save_case"].trigger()
     assert "a.cfg" in opened.window.banner.text.text()
+    assert opened.window.close()
 
 
 def test_a_picture_is_saved_at_the_size_asked_for(opened, answers, tmp_path, monkeypatch):
@@ -938,26 +914,6 @@ def test_a_picture_is_saved_at_the_size_asked_for(opened, answers, tmp_path, mon
     assert before.std() > 5, "the view still works"
 
 
-def test_roles_that_the_method_does_not_use_are_said(opened):
-    said = opened.window.boundaries.idle_text
-    assert not said.isVisible()
-    opened.window.store.change(changes.set_case, sliding="none", periodic="none")
-    assert said.text().splitlines() == [
-        "Periodicity is “none”: periodic_1 and periodic_2 will not repeat.",
-        "Sliding is “none”: inflow and outflow will not slide.",
-    ]
-
-
-def test_a_number_that_is_not_taken_is_said(opened):
-    opened.add_motion(Translate)
-    field = next(f for f in opened.window.motions.findChildren(NumberField) if f.isVisible())
-    before = field.text()
-    opened.type(field, "1..5")
-    assert field.text() == before
-    said = opened.window.statusBar().currentMessage()
-    assert said == f"Not taken: “1..5” is not a number; {before} is there again."
-
-
 def test_what_moves_fills_the_view_or_what_is_selected(opened):
     window, fit = opened.window, opened.window.actions_.by_name["fit_boundary"]
     whole = window.view.camera.parallel_scale
@@ -970,11 +926,6 @@ def test_what_moves_fills_the_view_or_what_is_selected(opened):
     window.store.change(changes.select, ())
     opened.role("airfoil", "fixed")
     assert not fit.isEnabled()
-
-
-def test_the_displacement_is_said_to_be_none_before_a_run(opened):
-    opened.window.store.change(changes.set_view, colour_by="displacement")
-    assert "no displacement yet" in opened.window.statusBar().currentMessage()
 
 
 @pytest.mark.parametrize("answer", ["cancel", "discard", "case"])
@@ -1027,14 +978,22 @@ def test_a_run_that_was_cancelled_is_not_what_the_case_gives(ready, answers):
     assert "repeats" not in asked[-1][0]
 
 
-def test_nothing_is_asked_when_nothing_changed(opened):
-    assert opened.window.close()
-
-
 # View -------------------------------------------------------------------------------------
 
 
-def test_colours_edges_and_ghosts_are_switched_from_the_tool_bar(opened):
+@pytest.mark.usefixtures("painted")
+def test_colours_edges_and_ghosts_are_switched_from_the_tool_bar_and_undo_says_what_it_undid(
+    opened,
+):
+    window, said = opened.window, opened.window.statusBar().currentMessage
+    undo, redo = (window.actions_.by_name[name] for name in ("undo", "redo"))
+    window.store.change(changes.set_view, edges=False)
+    undo.trigger()
+    assert said() == "Undone: mesh edges"
+    redo.trigger()
+    assert said() == "Done again: mesh edges"
+    keys = {keys.toString() for keys in redo.shortcuts()}
+    assert {"Ctrl+Shift+Z", "Ctrl+Y"} <= keys
     bar = opened.window.actions_
     opened.choose(bar.bar.colour, "skew")
     assert opened.session.view.colour_by == "skew"
@@ -1045,16 +1004,14 @@ def test_colours_edges_and_ghosts_are_switched_from_the_tool_bar(opened):
     assert not bar.by_name["perspective"].isEnabled(), "2D has none"
 
 
-def test_the_wheel_zooms_about_the_mouse_and_f_shows_all_again(opened):
+@pytest.mark.usefixtures("painted")
+def test_the_wheel_zooms_about_the_mouse_f_shows_all_again_and_keys_of_vtk_do_nothing(opened):
     window = opened.window
     scale = window.view.camera.parallel_scale
     window.view.signals.zoomed.emit(QPoint(100, 100), 1.5)
     assert window.view.camera.parallel_scale == pytest.approx(scale / 1.5)
     QTest.keyClick(window, Qt.Key.Key_F)
     assert window.view.camera.parallel_scale == pytest.approx(scale)
-
-
-def test_keys_of_vtk_do_nothing(opened):
     before = opened.window.view.snapshot()
     for key in (Qt.Key.Key_W, Qt.Key.Key_S, Qt.Key.Key_R):
         QTest.keyClick(opened.window.view, key)
@@ -1095,18 +1052,6 @@ def test_a_change_is_drawn_in_a_turn_of_its_own(opened, monkeypatch):
     opened.qtbot.waitUntil(lambda: bool(drawn))
     opened.qtbot.wait(20)
     assert len(drawn) == 1
-
-
-def test_what_was_undone_is_said_and_both_usual_keys_do_it_again(opened):
-    window, said = opened.window, opened.window.statusBar().currentMessage
-    undo, redo = (window.actions_.by_name[name] for name in ("undo", "redo"))
-    window.store.change(changes.set_view, edges=False)
-    undo.trigger()
-    assert said() == "Undone: mesh edges"
-    redo.trigger()
-    assert said() == "Done again: mesh edges"
-    keys = {keys.toString() for keys in redo.shortcuts()}
-    assert {"Ctrl+Shift+Z", "Ctrl+Y"} <= keys
 
 
 def test_what_goes_through_itself_is_told_beside_the_button_that_still_runs(ready):
