@@ -18,6 +18,8 @@ from slideviz.gui.window import MainWindow
 from slideviz.session import changes
 from slideviz.session.design_table import DesignTable
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 @pytest.fixture
 def folder(tmp_path):
@@ -80,7 +82,9 @@ def nothing_asked(monkeypatch):
     monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
 
 
-def test_nobody_else_may_read_what_is_kept(make, qtbot, folder, case_file, tmp_path):
+def test_nobody_else_may_read_what_is_kept_its_files_are_found_and_a_proper_end_leaves_nothing(
+    make, qtbot, folder, case_file, tmp_path
+):
     window = make()
     open_in(window, case_file, qtbot)
     kept(window, qtbot)
@@ -93,6 +97,13 @@ def test_nobody_else_may_read_what_is_kept(make, qtbot, folder, case_file, tmp_p
         (log,) = crashes.iterdir()
         assert log.stat().st_mode & 0o777 == 0o600
     assert crashes.stat().st_mode & 0o777 == 0o700
+    case = kept(window, qtbot)
+    original = Case.read(case_file)
+    assert case.mesh_file.samefile(original.mesh_file)
+    assert case.motions[0].path.samefile(original.motions[0].path)
+    assert case.roles == original.roles
+    window.close()
+    assert list(folder.iterdir()) == []
 
 
 def test_a_change_is_written_some_seconds_later(make, qtbot, case_file, monkeypatch):
@@ -104,24 +115,6 @@ def test_a_change_is_written_some_seconds_later(make, qtbot, case_file, monkeypa
     qtbot.waitUntil(lambda: Case.read(window.autosave.path).steps == 9)
     window.store.change(changes.set_view, edges=False)
     qtbot.waitUntil(lambda: "VIEW_SHOW" in Case.read(window.autosave.path).view)
-
-
-def test_files_in_it_are_found_from_its_folder(make, qtbot, case_file):
-    window = make()
-    open_in(window, case_file, qtbot)
-    case = kept(window, qtbot)
-    original = Case.read(case_file)
-    assert case.mesh_file.samefile(original.mesh_file)
-    assert case.motions[0].path.samefile(original.motions[0].path)
-    assert case.roles == original.roles
-
-
-def test_a_proper_end_leaves_nothing(make, qtbot, case_file, folder):
-    window = make()
-    open_in(window, case_file, qtbot)
-    kept(window, qtbot)
-    window.close()
-    assert list(folder.iterdir()) == []
 
 
 def test_nothing_is_written_before_a_mesh_is_open(make, folder):
@@ -340,6 +333,7 @@ os.kill(os.getpid(), 9)
 """
 
 
+@pytest.mark.slow
 def test_a_program_that_was_killed_leaves_its_session(tmp_path, folder, case_file):
     folder.mkdir(parents=True)
     call = [sys.executable, "-c", KILLED, str(folder), str(case_file)]

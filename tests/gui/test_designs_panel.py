@@ -18,6 +18,8 @@ from slideviz.plots.style import PRINT
 from slideviz.samples.table import write_sample
 from slideviz.session import changes
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 LEFT = Qt.MouseButton.LeftButton
 
 
@@ -102,14 +104,14 @@ def test_designs_are_run_drawn_and_shown(window, passage, qtbot, in_a_thread, dr
 
 def test_the_last_of_several_clicks_counts(window, passage, qtbot, in_a_thread, driver):
     panel = passage
-    fill(panel, "STEPS", "40, 41, 42")
+    fill(panel, "STEPS", "12, 13, 14")
     run(panel, qtbot)
     for number in (1, 2, 3):
         panel.show_design(number)
     driver.settle()
     qtbot.waitUntil(lambda: window.store.session.run_shown.name == "design 3")
     driver.settle()
-    assert len(window.store.session.run_shown.frames) == 42
+    assert len(window.store.session.run_shown.frames) == 14
     # Another job is not given up for it.
     window.start_run()
     assert window.runner.busy
@@ -119,23 +121,9 @@ def test_the_last_of_several_clicks_counts(window, passage, qtbot, in_a_thread, 
     driver.settle()
 
 
-def test_the_design_shown_is_none_of_another_table(passage, answers, tmp_path):
-    panel = passage
-    fill(panel, "STEPS", "1, 2, 3")
-    panel.shown = 2
-    panel.rows.model.setData(panel.rows.model.index(2, 0), "4")
-    assert panel.shown == 2
-    file = tmp_path / "designs.csv"
-    file.write_text("STEPS\n1\n5\n")
-    answers("ask_table", file)
-    QTest.mouseClick(panel.load, LEFT)
-    assert panel.shown is None
-    panel.shown = 1
-    fill(panel, "airfoil.rotate.angle_deg", "-1, -2")
-    assert panel.shown is None
-
-
-def test_designs_that_fail_say_why(passage, qtbot, in_a_thread):
+def test_designs_that_fail_say_why_and_what_is_done_is_not_run_again(
+    passage, qtbot, in_a_thread, window, tmp_path
+):
     panel = passage
     fill(panel, "SLIDING_MODE", "ps, none")
     assert panel.rows.model.headerData(0, Qt.Orientation.Horizontal) == "SLIDING_\nMODE"
@@ -147,6 +135,19 @@ def test_designs_that_fail_say_why(passage, qtbot, in_a_thread):
     panel.show_design(2)
     assert panel.said.label.text().startswith("Design 2: PERIODIC_MODE= moving needs")
     assert panel.shown is None
+    assert panel.table.results[2].problem
+    assert panel.run.text() == "Run 1 design"
+    panel.rows.view.selectRow(1)
+    QTest.mouseClick(panel.remove, LEFT)
+    assert not panel.run.isEnabled()
+    assert "are done" in panel.run.toolTip()
+    # Where the case is saved to changes no result.
+    case = window.store.session.case.change(source=tmp_path / "other.cfg")
+    window.store.change(changes.saved_case, case)
+    assert not panel.run.isEnabled()
+    assert not panel.said.text().startswith("The settings")
+    window.store.change(changes.set_case, steps=3)
+    assert panel.run.text() == "Run 1 design"
 
 
 def test_what_is_said_can_be_read_to_its_end(window, passage, qtbot):
@@ -197,7 +198,9 @@ def test_the_number_that_varies_is_read_whole(window, passage, qtbot):
     assert column.shown == column.currentText()
 
 
-def test_mistakes_are_told_and_change_nothing(passage):
+def test_mistakes_are_told_and_change_nothing_and_the_design_shown_is_none_of_another_table(
+    passage, answers, tmp_path
+):
     panel = passage
     fill(panel, "STEPS", "1, many")
     assert "whole number" in panel.said.label.text()
@@ -208,9 +211,25 @@ def test_mistakes_are_told_and_change_nothing(passage):
     assert panel.table.rows == (("1",), ("2",))
     panel.rows.model.setData(panel.rows.model.index(0, 0), "3")
     assert panel.table.rows == (("3",), ("2",))
+    panel.rows.model.setData(panel.rows.model.index(0, 0), "1")
+    panel = passage
+    fill(panel, "STEPS", "1, 2, 3")
+    panel.shown = 2
+    panel.rows.model.setData(panel.rows.model.index(2, 0), "4")
+    assert panel.shown == 2
+    file = tmp_path / "designs.csv"
+    file.write_text("STEPS\n1\n5\n")
+    answers("ask_table", file)
+    QTest.mouseClick(panel.load, LEFT)
+    assert panel.shown is None
+    panel.shown = 1
+    fill(panel, "airfoil.rotate.angle_deg", "-1, -2")
+    assert panel.shown is None
 
 
-def test_tables_are_loaded_and_saved(passage, answers, tmp_path):
+def test_tables_are_loaded_and_saved_and_all_mistakes_are_told_with_their_rows(
+    passage, answers, tmp_path, window
+):
     panel = passage
     file = tmp_path / "designs.csv"
     file.write_text("airfoil.translate.y\n0.05\n0.1\n")
@@ -226,7 +245,24 @@ def test_tables_are_loaded_and_saved(passage, answers, tmp_path):
     file.write_text("nothing\n1\n")
     answers("ask_table", file)
     QTest.mouseClick(panel.load, LEFT)
-    assert "no such number of a motion" in panel.said.label.text()
+    assert "no such number of a motion" in panel.said.text()
+    file = tmp_path / "designs.csv"
+    file.write_text("STEPS\n1\nmany\n0.5\nx\ny\nz\n")
+    answers("ask_table", file)
+    QTest.mouseClick(passage.load, LEFT)
+    assert "(and 4 more)" in passage.said.text()
+    assert window.banner.isVisible()
+    window.banner.details.click()
+    told = window.banner.dialog.text.toPlainText()
+    assert all(f"designs.csv:{line}: " in told for line in (3, 4, 5, 6, 7))
+    window.banner.dialog.close()
+    # They go with a file that has none; what else is told there stays.
+    file.write_text("STEPS\n1\n")
+    QTest.mouseClick(passage.load, LEFT)
+    assert not window.banner.isVisible()
+    window.banner.tell("Something else.")
+    QTest.mouseClick(passage.load, LEFT)
+    assert window.banner.isVisible()
 
 
 def test_other_settings_make_results_old(window, passage, qtbot, in_a_thread, answers):
@@ -304,51 +340,6 @@ def test_results_are_not_lost_without_a_question(
     assert (tmp_path / "out.csv").read_text().count("\n") == 3
 
 
-def test_results_can_be_saved_before_a_number_is_added_or_all_is_run_again(
-    window, passage, qtbot, in_a_thread, answers, tmp_path
-):
-    panel = passage
-    fill(panel, "STEPS", "1, 2")
-    run(panel, qtbot)
-    before = panel.table
-    asked = answers("ask_unsaved", "table")
-    answers("ask_save", None)
-    fill(panel, "airfoil.rotate.angle_deg", "-1, -2")
-    assert panel.table is before
-    assert "the results of 2 designs" in asked[0][0]
-    window.store.change(changes.set_case, sliding="ds")
-    answers("ask_unsaved", "cancel")
-    QTest.mouseClick(panel.run, LEFT)
-    assert panel.table is before
-    assert not panel.runner.busy
-    answers("ask_unsaved", "table")
-    answers("ask_save", tmp_path / "out.csv")
-    fill(panel, "airfoil.rotate.angle_deg", "-1, -2")
-    assert len(panel.table.rows) == 4
-    assert not panel.table.results
-    with (tmp_path / "out.csv").open() as file:
-        assert [row["steps"] for row in csv.DictReader(file)] == ["1", "2"]
-
-
-def test_what_is_done_is_not_run_again(window, passage, qtbot, in_a_thread, tmp_path):
-    panel = passage
-    fill(panel, "SLIDING_MODE", "ps, none")
-    run(panel, qtbot)
-    assert panel.table.results[2].problem
-    assert panel.run.text() == "Run 1 design"
-    panel.rows.view.selectRow(1)
-    QTest.mouseClick(panel.remove, LEFT)
-    assert not panel.run.isEnabled()
-    assert "are done" in panel.run.toolTip()
-    # Where the case is saved to changes no result.
-    case = window.store.session.case.change(source=tmp_path / "other.cfg")
-    window.store.change(changes.saved_case, case)
-    assert not panel.run.isEnabled()
-    assert not panel.said.label.text().startswith("The settings")
-    window.store.change(changes.set_case, steps=3)
-    assert panel.run.text() == "Run 1 design"
-
-
 def test_closing_asks_about_designs_that_go_on(
     window, passage, qtbot, in_a_thread, answers, tmp_path
 ):
@@ -371,26 +362,6 @@ def test_closing_asks_about_designs_that_go_on(
     with (tmp_path / "out.csv").open() as file:
         done = [row for row in csv.DictReader(file) if row["min"]]
     assert 1 < len(done) < 500
-
-
-def test_all_mistakes_of_a_file_are_told_with_their_rows(window, passage, answers, tmp_path):
-    file = tmp_path / "designs.csv"
-    file.write_text("STEPS\n1\nmany\n0.5\nx\ny\nz\n")
-    answers("ask_table", file)
-    QTest.mouseClick(passage.load, LEFT)
-    assert "(and 4 more)" in passage.said.label.text()
-    assert window.banner.isVisible()
-    window.banner.details.click()
-    told = window.banner.dialog.text.toPlainText()
-    assert all(f"designs.csv:{line}: " in told for line in (3, 4, 5, 6, 7))
-    window.banner.dialog.close()
-    # They go with a file that has none; what else is told there stays.
-    file.write_text("STEPS\n1\n")
-    QTest.mouseClick(passage.load, LEFT)
-    assert not window.banner.isVisible()
-    window.banner.tell("Something else.")
-    QTest.mouseClick(passage.load, LEFT)
-    assert window.banner.isVisible()
 
 
 def test_its_key_shows_and_hides_the_panel(window, passage, qtbot):

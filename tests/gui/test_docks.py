@@ -17,6 +17,8 @@ from slideviz.gui.widgets.fields import NumberField
 from slideviz.gui.window import MainWindow
 from slideviz.session import changes
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 SMALL = 1280, 800
 
 
@@ -93,7 +95,9 @@ def turn_wheel(widget, notches):
     QApplication.sendEvent(widget, event)
 
 
-def test_every_setting_is_reached_with_the_wheel_which_changes_none(method, driver):
+def test_every_setting_is_reached_with_the_wheel_which_changes_none_and_none_is_cut_off(
+    method, driver, qtbot
+):
     case, bar = driver.session.case, method.area.verticalScrollBar()
     bar.setValue(0)
     found = set()
@@ -112,13 +116,19 @@ def test_every_setting_is_reached_with_the_wheel_which_changes_none(method, driv
     found |= {w for w in controls(method) if is_whole(method, w)}
     assert set(controls(method)) == found
     assert driver.session.case == case
-
-
-def test_no_setting_is_cut_off_at_the_side(method):
     right = method.area.viewport().width()
     for widget in controls(method):
         edge = widget.mapTo(method.area.widget(), QPoint(widget.width(), 0)).x()
         assert edge <= right, widget.objectName()
+    # What was typed after a click on the tab Motion went into the tolerance, which nobody saw.
+    docks = driver.window.docks_.by_name
+    field = method.findChild(NumberField)
+    field.setFocus()
+    assert docks["method"].isAncestorOf(QApplication.focusWidget())
+    docks["motion"].raise_()
+    qtbot.waitUntil(
+        lambda: not docks["method"].isAncestorOf(QApplication.focusWidget() or driver.window)
+    )
 
 
 # The layout -------------------------------------------------------------------------------
@@ -251,18 +261,7 @@ def test_a_panel_is_taken_out_of_its_tab_and_put_back(start, qtbot, monkeypatch)
     tab_of(again, "Curves")
 
 
-def test_the_menu_of_a_tab_takes_its_panel_out_or_closes_it(start, qtbot):
-    window = start(SMALL)
-    menu = window.docks_.tabs.menu_of(window.docks["runs"])
-    texts = {action.text(): action for action in menu.actions()}
-    texts["Own window"].trigger()
-    assert window.docks["runs"].isFloating()
-    texts["Close"].trigger()
-    settled(qtbot, window)
-    assert not window.docks["runs"].isVisible()
-
-
-def test_a_panel_without_a_tab_has_a_title_to_be_moved_by(start, qtbot):
+def test_a_panel_without_a_tab_has_a_title_and_the_menu_of_a_tab_closes_it(start, qtbot):
     window = start(SMALL)
     for name in ("worst", "curves"):
         window.docks[name].close()
@@ -273,6 +272,14 @@ def test_a_panel_without_a_tab_has_a_title_to_be_moved_by(start, qtbot):
     settled(qtbot, window)
     assert not is_titled(window.docks["histogram"])
     assert run_is_seen(window)
+    window = start(SMALL)
+    menu = window.docks_.tabs.menu_of(window.docks["runs"])
+    texts = {action.text(): action for action in menu.actions()}
+    texts["Own window"].trigger()
+    assert window.docks["runs"].isFloating()
+    texts["Close"].trigger()
+    settled(qtbot, window)
+    assert not window.docks["runs"].isVisible()
 
 
 TWICE = """
@@ -306,6 +313,7 @@ for _ in range(2):
 """
 
 
+@pytest.mark.slow
 def test_no_tab_is_left_over_the_panels(tmp_path):
     call = [sys.executable, "-c", TWICE, str(tmp_path / "settings.ini")]
     done = subprocess.run(call, capture_output=True, text=True, timeout=120, check=True)
@@ -313,15 +321,3 @@ def test_no_tab_is_left_over_the_panels(tmp_path):
     every.append(["Runs", "Sections", "Display"])
     said = done.stdout.strip().splitlines()
     assert said == [str(every)] * 4, "twice at the start, and after the layout was put back"
-
-
-def test_a_field_behind_another_tab_gets_no_keys(method, driver, qtbot):
-    # What was typed after a click on the tab Motion went into the tolerance, which nobody saw.
-    docks = driver.window.docks_.by_name
-    field = method.findChild(NumberField)
-    field.setFocus()
-    assert docks["method"].isAncestorOf(QApplication.focusWidget())
-    docks["motion"].raise_()
-    qtbot.waitUntil(
-        lambda: not docks["method"].isAncestorOf(QApplication.focusWidget() or driver.window)
-    )

@@ -11,6 +11,8 @@ from qtpy.QtWidgets import QAbstractItemView, QApplication, QMenu, QTableView
 from slideviz.case.model import Ffd, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.session import changes
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 @pytest.fixture
 def opened(driver, passage_file):
@@ -27,7 +29,9 @@ def menu_key(view):
     QApplication.sendEvent(view, event)
 
 
-def test_the_menu_key_is_about_the_row_that_is_selected(opened):
+def test_the_menu_key_is_about_the_row_that_is_selected_a_right_click_about_that_below_the_mouse(
+    opened,
+):
     panel = opened.window.boundaries
 
     def select(name):
@@ -42,9 +46,6 @@ def test_the_menu_key_is_about_the_row_that_is_selected(opened):
         (menu,) = [menu for menu in panel.findChildren(QMenu) if menu.isVisible()]
         assert menu.actions()[0].text() == name
         menu.close()
-
-
-def test_a_right_click_is_about_the_row_below_the_mouse(opened):
     panel = opened.window.boundaries
     opened.click_row("inflow")
     table = panel.table
@@ -76,20 +77,17 @@ def test_roles_are_chosen_by_keys_alone(opened):
         assert table.hasFocus(), "the next one is chosen by keys, too"
 
 
-@pytest.mark.parametrize("back", [False, True])
-def test_the_tab_key_leaves_every_table(opened, back):
+def test_the_tab_key_leaves_every_table_and_comes_around(opened):
     window = opened.window
     views = window.findChildren(QAbstractItemView)
     assert not [v.objectName() for v in views if isinstance(v, QTableView) and v.tabKeyNavigation()]
     table = window.boundaries.table
-    table.setFocus()
-    QTest.keyClick(table, Qt.Key.Key_Backtab if back else Qt.Key.Key_Tab)
-    assert not table.hasFocus()
-    assert not table.isAncestorOf(window.focusWidget())
-
-
-def test_the_tab_key_comes_around(opened):
-    """From anywhere, tabs alone reach the roles, the motions, the method and Run."""
+    for key in (Qt.Key.Key_Backtab, Qt.Key.Key_Tab):
+        table.setFocus()
+        QTest.keyClick(table, key)
+        assert not table.hasFocus()
+        assert not table.isAncestorOf(window.focusWidget())
+    # From anywhere, tabs alone reach the roles, the motions, the method and Run.
     window, seen = opened.window, set()
     window.store.change(changes.add_motion, Translate("airfoil", (0.01, 0.0)))
     window.boundaries.table.setFocus()
@@ -127,7 +125,7 @@ def link(driver):
     panel.text.linkActivated.emit("motion")
 
 
-def test_the_link_of_a_motion_that_does_nothing_leads_to_its_field(opened):
+def test_links_beside_run_lead_to_the_field_that_does_nothing_or_is_wrong(opened):
     opened.add_motion(Rotate)
     opened.window.boundaries.table.setFocus()
     assert "Nothing moves yet" in opened.window.run_panel.text.text()
@@ -135,19 +133,7 @@ def test_the_link_of_a_motion_that_does_nothing_leads_to_its_field(opened):
     field = opened.window.motions.editor.angle
     assert field.hasFocus()
     assert field.selectedText() == "0"
-
-
-def test_the_link_of_a_boundary_without_motion_adds_one_for_it(opened):
-    opened.role("outflow", "moving")
-    opened.window.store.change(changes.add_motion, Translate("airfoil", (0.01, 0.0)))
-    assert "“outflow” has no motion: add one." in opened.window.run_panel.text.text()
-    link(opened)
-    assert opened.session.case.motions[1:] == (Translate("outflow", (0.0, 0.0)),)
-    assert opened.window.motions.list.currentRow() == 1
-    assert opened.window.motions.editor.vector.fields[0].hasFocus()
-
-
-def test_the_link_of_a_wrong_field_leads_to_it(opened):
+    opened.window.store.change(changes.set_case, motions=())
     opened.add_motion(Rotate)
     field = opened.window.motions.editor.angle
     field.selectAll()
@@ -155,6 +141,32 @@ def test_the_link_of_a_wrong_field_leads_to_it(opened):
     link(opened)
     assert field.hasFocus()
     assert field.selectedText() == "3.."
+
+
+def test_a_new_motion_is_for_the_boundary_without_one_or_for_all_about_their_centroid(opened):
+    opened.role("outflow", "moving")
+    opened.window.store.change(changes.add_motion, Translate("airfoil", (0.01, 0.0)))
+    assert "“outflow” has no motion: add one." in opened.window.run_panel.text.text()
+    link(opened)
+    assert opened.session.case.motions[1:] == (Translate("outflow", (0.0, 0.0)),)
+    assert opened.window.motions.list.currentRow() == 1
+    assert opened.window.motions.editor.vector.fields[0].hasFocus()
+    opened.window.store.change(changes.set_case, motions=())
+    opened.role("outflow", "moving")
+    opened.window.store.change(changes.select, ())
+    opened.add_motion(Translate)
+    assert opened.session.case.motions[0].marker == ""
+    opened.window.store.change(changes.set_case, motions=(Translate("airfoil", (0.1, 0.0)),))
+    opened.add_motion(Translate)
+    assert opened.session.case.motions[1].marker == "outflow"
+    opened.add_motion(Translate)
+    assert opened.session.case.motions[2].marker == ""
+    opened.role("outflow", "moving")
+    opened.window.store.change(changes.set_case, motions=(Rotate("", 1.0),))
+    opened.choose(opened.window.motions.editor.about, "point")
+    mesh = opened.session.mesh
+    nodes = [*mesh.marker("airfoil").nodes, *mesh.marker("outflow").nodes]
+    assert opened.session.case.motions[0].point == pytest.approx(mesh.points[nodes].mean(axis=0))
 
 
 # Several boundaries -----------------------------------------------------------------------
@@ -181,27 +193,6 @@ def test_a_motion_is_for_all_that_are_selected(opened):
     assert opened.session.case.motions[0].marker == ""
     opened.choose(editor.marker, words(editor.marker).index("inflow"))
     assert opened.session.case.motions[0].marker == "inflow"
-
-
-def test_or_for_those_without_one_or_for_all(opened):
-    opened.role("outflow", "moving")
-    opened.window.store.change(changes.select, ())
-    opened.add_motion(Translate)
-    assert opened.session.case.motions[0].marker == ""
-    opened.window.store.change(changes.set_case, motions=(Translate("airfoil", (0.1, 0.0)),))
-    opened.add_motion(Translate)
-    assert opened.session.case.motions[1].marker == "outflow"
-    opened.add_motion(Translate)
-    assert opened.session.case.motions[2].marker == ""
-
-
-def test_their_point_begins_at_their_common_centroid(opened):
-    opened.role("outflow", "moving")
-    opened.window.store.change(changes.set_case, motions=(Rotate("", 1.0),))
-    opened.choose(opened.window.motions.editor.about, "point")
-    mesh = opened.session.mesh
-    nodes = [*mesh.marker("airfoil").nodes, *mesh.marker("outflow").nodes]
-    assert opened.session.case.motions[0].point == pytest.approx(mesh.points[nodes].mean(axis=0))
 
 
 # The menu of the motions ------------------------------------------------------------------
@@ -237,18 +228,7 @@ def test_motions_are_duplicated_copied_and_pasted(opened):
     assert opened.session.case.motions == (one, one, other, other)
 
 
-def test_motions_are_pasted_from_a_case_file(opened):
-    text = "(HUB, translate, 0.1, 0.0) ; \\\n    (*, rotate, 5.0, centroid)"
-    QApplication.clipboard().setText(text)
-    press(opened, "Ctrl+V")
-    assert opened.session.case.motions == (Translate("airfoil", (0.1, 0.0)), Rotate("", 5.0))
-    QApplication.clipboard().setText("half a sentence")
-    press(opened, "Ctrl+V")
-    assert "What was copied is no motion" in opened.window.banner.text.text()
-    assert len(opened.session.case.motions) == 2
-
-
-def test_the_menu_of_the_motions_offers_what_can_be_done(opened):
+def test_the_menu_of_the_motions_offers_what_can_be_done_as_to_paste_from_a_case_file(opened):
     panel = opened.window.motions
     able = {name: act.isEnabled() for name, act in panel.actions_.items()}
     assert able == dict.fromkeys(able, False) | {"paste": True}
@@ -257,6 +237,15 @@ def test_the_menu_of_the_motions_offers_what_can_be_done(opened):
     able = {name for name, act in panel.actions_.items() if act.isEnabled()}
     assert able == {"duplicate", "copy", "paste", "later", "remove"}
     assert [act.text() for act in panel.list.actions()][:3] == ["Duplicate", "Copy", "Paste"]
+    opened.window.store.change(changes.set_case, motions=())
+    text = "(HUB, translate, 0.1, 0.0) ; \\\n    (*, rotate, 5.0, centroid)"
+    QApplication.clipboard().setText(text)
+    press(opened, "Ctrl+V")
+    assert opened.session.case.motions == (Translate("airfoil", (0.1, 0.0)), Rotate("", 5.0))
+    QApplication.clipboard().setText("half a sentence")
+    press(opened, "Ctrl+V")
+    assert "What was copied is no motion" in opened.window.banner.text.text()
+    assert len(opened.session.case.motions) == 2
 
 
 def test_arrows_change_no_role_after_a_click_on_one(driver, passage_file, qtbot):

@@ -18,6 +18,8 @@ from slideviz.session.run_messages import run_requirements
 from slideviz.terms import SHOWN
 from tests.slow import one_of_each_fast
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 NOISE = 3.7e-13
 
 
@@ -52,7 +54,7 @@ def listed(driver, row=0):
     return driver.window.motions.list.item(row).text()
 
 
-def test_what_rounding_left_of_zero_reads_0_and_stays_in_the_case(block):
+def test_what_rounding_left_is_not_shown_but_a_small_displacement_is(block):
     motion = Rotate("BLOCK", 5.0, (NOISE, 0.0, 0.0))
     put(block, motion)
     assert texts(editor(block).point) == ["0", "0", "0"]
@@ -62,14 +64,8 @@ def test_what_rounding_left_of_zero_reads_0_and_stays_in_the_case(block):
     put(block, Rotate("BLOCK", 5.0, (1e-7, 0.0, 0.0)))
     assert texts(editor(block).point)[0] == "1e-07", "a small length is none"
     assert "through (1e-07, 0, 0)" in listed(block)
-
-
-def test_a_small_displacement_is_shown_as_it_is(block):
     put(block, Translate("BLOCK", (NOISE, 0.0, 0.0)))
     assert texts(editor(block).vector) == ["3.7e-13", "0", "0"]
-
-
-def test_a_point_begins_at_the_centroid_without_the_digits_of_rounding(block):
     put(block, Scale("BLOCK", (2.0, 2.0, 2.0)))
     block.choose(editor(block).about, "point")
     point = block.session.case.motions[0].point
@@ -78,7 +74,7 @@ def test_a_point_begins_at_the_centroid_without_the_digits_of_rounding(block):
     assert point == (0.5, 0.5, 0.5)
 
 
-def test_an_axis_without_direction_is_marked_and_the_rest_goes_on(block):
+def test_an_axis_without_direction_is_marked_and_the_list_tells_the_others(block, sample_folder):
     put(block, Rotate("BLOCK", 5.0, "centroid", (1.0, 0.0, 0.0)))
     axis = editor(block).axis
     axis.fields[0].selectAll()
@@ -94,18 +90,21 @@ def test_an_axis_without_direction_is_marked_and_the_rest_goes_on(block):
     QTest.keyClicks(axis.fields[1], "0")
     block.type(editor(block).angle, "9")
     assert block.session.case.motions == (Rotate("BLOCK", 9.0, "centroid", (0.0, 2.0, 0.0)),)
-
-
-def test_the_list_tells_the_axis_of_a_3d_rotation(block, sample_folder):
     put(block, Rotate("BLOCK", 5.0, "centroid", (0.0, -1.0, 0.0)), Rotate("BLOCK", 5.0))
     assert listed(block, 0) == "1.  BLOCK: rotate by 5° about -y through its centroid"
     assert listed(block, 1) == "2.  BLOCK: rotate by 5° about z through its centroid"
 
 
-def test_the_list_tells_the_point_of_a_2d_rotation(blade):
+def test_the_list_tells_the_point_of_a_2d_rotation_and_of_a_box_what_is_missing(blade):
     put(blade, Rotate("airfoil", 5.0), Rotate("airfoil", 5.0, (1.0, 0.5)))
     assert listed(blade, 0) == "1.  airfoil: rotate by 5° about its centroid"
     assert listed(blade, 1) == "2.  airfoil: rotate by 5° about (1, 0.5)"
+    put(blade)
+    blade.add_motion(Ffd)
+    assert blade.session.case.motions[0].box == ""
+    blade.type(editor(blade).vector.fields[0], "0.1")
+    (missing,) = run_requirements(blade.session)
+    assert "names no FFD box; choose one of the mesh" in missing.text
 
 
 MOVED = {
@@ -162,7 +161,9 @@ def dialog(blade, qtbot):
     return made
 
 
-def test_a_table_is_checked_as_it_is_typed(dialog, blade, qtbot):
+def test_a_table_is_checked_as_it_is_typed_can_have_all_nodes_and_is_not_accepted_if_wrong(
+    dialog, blade, qtbot
+):
     node = blade.session.mesh.marker("airfoil").nodes[0]
     assert not dialog.save.isEnabled()
     QTest.keyClicks(dialog.edit, f"{node} 0.3 0.4")
@@ -173,17 +174,12 @@ def test_a_table_is_checked_as_it_is_typed(dialog, blade, qtbot):
     qtbot.waitUntil(lambda: bool(dialog.answer.property("bad")))
     assert "needed are 3: node dx dy" in dialog.answer.text()
     assert not dialog.save.isEnabled()
-
-
-def test_a_table_can_have_all_nodes_and_that_can_be_undone(dialog, blade):
+    dialog.edit.setPlainText("")
     blade.click(dialog.fill)
     assert len(dialog.text.splitlines()) == 1 + len(dialog.rows.nodes)
     assert dialog.save.isEnabled()
     dialog.edit.undo()
     assert dialog.text == ""
-
-
-def test_a_wrong_table_is_not_accepted(dialog):
     dialog.edit.setPlainText("nonsense")
     dialog.accept()
     assert dialog.result() != TableDialog.DialogCode.Accepted
@@ -208,7 +204,7 @@ def typed(monkeypatch):
     return answer
 
 
-def test_a_new_table_is_saved_and_used(blade, typed, answers, tmp_path):
+def test_a_new_table_is_saved_and_used_and_its_rows_are_changed(blade, typed, answers, tmp_path):
     mesh = blade.session.mesh
     node, file = int(mesh.marker("airfoil").nodes[0]), tmp_path / "mine.txt"
     asked = answers("ask_save", file)
@@ -218,17 +214,12 @@ def test_a_new_table_is_saved_and_used(blade, typed, answers, tmp_path):
     assert blade.session.case.motions == (FromFile(file, "airfoil"),)
     moved = blade.window.scene.motion_ghosts["airfoil"][0] - mesh.points[node]
     assert np.allclose(moved, [0.001, 0.002])
-
-
-def test_the_rows_of_a_file_are_changed_and_its_ghost_follows(blade, typed, answers, tmp_path):
-    mesh = blade.session.mesh
-    node, file = int(mesh.marker("airfoil").nodes[0]), tmp_path / "mine.txt"
     file.write_text(f"{node} 0.001 0.002\n")
     put(blade, FromFile(file, "airfoil"))
     began = typed(f"{node} 0.003 0.004")
     asked = answers("ask_save", file)
     blade.click(editor(blade).table)
-    assert began == [f"{node} 0.001 0.002\n"]
+    assert began == ["", f"{node} 0.001 0.002\n"]
     assert asked[0][1] == file
     assert blade.session.case.motions == (FromFile(file, "airfoil"),)
     moved = blade.window.scene.motion_ghosts["airfoil"][0] - mesh.points[node]
@@ -292,7 +283,18 @@ def test_boxes_can_be_drawn_where_there_are_some(driver, passage_file, tmp_path)
     assert action.isChecked()
 
 
-def test_motion_of_a_box_is_shown_edited_and_kept(boxed, tmp_path):
+def test_motion_of_a_box_is_shown_edited_and_kept_and_takes_whole_numbers(boxed, tmp_path):
+    boxed.add_motion(Ffd)
+    form = editor(boxed)
+    for text in ("0.5", "-2"):
+        boxed.type(form.index.fields[0], text)
+        assert boxed.session.case.motions[0].index == (0, 0, -1)
+    assert "whole numbers from 0, or -1 for all" in control_point((0.5, 0.0))
+    boxed.type(form.index.fields[0], "9")
+    assert boxed.session.case.motions[0].index == (9, 0, -1)
+    (missing,) = run_requirements(boxed.session)[:1]
+    assert "moves yet" in missing.text
+    put(boxed)
     boxed.add_motion(Ffd)
     form = editor(boxed)
     assert boxed.session.case.motions == (Ffd("low", "A", (0, 0, -1), (0.0, 0.0, 0.0)),)
@@ -310,24 +312,3 @@ def test_motion_of_a_box_is_shown_edited_and_kept(boxed, tmp_path):
     np.testing.assert_allclose(moved[:, 1], 0.1 * 3 * u**2 * (1 - u), atol=1e-14)
     boxed.session.case.write(tmp_path / "kept.cfg")
     assert sv.Case.read(tmp_path / "kept.cfg").motions == (motion,)
-
-
-def test_field_of_a_control_point_takes_whole_numbers_from_minus_one(boxed):
-    boxed.add_motion(Ffd)
-    form = editor(boxed)
-    for text in ("0.5", "-2"):
-        boxed.type(form.index.fields[0], text)
-        assert boxed.session.case.motions[0].index == (0, 0, -1)
-    assert "whole numbers from 0, or -1 for all" in control_point((0.5, 0.0))
-    boxed.type(form.index.fields[0], "9")
-    assert boxed.session.case.motions[0].index == (9, 0, -1)
-    (missing,) = run_requirements(boxed.session)[:1]
-    assert "moves yet" in missing.text
-
-
-def test_motion_of_a_box_without_a_box_says_what_is_missing(blade):
-    blade.add_motion(Ffd)
-    assert blade.session.case.motions[0].box == ""
-    blade.type(editor(blade).vector.fields[0], "0.1")
-    (missing,) = run_requirements(blade.session)
-    assert "names no FFD box; choose one of the mesh" in missing.text
