@@ -75,6 +75,7 @@ def case_file(sample_folder):
     return next((sample_folder / "hexahedron").glob("*.cfg"))
 
 
+@pytest.mark.slow
 def test_five_windows_leave_nothing(qtbot, settings, case_file, monkeypatch):
     threads, widgets = threading.active_count(), set(QApplication.allWidgets())
     windows(qtbot, settings, case_file, monkeypatch, 5)

@@ -36,6 +36,7 @@ def sound(session):
     return run
 
 
+@pytest.mark.slow
 def test_cancel_at_ten_random_moments_of_a_3d_run(driver, case_file):
     window = driver.window
     driver.open(case_file)
@@ -219,7 +220,8 @@ sys.exit(app.launch(Path(sys.argv[1])))
 """
 
 
-@pytest.mark.parametrize("after_ms", [5, pytest.param(700, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("after_ms", [5, 700])
 def test_the_program_ends_well_when_it_is_closed_while_it_runs(case_file, tmp_path, after_ms):
     places = {f"XDG_{name}_HOME": str(tmp_path / name) for name in ("DATA", "CACHE", "CONFIG")}
     places["NUMBA_CACHE_DIR"] = os.environ.get("NUMBA_CACHE_DIR", "")

@@ -19,6 +19,8 @@ from slideviz.gui.window import MainWindow
 from slideviz.samples.table import SAMPLES
 from slideviz.session import changes
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 SIZES = """
 import sys, tempfile
 from qtpy.QtCore import QSettings
@@ -45,7 +47,8 @@ def test_the_window_fits_the_screen(window):
     assert fits(window) == (True, True, True)
 
 
-@pytest.mark.parametrize("scale", [pytest.param("1.25", marks=pytest.mark.slow), "1.6"])
+@pytest.mark.slow
+@pytest.mark.parametrize("scale", ["1.25", "1.6"])
 def test_the_window_fits_a_screen_that_is_small_beside_the_letters(scale):
     """It is 1000 pixels wide at the last scale."""
     call = [sys.executable, "-c", inspect.getsource(fits) + SIZES]

@@ -21,6 +21,7 @@ def window(qapp, tmp_path):
         yield opened
 
 
+@pytest.mark.slow
 def test_roles_are_guesses_and_the_menu_is_in_the_picture(window, tmp_path):
     shots_states.roles(window, tmp_path)
     session = window.store.session
@@ -40,6 +41,7 @@ def test_roles_are_guesses_and_the_menu_is_in_the_picture(window, tmp_path):
     assert (np.abs(shown - plain).max(axis=2) > 40).sum() > 3_000
 
 
+@pytest.mark.slow
 def test_quality_shows_the_last_step_with_neighbours(window, tmp_path):
     shots_states.quality(window, tmp_path)
     session = window.store.session
@@ -50,6 +52,7 @@ def test_quality_shows_the_last_step_with_neighbours(window, tmp_path):
     assert session.view.colour_by == "size-skew"
 
 
+@pytest.mark.slow
 def test_section_is_a_cylinder_that_is_unrolled(window, tmp_path):
     shots_states.section(window, tmp_path)
     (cut,) = window.store.session.view.sections
@@ -59,6 +62,7 @@ def test_section_is_a_cylinder_that_is_unrolled(window, tmp_path):
     assert window.section_views.flat.isVisible()
 
 
+@pytest.mark.slow
 def test_side_by_side_shows_what_sliding_is_good_for(window, tmp_path):
     shots_states.beside(window, tmp_path)
     session = window.store.session

@@ -10,6 +10,8 @@ import pytest
 
 from slideviz.session import jit_warmup
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 @pytest.fixture
 def work(monkeypatch):
@@ -63,6 +65,7 @@ def test_closing_does_not_wait_for_it(window, work):
     assert work.stopped()
 
 
+@pytest.mark.slow
 def test_the_program_ends_while_it_compiles(tmp_path):
     code = (
         "import sys\n"
