@@ -14,6 +14,8 @@ from slideviz.scene.passages import PassageLayer
 from slideviz.scene.pick import to_display
 from slideviz.session import changes
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 @pytest.fixture
 def shown(driver, sample_folder):

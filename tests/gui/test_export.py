@@ -29,6 +29,8 @@ from slideviz.gui.widgets.pixmaps import fitted, framed, to_image
 from slideviz.mesh.quality import quality
 from slideviz.session import changes, jobs, jobs_export, pieces
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 @pytest.fixture
 def opened(driver, passage_file):

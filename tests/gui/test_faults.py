@@ -15,6 +15,8 @@ from slideviz.gui.widgets import faults, questions
 from slideviz.session import changes, jobs
 from slideviz.session.store import Store, tell_all
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 @pytest.fixture
 def caught(window):

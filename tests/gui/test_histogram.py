@@ -15,6 +15,8 @@ from slideviz.sections.threshold import ONLY_INVERTED
 from slideviz.session import changes
 from slideviz.session.state import StepFrame
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 @pytest.fixture
 def panel(plot_panel):

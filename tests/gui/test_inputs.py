@@ -6,6 +6,8 @@ from slideviz.errors import SlidevizError
 from slideviz.gui.widgets import questions
 from slideviz.mesh.io.atomic import atomic_write
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 @pytest.fixture
 def opened(window, driver, passage_file):

@@ -9,6 +9,8 @@ from slideviz.case.model import Rotate, Scale, Translate
 from slideviz.gui.widgets.fields import NumberBox, NumberField
 from slideviz.session import changes
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 @pytest.fixture
 def blade(driver, passage_file):

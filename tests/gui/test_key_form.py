@@ -11,6 +11,8 @@ from slideviz.gui.widgets.fields import NumberBox, NumberField, Switch
 from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.session import changes
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 OWN = {"multilevel": "levels", "level_size": "level_end"}
 """Fields that stand for more than one key, by the one that they have label and tip from."""
 

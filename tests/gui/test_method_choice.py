@@ -6,6 +6,8 @@ import pytest
 
 from slideviz.session import changes
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 REDUCTION = ("selection", "levels", "level_end", "gamma")
 
 

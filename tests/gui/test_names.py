@@ -8,6 +8,8 @@ from slideviz.gui.start import StartPage
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.labels import wrapped
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 NAME = '<b>wing</b><img src="a.png">'
 ask_replace = questions.ask_replace
 ask_overwrite_input = questions.ask_overwrite_input

@@ -9,6 +9,8 @@ from slideviz.case.model import Radial, Rotate
 from slideviz.samples.table import write_sample
 from slideviz.session import changes
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 @pytest.fixture
 def stator(driver, tmp_path):

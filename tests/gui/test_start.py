@@ -16,6 +16,8 @@ from slideviz.gui.widgets.cards import _DRAWINGS, SIZE, card
 from slideviz.samples.table import SAMPLES
 from slideviz.session import jobs
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 @pytest.fixture
 def small(monkeypatch, tmp_path):

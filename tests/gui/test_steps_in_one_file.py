@@ -7,6 +7,8 @@ import pytest
 from slideviz.errors import Cancelled
 from slideviz.session import changes, jobs_export
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 @pytest.fixture
 def ran(driver, sample_folder):

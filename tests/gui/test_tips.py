@@ -21,6 +21,8 @@ from slideviz.gui.widgets.fields import NumberField
 from slideviz.gui.widgets.labels import LETTERS, wrapped
 from slideviz.session import changes
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 LONG = "the correction of a blade moves nodes of a shroud that is < 0.01 away " * 4
 
 

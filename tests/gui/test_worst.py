@@ -23,6 +23,8 @@ from slideviz.session.locate import nearest_boundary
 from slideviz.session.state import StepFrame
 from slideviz.session.store import Store
 
+pytestmark = pytest.mark.usefixtures("unpainted")
+
 
 def shaken(mesh, size, seed):
     rng = np.random.default_rng(seed)
