@@ -93,27 +93,27 @@ def test_the_ball_is_seen_on_the_cut_in_front_of_all(window, panel, side):
     assert np.linalg.norm(cut - ball(window), axis=1).min() < 0.1 * np.ptp(cut, axis=0).max()
 
 
-@pytest.mark.parametrize("perspective", [False, True])
-def test_it_is_pulled_to_another_radius_and_undone_as_one(window, panel, perspective):
-    window.store.change(changes.set_view, perspective=perspective)
-    window.viewing.look_from("iso")
-    window.view.snapshot()
-    (first,), camera = sections(window), window.scene.camera.place
-    low, high = panel.editor._span
-    wanted = high - 0.2 * (high - low)
-    pull(window, wanted)
-    (pulled,) = sections(window)
-    assert pulled.radius == pytest.approx(wanted, abs=0.02 * (high - low))
-    assert (pulled.origin, pulled.direction) == (first.origin, first.direction)
-    assert len(str(pulled.radius)) <= 8
-    assert panel.editor.number.value == pytest.approx(pulled.radius)
-    assert window.scene.camera.place[:9] == pytest.approx(camera[:9])
-    pull(window, low + 0.2 * (high - low))
-    assert sections(window)[0].radius < first.radius
-    window.store.undo()
-    assert sections(window) == (pulled,)
-    window.store.undo()
-    assert sections(window) == (first,)
+def test_it_is_pulled_to_another_radius_and_undone_as_one(window, panel):
+    for perspective in (False, True):
+        window.store.change(changes.set_view, perspective=perspective)
+        window.viewing.look_from("iso")
+        window.view.snapshot()
+        (first,), camera = sections(window), window.scene.camera.place
+        low, high = panel.editor._span
+        wanted = high - 0.2 * (high - low)
+        pull(window, wanted)
+        (pulled,) = sections(window)
+        assert pulled.radius == pytest.approx(wanted, abs=0.02 * (high - low))
+        assert (pulled.origin, pulled.direction) == (first.origin, first.direction)
+        assert len(str(pulled.radius)) <= 8
+        assert panel.editor.number.value == pytest.approx(pulled.radius)
+        assert window.scene.camera.place[:9] == pytest.approx(camera[:9])
+        pull(window, low + 0.2 * (high - low))
+        assert sections(window)[0].radius < first.radius
+        window.store.undo()
+        assert sections(window) == (pulled,)
+        window.store.undo()
+        assert sections(window) == (first,)
 
 
 def test_that_of_a_cone_is_pulled_to_another_half_angle(window, driver, panel):
@@ -159,7 +159,16 @@ def test_who_looks_along_the_radius_pulls_upwards(window, driver, panel):
     assert sections(window)[0].radius < before.radius
 
 
-def test_what_the_mouse_would_take_is_shown(window, panel):
+def test_what_the_mouse_would_take_is_shown_and_what_is_dragged_beside_it_turns_the_view(
+    window, panel
+):
+    camera, before = window.scene.camera.place, sections(window)
+    start = pixel(window.view, ball(window)) + np.array([0.0, 60.0])
+    drag(window.view, start, start + 40.0)
+    assert window.scene.camera.place != camera
+    assert sections(window) == before
+    window.viewing.look_from("iso")
+    window.view.snapshot()
     at = QPoint(*pixel(window.view, ball(window)).round().astype(int))
     shapes = Qt.CursorShape
     QTest.mouseMove(window.view, at)
@@ -173,15 +182,7 @@ def test_what_the_mouse_would_take_is_shown(window, panel):
     assert len(blue(window.view)) > 30
 
 
-def test_what_is_dragged_beside_it_turns_the_view(window, panel):
-    camera, before = window.scene.camera.place, sections(window)
-    start = pixel(window.view, ball(window)) + np.array([0.0, 60.0])
-    drag(window.view, start, start + 40.0)
-    assert window.scene.camera.place != camera
-    assert sections(window) == before
-
-
-def test_in_a_detail_it_is_in_reach(window, panel):
+def test_in_a_detail_it_is_in_reach_and_it_leaves_nothing(window, panel, driver):
     cut = window.scene.sections.drawn["section:0"].polygons.points
     corner = cut[np.argmax(np.linalg.norm(cut - ball(window), axis=1))]
     window.scene.camera.aim(corner, 0.1 * float(np.ptp(cut, axis=0).max()), 1.0)
@@ -189,9 +190,12 @@ def test_in_a_detail_it_is_in_reach(window, panel):
     x, y = pixel(window.view, ball(window))
     assert 0 < x < window.view.width()
     assert 0 < y < window.view.height()
-
-
-def test_it_leaves_nothing(window, driver, panel):
+    driver.click(panel.add["plane"])
+    assert not marks(window.view)
+    assert isinstance(window.section_views.handles.of(window.view), PlaneHandle)
+    panel.list.setCurrentRow(0)
+    assert isinstance(window.section_views.handles.of(window.view), RoundHandle)
+    assert marks(window.view)
     assert marks(window.view)
     frame = window.view.actors["handle:frame"].mapper.dataset
     assert (frame.n_verts, frame.n_lines) == (0, 4)
@@ -203,15 +207,6 @@ def test_it_leaves_nothing(window, driver, panel):
     panel.list.item(0).setCheckState(Qt.CheckState.Unchecked)
     assert not marks(window.view)
     assert not panel.handle.isEnabled()
-
-
-def test_another_kind_of_section_has_another_handle(window, driver, panel):
-    driver.click(panel.add["plane"])
-    assert not marks(window.view)
-    assert isinstance(window.section_views.handles.of(window.view), PlaneHandle)
-    panel.list.setCurrentRow(0)
-    assert isinstance(window.section_views.handles.of(window.view), RoundHandle)
-    assert marks(window.view)
 
 
 def test_beside_the_mesh_it_can_be_pulled_back(window, driver, panel):

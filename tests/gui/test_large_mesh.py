@@ -42,7 +42,7 @@ def add(stator, section):
     return stator.window.scene.sections.drawn["section:0"]
 
 
-def test_only_the_boundary_is_in_memory_and_said_so(stator, folder):
+def test_only_the_boundary_is_in_memory_and_what_needs_all_cells_says_so(stator, folder, answers):
     session, whole = stator.session, sv.read(folder / "mesh.su2b")
     assert session.in_file
     assert len(session.mesh.cells) < len(whole.cells)
@@ -55,6 +55,36 @@ def test_only_the_boundary_is_in_memory_and_said_so(stator, folder):
     assert session.frame.quality.cells == len(whole.cells)
     for marker in whole.markers:
         assert len(session.mesh.marker(marker.name).cells) == len(marker.cells)
+    actions = {one.objectName(): one for one in stator.window.findChildren(type_of_action())}
+    for name in ("save_mesh", "export_quality"):
+        assert not actions[name].isEnabled()
+        assert "stays in its file" in actions[name].toolTip().replace("\n", " ")
+    panel = stator.window.docks_.panels["sections"]
+    assert not panel.picture.isEnabled()
+    display = stator.window.docks_.panels["display"]
+    assert not display.only.isEnabled()
+    assert "stays in its file" in display.only.toolTip().replace("\n", " ")
+    stator.window.store.change(changes.set_view, threshold=(0.0, 0.5))
+    assert stator.session.view.threshold is None
+    answers("ask_save", None)
+    stator.window.start_run()
+    assert not stator.window.runner.busy
+    assert not stator.session.runs
+    before = (folder / "mesh.su2b").read_bytes()
+    answers("ask_save", folder / "mesh.su2b")
+    stator.window.start_run()
+    assert not stator.window.runner.busy
+    assert "is the mesh itself" in stator.window.banner.text.text()
+    assert (folder / "mesh.su2b").read_bytes() == before
+    stator.window.actions_.by_name["designs"].trigger()
+    panel = stator.window.docks["designs"].findChild(DesignsPanel)
+    assert "sweep it with `slideviz sweep`" in panel.said.text()
+    assert not any(widget.isEnabled() for widget in (panel.rows.add, panel.load, panel.run))
+    panel.start()
+    assert not panel.runner.busy
+    stator.window.store.change(changes.set_case, method="elastic")
+    wanted = changes.run_requirements(stator.session)
+    assert any("needs all of a mesh in memory" in one.text for one in wanted)
 
 
 def test_a_small_mesh_and_other_formats_are_opened_whole(driver, folder, tmp_path, monkeypatch):
@@ -114,20 +144,6 @@ def test_worst_cells_are_listed_and_marked(stator, folder):
         assert any(name.startswith("mark") for name in window.scene.plotter.renderer.actors)
 
 
-def test_what_needs_all_cells_is_disabled_with_the_reason(stator):
-    actions = {one.objectName(): one for one in stator.window.findChildren(type_of_action())}
-    for name in ("save_mesh", "export_quality"):
-        assert not actions[name].isEnabled()
-        assert "stays in its file" in actions[name].toolTip().replace("\n", " ")
-    panel = stator.window.docks_.panels["sections"]
-    assert not panel.picture.isEnabled()
-    display = stator.window.docks_.panels["display"]
-    assert not display.only.isEnabled()
-    assert "stays in its file" in display.only.toolTip().replace("\n", " ")
-    stator.window.store.change(changes.set_view, threshold=(0.0, 0.5))
-    assert stator.session.view.threshold is None
-
-
 def type_of_action():
     from qtpy.QtGui import QAction
 
@@ -159,22 +175,6 @@ def test_a_run_goes_from_file_to_file(stator, folder, tmp_path, answers):
     assert not stator.session.unsaved_mesh  # it is in its file
 
 
-def test_nothing_is_run_where_no_file_is_named(stator, answers):
-    answers("ask_save", None)
-    stator.window.start_run()
-    assert not stator.window.runner.busy
-    assert not stator.session.runs
-
-
-def test_the_mesh_itself_is_not_written_over(stator, folder, answers):
-    before = (folder / "mesh.su2b").read_bytes()
-    answers("ask_save", folder / "mesh.su2b")
-    stator.window.start_run()
-    assert not stator.window.runner.busy
-    assert "is the mesh itself" in stator.window.banner.text.text()
-    assert (folder / "mesh.su2b").read_bytes() == before
-
-
 def test_a_run_that_is_cancelled_leaves_no_file(stator, tmp_path, answers):
     output = tmp_path / "out.su2b"
     answers("ask_save", output)
@@ -185,20 +185,5 @@ def test_a_run_that_is_cancelled_leaves_no_file(stator, tmp_path, answers):
     assert stator.session.frame is stator.session.first
 
 
-def test_elasticity_says_that_it_needs_all_cells(stator):
-    stator.window.store.change(changes.set_case, method="elastic")
-    wanted = changes.run_requirements(stator.session)
-    assert any("needs all of a mesh in memory" in one.text for one in wanted)
-
-
 def test_the_reason_is_a_sentence():
     assert IN_FILE.endswith(".")
-
-
-def test_designs_are_not_swept_of_its_boundary_alone(stator):
-    stator.window.actions_.by_name["designs"].trigger()
-    panel = stator.window.docks["designs"].findChild(DesignsPanel)
-    assert "sweep it with `slideviz sweep`" in panel.said.text()
-    assert not any(widget.isEnabled() for widget in (panel.rows.add, panel.load, panel.run))
-    panel.start()
-    assert not panel.runner.busy

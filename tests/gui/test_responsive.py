@@ -159,7 +159,9 @@ def test_closing_does_not_wait_for_a_job_that_does_not_stop(driver, case_file, m
         go.set()
 
 
-def test_a_large_mesh_appears_part_by_part_and_wholly(driver, case_file, monkeypatch):
+def test_a_large_mesh_appears_part_by_part_but_a_picture_is_whole_and_what_is_hidden_stays_so(
+    driver, case_file, monkeypatch
+):
     from slideviz.gui.viewport import canvas
 
     monkeypatch.setattr(canvas, "PART_CELLS", 40)
@@ -169,26 +171,12 @@ def test_a_large_mesh_appears_part_by_part_and_wholly(driver, case_file, monkeyp
     driver.qtbot.waitUntil(lambda: not view._veiled, timeout=20_000)
     for name, one in driver.window.scene.drawn.items():
         assert one.actor.visibility, name
-
-
-def test_a_picture_of_a_mesh_that_is_still_appearing_is_whole(driver, case_file, monkeypatch):
-    from slideviz.gui.viewport import canvas
-
-    monkeypatch.setattr(canvas, "PART_CELLS", 40)
     driver.open(case_file)
-    view = driver.window.view
     assert view._veiled
     early = view.snapshot()
     assert not view._veiled
     assert (early == view.snapshot()).mean() > 0.999
-
-
-def test_what_is_hidden_meanwhile_stays_hidden(driver, case_file, monkeypatch):
-    from slideviz.gui.viewport import canvas
-
-    monkeypatch.setattr(canvas, "PART_CELLS", 40)
     driver.open(case_file)
-    view = driver.window.view
     assert view._veiled
     name = driver.session.mesh.marker_names[-1]
     driver.window.store.change(changes.show, (name,), False)
