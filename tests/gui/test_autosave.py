@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from qtpy.QtWidgets import QMessageBox
+from qtpy.QtWidgets import QMessageBox, QWidget
 
 from slideviz.case.model import Case
 from slideviz.design.sweeps.row import DesignRow
@@ -410,8 +410,9 @@ def test_nobody_is_asked_twice(make, qtbot, case_file, monkeypatch, tmp_path, an
         ((), ["&Don’t save", "C&ancel"]),
     ],
 )
-def test_the_question_offers_what_can_be_saved(make, monkeypatch, can_save, words):
-    window = make()
+def test_the_question_offers_what_can_be_saved(qtbot, monkeypatch, can_save, words):
+    window = QWidget()
+    qtbot.addWidget(window)
     monkeypatch.undo()
     seen = []
 

@@ -34,7 +34,7 @@ def view(driver):
     return driver.session.view
 
 
-def test_colours_and_map_are_chosen_and_undone(shown):
+def test_colours_map_and_points_are_chosen_and_undone(shown):
     shown.choose(panel(shown).colour_by, "skew")
     assert view(shown).colour_by == "skew"
     assert shown.window.actions_.bar.colour.currentData() == "skew"
@@ -44,9 +44,19 @@ def test_colours_and_map_are_chosen_and_undone(shown):
     shown.window.actions_.by_name["undo"].trigger()
     assert view(shown).colour_map == "viridis"
     assert panel(shown).map.currentData() == "viridis"
+    shown.choose(panel(shown).points, "types")
+    assert view(shown).points == "types"
+    assert shown.window.view.actors["points:nodes"].visibility
+    shown.choose(panel(shown).points, "none")
+    assert not shown.window.view.actors["points:nodes"].visibility
+    session = shown.session
+    lonely = changes.set_role(session, session.case.markers_with("periodic"), "fixed")
+    shown.window.store.put(replace(lonely, pairs=()))
+    assert not panel(shown).passages.isEnabled()
+    assert NOT_PERIODIC in panel(shown).passages.toolTip()
 
 
-def test_the_range_is_typed_checked_and_reset(shown):
+def test_the_range_is_typed_checked_reset_and_fits_the_values_of_the_step(shown):
     box = panel(shown)
     assert not box.range.isEnabled(), "roles have no range"
     assert box.range.low.toolTip() == box.map.toolTip() == ROLES_ONLY
@@ -66,9 +76,6 @@ def test_the_range_is_typed_checked_and_reset(shown):
     shown.click(box.reset_range)
     assert view(shown).colour_range is None
     assert (box.range.low.value, box.range.high.value) == (0.0, 1.0)
-
-
-def test_the_range_fits_the_values_of_the_step(shown):
     shown.window.store.change(changes.set_view, colour_by="skew")
     shown.click(panel(shown).fit_range)
     low, high = view(shown).colour_range
@@ -80,7 +87,9 @@ def test_the_range_fits_the_values_of_the_step(shown):
     assert view(shown).colour_range is None
 
 
-def test_only_cells_of_a_range_are_chosen(shown):
+def test_only_cells_of_a_range_are_chosen_and_steps_and_selection_leave_the_panel_alone(
+    shown, monkeypatch
+):
     box = panel(shown)
     assert not box.threshold.isEnabled()
     QTest.mouseClick(box.only, Qt.MouseButton.LeftButton, pos=QPoint(8, 8))
@@ -92,14 +101,14 @@ def test_only_cells_of_a_range_are_chosen(shown):
     assert box.threshold.low.text() == "0"
     QTest.mouseClick(box.only, Qt.MouseButton.LeftButton, pos=QPoint(8, 8))
     assert view(shown).threshold is None
-
-
-def test_points_are_chosen_and_drawn(shown):
-    shown.choose(panel(shown).points, "types")
-    assert view(shown).points == "types"
-    assert shown.window.view.actors["points:nodes"].visibility
-    shown.choose(panel(shown).points, "none")
-    assert not shown.window.view.actors["points:nodes"].visibility
+    synced = []
+    monkeypatch.setattr(panel(shown), "_sync", lambda session: synced.append(session))
+    shown.window.store.change(changes.select, ("airfoil",))
+    shown.window.store.change(changes.mark_cell, 3)
+    shown.window.store.change(changes.start_run)
+    assert not synced
+    shown.window.store.change(changes.set_view, edges=False)
+    assert len(synced) == 1
 
 
 @pytest.fixture(scope="module")
@@ -133,14 +142,6 @@ def test_neighbours_of_a_row_and_of_a_wheel(shown, stator):
     shown.window.actions_.by_name["undo"].trigger()
     assert view(shown).passages == 0
     assert box.passages.value() == 0
-
-
-def test_a_mesh_that_does_not_repeat_says_why_there_are_no_neighbours(shown):
-    session = shown.session
-    lonely = changes.set_role(session, session.case.markers_with("periodic"), "fixed")
-    shown.window.store.put(replace(lonely, pairs=()))
-    assert not panel(shown).passages.isEnabled()
-    assert NOT_PERIODIC in panel(shown).passages.toolTip()
 
 
 def test_a_number_of_neighbours_can_be_typed(qtbot):
@@ -198,17 +199,6 @@ def test_the_panel_fits_its_dock_and_is_off_without_a_mesh(driver, passage_file)
         right = widget.mapTo(box, widget.rect().topRight()).x()
         assert right < box.width(), widget.objectName()
         assert widget.width() >= widget.minimumSizeHint().width(), widget.objectName()
-
-
-def test_steps_and_selection_leave_the_panel_alone(shown, monkeypatch):
-    synced = []
-    monkeypatch.setattr(panel(shown), "_sync", lambda session: synced.append(session))
-    shown.window.store.change(changes.select, ("airfoil",))
-    shown.window.store.change(changes.mark_cell, 3)
-    shown.window.store.change(changes.start_run)
-    assert not synced
-    shown.window.store.change(changes.set_view, edges=False)
-    assert len(synced) == 1
 
 
 def test_colours_fit_a_step_or_all_and_are_as_ever_again(shown):

@@ -42,30 +42,54 @@ def try_all_ways(driver):
     return len(driver.session.runs)
 
 
-@pytest.mark.parametrize(
-    ("typed", "told"),
-    [("360**2", "Angle (°): “360**2” is not a number."), ("", "Angle (°): a number is needed.")],
-)
-def test_no_run_starts_with_what_was_typed_before(blade, typed, told):
+def test_no_run_starts_with_what_was_typed_before(blade):
     window, field = blade.window, blade.window.motions.editor.angle
-    type_into(field, typed)
-    assert field.property("bad")
-    assert told in window.run_panel.text.text()
-    assert not window.run_panel.run.isEnabled()
-    assert not window.actions_.by_name["run"].isEnabled()
-    assert try_all_ways(blade) == 0
-    type_into(field, "4")
-    assert window.run_panel.run.isEnabled()
-    assert window.actions_.by_name["run"].isEnabled()
+    for typed, told in (
+        ("360**2", "Angle (°): “360**2” is not a number."),
+        ("", "Angle (°): a number is needed."),
+    ):
+        type_into(field, typed)
+        assert field.property("bad")
+        assert told in window.run_panel.text.text()
+        assert not window.run_panel.run.isEnabled()
+        assert not window.actions_.by_name["run"].isEnabled()
+        assert try_all_ways(blade) == 0
+        type_into(field, "4")
+        assert window.run_panel.run.isEnabled()
+        assert window.actions_.by_name["run"].isEnabled()
 
 
-def test_the_field_that_is_left_has_the_number_that_is_computed(blade):
+def test_a_field_that_is_left_hidden_or_gone_keeps_nobody_and_letters_belong_to_the_window(
+    blade, qtbot
+):
     field = blade.window.motions.editor.angle
     type_into(field, "360**2")
     QTest.keyClick(field, Qt.Key.Key_Tab)
     assert field.text() == "3"
     assert blade.session.case.motions == (Rotate("airfoil", 3.0),)
     assert blade.window.run_panel.run.isEnabled()
+    window, field = blade.window, blade.window.motions.editor.angle
+    type_into(field, "1fgab.5xe-1")
+    assert field.text() == "1.5e-1"
+    edges = "edges" in blade.session.view.drawn
+    QTest.keyClick(field, Qt.Key.Key_G)
+    assert field.text() == "1.5e-1"
+    window.docks["method"].raise_()
+    steps = window.method.steps
+    type_into(steps.lineEdit(), "7")
+    QTest.keyClicks(steps, "fg")
+    assert steps.value() == 7
+    assert ("edges" in blade.session.view.drawn) == edges
+    window.docks["motion"].raise_()
+    window, field = blade.window, blade.window.motions.editor.angle
+    type_into(field, "3.3.3")
+    window.store.change(changes.replace_motion, 0, Translate("airfoil", (0.01, 0.0)))
+    assert not blade.session.invalid
+    assert window.run_panel.run.isEnabled()
+    window.store.change(changes.replace_motion, 0, Rotate("airfoil", 2.0))
+    type_into(field, "-")
+    window.store.change(changes.remove_motion, 0)
+    assert not blade.session.invalid
 
 
 def test_every_field_of_motion_and_method_is_watched(blade):
@@ -103,30 +127,3 @@ def test_an_axis_without_direction_stays_told(driver, sample_folder):
     assert try_all_ways(driver) == 0
     driver.type(window.motions.editor.axis.fields[0], "1")
     assert window.run_panel.run.isEnabled()
-
-
-def test_a_field_that_is_hidden_or_gone_keeps_nobody(blade):
-    window, field = blade.window, blade.window.motions.editor.angle
-    type_into(field, "3.3.3")
-    window.store.change(changes.replace_motion, 0, Translate("airfoil", (0.01, 0.0)))
-    assert not blade.session.invalid
-    assert window.run_panel.run.isEnabled()
-    window.store.change(changes.replace_motion, 0, Rotate("airfoil", 2.0))
-    type_into(field, "-")
-    window.store.change(changes.remove_motion, 0)
-    assert not blade.session.invalid
-
-
-def test_letters_belong_to_the_window(blade, qtbot):
-    window, field = blade.window, blade.window.motions.editor.angle
-    type_into(field, "1fgab.5xe-1")
-    assert field.text() == "1.5e-1"
-    edges = "edges" in blade.session.view.drawn
-    QTest.keyClick(field, Qt.Key.Key_G)
-    assert field.text() == "1.5e-1"
-    window.docks["method"].raise_()
-    steps = window.method.steps
-    type_into(steps.lineEdit(), "7")
-    QTest.keyClicks(steps, "fg")
-    assert steps.value() == 7
-    assert ("edges" in blade.session.view.drawn) == edges

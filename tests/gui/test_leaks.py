@@ -75,10 +75,10 @@ def case_file(sample_folder):
     return next((sample_folder / "hexahedron").glob("*.cfg"))
 
 
-@pytest.mark.slow
-def test_five_windows_leave_nothing(qtbot, settings, case_file, monkeypatch):
+@pytest.mark.parametrize("count", [1, pytest.param(5, marks=pytest.mark.slow)])
+def test_windows_leave_nothing(qtbot, settings, case_file, monkeypatch, count):
     threads, widgets = threading.active_count(), set(QApplication.allWidgets())
-    windows(qtbot, settings, case_file, monkeypatch, 5)
+    windows(qtbot, settings, case_file, monkeypatch, count)
     assert threading.active_count() <= threads
     assert set(QApplication.allWidgets()) <= widgets
 

@@ -87,28 +87,22 @@ def test_no_tooltip_of_the_window_is_wider_than_it_can_be_read(driver, sample_fo
     assert not wide
 
 
-def test_entries_of_sliding_and_periodicity_explain_themselves(driver, passage_file):
+def test_words_explain_themselves_and_name_the_hovering(driver, passage_file, window):
     driver.open(passage_file)
     for choice in (driver.window.method.sliding, driver.window.method.periodic):
         tips = list(tips_of(choice))[1:]
         assert len(set(tips)) == choice.count()
         assert all(len(tip.split()) > 5 for tip in tips)
-
-
-def test_words_of_the_help_are_told_apart_and_name_the_hovering(window):
-    rows = [row for _title, rows in shortcut_rows(window) for row in rows]
-    names = [text for text, _keys, _tip in rows]
-    assert len(set(names)) == len(names)
-    assert {"Undeformed boundaries", "Undeformed mesh"} <= set(names)
-    assert any(keys.startswith("Rest on a cell") for keys, _what in MOUSE)
-
-
-def test_words_of_ranges_and_lengths(driver, passage_file):
     driver.open(passage_file)
     panels = driver.window.docks_.panels
     assert panels["display"].reset_range.text() == "Reset"
     labels = {label.text() for label in panels["motion"].findChildren(QLabel)}
     assert "and by (length)" in labels
+    rows = [row for _title, rows in shortcut_rows(window) for row in rows]
+    names = [text for text, _keys, _tip in rows]
+    assert len(set(names)) == len(names)
+    assert {"Undeformed boundaries", "Undeformed mesh"} <= set(names)
+    assert any(keys.startswith("Rest on a cell") for keys, _what in MOUSE)
 
 
 def test_the_status_bar_follows_a_run_and_the_log_keeps_its_warnings(
