@@ -11,12 +11,11 @@ from qtpy.QtWidgets import QMessageBox, QWidget
 from slideviz.case.model import Case
 from slideviz.design.sweeps.row import DesignRow
 from slideviz.gui import autosave
-from slideviz.gui.autosave import find_sessions
-from slideviz.gui.panels.designs import DesignsPanel
+from slideviz.gui.autosave import Autosave, find_sessions
 from slideviz.gui.widgets import faults, questions
 from slideviz.gui.window import MainWindow
-from slideviz.session import changes
-from slideviz.session.design_table import DesignTable
+from slideviz.session import changes, jobs
+from slideviz.session.store import Store
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
@@ -62,16 +61,16 @@ def kept(window, qtbot):
 
 
 @pytest.fixture
-def crashed(make, qtbot, folder, case_file):
+def crashed(qtbot, folder, case_file):
     """The file of a session that did not end properly: with other settings, and a view."""
-    window = make()
-    open_in(window, case_file, qtbot)
-    window.store.change(changes.set_case, steps=7)
-    window.store.change(changes.set_view, colour_by="skew")
-    kept(window, qtbot)
-    text = window.autosave.path.read_text()
-    window.store.put(window.store.session)
-    window.close()
+    session = jobs.open_file(case_file, None, lambda _: None, lambda: False).session
+    store = Store()
+    keeper = Autosave(store, folder, lambda: None)
+    store.put(changes.set_view(changes.set_case(session, steps=7), colour_by="skew"))
+    keeper.save()
+    qtbot.waitUntil(lambda: not keeper._runner.busy and keeper.path.exists())
+    text = keeper.path.read_text()
+    keeper.close()
     left = folder / "session-4194399-1.cfg"
     left.write_text(text)
     return left
@@ -260,24 +259,34 @@ def test_a_session_whose_mesh_is_gone_is_told_and_kept(make, crashed, qtbot, cas
         away.rename(mesh)
 
 
-@pytest.mark.parametrize(
-    "text", ["", "MESH_FILENAME= ", "NONSENSE= 3\n", "STEPS= 3\n", "MESH_FILENAME= a.su2\nSTE"]
-)
-def test_a_session_that_cannot_be_read_is_told_and_kept(make, folder, text):
+BROKEN = ["", "MESH_FILENAME= ", "NONSENSE= 3\n", "STEPS= 3\n", "MESH_FILENAME= a.su2\nSTE"]
+
+
+@pytest.mark.parametrize("text", BROKEN)
+def test_a_session_that_cannot_be_read_is_kept(folder, text):
     folder.mkdir(parents=True)
     bad = folder / "session-4194399-1.cfg"
     bad.write_text(text)
     (folder / "session-4194399-1.cfg.broken").write_text("an earlier one")
-    window = make()
-    window.recovery.look()
-    assert "cannot be read" in window.banner.text.text()
-    assert not window.offer.isVisible()
+    found, (problem,) = find_sessions(folder)
+    assert found == []
+    assert "cannot be read" in problem
     assert not bad.exists()
     assert (folder / "session-4194399-1.cfg.2.broken").read_text() == text
     assert (folder / "session-4194399-1.cfg.broken").read_text() == "an earlier one"
-    window.banner.hide()
-    window.recovery.look()
-    assert not window.banner.isVisible()
+
+
+def test_sessions_that_cannot_be_read_are_told_once(make, folder):
+    folder.mkdir(parents=True)
+    window = make()
+    for text in BROKEN:
+        (folder / "session-4194399-1.cfg").write_text(text)
+        window.recovery.look()
+        assert "cannot be read" in window.banner.text.text()
+        assert not window.offer.isVisible()
+        window.banner.hide()
+        window.recovery.look()
+        assert not window.banner.isVisible()
 
 
 def test_a_half_written_file_is_told_and_kept_unless_it_is_being_written(make, folder):

@@ -60,33 +60,14 @@ def test_turning_draws_fewer_facets_until_the_button_is_up(stator):
     assert np.abs(after.astype(int) - moving).mean() < 25.0
 
 
-def test_a_mouse_that_rests_shows_all_facets(stator, qtbot):
+def test_a_mouse_that_rests_shows_all_facets_and_a_quick_picture_is_never_made_coarse(
+    stator, qtbot, monkeypatch
+):
     scene = stator.window.scene
     press_and_move(stator.window.view)
     assert scene.coarse
     qtbot.waitUntil(lambda: not scene.coarse)
     QTest.mouseRelease(stator.window.view, Qt.MouseButton.LeftButton, pos=QPoint(210, 150))
-
-
-def test_what_changes_meanwhile_is_drawn(stator):
-    window, scene = stator.window, stator.window.scene
-    press_and_move(window.view)
-    name = stator.session.mesh.marker_names[0]
-    window.store.change(changes.set_view, colour_by="size-skew")
-    window.store.change(changes.show, (name,), shown=False)
-    every, some = shown(scene)
-    assert not every
-    assert name not in some
-    one = next(iter(scene._coarse.drawn.values()))
-    values = stator.session.frame.quality.values[one.surface.owner]
-    np.testing.assert_array_equal(one.shape.cell_data[VALUES], values)
-    QTest.mouseRelease(window.view, Qt.MouseButton.LeftButton, pos=QPoint(210, 150))
-    every, some = shown(scene)
-    assert not some
-    assert name not in every
-
-
-def test_a_quick_picture_is_never_made_coarse(stator, monkeypatch):
     monkeypatch.setattr(coarse_moving, "SLOW_FRAME_S", 1e9)
     press_and_move(stator.window.view)
     assert not stator.window.scene.coarse
@@ -114,7 +95,9 @@ def test_a_movement_of_the_mouse_is_drawn_once(stator, qtbot):
     QTest.mouseRelease(view, Qt.MouseButton.LeftButton, pos=QPoint(240, 150))
 
 
-def test_a_section_that_is_dragged_goes_with_fewer_facets(stator, qtbot):
+def test_a_section_that_is_dragged_goes_with_fewer_facets_and_what_changes_meanwhile_is_drawn(
+    stator, qtbot
+):
     window, scene = stator.window, stator.window.scene
     place = tuple(stator.session.mesh.points.mean(axis=0).tolist())
     window.store.change(changes.add_section, Section("plane", place, (0, 0, 1)))
@@ -129,3 +112,18 @@ def test_a_section_that_is_dragged_goes_with_fewer_facets(stator, qtbot):
     window.store.set_dragging(False)
     qtbot.waitUntil(lambda: not scene.coarse)
     assert section.show_edges
+    window, scene = stator.window, stator.window.scene
+    press_and_move(window.view)
+    name = stator.session.mesh.marker_names[0]
+    window.store.change(changes.set_view, colour_by="size-skew")
+    window.store.change(changes.show, (name,), shown=False)
+    every, some = shown(scene)
+    assert not every
+    assert name not in some
+    one = next(iter(scene._coarse.drawn.values()))
+    values = stator.session.frame.quality.values[one.surface.owner]
+    np.testing.assert_array_equal(one.shape.cell_data[VALUES], values)
+    QTest.mouseRelease(window.view, Qt.MouseButton.LeftButton, pos=QPoint(210, 150))
+    every, some = shown(scene)
+    assert not some
+    assert name not in every

@@ -19,7 +19,7 @@ def ready(driver, sample_folder):
     return driver
 
 
-def test_what_the_method_does_not_use_is_disabled_and_says_so(ready):
+def test_what_the_method_does_not_use_is_disabled_says_so_and_comes_back(ready):
     panel, more = ready.window.method, ready.window.method.more
     ready.click(more.button)
     fields = [panel.reduction, more.kernel, more.influence_factor]
@@ -36,9 +36,6 @@ def test_what_the_method_does_not_use_is_disabled_and_says_so(ready):
     ready.choose(panel.method, "rbf")
     assert all(field.isEnabled() for field in fields)
     assert "does not use it" not in more.kernel.toolTip()
-
-
-def test_a_setting_that_is_switched_off_comes_back(ready):
     panel = ready.window.method
     ready.choose(panel.reduction, "YES")
     ready.type(panel.tolerance, "0.002")

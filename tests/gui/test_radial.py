@@ -29,7 +29,7 @@ def typed(field, text):
     QTest.keyClick(field, Qt.Key.Key_Tab)
 
 
-def test_three_percent_about_the_machines_axis(stator):
+def test_three_percent_about_the_machines_axis_or_another(stator):
     panel = stator.window.motions
     panel.add_actions[Radial].trigger()
     editor = panel.editor
@@ -50,9 +50,7 @@ def test_three_percent_about_the_machines_axis(stator):
     QTest.keyClicks(editor.percent, "-100")
     assert editor.percent.property("bad")
     assert stator.session.case.motions[0].factor > 0
-
-
-def test_another_axis_can_be_chosen_and_the_machines_again(stator):
+    stator.window.store.change(changes.set_case, motions=())
     panel = stator.window.motions
     panel.add_actions[Rotate].trigger()
     editor = panel.editor

@@ -105,7 +105,9 @@ def test_when_a_file_was_changed(tmp_path):
     assert "today" not in when_changed(path, now)
 
 
-def test_everything_can_be_reached_with_tab(window):
+def test_everything_can_be_reached_with_tab_and_cards_follow_the_theme(
+    window, tmp_path, monkeypatch
+):
     start = window.start
     start.attempt.setFocus()
     seen = set()
@@ -114,21 +116,38 @@ def test_everything_can_be_reached_with_tab(window):
         QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
     assert {"run", "open_page", "sample_square", "sample_stator"} <= seen
 
+    def shown():
+        return window.start.sample_buttons["square"].icon().pixmap(SIZE[0], SIZE[1]).toImage()
 
-@pytest.mark.parametrize("size", [(1280, 800), (1920, 1080)])
-def test_all_cards_are_seen_without_scrolling(driver, passage_file, size):
+    window.set_theme("light")
+    QApplication.processEvents()
+    light = shown()
+    window.set_theme("dark")
+    QApplication.processEvents()
+    assert shown() != light
+    monkeypatch.chdir(tmp_path)
+    assert window.files.folder() == tmp_path
+    monkeypatch.chdir("/")
+    assert window.files.folder() == Path.home(), "from a desktop"
+    window.files.remember(tmp_path / "mesh.su2")
+    assert window.files.folder() == tmp_path
+
+
+def test_all_cards_are_seen_without_scrolling(driver, passage_file):
     window = driver.window
-    window.resize(*size)
     window.start.show_recent([Path(passage_file)] * RECENT)
-    driver.qtbot.waitUntil(lambda: window.width() == size[0])
-    assert window.start.verticalScrollBar().maximum() == 0
-    cards = list(window.start.sample_buttons.values())
-    assert len({card.y() for card in cards}) == -(-len(cards) // COLUMNS)
-    for one in cards:
-        assert one.iconSize().width() + 8 <= one.width()
+    for size in ((1280, 800), (1920, 1080)):
+        window.resize(*size)
+        driver.qtbot.waitUntil(lambda size=size: window.width() == size[0])
+        QApplication.processEvents()
+        assert window.start.verticalScrollBar().maximum() == 0
+        cards = list(window.start.sample_buttons.values())
+        assert len({card.y() for card in cards}) == -(-len(cards) // COLUMNS)
+        for one in cards:
+            assert one.iconSize().width() + 8 <= one.width()
 
 
-def test_each_sample_has_a_picture_of_its_own(window):
+def test_each_sample_has_a_picture_of_its_own(qapp):
     assert set(_DRAWINGS) == set(SAMPLES)
     drawn = {name: card(name, "#888888").toImage() for name in SAMPLES}
     assert all(image.width() == 2 * SIZE[0] for image in drawn.values())
@@ -144,24 +163,3 @@ def test_each_sample_has_a_picture_of_its_own(window):
             if image.pixelColor(x, y).alpha() == 255
         }
         assert orange in colours
-
-
-def test_cards_follow_the_theme(window):
-    def shown():
-        return window.start.sample_buttons["square"].icon().pixmap(SIZE[0], SIZE[1]).toImage()
-
-    window.set_theme("light")
-    QApplication.processEvents()
-    light = shown()
-    window.set_theme("dark")
-    QApplication.processEvents()
-    assert shown() != light
-
-
-def test_the_first_file_dialog_opens_where_the_program_was_started(window, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert window.files.folder() == tmp_path
-    monkeypatch.chdir("/")
-    assert window.files.folder() == Path.home(), "from a desktop"
-    window.files.remember(tmp_path / "mesh.su2")
-    assert window.files.folder() == tmp_path

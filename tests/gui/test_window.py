@@ -185,7 +185,7 @@ def test_a_role_is_chosen_in_the_table_also_for_all_selected_rows_and_shown_in_t
     assert not opened.window.scene.drawn["airfoil"].actor.visibility
 
 
-def test_a_click_in_the_view_selects_the_row_and_a_drag_does_not(opened):
+def test_a_click_in_the_view_selects_and_the_right_button_assigns_a_role_and_isolates(opened):
     window, mesh = opened.window, opened.session.mesh
     nodes = mesh.marker("outflow").cells.connectivity.reshape(-1, 2)
     opened.click_view(mesh.points[nodes[len(nodes) // 2]].mean(axis=0))
@@ -203,16 +203,6 @@ def test_a_click_in_the_view_selects_the_row_and_a_drag_does_not(opened):
     assert set(window.boundaries.selected()) == {"outflow", "airfoil"}
     QTest.mouseClick(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, QPoint(4, 4))
     assert window.boundaries.selected() == ()
-
-
-def test_a_click_in_a_3d_view_selects_the_face_in_front(driver, sample_folder):
-    driver.open(sample_folder / "hexahedron" / "mesh.su2")
-    driver.window.viewing.look_from("+x")
-    driver.click_view((1.0, 0.5, 0.5))
-    assert driver.window.boundaries.selected() == ("RIGHT",)
-
-
-def test_the_right_button_assigns_a_role_and_isolates(opened):
     window, mesh = opened.window, opened.session.mesh
     nodes = mesh.marker("inflow").cells.connectivity.reshape(-1, 2)
     middle = mesh.points[nodes[len(nodes) // 2]].mean(axis=0)
@@ -236,6 +226,25 @@ def test_the_right_button_assigns_a_role_and_isolates(opened):
     assert not opened.session.view.hidden
     trigger("Hide")
     assert opened.session.view.hidden == {"inflow"}
+
+
+def test_a_click_in_a_3d_view_selects_the_face_in_front_and_a_3d_rotation_has_an_axis(
+    driver, sample_folder
+):
+    driver.open(sample_folder / "hexahedron" / "mesh.su2")
+    driver.window.viewing.look_from("+x")
+    driver.click_view((1.0, 0.5, 0.5))
+    assert driver.window.boundaries.selected() == ("RIGHT",)
+    driver.role("BLOCK", "moving")
+    driver.add_motion(Rotate)
+    editor = driver.window.motions.editor
+    assert editor.axis.isVisible()
+    driver.type(editor.angle, "10")
+    driver.type(editor.axis.fields[0], "1")
+    driver.type(editor.axis.fields[2], "0")
+    assert driver.session.case.motions == (Rotate("BLOCK", 10.0, "centroid", (1.0, 0.0, 0.0)),)
+    driver.type(editor.axis.fields[0], "0")
+    assert driver.session.case.motions[0].axis == (1.0, 0.0, 0.0), "an axis has a direction"
 
 
 # Motions ----------------------------------------------------------------------------------
@@ -266,7 +275,9 @@ def test_a_translation_and_a_scaling_are_typed_and_the_ghost_moves_at_once(opene
     assert opened.session.case.motions == (Scale("airfoil", (1.5, 1.0)),)
 
 
-def test_a_rotation_about_the_centroid_and_about_a_point(opened):
+def test_a_rotation_is_typed_and_an_intersection_is_told_meanwhile_of_the_last_motion_only(
+    opened, monkeypatch
+):
     opened.add_motion(Rotate)
     editor = opened.window.motions.editor
     opened.type(editor.angle, "90")
@@ -281,23 +292,7 @@ def test_a_rotation_about_the_centroid_and_about_a_point(opened):
     assert opened.session.case.motions[0].point == (0.0, 0.0)
     assert np.allclose(ghost(opened), np.stack([-start[:, 1], start[:, 0]], 1))
     assert not editor.axis.isVisible(), "a 2D mesh has but one axis"
-
-
-def test_a_3d_rotation_has_an_axis(driver, sample_folder):
-    driver.open(sample_folder / "hexahedron" / "mesh.su2")
-    driver.role("BLOCK", "moving")
-    driver.add_motion(Rotate)
-    editor = driver.window.motions.editor
-    assert editor.axis.isVisible()
-    driver.type(editor.angle, "10")
-    driver.type(editor.axis.fields[0], "1")
-    driver.type(editor.axis.fields[2], "0")
-    assert driver.session.case.motions == (Rotate("BLOCK", 10.0, "centroid", (1.0, 0.0, 0.0)),)
-    driver.type(editor.axis.fields[0], "0")
-    assert driver.session.case.motions[0].axis == (1.0, 0.0, 0.0), "an axis has a direction"
-
-
-def test_an_intersection_is_told_while_the_motion_is_typed(opened):
+    opened.window.store.change(changes.set_case, motions=())
     from slideviz.color_scheme import INTERSECTION_COLOUR
     from slideviz.terms import ROLES
 
@@ -309,21 +304,19 @@ def test_an_intersection_is_told_while_the_motion_is_typed(opened):
     opened.type(field, "0.01")
     opened.qtbot.waitUntil(lambda: not window.intersection_check.busy)
     assert panel.run.isEnabled()
-    ghost = window.scene.plotter.actors["motion:airfoil"]
-    assert ghost.prop.color == ROLES["moving"].colour
+    drawn = window.scene.plotter.actors["motion:airfoil"]
+    assert drawn.prop.color == ROLES["moving"].colour
     opened.type(field, "-0.4")
     opened.qtbot.waitUntil(lambda: not panel.run.isEnabled())
     assert "puts airfoil through periodic_1" in panel.text.text()
     assert "move airfoil less" in panel.text.toolTip()
-    assert ghost.prop.color == INTERSECTION_COLOUR
+    assert drawn.prop.color == INTERSECTION_COLOUR
     assert "href='motion'" in panel.text.text()
     opened.type(field, "0.02")
     opened.qtbot.waitUntil(panel.run.isEnabled)
-    assert ghost.prop.color == ROLES["moving"].colour
+    assert drawn.prop.color == ROLES["moving"].colour
     assert panel.text.text() == "Ready."
-
-
-def test_typing_on_asks_for_the_last_motion_only(opened, monkeypatch):
+    opened.window.store.change(changes.set_case, motions=())
     from slideviz.session import intersections
 
     window, asked = opened.window, []
@@ -514,23 +507,6 @@ def run(driver, steps=3):
     driver.settle()
 
 
-def test_a_run_shows_its_steps_and_the_quality(ready):
-    run(ready)
-    session, window = ready.session, ready.window
-    assert len(session.frames) == 4
-    assert session.view.frame == 3
-    assert session.view.colour_by == "size-skew"
-    assert window.player.step_text.text() == "Step 3 of 3"
-    quality = session.deformed.quality
-    window.resize(1920, 1080)
-    ready.qtbot.waitUntil(lambda: f"{quality.mean:.4f}" in window.player.result.text())
-    text = window.player.result.text()
-    assert f"{quality.min:.4f}" in text
-    assert "<b>0</b> inverted" in text
-    assert window.windowTitle().startswith("*")
-    assert list(window.scene.plotter.scalar_bars.keys()) == ["size-skew"]
-
-
 def test_an_automatic_run_says_how_many_steps_it_took(ready):
     window = ready.window
     window.docks["method"].raise_()
@@ -634,7 +610,8 @@ def test_where_drawing_takes_long_steps_are_left_out(ran, monkeypatch):
     assert told == [0, 2, 3]
 
 
-def test_neither_view_nor_slider_nor_panels_change_their_size_with_the_numbers(ready):
+@pytest.mark.usefixtures("painted")
+def test_a_run_shows_its_steps_and_the_quality_and_no_size_changes_with_the_numbers(ready):
     window, player = ready.window, ready.window.player
     parts = (window.view, player.slider, window.docks["boundaries"], window.docks["runs"])
     QApplication.processEvents()
@@ -644,6 +621,20 @@ def test_neither_view_nor_slider_nor_panels_change_their_size_with_the_numbers(r
         player.go(step)
         QApplication.processEvents()
         assert [part.width() for part in parts] == widths
+    player.go(3)
+    session, window = ready.session, ready.window
+    assert len(session.frames) == 4
+    assert session.view.frame == 3
+    assert session.view.colour_by == "size-skew"
+    assert window.player.step_text.text() == "Step 3 of 3"
+    quality = session.deformed.quality
+    window.resize(1920, 1080)
+    ready.qtbot.waitUntil(lambda: f"{quality.mean:.4f}" in window.player.result.text())
+    text = window.player.result.text()
+    assert f"{quality.min:.4f}" in text
+    assert "<b>0</b> inverted" in text
+    assert window.windowTitle().startswith("*")
+    assert list(window.scene.plotter.scalar_bars.keys()) == ["size-skew"]
 
 
 def test_numbers_without_room_are_shorter_and_a_narrow_player_leaves_out_speed_before_them(ran):
@@ -850,18 +841,18 @@ def test_the_mesh_is_saved_as_it_is_at_the_step_that_is_shown(ran, answers, tmp_
     assert not ran.session.unsaved_mesh
 
 
-@pytest.mark.parametrize("sure", [False, True])
-def test_the_input_is_replaced_only_when_confirmed(opened, answers, passage_file, sure):
+def test_the_input_is_replaced_only_when_confirmed(opened, answers, passage_file):
     before = Path(passage_file).read_bytes()
     opened.add_motion(Translate)
     opened.type(opened.window.motions.editor.vector.fields[0], "0.01")
     run(opened, 1)
     answers("ask_save", Path(passage_file))
-    asked = answers("ask_overwrite_input", sure)
-    opened.window.actions_.by_name["save_mesh"].trigger()
-    opened.settle()
-    assert len(asked) == 1
-    assert (Path(passage_file).read_bytes() != before) == sure
+    for sure in (False, True):
+        asked = answers("ask_overwrite_input", sure)
+        opened.window.actions_.by_name["save_mesh"].trigger()
+        opened.settle()
+        assert len(asked) == 1
+        assert (Path(passage_file).read_bytes() != before) == sure
 
 
 def test_a_case_is_saved_and_means_the_same(opened, answers, tmp_path):
@@ -914,42 +905,16 @@ def test_a_picture_is_saved_at_the_size_asked_for(opened, answers, tmp_path, mon
     assert before.std() > 5, "the view still works"
 
 
-def test_what_moves_fills_the_view_or_what_is_selected(opened):
-    window, fit = opened.window, opened.window.actions_.by_name["fit_boundary"]
-    whole = window.view.camera.parallel_scale
-    QTest.keyClick(window, Qt.Key.Key_F, Qt.KeyboardModifier.ShiftModifier)
-    moving = window.view.camera.parallel_scale
-    assert moving < whole
-    opened.click_row("inflow")
-    fit.trigger()
-    assert window.view.camera.parallel_scale != moving
-    window.store.change(changes.select, ())
+@pytest.mark.parametrize("given", [("cancel", "case"), ("discard",)])
+def test_unsaved_changes_are_asked_about_on_close(opened, answers, tmp_path, given):
     opened.role("airfoil", "fixed")
-    assert not fit.isEnabled()
-
-
-@pytest.mark.parametrize("answer", ["cancel", "discard", "case"])
-def test_unsaved_changes_are_asked_about_on_close(opened, answers, tmp_path, answer):
-    opened.role("airfoil", "fixed")
-    asked = answers("ask_unsaved", answer)
-    answers("ask_save", tmp_path / "a.cfg")
-    closed = opened.window.close()
-    assert closed == (answer != "cancel")
-    assert asked[0][0] == "Save roles, motions and method as a case before closing?"
-    assert (tmp_path / "a.cfg").exists() == (answer == "case")
-
-
-def test_the_question_promises_the_same_result_only_where_that_is_true(ready, answers):
-    asked = answers("ask_unsaved", "cancel")
-    ready.window.store.change(changes.set_case, sliding="ds")
-    run(ready, 1)
-    ready.window.store.change(changes.saved_mesh)
-    ready.window.close()
-    question = "Save the changes to passage.cfg before closing?"
-    assert asked[-1][:2] == (f"{question}\nThe case repeats run 1 exactly.", ["case"])
-    ready.window.store.change(changes.set_case, steps=7)
-    ready.window.close()
-    assert asked[-1][:2] == (question, ["case"])
+    for answer in given:
+        asked = answers("ask_unsaved", answer)
+        answers("ask_save", tmp_path / "a.cfg")
+        closed = opened.window.close()
+        assert closed == (answer != "cancel")
+        assert asked[0][0] == "Save roles, motions and method as a case before closing?"
+        assert (tmp_path / "a.cfg").exists() == (answer == "case")
 
 
 def test_the_question_names_other_runs_whose_mesh_would_be_lost(ready, answers):
@@ -965,7 +930,7 @@ def test_the_question_names_other_runs_whose_mesh_would_be_lost(ready, answers):
     assert "either" not in asked[-1][0]
 
 
-def test_a_run_that_was_cancelled_is_not_what_the_case_gives(ready, answers):
+def test_the_question_promises_the_same_result_only_where_that_is_true(ready, answers):
     asked = answers("ask_unsaved", "cancel")
     ready.window.store.change(changes.set_case, sliding="ds")
     run(ready, 1)
@@ -976,6 +941,14 @@ def test_a_run_that_was_cancelled_is_not_what_the_case_gives(ready, answers):
     ready.window.store.change(lambda session: replace(session, runs=(stopped,)))
     ready.window.close()
     assert "repeats" not in asked[-1][0]
+    ready.window.store.change(lambda session: replace(session, runs=(only,)))
+    ready.window.store.change(changes.saved_mesh)
+    ready.window.close()
+    question = "Save the changes to passage.cfg before closing?"
+    assert asked[-1][:2] == (f"{question}\nThe case repeats run 1 exactly.", ["case"])
+    ready.window.store.change(changes.set_case, steps=7)
+    ready.window.close()
+    assert asked[-1][:2] == (question, ["case"])
 
 
 # View -------------------------------------------------------------------------------------
@@ -1005,7 +978,7 @@ def test_colours_edges_and_ghosts_are_switched_from_the_tool_bar_and_undo_says_w
 
 
 @pytest.mark.usefixtures("painted")
-def test_the_wheel_zooms_about_the_mouse_f_shows_all_again_and_keys_of_vtk_do_nothing(opened):
+def test_what_moves_fills_the_view_or_what_is_selected_and_the_wheel_zooms_about_the_mouse(opened):
     window = opened.window
     scale = window.view.camera.parallel_scale
     window.view.signals.zoomed.emit(QPoint(100, 100), 1.5)
@@ -1016,6 +989,17 @@ def test_the_wheel_zooms_about_the_mouse_f_shows_all_again_and_keys_of_vtk_do_no
     for key in (Qt.Key.Key_W, Qt.Key.Key_S, Qt.Key.Key_R):
         QTest.keyClick(opened.window.view, key)
     assert np.array_equal(opened.window.view.snapshot(), before)
+    window, fit = opened.window, opened.window.actions_.by_name["fit_boundary"]
+    whole = window.view.camera.parallel_scale
+    QTest.keyClick(window, Qt.Key.Key_F, Qt.KeyboardModifier.ShiftModifier)
+    moving = window.view.camera.parallel_scale
+    assert moving < whole
+    opened.click_row("inflow")
+    fit.trigger()
+    assert window.view.camera.parallel_scale != moving
+    window.store.change(changes.select, ())
+    opened.role("airfoil", "fixed")
+    assert not fit.isEnabled()
 
 
 def test_themes_change_the_view_and_are_remembered(opened, settings):
@@ -1026,7 +1010,7 @@ def test_themes_change_the_view_and_are_remembered(opened, settings):
     assert settings.value("theme") == "dark"
 
 
-def test_all_panels_fit_1280_x_800(ready):
+def test_all_panels_fit_1280_x_800_and_links_lead_to_them(ready):
     window = ready.window
     window.resize(1280, 800)
     ready.qtbot.wait(50)
@@ -1040,21 +1024,6 @@ def test_all_panels_fit_1280_x_800(ready):
     bottom = window.run_panel.mapTo(window, window.run_panel.rect().bottomLeft()).y()
     assert bottom < 800
     assert window.run_panel.run.isVisible()
-
-
-def test_a_change_is_drawn_in_a_turn_of_its_own(opened, monkeypatch):
-    view, drawn = opened.window.view, []
-    opened.qtbot.wait(50)
-    monkeypatch.setattr(view, "update", lambda: drawn.append(1))
-    for name in ("inflow", "outflow", "inflow"):
-        opened.window.store.change(changes.select, (name,))
-    assert not drawn
-    opened.qtbot.waitUntil(lambda: bool(drawn))
-    opened.qtbot.wait(20)
-    assert len(drawn) == 1
-
-
-def test_what_goes_through_itself_is_told_beside_the_button_that_still_runs(ready):
     from slideviz.session.intersections import intersection_key, set_intersection
 
     window = ready.window
@@ -1070,3 +1039,15 @@ def test_what_goes_through_itself_is_told_beside_the_button_that_still_runs(read
     ready.qtbot.waitUntil(lambda: not window.motions.visibleRegion().isEmpty())
     window.store.change(set_intersection, ("", ""), key)
     assert panel.text.text() == "Ready."
+
+
+def test_a_change_is_drawn_in_a_turn_of_its_own(opened, monkeypatch):
+    view, drawn = opened.window.view, []
+    opened.qtbot.wait(50)
+    monkeypatch.setattr(view, "update", lambda: drawn.append(1))
+    for name in ("inflow", "outflow", "inflow"):
+        opened.window.store.change(changes.select, (name,))
+    assert not drawn
+    opened.qtbot.waitUntil(lambda: bool(drawn))
+    opened.qtbot.wait(20)
+    assert len(drawn) == 1

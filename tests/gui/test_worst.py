@@ -2,6 +2,7 @@
 
 import csv
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -42,6 +43,7 @@ def with_runs(session):
     return changes.set_view(session, colour_by="size-skew")
 
 
+@cache
 def session_with_runs():
     mesh = sample("square", size=12).mesh
     return with_runs(changes.open_mesh(StepFrame(mesh, quality(mesh)), None))
