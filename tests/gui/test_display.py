@@ -166,7 +166,9 @@ def test_a_number_of_neighbours_can_be_typed(qtbot):
     assert box.text() == "all 2 around"
 
 
-def test_what_is_drawn_is_switched_and_agrees_with_the_menu(shown):
+def test_what_is_drawn_is_switched_agrees_with_the_menu_and_perspective_is_for_solid_meshes(
+    shown, sample_folder
+):
     for name in [name for name, term in SHOWN.items() if not term.why_not]:
         box, before = panel(shown).shown[name], name in view(shown).drawn
         # Beside its word a check box is deaf.
@@ -176,9 +178,6 @@ def test_what_is_drawn_is_switched_and_agrees_with_the_menu(shown):
         assert action.isChecked() != before, name
         action.trigger()
         assert box.isChecked() == before == (name in view(shown).drawn), name
-
-
-def test_perspective_is_for_solid_meshes(shown, sample_folder):
     box = panel(shown).shown["perspective"]
     assert not box.isEnabled()
     assert "2D" in box.toolTip()
@@ -201,7 +200,7 @@ def test_the_panel_fits_its_dock_and_is_off_without_a_mesh(driver, passage_file)
         assert widget.width() >= widget.minimumSizeHint().width(), widget.objectName()
 
 
-def test_colours_fit_a_step_or_all_and_are_as_ever_again(shown):
+def test_colours_fit_a_step_or_all_or_both_views_of_a_comparison_and_are_as_ever_again(shown):
     window, acts = shown.window, shown.window.actions_.by_name
     one, every, usual = (acts[f"{n}_colours"] for n in ("fit", "fit_all", "usual"))
     assert not one.isEnabled(), "roles have no range"
@@ -223,12 +222,8 @@ def test_colours_fit_a_step_or_all_and_are_as_ever_again(shown):
     shown.window.store.change(changes.set_view, colour_by="size")
     one.trigger()
     assert view(shown).colour_range is None, "all cells have the size they had"
-
-
-def test_the_range_fits_both_views_of_a_comparison(shown):
+    shown.window.store.change(changes.show_frame, len(shown.session.frames) - 1)
     shown.window.store.change(changes.set_view, colour_by="size-skew")
-    shown.window.start_run()
-    shown.settle()
     shown.window.store.change(changes.show_beside, changes.UNDEFORMED)
     shown.click(panel(shown).fit_range)
     values = shown.session.frame.quality.values

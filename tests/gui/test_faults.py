@@ -78,7 +78,9 @@ def test_of_several_errors_the_first_is_raised_when_all_were_called():
 # The window -------------------------------------------------------------------------------
 
 
-def test_an_error_in_a_slot_is_told_with_details_to_copy(caught, qtbot):
+def test_errors_in_slots_and_threads_are_told_expected_ones_in_their_own_words_others_with_details(
+    caught, qtbot
+):
     QTimer.singleShot(0, boom)
     qtbot.waitUntil(lambda: caught.faults.count == 1)
     assert caught.banner.isVisible()
@@ -88,9 +90,8 @@ def test_an_error_in_a_slot_is_told_with_details_to_copy(caught, qtbot):
     copied = QApplication.clipboard().text()
     for part in ("Traceback", "in boom", "Python 3", "numpy", "vtk", "PySide6"):
         assert part in copied
+    caught.faults.count = 0
 
-
-def test_an_expected_error_that_nobody_caught_is_told_in_its_own_words(caught, qtbot):
     def wrong():
         raise CaseError("case.cfg:3: STEPS= -1 is negative; write a positive number")
 
@@ -98,6 +99,12 @@ def test_an_expected_error_that_nobody_caught_is_told_in_its_own_words(caught, q
     qtbot.waitUntil(lambda: caught.faults.count == 1)
     assert text(caught).startswith("case.cfg:3: STEPS= -1 is negative")
     assert not caught.banner.copy.isVisible()
+    caught.faults.count = 0
+    thread = threading.Thread(target=lambda: int("word"))
+    thread.start()
+    thread.join()
+    qtbot.waitUntil(lambda: caught.faults.count == 1)
+    assert "ValueError" in text(caught)
 
 
 def test_the_same_error_again_and_again_is_counted_and_logged_once(caught, qtbot, caplog):
@@ -112,7 +119,9 @@ def test_the_same_error_again_and_again_is_counted_and_logged_once(caught, qtbot
     assert sum(record.message == "unexpected" for record in caplog.records) == 1
 
 
-def test_two_errors_that_alternate_are_told_once_each(window, monkeypatch):
+def test_two_errors_that_alternate_are_told_once_each_and_a_line_that_repeats_is_counted(
+    window, monkeypatch, qtbot
+):
     told, now = [], [0.0]
     made = faults.Faults(window.banner, clock=lambda: now[0])
     monkeypatch.setattr(window.banner, "tell_error", lambda error: told.append(str(error)))
@@ -123,26 +132,29 @@ def test_two_errors_that_alternate_are_told_once_each(window, monkeypatch):
     now[0] = faults.REST_S + 1.0
     made.tell(CaseError("one"))
     assert told == ["one", "two", "one"]
+    for _ in range(30):
+        logging.getLogger("slideviz.vtk").warning("no texture")
+    logging.getLogger("slideviz").warning("something else")
+    qtbot.waitUntil(lambda: "something else" in log_text(window))
+    assert log_text(window).count("no texture") == 1
+    assert "29 times more" in log_text(window)
+    before = sys.excepthook, threading.excepthook, sys.unraisablehook
+    with faults.caught(window.faults):
+        assert sys.excepthook is not before[0]
+    assert (sys.excepthook, threading.excepthook, sys.unraisablehook) == before
 
 
-def test_an_error_in_another_thread_is_told(caught, qtbot):
-    thread = threading.Thread(target=boom)
-    thread.start()
-    thread.join()
-    qtbot.waitUntil(lambda: caught.faults.count == 1)
-    assert "ZeroDivisionError" in text(caught)
-
-
-def test_an_error_in_a_job_is_told_and_the_next_job_runs(driver, caught, monkeypatch, passage_file):
+def test_errors_in_a_job_and_in_a_file_dialog_are_told_and_the_next_job_runs(
+    driver, caught, monkeypatch, passage_file
+):
     with monkeypatch.context() as patch:
         patch.setattr(jobs, "open_file", boom)
         driver.open(passage_file)
     assert "ZeroDivisionError" in text(caught)
     assert driver.open(passage_file).mesh is not None
     assert not caught.banner.isVisible()
+    caught.faults.count = 0
 
-
-def test_an_error_in_a_file_dialog_is_told(driver, caught, monkeypatch, passage_file):
     def broken(*_):
         raise OSError("the portal does not answer")
 
@@ -199,22 +211,6 @@ def test_what_qt_and_vtk_and_python_complain_of_stands_in_the_log(caught, qtbot)
     qtbot.waitUntil(lambda: "old option" in log_text(caught))
     assert "Qt: a timer of another thread" in log_text(caught)
     assert "VTK: ERROR: In vtkX.cxx, line 3 no input" in log_text(caught)
-
-
-def test_afterwards_everything_is_as_it_was(window):
-    before = sys.excepthook, threading.excepthook, sys.unraisablehook
-    with faults.caught(window.faults):
-        assert sys.excepthook is not before[0]
-    assert (sys.excepthook, threading.excepthook, sys.unraisablehook) == before
-
-
-def test_a_line_that_repeats_is_counted(window, qtbot):
-    for _ in range(30):
-        logging.getLogger("slideviz.vtk").warning("no texture")
-    logging.getLogger("slideviz").warning("something else")
-    qtbot.waitUntil(lambda: "something else" in log_text(window))
-    assert log_text(window).count("no texture") == 1
-    assert "29 times more" in log_text(window)
 
 
 # Crashes ----------------------------------------------------------------------------------

@@ -15,8 +15,6 @@ from slideviz.sections.threshold import ONLY_INVERTED
 from slideviz.session import changes
 from slideviz.session.state import StepFrame
 
-pytestmark = pytest.mark.usefixtures("unpainted")
-
 
 @pytest.fixture
 def panel(plot_panel):
@@ -111,7 +109,7 @@ def test_the_axis_is_close_around_the_values_or_from_0_to_1(panel, qtbot):
     assert panel.canvas.figure.axes[0].get_xlim() == pytest.approx((0.0, 1.0))
 
 
-def test_each_drag_is_undone_as_one(full, qtbot):
+def test_the_brush_chooses_the_cells_between_and_each_drag_is_undone_as_one(full, qtbot):
     full.whole.click()
     qtbot.waitUntil(lambda: not full.canvas.busy)
     drag(full, 0.6, 0.9)
@@ -120,16 +118,6 @@ def test_each_drag_is_undone_as_one(full, qtbot):
     assert full.store.session.view.threshold == pytest.approx((0.6, 0.9), abs=0.01)
     full.store.undo()
     assert full.store.session.view.threshold is None
-
-
-def test_the_count_can_be_linear(full, qtbot):
-    assert full.canvas.figure.axes[0].get_yscale() == "log"
-    with qtbot.waitSignal(full.canvas.drawn):
-        full.log.setChecked(False)
-    assert full.canvas.figure.axes[0].get_yscale() == "linear"
-
-
-def test_the_brush_chooses_the_cells_between(full, qtbot):
     drag(full, 0.6, 0.9)
     qtbot.waitUntil(lambda: full.store.session.view.threshold is not None)
     low, high = full.store.session.view.threshold
@@ -142,6 +130,23 @@ def test_the_brush_chooses_the_cells_between(full, qtbot):
     drag(full, high, 0.7)
     qtbot.waitUntil(lambda: full.store.session.view.threshold[1] < 0.72)
     assert full.store.session.view.threshold[0] == pytest.approx(low)
+
+
+def test_counts_are_made_once_for_a_frame_and_can_be_linear(full, qtbot, monkeypatch):
+    assert full.canvas.figure.axes[0].get_yscale() == "log"
+    with qtbot.waitSignal(full.canvas.drawn):
+        full.log.setChecked(False)
+    assert full.canvas.figure.axes[0].get_yscale() == "linear"
+    from slideviz.plots import session_histogram
+
+    asked = []
+    real = session_histogram.distribution
+    monkeypatch.setattr(
+        session_histogram, "distribution", lambda *v: asked.append(v[0]) or real(*v)
+    )
+    with qtbot.waitSignal(full.canvas.drawn):
+        full.store.change(changes.show_frame, 1)
+    assert asked == [full.store.session.frame]
 
 
 def test_from_the_strip_of_the_inverted_the_range_begins_at_0(full, qtbot):
@@ -157,29 +162,29 @@ def test_from_the_strip_of_the_inverted_the_range_begins_at_0(full, qtbot):
     assert f"inverted cells, {quality.inverted} of" in full.range_text.text()
 
 
-@pytest.mark.parametrize("how", ["button", "click", "escape"])
-def test_the_choice_ends(full, qtbot, how):
-    full.store.change(changes.set_view, threshold=(0.2, 0.4))
-    assert full.canvas.band == (0.2, 0.4)
-    if how == "button":
-        QTest.mouseClick(full.show_all, Qt.MouseButton.LeftButton)
-    elif how == "click":
-        QTest.mouseClick(
-            full.canvas,
-            Qt.MouseButton.LeftButton,
-            pos=QPoint(round(full.canvas.pixel_of(0.8)), 90),
-        )
-    else:
-        full.activateWindow()
-        qtbot.waitUntil(full.isActiveWindow)
-        full.canvas.setFocus()
-        QTest.keyClick(full.canvas, Qt.Key.Key_Escape)
-    assert full.store.session.view.threshold is None
-    assert full.canvas.band is None
-    assert not full.show_all.isEnabled()
+def test_the_choice_ends(full, qtbot):
+    for how in ("button", "click", "escape"):
+        full.store.change(changes.set_view, threshold=(0.2, 0.4))
+        assert full.canvas.band == (0.2, 0.4)
+        if how == "button":
+            QTest.mouseClick(full.show_all, Qt.MouseButton.LeftButton)
+        elif how == "click":
+            QTest.mouseClick(
+                full.canvas,
+                Qt.MouseButton.LeftButton,
+                pos=QPoint(round(full.canvas.pixel_of(0.8)), 90),
+            )
+        else:
+            full.activateWindow()
+            qtbot.waitUntil(full.isActiveWindow)
+            full.canvas.setFocus()
+            QTest.keyClick(full.canvas, Qt.Key.Key_Escape)
+        assert full.store.session.view.threshold is None
+        assert full.canvas.band is None
+        assert not full.show_all.isEnabled()
 
 
-def test_a_range_set_elsewhere_is_shown(full):
+def test_a_range_set_elsewhere_is_shown_also_in_a_stretched_image(full):
     full.store.change(changes.set_view, threshold=(0.25, 0.5))
     assert full.canvas.band == (0.25, 0.5)
     assert full.range_text.isVisible()
@@ -189,6 +194,10 @@ def test_a_range_set_elsewhere_is_shown(full):
     after = full.canvas.grab().toImage()
     x, y = round(full.canvas.pixel_of(0.4)), round(full.canvas.height() * 0.7)
     assert before.pixelColor(x, y) != after.pixelColor(x, y)
+    before = full.canvas.pixel_of(0.5) / full.canvas.width()
+    full.canvas.resize(2 * full.canvas.width(), full.canvas.height())
+    assert full.canvas.pixel_of(0.5) / full.canvas.width() == pytest.approx(before)
+    assert full.canvas.value_at(full.canvas.pixel_of(0.25)) == pytest.approx(0.25)
 
 
 def test_hidden_it_draws_nothing_and_catches_up(full, qtbot):
@@ -228,13 +237,6 @@ def test_of_many_states_the_newest_is_drawn_last(full, qtbot):
     assert bars == list(np.maximum(wanted.counts - 0.5, 0.0))
 
 
-def test_a_stretched_image_still_tells_what_is_where(full):
-    before = full.canvas.pixel_of(0.5) / full.canvas.width()
-    full.canvas.resize(2 * full.canvas.width(), full.canvas.height())
-    assert full.canvas.pixel_of(0.5) / full.canvas.width() == pytest.approx(before)
-    assert full.canvas.value_at(full.canvas.pixel_of(0.25)) == pytest.approx(0.25)
-
-
 def test_what_goes_wrong_in_a_drawing_is_told_in_the_window(full, qtbot, monkeypatch):
     def broken(_figure, _style):
         raise ValueError("no such font")
@@ -249,32 +251,17 @@ def test_what_goes_wrong_in_a_drawing_is_told_in_the_window(full, qtbot, monkeyp
         full.canvas.ask()
 
 
-def test_counts_are_made_once_for_a_frame(full, qtbot, monkeypatch):
-    from slideviz.plots import session_histogram
-
-    asked = []
-    real = session_histogram.distribution
-    monkeypatch.setattr(
-        session_histogram, "distribution", lambda *v: asked.append(v[0]) or real(*v)
-    )
-    with qtbot.waitSignal(full.canvas.drawn):
-        full.store.change(changes.show_frame, 1)
-    assert asked == [full.store.session.frame]
-
-
 def test_it_is_dark_in_the_dark(full, qtbot):
     with qtbot.waitSignal(full.canvas.drawn):
         full.take_theme(DARK)
     assert full.canvas.grab().toImage().pixelColor(3, 3).name() == DARK.background
 
 
-@pytest.mark.parametrize(
-    ("name", "start"), [("h.png", b"\x89PNG"), ("h.svg", b"<?xml"), ("h.pdf", b"%PDF")]
-)
-def test_it_is_saved_as_a_figure(full, tmp_path, answers, name, start):
-    answers("ask_save", tmp_path / name)
-    QTest.mouseClick(full.save, Qt.MouseButton.LeftButton)
-    assert (tmp_path / name).read_bytes().startswith(start)
+def test_it_is_saved_as_a_figure(full, tmp_path, answers):
+    for name, start in (("h.png", b"\x89PNG"), ("h.svg", b"<?xml"), ("h.pdf", b"%PDF")):
+        answers("ask_save", tmp_path / name)
+        QTest.mouseClick(full.save, Qt.MouseButton.LeftButton)
+        assert (tmp_path / name).read_bytes().startswith(start)
 
 
 def test_another_kind_of_file_is_refused_and_nothing_written(full, tmp_path):
