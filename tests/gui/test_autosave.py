@@ -12,9 +12,11 @@ from slideviz.case.model import Case
 from slideviz.design.sweeps.row import DesignRow
 from slideviz.gui import autosave
 from slideviz.gui.autosave import Autosave, find_sessions
+from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import faults, questions
 from slideviz.gui.window import MainWindow
 from slideviz.session import changes, jobs
+from slideviz.session.design_table import DesignTable
 from slideviz.session.store import Store
 
 pytestmark = pytest.mark.usefixtures("unpainted")

@@ -134,7 +134,7 @@ def test_numbers_are_typed_also_of_a_free_normal(window, driver, panel):
 def test_sections_are_added_by_keys_removed_by_delete_and_looked_at_along_their_normal(
     window, driver, panel
 ):
-    window.docks_.lead_to("boundaries")
+    window.docks_.bring_to_front("boundaries")
     QTest.keyClick(window, Qt.Key.Key_C)
     QTest.keyClick(window, Qt.Key.Key_C, Qt.KeyboardModifier.ShiftModifier)
     assert [section.kind for section in sections(window)] == ["plane", "cylinder"]

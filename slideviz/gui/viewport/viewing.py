@@ -129,7 +129,7 @@ class Viewing(QWidget):
             self.fit()
 
     def _share_legend(self, swapped: bool) -> None:
-        """Draw the legend in the right view only, and widen that view by the strip of the legend."""
+        """Draw the legend in the right view only, which is wider by the legend's strip."""
         self.scene.set_legend(swapped)
         self.second_scene.set_legend(not swapped)
         self._share_width()
