@@ -67,7 +67,7 @@ def crashed(qtbot, folder, case_file):
     """The file of a session that did not end properly: with other settings, and a view."""
     session = jobs.open_file(case_file, None, lambda _: None, lambda: False).session
     store = Store()
-    keeper = Autosave(store, folder, lambda: None)
+    keeper = Autosave(store, folder, lambda: None, lambda: (DesignTable(), None))
     store.put(changes.set_view(changes.set_case(session, steps=7), colour_by="skew"))
     keeper.save()
     qtbot.waitUntil(lambda: not keeper._runner.busy and keeper.path.exists())

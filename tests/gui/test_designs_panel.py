@@ -145,7 +145,7 @@ def test_designs_that_fail_say_why_and_what_is_done_is_not_run_again(
     case = window.store.session.case.change(source=tmp_path / "other.cfg")
     window.store.change(changes.saved_case, case)
     assert not panel.run.isEnabled()
-    assert not panel.said.text().startswith("The settings")
+    assert not panel.said.label.text().startswith("The settings")
     window.store.change(changes.set_case, steps=3)
     assert panel.run.text() == "Run 1 design"
 
@@ -245,12 +245,12 @@ def test_tables_are_loaded_and_saved_and_all_mistakes_are_told_with_their_rows(
     file.write_text("nothing\n1\n")
     answers("ask_table", file)
     QTest.mouseClick(panel.load, LEFT)
-    assert "no such number of a motion" in panel.said.text()
+    assert "no such number of a motion" in panel.said.label.text()
     file = tmp_path / "designs.csv"
     file.write_text("STEPS\n1\nmany\n0.5\nx\ny\nz\n")
     answers("ask_table", file)
     QTest.mouseClick(passage.load, LEFT)
-    assert "(and 4 more)" in passage.said.text()
+    assert "(and 4 more)" in passage.said.label.text()
     assert window.banner.isVisible()
     window.banner.details.click()
     told = window.banner.dialog.text.toPlainText()
