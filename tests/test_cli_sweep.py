@@ -41,6 +41,14 @@ def said(capsys, *words):
     return code, out, err
 
 
+def test_one_design_is_no_designs(folder, in_threads, capsys):
+    (folder / "one.csv").write_text("STEPS\n1\n")
+    code, out, _ = said(capsys, "sweep", "passage.cfg", "one.csv", "-o", "one")
+    assert code == 0
+    assert "1 design of STEPS" in out
+    assert "designs" not in out.replace("designs:", "")
+
+
 def test_a_table_of_results(folder, in_threads, capsys):
     words = ("sweep", "passage.cfg", "designs.csv", "-o", "out", "--json", "report.json")
     code, out, err = said(capsys, *words)

@@ -87,9 +87,12 @@ def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
             if name in moving or name in seen:
                 continue
             seen.add(name)
+            remedy, several = "one of the two is wrong", name.split("+")
+            if set(several) <= set(moving):
+                remedy = f"several stand in brackets, as (({', '.join(several)}), translate, ...)"
             sentence = (
                 f"motion {place} names {name!r}, which does not move: MARKER_MOVING= "
-                f"({', '.join(moving)}) does not have it; one of the two is wrong"
+                f"({', '.join(moving)}) does not have it; {remedy}"
             )
             found.append((("MOTION", "MARKER_MOVING"), sentence))
     if case.periodic_type == "rotational" and case.direction in (0, 2):
@@ -104,10 +107,9 @@ def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
 
 def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return the markers of the case that the mesh lacks, and whether any marker moves."""
-    found = unknown_markers(mesh, {name: ROLES[role].key for name, role in case.roles.items()})
-    if not case.markers_with("moving"):
-        found.append("no marker moves; name one in MARKER_MOVING")
-    return tuple(found)
+    nothing = "no marker moves; name one in MARKER_MOVING"
+    named = {name: ROLES[role].key for name, role in case.roles.items()}
+    return (*unknown_markers(mesh, named), *[nothing] * (not case.markers_with("moving")))
 
 
 def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:

@@ -278,7 +278,7 @@ GRAMMAR = (
     "(BLADE, ffd, BOX, i, j, k, dx, dy, dz)        control point of a box; -1: all of an index",
     "(BLADE, file, path)                           node, dx, dy[, dz] in each line",
     "(*, VERB, ...)                                all moving boundaries, as one body",
-    "((BLADE, TIP), VERB, ...)                     several boundaries, as one body",
+    "((BLADE, TIP), VERB, ...)                     several, as one body; in a sweep: BLADE+TIP",
     "centroid: mean of the nodes of what is moved, where they are at that moment",
 )
 MOTIONS = Kind(

@@ -170,6 +170,11 @@ def shown(text: str) -> str:
     return repr(text if len(text) <= 60 else f"{text[:57]}...")
 
 
+def counted(number: int, what: str) -> str:
+    """Return a number of things in words: 1 step, 2 steps."""
+    return f"{number} {what}" if number == 1 else f"{number:,} {what}s"
+
+
 def not_one_of(value: object, known: Iterable[str]) -> str:
     """Return in words that a value is none of the known ones, and which is most like it."""
     words = list(known)

@@ -177,7 +177,7 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Step
 
 
 def _print_film(arguments: argparse.Namespace, reel: Reel, runs: list[Run]) -> None:
-    from slideviz.cli.report import counted
+    from slideviz.case.words import counted
 
     for run in runs:
         last = run.frames[-1].quality

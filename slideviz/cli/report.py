@@ -188,11 +188,6 @@ def info_report(
     }
 
 
-def counted(number: int, what: str) -> str:
-    """Return a number of things in words: 1 step, 2 steps."""
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
-
-
 def print_remarks(remarks: Iterable[str], *, quiet: bool) -> None:
     """Print warnings, and what is harmless as notes unless ``quiet``, where errors go."""
     for text in remarks:

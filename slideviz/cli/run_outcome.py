@@ -76,7 +76,8 @@ def _print_run(
     report: dict, found: Quality, before: Quality, files: dict[str, Path | None]
 ) -> None:
     """Print the summary of a run; ``found`` and ``before`` are the quality after it and before."""
-    from slideviz.cli.report import counted, quality_lines, table
+    from slideviz.case.words import counted
+    from slideviz.cli.report import quality_lines, table
 
     counts, spent = report["node_counts"], report["seconds"]
     method = "" if report["method"] == "rbf" else f"method {report['method']}, "

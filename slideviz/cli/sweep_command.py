@@ -65,6 +65,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     """Deform a mesh by many designs, and write the table of results."""
     from slideviz import read
     from slideviz import sweep as sweep_of
+    from slideviz.case.words import counted
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import OutputPath, make_folder, require_places
     from slideviz.cli.report import save_json
@@ -96,7 +97,7 @@ def sweep(arguments: argparse.Namespace) -> int:
             force=arguments.force,
         )
         if not arguments.quiet:
-            what = f"{len(designs.rows)} designs of {', '.join(designs.columns)}"
+            what = f"{counted(len(designs.rows), 'design')} of {', '.join(designs.columns)}"
             print(f"{arguments.case}, {len(mesh.cells):,} cells: {what}", flush=True)
         begin = time.perf_counter()
         found = _pulled(arguments, rows, len(designs.rows), folder / RESULTS)
@@ -166,6 +167,7 @@ def _pulled(
     arguments: argparse.Namespace, rows: Iterator[DesignRow], total: int, results: Path
 ) -> list[DesignRow]:
     """Return all rows; a bar tells how many there are and how long the rest will take."""
+    from slideviz.case.words import counted
     from slideviz.mesh.io.cleanup import keep
 
     found: list[DesignRow] = []
@@ -175,7 +177,8 @@ def _pulled(
         for row in rows:
             found.append(row)
             earlier += row.earlier
-            keep(results, f"{results} has {len(found)} of {total} designs, and --resume goes on")
+            so_far = f"{len(found)} of {counted(total, 'design')}"
+            keep(results, f"{results} has {so_far}, and --resume goes on")
             fresh = len(found) - earlier
             left = (time.monotonic() - begin) / fresh * (total - len(found)) if fresh else None
             bar.count(len(found), total, "designs:", left)
@@ -214,7 +217,8 @@ def _named(row: DesignRow) -> dict[str, Any]:
 
 def _print_sweep(report: dict[str, Any]) -> None:
     """Print the summary of a sweep."""
-    from slideviz.cli.report import counted, table
+    from slideviz.case.words import counted
+    from slideviz.cli.report import table
 
     seconds = report["seconds"]
     fresh = report["designs"] - report["earlier"]

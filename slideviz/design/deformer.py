@@ -168,7 +168,7 @@ class Deformer:
         Warns
         -----
         ToleranceWarning
-            The control nodes of the reference do not suffice for a design.
+            Control nodes or facets of the reference do not suffice for a design.
         ConditionWarning
             Between the boundary nodes, the points of a design cannot be trusted.
         """
@@ -176,7 +176,8 @@ class Deformer:
         given = self._checked(given, "displacement")
         points, errors, doubt = self._deformed(given)
         warn_of_doubt(self._steps, doubt)
-        warn_of_errors(errors, self._checks.tolerance(given))
+        reduced = self._setup.reduction is not None
+        warn_of_errors(errors, self._checks.tolerance(given), reduced=reduced)
         return points
 
     def max_error(self, displacement: FloatArray) -> float | FloatArray:

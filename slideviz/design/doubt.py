@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from slideviz.case.words import counted
 from slideviz.design.frozen.solve import REMEDY
 from slideviz.design.frozen.step import FrozenStep
 from slideviz.errors import ConditionWarning, Note, ToleranceWarning
@@ -62,7 +63,7 @@ def warn_of_doubt(steps: Sequence[FrozenStep], doubt: FloatArray) -> bool:
     worst = float(doubt.max(initial=0.0))
     if worst <= TRUSTED:
         return False
-    of = "" if doubt.ndim == 0 else f" of {np.count_nonzero(doubt > TRUSTED)} designs"
+    of = "" if doubt.ndim == 0 else f" of {counted(int((doubt > TRUSTED).sum()), 'design')}"
     warnings.warn(
         f"the condition number of the system is {largest_condition(steps):.0e}: derivatives, and "
         f"points{of} between the boundary nodes, may be wrong by {100 * worst:.2g} % of the "
@@ -73,16 +74,20 @@ def warn_of_doubt(steps: Sequence[FrozenStep], doubt: FloatArray) -> bool:
     return True
 
 
-def warn_of_errors(errors: FloatArray, allowed: FloatArray) -> None:
-    """Warn where designs miss what they must do by more than is allowed."""
+def warn_of_errors(errors: FloatArray, allowed: FloatArray, *, reduced: bool) -> None:
+    """Warn where designs miss what they must do by more than is allowed.
+
+    ``reduced`` tells whether control nodes were chosen, beside the facets of sliding nodes.
+    """
     above = errors > allowed
     if not above.any():
         return
     worst = np.unravel_index(int(np.argmax(errors - allowed)), errors.shape)
-    of = "" if errors.ndim == 0 else f" of {np.count_nonzero(above)} designs"
+    chosen = "control nodes and facets" if reduced else "the facets that nodes slide on"
+    of = "" if errors.ndim == 0 else f" of {counted(int(above.sum()), 'design')}"
     warnings.warn(
         f"the largest error{of} at the boundary is {errors[worst]:.3g}, above the tolerance of "
-        f"{allowed[worst]:.3g}: control nodes and facets are those of another displacement; "
+        f"{allowed[worst]:.3g}: {chosen} are those of another displacement; "
         "choose them anew with `deformer = deformer.refresh(displacement)`",
         ToleranceWarning,
         stacklevel=3,

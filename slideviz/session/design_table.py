@@ -12,7 +12,7 @@ import numpy as np
 from slideviz.case.key import FILES, MOTION, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
-from slideviz.case.words import is_number
+from slideviz.case.words import counted, is_number
 from slideviz.design.sweeps.columns import columns_of, numbers_of, own_values
 from slideviz.design.sweeps.row import DesignRow
 from slideviz.errors import CaseError
@@ -134,7 +134,7 @@ class DesignTable:
         """
         done, count = len(self.results), len(self.rows)
         if busy:
-            so_far = f"{done:,} of {count:,} designs are done"
+            so_far = f"{done:,} of {counted(count, 'design')} done"
             return f"The sweep still runs ({so_far}) and will be stopped."
         if not done or self is saved:
             return ""
@@ -157,7 +157,7 @@ class DesignTable:
             if self.results[number].problem:
                 reasons.setdefault(self.reason(number, mesh), []).append(number)
         failed = len(self.results) - done
-        parts = [f"{done:,} design{'s' * (done != 1)} done"]
+        parts = [f"{counted(done, 'design')} done"]
         parts += [f"{failed:,} failed"] * bool(failed)
         parts += [f"{bad:,} with inverted cells"] * bool(bad)
         lines = [f"{_named(numbers)}: {reason}" for reason, numbers in reasons.items()]

@@ -6,6 +6,7 @@ import time
 from dataclasses import replace
 
 from slideviz.case.model import Case
+from slideviz.case.words import counted
 from slideviz.design.sweeps.sweep import sweep
 from slideviz.mesh.model import Mesh
 from slideviz.session.design_table import DesignTable
@@ -25,7 +26,7 @@ def run_designs(
     total = len(table.rows)
     left = [at for at in range(1, total + 1) if at not in table.results]
     wanted = [design for at, design in enumerate(table.designs(), start=1) if at in set(left)]
-    report(Doing(f"Starting with {len(left)} designs"))
+    report(Doing(f"Starting with {counted(len(left), 'design')}"))
     begin = time.monotonic()
     rows = sweep(case, wanted, mesh=mesh, going_on=lambda: require_going(stopped))
     for done, row in enumerate(rows, start=1):

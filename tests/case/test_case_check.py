@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from slideviz.case.check import contradictions
 from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.case.motion import check_case, require_valid
 from slideviz.case.reduction import Reduction
@@ -179,3 +180,9 @@ def test_all_problems_at_once(square):
     with pytest.raises(CaseError) as caught:
         require_valid(case, square)
     assert str(caught.value).splitlines() == list(check_case(case, square))
+
+
+def test_several_markers_with_a_plus_are_told_their_brackets():
+    roles = dict.fromkeys(("UPPER", "LEFT"), "moving")
+    ((_, said),) = contradictions(Case(roles=roles, motions=(Translate("UPPER+LEFT", (1.0, 0.0)),)))
+    assert said.endswith("several stand in brackets, as ((UPPER, LEFT), translate, ...)")

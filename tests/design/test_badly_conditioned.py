@@ -120,7 +120,7 @@ def test_a_design_that_cannot_be_trusted_is_told():
     deformer = sv.Deformer(mesh, case)
     designs = np.zeros((2, *deformer.displacement.shape))
     designs[1, 0, 1] = 0.01  # the trailing edge alone
-    with pytest.warns(ConditionWarning, match="points of 1 designs between the boundary nodes"):
+    with pytest.warns(ConditionWarning, match="points of 1 design between the boundary nodes"):
         deformer.deform(designs)
 
 

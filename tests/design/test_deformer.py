@@ -178,13 +178,20 @@ def test_control_nodes_suffice_for_all_displacements_together(levels, sliding):
     assert rest.max_error(basis[0]) <= 2e-5
 
 
+def test_a_design_off_its_facets_warns_of_them_alone():
+    mesh, case = made("curved", method="idw", reduction=None)
+    deformer = sv.Deformer(mesh, case)
+    with pytest.warns(ToleranceWarning, match=": the facets that nodes slide on are those of"):
+        deformer.deform(-2.0 * deformer.displacement)
+
+
 def test_a_design_outside_the_tolerance_warns_until_refreshed():
     mesh, case = made("curved", reduction=REDUCED)
     deformer = sv.Deformer(mesh, case)
     design = -2.0 * deformer.displacement
     with pytest.warns(ToleranceWarning, match=r"above the tolerance of 0.0001: .* `deformer ="):
         deformer.deform(design)
-    with pytest.warns(ToleranceWarning, match="of 1 designs"):
+    with pytest.warns(ToleranceWarning, match="of 1 design at"):
         deformer.deform(np.stack([deformer.displacement, design]))
     fresh = deformer.refresh(design)
     assert fresh.max_error(design) <= 1e-4 < deformer.max_error(design)

@@ -378,7 +378,7 @@ def test_roles_follow_from_the_lists_of_su2_and_of_ours(here):
         ("DV_VALUE= 1", "DV_KIND is missing: which design variables there are"),
         ("DV_KIND= SCALE, SURFACE_FILE\nDV_VALUE= 1, 1", "SURFACE_FILE must stand alone; make two"),
         ("DV_KIND= SCALE", "DV_VALUE is missing: a value for each variable"),
-        ("DV_KIND= SCALE, SCALE\nDV_VALUE= 1", "DV_VALUE has 1 values for 2 variables"),
+        ("DV_KIND= SCALE, SCALE\nDV_VALUE= 1", "DV_VALUE has 1 value for 2 variables"),
         ("DV_KIND= SCALE\nDV_VALUE= x", "DV_VALUE: 'x' is not a number"),
         ("DV_KIND= TRANSLATION\nDV_VALUE= 1", "DV_PARAM is missing"),
         (
@@ -387,7 +387,7 @@ def test_roles_follow_from_the_lists_of_su2_and_of_ours(here):
         ),
         (
             "DV_KIND= TRANSLATION, SCALE\nDV_VALUE= 1, 1\nDV_PARAM= (1, 0, 0)",
-            "DV_PARAM has 1 groups for 2 variables",
+            "DV_PARAM has 1 group for 2 variables",
         ),
         (
             "DV_KIND= FFD_CONTROL_POINT_2D\nDV_VALUE= 1\nDV_PARAM= (BOX, 1, 0, 0, 0, 1)",
@@ -581,7 +581,7 @@ def test_set_changes_su2s_keys(here, capsys):
     assert run([*call, "dv_value = 0.05"]) == 0
     assert Path("out.su2").read_bytes() == expected
     for given, said in (
-        ("DV_VALUE=1, 2", "a.cfg: DV_VALUE has 2 values for 1 variables; give one each"),
+        ("DV_VALUE=1, 2", "a.cfg: DV_VALUE has 2 values for 1 variable; give one each"),
         ("DV_VALU=1", "unknown key 'DV_VALU'; did you mean DV_VALUE?"),
         ("MACH_NUMBER=1", "unknown key 'MACH_NUMBER'; `slideviz keys` lists those of slideviz"),
         ("DV_VALUE", "--set 'DV_VALUE' is not of the form KEY=VALUE"),

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 import slideviz as sv
+from slideviz.design.sweeps import processes
 from slideviz.design.sweeps import sweep as sweeping
 from slideviz.design.sweeps.processes import Processes
 from slideviz.design.sweeps.worker import packed
+from slideviz.errors import DeformError
 from slideviz.samples.table import sample
 
 
@@ -102,6 +106,24 @@ def test_workers_end_with_their_parent_however_it_ends(tmp_path):
         assert is_running(pid)
         parent.kill()
     wait_until(lambda: not is_running(pid))
+
+
+@pytest.mark.parametrize(
+    ("end", "said"),
+    [
+        (partial(signal.raise_signal, 9), "killed before they begin, perhaps for want of memory"),
+        (partial(os._exit, 1), 'must stand under `if __name__ == "__main__":`'),
+    ],
+)
+def test_why_no_process_starts_is_told(passage, monkeypatch, end, said):
+    monkeypatch.setattr(processes, "_begin", end)
+    with pytest.raises(DeformError, match=re.escape(said)) as found:
+        list(sv.sweep(passage.case, {"STEPS": [1, 2]}, mesh=passage.mesh, workers=1))
+    assert ("__name__" in str(found.value)) is ("__name__" in said)
+    monkeypatch.setattr(sys.modules["__main__"], "__package__", "slideviz")  # the command
+    with pytest.raises(DeformError) as found:
+        list(sv.sweep(passage.case, {"STEPS": [1, 2]}, mesh=passage.mesh, workers=1))
+    assert "__name__" not in str(found.value)
 
 
 @pytest.mark.slow

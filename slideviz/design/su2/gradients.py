@@ -23,8 +23,8 @@ REACH = 1e-3
 """How far these move the boundary, as a part of the mesh."""
 
 INSUFFICIENT = (
-    "the control nodes do not suffice for this design: boundary nodes still get exactly their "
-    "displacement, and the gradient is that of such a deformation; see what `slideviz def` warns of"
+    "; boundary nodes still get exactly their displacement, and the gradient is that of such a "
+    "deformation; see what `slideviz def` warns of"
 )
 
 
@@ -120,7 +120,7 @@ def _heard(said: list[str]) -> Iterator[None]:
         if one.category is ConditionWarning:
             said.append(str(one.message))
         elif one.category is ToleranceWarning:  # its remedy is one for Python
-            said.append(INSUFFICIENT)
+            said.append(str(one.message).partition("; ")[0] + INSUFFICIENT)
         else:
             warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from slideviz.case.lines import Entry, Problem
-from slideviz.case.words import Word, groups_of, list_of, number, words_of
+from slideviz.case.words import Word, counted, groups_of, list_of, number, words_of
 from slideviz.errors import CaseError
 
 KINDS = {
@@ -97,7 +97,7 @@ def _values(rows: Mapping[str, Entry], kinds: list[str], problems: list[Problem]
         problems.append((entry.line, f"DV_VALUE: {problem}"))
         return [0.0] * len(kinds)
     if len(values) != len(kinds) and kinds[0] not in ALONE:
-        said = f"DV_VALUE has {len(values)} values for {len(kinds)} variables; give one each"
+        said = f"DV_VALUE has {_for(len(values), 'value', kinds)}"
         problems.append((entry.line, said))
     return (values + [0.0] * len(kinds))[: len(kinds)]
 
@@ -119,9 +119,13 @@ def _groups(
         return []
     groups = groups[:-1] if not groups[-1] else groups  # a semicolon after the last
     if len(groups) != len(kinds):
-        said = f"DV_PARAM has {len(groups)} groups for {len(kinds)} variables; give one each"
+        said = f"DV_PARAM has {_for(len(groups), 'group', kinds)}"
         problems.append((entry.line, said))
     return groups
+
+
+def _for(number: int, what: str, kinds: list[str]) -> str:
+    return f"{counted(number, what)} for {counted(len(kinds), 'variable')}; give one each"
 
 
 def _variable(kind: str, value: float, group: list[Word]) -> DesignVariable:

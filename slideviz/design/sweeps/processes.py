@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -67,11 +68,26 @@ class Processes(Executor):
         self._given_up = False
         self.lost = 0
         """Processes that ended while they worked."""
+        self.exit_codes: list[int] = []
+        """Of those that ended before they began; negative where a signal ended them."""
 
     @property
-    def cannot_start(self) -> bool:
-        """Tell whether processes end before they begin."""
-        return self._failed_starts >= _STARTS
+    def why_none_starts(self) -> str:
+        """Return why processes end before they begin; nothing where they do not."""
+        if self._failed_starts < _STARTS:
+            return ""
+        if any(code < 0 for code in self.exit_codes):
+            return (
+                "processes are killed before they begin, perhaps for want of memory; let fewer "
+                "work at a time (workers)"
+            )
+        main = sys.modules["__main__"]
+        if main.__package__ == "slideviz" or not str(getattr(main, "__file__", "")).endswith(".py"):
+            return "processes end before they begin; what they have printed says why"
+        return (
+            "processes end before they begin; in a script, the sweep must stand under "
+            '`if __name__ == "__main__":`, for each process imports the script'
+        )
 
     @property
     def pids(self) -> list[int]:
@@ -192,6 +208,9 @@ class _Process:
             # It does its calls in their order, and they are told so.
             lost = broken and self._forget(pool)
             began = begun is not None and _succeeded(begun)
+            if lost and not began:
+                ended = (getattr(pool, "_processes", None) or {}).values()
+                self._owner.exit_codes += [one.exitcode or 0 for one in ended]
             self._owner._done(self, call, inner, lost=lost, began=began)
 
         inner.add_done_callback(done)

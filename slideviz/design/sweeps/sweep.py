@@ -270,11 +270,8 @@ class _Loop:
 
     def _lost(self, design: Design, problem: Exception) -> DesignRow | None:
         """Let a design be done again whose worker was lost; a row when that was so too often."""
-        if isinstance(self._executor, Processes) and self._executor.cannot_start:
-            raise DeformError(
-                "processes end before they begin; in a script, the sweep must stand under "
-                '`if __name__ == "__main__":`, for each process imports the script'
-            ) from problem
+        if isinstance(self._executor, Processes) and (why := self._executor.why_none_starts):
+            raise DeformError(why) from problem
         self.lacking.clear()
         self._refused = False
         lost = self._tries[design.number] = self._tries.get(design.number, 0) + 1

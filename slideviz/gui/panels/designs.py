@@ -10,6 +10,7 @@ from qtpy.QtCore import QSize, Qt, Signal
 from qtpy.QtWidgets import QHBoxLayout, QSplitter
 
 from slideviz.case.model import Case
+from slideviz.case.words import counted
 from slideviz.design.sweeps.designs import read_designs
 from slideviz.design.sweeps.row import DesignRow
 from slideviz.errors import CaseError, SlidevizError
@@ -191,7 +192,7 @@ class DesignsPanel(Panel):
                 self._mistakes = str(error)
                 self.services.banner.tell_error(error)
             return
-        self._say(f"{len(table.rows):,} designs" if table.rows else "")
+        self._say(counted(len(table.rows), "design") if table.rows else "")
         self.put(table)
 
     def _picked(self, number: int) -> None:
