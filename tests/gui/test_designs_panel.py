@@ -347,11 +347,11 @@ def test_closing_asks_about_designs_that_go_on(
     QTest.mouseClick(passage.run, LEFT)
     asked = answers("ask_unsaved", "cancel")
     assert not window.close()
-    assert "The sweep still runs (0 of 500 designs are done) and will be stopped." in asked[0][0]
+    assert "The sweep still runs (0 of 500 designs done) and will be stopped." in asked[0][0]
     # The question counts on while it is there.
     now = asked[0][2]
     passage._came([DesignRow(1, min=0.5)])
-    assert "(1 of 500 designs are done)" in now()
+    assert "(1 of 500 designs done)" in now()
     assert passage.runner.busy
     # What is done can be saved before it is stopped.
     qtbot.waitUntil(lambda: len(passage.table.results) > 1, timeout=60_000)
