@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from slideviz.case.model import Case, Ffd
 from slideviz.case.reduction import Reduction
 from slideviz.mesh.model import Mesh
@@ -17,6 +19,8 @@ from slideviz.session.state import Guess, Run, Session, StepFrame, ViewState
 from slideviz.terms import ColourBy, Role
 
 RELATIVE_TOLERANCE = 1e-5
+SQUARE = 1e-6
+"""Cosines up to this, or as near to 1, are of right angles, or of none."""
 STEPS = 5
 """Of a mesh whose boundaries slide, until somebody chooses."""
 
@@ -107,17 +111,30 @@ def guess_roles(mesh: Mesh, pairs: Sequence[Pair] = ()) -> dict[str, Guess]:
     """Return a guess for each boundary that gives a hint, in the order of the mesh.
 
     The name comes first, because the opposite sides of every box match each other; a match
-    decides only where neither name says anything.
+    decides only where neither name says anything, and not in a box that matches every way.
     """
     guesses = {name: found for name in mesh.marker_names if (found := guess_by_name(name))}
+    unnamed = [p for p in pairs if p.first not in guesses and p.second not in guesses]
+    box = _is_box(mesh, unnamed)
     for pair in pairs:
         ends = (pair.first, pair.second)
         named = [guesses[name].role for name in ends if name in guesses]
-        if named and set(named) != {"periodic"}:
+        if (named and set(named) != {"periodic"}) or (box and not named):
             continue
         for name, other in (ends, ends[::-1]):
             guesses[name] = Guess("periodic", f"it matches {other}: {pair.describe()}")
     return {name: guesses[name] for name in mesh.marker_names if name in guesses}
+
+
+def _is_box(mesh: Mesh, pairs: Sequence[Pair]) -> bool:
+    """Tell whether pairs match by translations along all axes of a box, and no other way."""
+    ways = np.array(
+        [p.vector / np.linalg.norm(p.vector) for p in pairs if p.kind == "translational"]
+    )
+    if len(ways) < max(len(pairs), mesh.dim) or np.linalg.matrix_rank(ways) < mesh.dim:
+        return False
+    cosines = abs(ways @ ways.T)
+    return bool((np.minimum(cosines, 1.0 - cosines) < SQUARE).all())
 
 
 def guess_case(mesh: Mesh, guesses: dict[str, Guess], pairs: Sequence[Pair]) -> Case:

@@ -1,6 +1,9 @@
+from dataclasses import replace
+
 import pytest
 
 from slideviz.mesh.periodic import find_pairs
+from slideviz.samples.table import sample
 from slideviz.session.opening import guess_by_name, guess_case, guess_roles
 
 
@@ -38,8 +41,6 @@ def test_opposite_sides_of_a_box_are_not_periodic_because_they_match(square):
 
 
 def test_a_match_decides_where_the_names_say_nothing(square):
-    from dataclasses import replace
-
     names = {"bottom": "q1", "top": "q2", "left": "inlet", "right": "outlet"}
     markers = tuple(replace(m, name=names[m.name]) for m in square.markers)
     mesh = replace(square, markers=markers)
@@ -48,6 +49,22 @@ def test_a_match_decides_where_the_names_say_nothing(square):
     assert "q2" in guesses["q1"].reason
     assert guesses["inlet"].role == "sliding", "that it matches the outlet does not matter"
     assert guess_case(mesh, guesses, find_pairs(mesh)).periodic == "moving"
+
+
+@pytest.mark.parametrize("name", ["square", "hexahedron"])
+@pytest.mark.parametrize(("prefix", "role"), [("side", None), ("PER", "periodic")])
+def test_a_box_that_matches_every_way_is_periodic_only_by_name(name, prefix, role):
+    mesh = sample(name, 5).mesh
+    markers = [replace(m, name=f"{prefix}_{k}") for k, m in enumerate(mesh.markers)]
+    mesh = replace(mesh, markers=tuple(markers))
+    pairs = find_pairs(mesh)
+    assert len(pairs) == mesh.dim
+    guesses = guess_roles(mesh, pairs)
+    assert {guesses[p.first].role if p.first in guesses else None for p in pairs} == {role}
+    assert guess_case(mesh, guesses, pairs).periodic == ("none" if role is None else "fixed")
+    # Of a part of its sides a match tells more.
+    some = guess_roles(mesh, pairs[1:])
+    assert {some[p.first].role for p in pairs[1:]} == {"periodic"}
 
 
 def test_without_a_pair_the_case_is_not_periodic(square):
