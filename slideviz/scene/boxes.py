@@ -22,15 +22,16 @@ from slideviz.terms import ROLES
 BASE, MOVED, BEHIND, LABELS = "boxes:undeformed", "boxes:moved", "boxes:behind", "boxes:-labels"
 ENDS = (0, 0, 0), (-1, 0, 0), (0, -1, 0), (0, 0, -1)
 """The first control point of a box, and those at the ends of its edges from there."""
-FAINT = 0.3
-"""Opacity of what the mesh is in front of."""
+FAINT, CLEAR = 0.3, 0.75
+"""Opacity of what the mesh is in front of: of boxes, and of what moves of them."""
 
 
 class BoxLayer(Layer):
     """The control points of all boxes, and those that motions move where they come to be.
 
-    What is inside the mesh, or behind it, is seen faintly. Beside the first corner of a box is its
-    name, and at the ends of its edges from there are i, j and k, as far as there is room.
+    What is inside the mesh, or behind it, is seen faintly, and clearly what moves of it. Beside the
+    first corner of a box is its name, and at the ends of its edges from there are i, j and k, as
+    far as there is room.
     """
 
     def __init__(self, stage: Stage) -> None:
@@ -75,7 +76,7 @@ class BoxLayer(Layer):
             self._add(shape, name, colour)
             if mesh.dim == 3:
                 behind = self._add(shape, BEHIND if name == BASE else f"{MOVED}:behind", colour)
-                behind.prop.opacity = FAINT
+                behind.prop.opacity = FAINT if name == BASE else CLEAR
                 behind.mapper.SetResolveCoincidentTopologyToPolygonOffset()
                 behind.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, IN_FRONT)
                 behind.mapper.SetRelativeCoincidentTopologyPointOffsetParameter(IN_FRONT)

@@ -10,15 +10,16 @@ import pyvista as pv
 
 from slideviz.case.model import Case
 from slideviz.color_scheme import INTERSECTION_COLOUR
-from slideviz.mesh.model import FloatArray
+from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
 from slideviz.scene.stage import Layer, Stage
 from slideviz.session.state import Session
 from slideviz.terms import ROLES
 
-RIM = "\nrim"
-"""What stands behind the name of an actor that draws the rim of a ghost; no boundary has it."""
+RIM, WIRE = "\nrim", "\nwire"
+"""What stands behind the name of an actor that draws the rim of a ghost, or the edges of its
+faces; no boundary has it."""
 STILL = 1e-9
 """Part of its extent that rounding may move a boundary that stays where it is."""
 DEEPER = 330.0
@@ -26,8 +27,10 @@ DEEPER = 330.0
 the 65536 from the nearest to the furthest point. A boundary that slides within its surface would
 show through its ghost in patches."""
 ON_TOP = 70000.0
-"""As many units that the rim of a motion's ghost is before everything: one that goes into the
+"""As many units that the lines of a motion's ghost are before everything: one that goes into the
 solid, behind opaque boundaries, would not be seen at all."""
+MOST_WIRE = 50_000
+"""Faces of a ghost whose edges are drawn: of more they are one colour, and take long."""
 ARRIVED = 0.01
 """Part of its displacement by which a boundary may miss its ghost and still cover it."""
 
@@ -57,7 +60,8 @@ class GhostLayer(Layer):
     def set_moved(self, moved: Mapping[str, FloatArray]) -> None:
         """Draw where boundaries will go: points (u, d) of the nodes of each."""
         for name in set(self.moved) - set(moved):
-            for key in (f"motion:{name}", f"motion:{name}{RIM}"):
+            for part in ("", RIM, WIRE):
+                key = f"motion:{name}{part}"
                 self._actors.pop(key, None)
                 self._shapes.pop(key, None)
                 self.stage.remove(key)
@@ -82,9 +86,9 @@ class GhostLayer(Layer):
             key = f"motion:{name}"
             # In the same place there is nothing to tell.
             if not shown or name in view.hidden or not is_apart(points, surface, session):
-                for part in (key, f"{key}{RIM}"):
-                    if part in self._actors:
-                        self._actors[part].visibility = False
+                for part in ("", RIM, WIRE):
+                    if f"{key}{part}" in self._actors:
+                        self._actors[f"{key}{part}"].visibility = False
                 continue
             hits = bool(session.intersection or session.folding)
             colour = INTERSECTION_COLOUR if hits else ROLES["moving"].colour
@@ -93,6 +97,18 @@ class GhostLayer(Layer):
                 actor.prop.color = self._rim_colour(colour) if actor.name.endswith(RIM) else colour
                 actor.prop.line_width = 4.5 if hits else 2.5
                 actor.visibility = True
+            if not surface.flat:
+                self._draw_wire(key, colour, not rim_goes_along(points, surface, session.mesh))
+
+    def _draw_wire(self, key: str, colour: str, wanted: bool) -> None:
+        """Draw the edges of a ghost's faces over everything, or end that."""
+        shape = self._shapes[key]
+        wanted = wanted and shape.n_cells <= MOST_WIRE
+        if wanted or f"{key}{WIRE}" in self._actors:
+            wire, _ = self._part(f"{key}{WIRE}", lambda *_: shape)
+            wire.prop.style, wire.prop.color, wire.prop.opacity = "wireframe", colour, 0.5
+            wire.prop.line_width, wire.visibility = 1.0, wanted
+            _shift_depth(wire, -ON_TOP)
 
     def _rim_colour(self, colour: str) -> tuple[float, float, float]:
         """Return a colour that is seen on that of the boundary itself."""
@@ -136,7 +152,7 @@ class GhostLayer(Layer):
             mesh = self._session.mesh
             assert mesh is not None
             shape = make(mesh.points, 3 * self.stage.lift(mesh))
-            lit = mesh.dim == 3 and not key.endswith(RIM)
+            lit = mesh.dim == 3 and not key.endswith((RIM, WIRE))
             actor = self.stage.add(shape, key, lighting=lit, pickable=False)
             actor.prop.line_width = 2.5
             self._actors[key], self._shapes[key] = actor, shape
@@ -166,6 +182,15 @@ def is_apart(points: FloatArray, surface: Surface, session: Session) -> bool:
         return way > still
     left = float(np.abs(points - session.frame.mesh.points[surface.nodes]).max())
     return left > max(still, ARRIVED * way)
+
+
+def rim_goes_along(points: FloatArray, surface: Surface, mesh: Mesh) -> bool:
+    """Tell whether the rim of a ghost, at points (u, d), goes where its faces go, and shows it.
+
+    That of a wall that a free-form box dents stays where it is, and a closed surface has none.
+    """
+    way = np.abs(points - mesh.points[surface.nodes]).max(axis=1)
+    return bool(way[surface.rim].max(initial=0.0) > 0.5 * way.max())
 
 
 def is_planned(session: Session) -> bool:

@@ -6,6 +6,7 @@ import pyvista as pv
 
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
+from slideviz.scene.ghosts import WIRE
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
 from slideviz.session.state import StepFrame
@@ -144,6 +145,25 @@ def test_a_boundary_that_goes_into_the_solid_is_seen_through_what_is_before_it(s
     across = changed.sum(axis=1)
     assert across.max() > 100, "the rim is a line over the whole side"
     assert (across > 100).sum() < 8
+
+
+def test_a_wall_that_is_dented_within_its_rim_is_seen_through_what_is_before_it(scene, cube):
+    top, _ = moving_top(cube, scene)
+    scene.look_from("-y")
+    before = image(scene)
+    nodes = cube.marker(top).nodes
+    low, high = cube.points[nodes].min(axis=0), cube.points[nodes].max(axis=0)
+    part = (cube.points[nodes] - low)[:, :2] / (high - low)[:2]
+    dent = cube.points[nodes].copy()
+    dent[:, 2] -= 0.3 * cube.extent * np.prod(4.0 * part * (1.0 - part), axis=1)
+    scene.set_motion_ghosts({top: dent})
+    changed = np.abs(image(scene) - before).max(axis=2) > 25
+    assert changed.sum() > 300
+    # Where the rim goes along, it is enough.
+    scene.set_motion_ghosts({top: cube.points[nodes] + (0.0, 0.0, 1.0)})
+    assert not scene.plotter.actors[f"motion:{top}{WIRE}"].visibility
+    scene.set_motion_ghosts({})
+    assert not any(name.startswith("motion:") for name in scene.plotter.actors)
 
 
 def test_a_ghost_is_not_drawn_over_the_boundary_that_has_arrived(scene, cube):

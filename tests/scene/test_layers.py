@@ -335,6 +335,7 @@ def test_of_a_box_only_what_moves_is_drawn_again(scene, boxed):
     assert scene.plotter.actors["boxes:behind"].prop.opacity < 0.5
     scene.update(after)
     moved = scene.plotter.actors["boxes:moved"].mapper.dataset
+    assert scene.plotter.actors["boxes:moved:behind"].prop.opacity > 0.5
     assert (moved.n_verts, moved.n_lines) == (1, 5)
     assert "boxes:-labels" in scene.plotter.actors
     scene.update(changes.set_view(after, ffd=False))
