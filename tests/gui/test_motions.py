@@ -278,7 +278,16 @@ def test_boxes_can_be_drawn_where_there_are_some(driver, passage_file, tmp_path)
     assert action.isEnabled()
     assert shown.toolTip() == wrapped(SHOWN["ffd"].tip)
     assert driver.window.statusBar().currentMessage().endswith(". 2 FFD boxes: B shows them")
+    # In the panel of motions that stays until they are shown.
+    hint = driver.window.motions.hint
+    assert hint.text().endswith("\n2 FFD boxes: B shows them")
+    driver.role("low", "moving")
+    driver.add_motion(Ffd)
+    driver.window.store.change(changes.set_view, ffd=False)
+    assert hint.isVisible()
+    assert hint.text() == "2 FFD boxes: B shows them"
     shown.click()
+    assert not hint.isVisible()
     assert "ffd" in driver.session.view.drawn
     assert action.isChecked()
 

@@ -28,7 +28,14 @@ from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes
 from slideviz.session.motion_table import TableRows
-from slideviz.session.motions import box_names, centroid, machine_axis, new_target, targets
+from slideviz.session.motions import (
+    box_names,
+    boxes_hint,
+    centroid,
+    machine_axis,
+    new_target,
+    targets,
+)
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -159,8 +166,10 @@ class MotionPanel(Panel):
         else:
             why = ""
         self.add.setToolTip(why or "Add a motion; several are performed in sequence.")
-        self.hint.setText(why or "Add the motions of the boundary; the view shows them at once.")
-        self.hint.setVisible(bool(why) or count == 0)
+        usual = "Add the motions of the boundary; the view shows them at once."
+        hints = [why or (usual if count == 0 else ""), boxes_hint(session)]
+        self.hint.setText("\n".join(filter(None, hints)))
+        self.hint.setVisible(any(hints))
 
     # Widgets to state ------------------------------------------------------------------
 
