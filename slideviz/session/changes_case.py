@@ -137,5 +137,5 @@ def moved_files(session: Session, moved: Mapping[Path, Path]) -> Session:
 
 
 def saved_case(session: Session, case: Case) -> Session:
-    """Return the session with ``case`` on disk."""
-    return replace(session, case=case, saved=case)
+    """Return the session with ``case`` and its sections on disk."""
+    return replace(session, case=case, saved=case, saved_sections=session.view.sections)

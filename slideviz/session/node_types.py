@@ -64,7 +64,8 @@ class NodeTypes:
             return control_nodes(session)
         # Steps were computed with the settings of their run, not with those of now.
         ran = session.frame is not None and session.frame.step is not None
-        return self._typed(session.mesh, (session.ran if ran else None) or session.case)
+        run = session.run_shown if ran else None
+        return self._typed(session.mesh, session.case if run is None else run.case)
 
     def _typed(self, mesh: Mesh, case: Case) -> TypedNodes:
         roles = tuple(case.roles.get(name, "fixed") for name in mesh.marker_names)

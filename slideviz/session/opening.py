@@ -44,7 +44,8 @@ def open_mesh(
     view = replace(view, section_index=flat if flat is not None else 0 if view.sections else None)
     # From here on the view is the session's; it goes back into the case when that is saved.
     chosen = chosen.change(view={})
-    return Session(mesh, path, chosen, guesses, tuple(pairs), first, saved=chosen, view=view)
+    session = Session(mesh, path, chosen, guesses, tuple(pairs), first, view=view)
+    return replace(session, saved=chosen, saved_sections=view.sections)
 
 
 def has_ffd(case: Case) -> bool:

@@ -169,7 +169,9 @@ class Session:
     newest : int
         The highest number that a run was given, removed ones too.
     saved : Case or None
-        What is on disk, or what was there at the start.
+        What is on disk, or what was there at the start, without its view.
+    saved_sections : tuple of Section
+        Those of that view.
     intersection : str
         What the motions put through what, in a sentence; empty as far as is known.
     folding : str
@@ -188,6 +190,7 @@ class Session:
     runs: tuple[Run, ...] = ()
     shown: int | None = None
     saved: Case | None = None
+    saved_sections: tuple[Section, ...] = ()
     view: ViewState = field(default_factory=ViewState)
     intersection: str = ""
     folding: str = ""
@@ -220,12 +223,6 @@ class Session:
         run = self.run_shown
         first = (run and run.undeformed) or self.first
         return (() if first is None else (first,)) + (() if run is None else run.frames)
-
-    @property
-    def ran(self) -> Case | None:
-        """Return the case of the run that is shown."""
-        run = self.run_shown
-        return run.case if run is not None else None
 
     @property
     def frame(self) -> StepFrame | None:

@@ -27,11 +27,11 @@ class Unsaved:
     def of(cls, session: Session, busy: bool, designs: str = "") -> Unsaved:
         """Return the unsaved work of a session, while a job runs or none does, and of designs."""
         what = {}
-        if session.unsaved_case:
-            source = session.case.source
-            what["case"] = (
-                f"the changes to {source.name}" if source else "roles, motions and method as a case"
-            )
+        cut, source = unsaved_sections(session), session.case.source
+        if session.unsaved_case or cut:
+            words = "roles, motions, method and sections" if cut else "roles, motions and method"
+            new = f"{words if session.unsaved_case else 'the sections'} as a case"
+            what["case"] = f"the changes to {source.name}" if source else new
         run = session.run_shown
         # The mesh of a design comes again at a click.
         if session.unsaved_mesh and run is not None and run.panels is None:
@@ -76,7 +76,7 @@ class Unsaved:
 
     def _repeats(self) -> str:
         run = self.session.run_shown
-        if "case" in self.what and run and run.end == "done" and not self.session.outdated:
+        if self.session.unsaved_case and run and run.end == "done" and not self.session.outdated:
             return f"The case repeats run {run.number} exactly."
         return ""
 
@@ -95,6 +95,15 @@ class Unsaved:
         )
 
 
+def unsaved_sections(session: Session) -> bool:
+    """Tell whether the sections are others than those saved or opened, however they are shown."""
+    now, saved = (
+        [replace(section, shown=True, flat=False, name="") for section in sections]
+        for sections in (session.view.sections, session.saved_sections)
+    )
+    return session.saved is not None and now != saved
+
+
 def title_of(session: Session) -> str:
     """Return the title of the window that shows a session, with a star if something is unsaved."""
     file = session.case.source or session.path
@@ -103,5 +112,5 @@ def title_of(session: Session) -> str:
     run = session.run_shown
     comes_again = session.repeatable or (run is not None and run.panels is not None)
     lost = session.unsaved_mesh and not comes_again
-    star = "*" if session.unsaved_case or lost else ""
+    star = "*" if session.unsaved_case or unsaved_sections(session) or lost else ""
     return f"{star}{file.name} – slideviz" if file else "slideviz"

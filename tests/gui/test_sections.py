@@ -24,6 +24,11 @@ from slideviz.session.changes_view import followed
 pytestmark = pytest.mark.usefixtures("unpainted")
 
 
+@pytest.fixture(autouse=True)
+def sections_may_be_lost(monkeypatch):
+    monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
+
+
 @pytest.fixture
 def panel(window, driver, sample_folder):
     driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")

@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 from slideviz.mesh.quality import quality
+from slideviz.sections.model import Section
 from slideviz.session import changes
+from slideviz.session.keep import keep_view
 from slideviz.session.state import Run, StepFrame
 from slideviz.session.unsaved import Unsaved, title_of
 
@@ -94,3 +96,31 @@ def test_designs_with_results_can_be_saved(session):
         "Save the deformed mesh of run 2 before closing?",
         words,
     ]
+
+
+def test_sections_are_part_of_what_a_case_keeps(session):
+    opened = saved(session, 1, 2)
+    cut = changes.add_section(opened, Section("plane", origin=(0.5, 0.0, 0.0)))
+    assert Unsaved.of(cut, busy=False).question("closing") == (
+        "Save the sections as a case before closing?"
+    )
+    both = changes.set_case(cut, steps=7)
+    assert (
+        Unsaved.of(both, busy=False)
+        .question("closing")
+        .startswith("Save roles, motions, method and sections as a case")
+    )
+    named = replace(cut, case=replace(cut.case, source=Path("a.cfg")))
+    assert title_of(named).startswith("*")
+    assert "the changes to a.cfg" in Unsaved.of(named, busy=False).question("closing")
+    written = changes.saved_case(cut, cut.case)
+    assert not Unsaved.of(written, busy=False).what
+    # How they are shown is not asked about; that they are gone is.
+    hidden = changes.set_view(written, sections=(replace(written.view.section, shown=False),))
+    assert not Unsaved.of(hidden, busy=False).what
+    assert Unsaved.of(changes.set_view(written, sections=()), busy=False).can_save == ["case"]
+    # A case that is opened with sections has them.
+    kept = keep_view(written)
+    again = changes.open_mesh(session.first, None, (), kept)
+    assert len(again.view.sections) == 1
+    assert not Unsaved.of(again, busy=False).what
