@@ -29,8 +29,8 @@ class Unsaved:
         what = {}
         cut, source = unsaved_sections(session), session.case.source
         if session.unsaved_case or cut:
-            words = "roles, motions, method and sections" if cut else "roles, motions and method"
-            new = f"{words if session.unsaved_case else 'the sections'} as a case"
+            last = ", method and sections" if session.view.sections else " and method"
+            new = f"roles, motions{last} as a case"
             what["case"] = f"the changes to {source.name}" if source else new
         run = session.run_shown
         # The mesh of a design comes again at a click.
@@ -96,12 +96,15 @@ class Unsaved:
 
 
 def unsaved_sections(session: Session) -> bool:
-    """Tell whether the sections are others than those saved or opened, however they are shown."""
+    """Tell whether the sections are others than those of the case file, however they are shown.
+
+    Where there is no case file they were only looked at: False.
+    """
     now, saved = (
         [replace(section, shown=True, flat=False, name="") for section in sections]
         for sections in (session.view.sections, session.saved_sections)
     )
-    return session.saved is not None and now != saved
+    return session.case.source is not None and now != saved
 
 
 def title_of(session: Session) -> str:
