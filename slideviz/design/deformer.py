@@ -196,9 +196,9 @@ class Deformer:
         Parameters
         ----------
         displacement : (m, d)
-            The design.
+            The design; of several, call it for each.
         direction : (m, d) or (k, m, d)
-            Changes of the displacement.
+            Changes of the displacement, all of them at this one.
         """
         _, start, end = self._taped(displacement)
         return np.array(start.tape.push(start, self._checked(direction, "direction"), end))
@@ -209,7 +209,7 @@ class Deformer:
         Parameters
         ----------
         displacement : (m, d)
-            The design.
+            The design; of several, call it for each.
         weights : (n, d) or (k, n, d)
             Sensitivities of a function with respect to all points, such as those of an adjoint
             solver: the result is its gradient with respect to the displacement of the moving nodes.
@@ -299,7 +299,9 @@ class Deformer:
         """Return the states of a design, and input and points as variables of one tape."""
         given = self._shaped(displacement, self.displacement.shape, "displacement")
         if given.ndim == 3:
-            raise CaseError("derivatives are those at one displacement, not at several")
+            raise CaseError(
+                "derivatives are those at one displacement; of several, call it for each"
+            )
         start = Tape().variable(given)
         states = self._run(self._input.target(start))
         end = states[-1].points
