@@ -10,6 +10,10 @@ from hypothesis import settings
 settings.register_profile("slideviz", deadline=None)
 settings.load_profile("slideviz")
 
+# Workers share the cores: threads of BLAS that wait for each other cost a third of the time.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # Many tests start the program, which would compile each of its modules anew.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
