@@ -25,7 +25,7 @@ class Body:
     parts : list of ShapeBlock
         Its elements.
     frame : Frame
-        In which displacements are given and wanted.
+        The frame of the problem's displacements; the body is solved in Cartesian ones.
     axis : (n,) bool
         Nodes on the axis of a cylindrical frame, which move along it only.
     """
@@ -36,10 +36,11 @@ class Body:
 
 
 def conditions(problem: Problem, body: Body, nodes: IntArray, values: FloatArray) -> Conditions:
-    """Return the conditions when these nodes (m,) are displaced by ``values`` (m, d).
+    """Return the conditions of the body when ``nodes`` (m,) are displaced by ``values`` (m, d).
 
-    Nodes that coincide, and periodic images, are one block of unknowns; all other sliding nodes
-    of the problem keep off their normals. Nodes of no cell stay.
+    ``values`` are in the frame. Coinciding nodes and periodic images share one block of unknowns.
+    Sliding nodes that are not among ``nodes`` do not move along their normals. Nodes of no cell
+    have displacement zero.
 
     Raises
     ------
@@ -57,12 +58,12 @@ def conditions(problem: Problem, body: Body, nodes: IntArray, values: FloatArray
 
 
 def unknowns(problem: Problem, body: Body, known: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return the block of unknowns of each node (n,), -1 without, and R_i (n, d, d).
+    """Return each node's block of unknowns (n,), -1 if it has none, and R_i (n, d, d).
 
     Parameters
     ----------
     known : (m,)
-        Nodes with known displacement, of coinciding ones the one that stands for them.
+        Nodes with known displacement; of coinciding nodes, the one that represents them.
     """
     same = problem.same_as
     n, d = problem.coords.shape
@@ -79,12 +80,14 @@ def unknowns(problem: Problem, body: Body, known: IntArray) -> tuple[IntArray, F
 
 
 def held(place: IntArray, turn: FloatArray, free: FloatArray, known: FloatArray) -> Conditions:
-    """Return the conditions of unknowns that are free as ``free`` (k, d, d) says.
+    """Return the conditions with the unknowns restricted by the projections ``free``.
 
     Parameters
     ----------
     place, turn : (n,), (n, d, d)
-        As of ``unknowns``.
+        As ``unknowns`` returns them.
+    free : (k, d, d)
+        P_k of each block of unknowns.
     known : (n, d)
         g_i.
     """
@@ -96,7 +99,7 @@ def held(place: IntArray, turn: FloatArray, free: FloatArray, known: FloatArray)
 
 
 def _cartesian(problem: Problem, frame: Frame, displacement: FloatArray) -> FloatArray:
-    """Return displacements (n, d) of the frame as Cartesian ones; zero ones stay zero."""
+    """Return Cartesian displacements (n, d) of displacements in the frame; zero rows stay zero."""
     if not frame.cylindrical:
         return displacement
     moved = frame.points(problem.coords + displacement) - frame.points(problem.coords)
@@ -104,7 +107,7 @@ def _cartesian(problem: Problem, frame: Frame, displacement: FloatArray) -> Floa
 
 
 def _turns(problem: Problem, frame: Frame, nodes: IntArray) -> FloatArray:
-    """Return the rotations (m, d, d) of displacements of the nodes' owners into their own."""
+    """Return the rotations R_i (m, d, d) from the representatives' displacements to the nodes'."""
     d = problem.coords.shape[1]
     if not (frame.cylindrical and frame.period):
         return np.tile(np.eye(d), (len(nodes), 1, 1))
@@ -122,16 +125,17 @@ def _turns(problem: Problem, frame: Frame, nodes: IntArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class HeldRows:
-    """How unknowns are held by the normals of sliding nodes, and by the axis.
+    """The directions in which unknowns may not move, as rows: normals of sliding nodes, then axis.
 
     Attributes
     ----------
     axis : (a, d) float64
-        Directions of nodes on the axis, which follow the normals.
+        Directions that hold nodes on the axis: rows after the problem's normals.
     images, back : (i,) int64, (i, d, d) float64
-        Those of them all that are of periodic images, and the rotations back.
+        The rows of periodic images, and the rotations of their directions to the representative.
     order, place, turn : (r,) int64
-        Those that hold an unknown, whose block, and which of its directions: 0 for its first.
+        The rows that hold an unknown, sorted by its block; the block; and the number of the row
+        among those of the block, from 0.
     """
 
     axis: FloatArray
@@ -143,7 +147,7 @@ class HeldRows:
 
 
 def held_rows(problem: Problem, body: Body, place: IntArray) -> HeldRows:
-    """Return how blocks of unknowns ``place`` (n,) are held."""
+    """Return the rows that hold blocks of unknowns; ``place`` (n,) is the block of each node."""
     nodes, across = problem.normal_nodes, np.zeros((0, problem.coords.shape[1]))
     on_axis = np.flatnonzero(body.axis)
     if len(on_axis):
@@ -160,7 +164,7 @@ def held_rows(problem: Problem, body: Body, place: IntArray) -> HeldRows:
 
 
 def _projections(problem: Problem, body: Body, place: IntArray, count: int) -> FloatArray:
-    """Return the projections (count, d, d) on the directions in which unknowns are free."""
+    """Return the projections P_k (count, d, d) on the directions in which unknowns may move."""
     nodes, held = problem.normal_nodes, held_rows(problem, body, place)
     own = cartesian_normals(body.frame, problem.coords[nodes], problem.normals)
     normals = np.concatenate([own, held.axis])
@@ -180,10 +184,10 @@ def _projections(problem: Problem, body: Body, place: IntArray, count: int) -> F
 
 
 def cartesian_normals(frame: Frame, coords: FloatArray, normals: FloatArray) -> FloatArray:
-    """Return the directions (m, d) off which Cartesian displacements must keep.
+    """Return the unit directions (m, d) to which Cartesian displacements must be perpendicular.
 
-    In a cylindrical frame displacements are (dr, rho dtheta[, dz]), and rho dtheta is rho / r
-    times the distance along the circle.
+    From normals (m, d) in the frame at ``coords`` (m, d). In a cylindrical frame displacements are
+    (dr, rho dtheta[, dz]), and rho dtheta is rho / r times the distance along the circle.
     """
     if not frame.cylindrical:
         return np.array(normals)
@@ -201,7 +205,10 @@ def cartesian_normals(frame: Frame, coords: FloatArray, normals: FloatArray) -> 
 
 
 def rigid_motions(points: FloatArray, conditions: Conditions) -> FloatArray:
-    """Return the rigid motions of the unknowns, as far as they are free, (k d, 3 or 6)."""
+    """Return the rigid motions, projected on what the unknowns may do, (k d, 3) or (k d, 6).
+
+    ``points`` (n, d) are those of all nodes.
+    """
     place = conditions.place
     owner = np.zeros(len(conditions.free), np.int64)
     owner[place[place >= 0][::-1]] = np.flatnonzero(place >= 0)[::-1]

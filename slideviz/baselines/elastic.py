@@ -1,9 +1,9 @@
 """Linear elasticity: the mesh as an elastic body, as SU2 deforms it by default.
 
-Cells are the stiffer the smaller they are (Young's modulus is the inverse of the volume).
-Moving and fixed nodes have their displacement, sliding ones none along their normals, periodic
-images that of each other, turned where the mesh repeats by rotation; all others are free. In
-every step the body is taken as it is then, without stresses.
+Small cells are stiff: Young's modulus is the inverse of the cell's volume. The displacement of
+moving and fixed nodes is known, that of sliding nodes is zero along their normals, and periodic
+images have equal displacements, turned where the mesh repeats by rotation; all other nodes are
+free. Each step begins with the deformed mesh, without stresses.
 """
 
 from __future__ import annotations
@@ -20,17 +20,18 @@ from slideviz.rbf.methods import within
 from slideviz.rbf.problem import Problem, Solution, Watch
 
 HOPELESS = 1e-3
-"""Fall of the residual that must be reached; from it to the tolerance there is a warning."""
+"""Largest residual ratio of a usable solution; above ``multigrid.TOLERANCE`` there is a warning."""
 
 ASSEMBLING = 0.2
 """The part of the phase ``solve`` that the matrix takes."""
 
 
 def deform_elastic(problem: Problem, watch: Watch, body: Body) -> Solution:
-    """Return the displacement of an elastic body.
+    """Return the solution of one step as an elastic body.
 
-    Sliding nodes move in the tangent planes of their boundary. Where it is curved, or a node
-    slid past its end, they are then put back on it, and all else follows once more.
+    Sliding nodes move in the tangent planes of their boundary. Where a boundary is curved, or a
+    node slid past its end, sliding nodes are then projected on it, and a second solution has them
+    as known nodes.
 
     Raises
     ------
@@ -68,7 +69,15 @@ def _equilibrium(
     values: FloatArray,
     start: FloatArray | None = None,
 ) -> tuple[FloatArray, tuple[str, ...]]:
-    """Return the displacement of all nodes in the frame (n, d), and warnings of the solver."""
+    """Return the displacement of all nodes in the frame (n, d), and warnings of the solver.
+
+    Parameters
+    ----------
+    nodes, values : (m,), (m, d)
+        Nodes with known displacement, in the frame.
+    start : (n, d), optional
+        A guess of the displacement, in the frame.
+    """
     with watch.phase("solve") as tick:
         points = body.frame.points(problem.coords)
         given = conditions(problem, body, nodes, values)
@@ -95,12 +104,12 @@ def _equilibrium(
 
 
 def _warnings(found: LinearSolution) -> tuple[str, ...]:
-    """Return a warning where the solver did not reach its tolerance.
+    """Return a warning if the solver did not reach its tolerance; empty if it did.
 
     Raises
     ------
     DeformError
-        It did not get near a solution.
+        The residual ratio is above `HOPELESS`.
     """
     if found.converged:
         return ()

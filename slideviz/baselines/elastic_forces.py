@@ -1,4 +1,4 @@
-"""Forces of an elastic body, f = K(x) u, and their derivatives by the positions x of its nodes.
+"""Forces of an elastic body, f = K(x) u, and derivatives with respect to the node positions x.
 
 With G the gradient of the displacement u, and its stress per modulus of the cell
 
@@ -30,7 +30,17 @@ LAM = POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """The forces of a body whose nodes are at ``points`` (n, d)."""
+    """Computes the forces of a body, and their derivatives.
+
+    Attributes
+    ----------
+    points : (n, d) float64
+        Positions of the nodes.
+    parts : list of ShapeBlock
+        The elements.
+    volume : (c,) float64
+        Volume (area in 2D) of each cell.
+    """
 
     points: FloatArray
     parts: list[ShapeBlock]
@@ -38,7 +48,7 @@ class Forces:
 
     @classmethod
     def at(cls, points: FloatArray, parts: list[ShapeBlock]) -> Forces:
-        """Return those at some positions."""
+        """Return the forces of a body with its nodes at ``points`` (n, d)."""
         return cls(points, parts, cell_volumes(points, parts))
 
     def of(self, moved: FloatArray) -> FloatArray:
@@ -49,7 +59,7 @@ class Forces:
         return out
 
     def pushed(self, moved: FloatArray, by: FloatArray) -> FloatArray:
-        """Return how forces change as positions change by ``by`` (n, d)."""
+        """Return the change (n, d) of the forces of ``moved`` as positions change by ``by``."""
         out, swelling = np.zeros_like(self.points), np.zeros_like(self.volume)
         for part in self.parts:
             each = np.empty(len(part.nodes))
@@ -62,7 +72,7 @@ class Forces:
         return out
 
     def pulled(self, moved: FloatArray, weights: FloatArray) -> FloatArray:
-        """Return the gradient by positions (n, d) of the sum of ``weights`` (n, d) times forces."""
+        """Return the gradient (n, d) of ``(weights * forces).sum()`` with respect to positions."""
         out, work = np.zeros_like(self.points), np.zeros_like(self.volume)
         for part in self.parts:
             each = np.empty(len(part.nodes))
@@ -79,12 +89,13 @@ class Forces:
         return points, nodes, part.shape.gradients, part.shape.weights
 
     def _modulus(self, part: ShapeBlock) -> FloatArray:
+        """Return Young's modulus times the share of each element, (m,)."""
         return np.asarray(part.share / self.volume[part.cell])
 
 
 @njit(**OPTIONS)
 def _at(elements, e, q, x, inverse, slopes):  # type: ignore[no-untyped-def]
-    """Write grad N_a (a, d) at an integration point of an element; return |det J| w."""
+    """Write grad N_a (a, d) at integration point q of element e to ``slopes``; return |det J| w."""
     points, nodes, gradients, weights = elements
     n, d = x.shape
     _gather(points, nodes, e, x)
@@ -100,7 +111,10 @@ def _at(elements, e, q, x, inverse, slopes):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def _gradient(nodes, e, field, slopes, out):  # type: ignore[no-untyped-def]
-    """Write the gradient (d, d) of a field (n, d), components first; return its trace."""
+    """Write the gradient (d, d) of a nodal field (n, d) in element e to ``out``; return its trace.
+
+    The first index is the component of the field.
+    """
     n, d = slopes.shape
     out[:] = 0.0
     for a in range(n):
@@ -115,7 +129,7 @@ def _gradient(nodes, e, field, slopes, out):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def _stress(gradient, trace, out):  # type: ignore[no-untyped-def]
-    """Write the stress (d, d) per modulus."""
+    """Write the stress S (d, d) for a modulus of 1 to ``out``."""
     for i in range(len(out)):
         for j in range(len(out)):
             out[i, j] = MU * (gradient[i, j] + gradient[j, i])
@@ -124,7 +138,7 @@ def _stress(gradient, trace, out):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def _spread(nodes, e, slopes, size, what, out):  # type: ignore[no-untyped-def]
-    """Add ``size`` times a matrix (d, d) times grad N_a to each node of an element."""
+    """Add ``size`` times ``what`` (d, d) times grad N_a to the nodes of element e in ``out``."""
     n, d = slopes.shape
     for a in range(n):
         for i in range(d):
@@ -136,7 +150,7 @@ def _spread(nodes, e, slopes, size, what, out):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def add_forces(elements, modulus, moved, out):  # type: ignore[no-untyped-def]
-    """Add the forces of elements to those of nodes."""
+    """Add the forces of elements at displacement ``moved`` (n, d) to ``out`` (n, d)."""
     nodes, d = elements[1], elements[0].shape[1]
     x, slopes = np.empty((nodes.shape[1], d)), np.empty((nodes.shape[1], d))
     inverse, g, s = np.empty((3, 3)), np.empty((d, d)), np.empty((d, d))
@@ -149,7 +163,7 @@ def add_forces(elements, modulus, moved, out):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def swell(elements, by, out):  # type: ignore[no-untyped-def]
-    """Write how the volumes of elements change as positions change by ``by`` (n, d)."""
+    """Write the change of each element's volume as positions change by ``by`` (n, d) to ``out``."""
     nodes, d = elements[1], elements[0].shape[1]
     x, slopes = np.empty((nodes.shape[1], d)), np.empty((nodes.shape[1], d))
     inverse, t = np.empty((3, 3)), np.empty((d, d))
@@ -162,7 +176,7 @@ def swell(elements, by, out):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def press(elements, by, out):  # type: ignore[no-untyped-def]
-    """Add to nodes the gradient of the volumes of elements, each times ``by``."""
+    """Add to ``out`` (n, d) the gradient of the sum of element volumes, each times ``by`` (m,)."""
     nodes, d = elements[1], elements[0].shape[1]
     x, slopes = np.empty((nodes.shape[1], d)), np.empty((nodes.shape[1], d))
     inverse, one = np.empty((3, 3)), np.eye(d)
@@ -174,9 +188,9 @@ def press(elements, by, out):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def push(elements, modulus, rate, moved, by, out):  # type: ignore[no-untyped-def]
-    """Add how the forces of elements change as positions change by ``by`` (n, d).
+    """Add to ``out`` the change of the forces as positions change by ``by`` (n, d).
 
-    ``rate``: by what part their cells' volumes change.
+    ``rate`` (m,) is the relative change of the volume of each element's cell.
     """
     nodes, d = elements[1], elements[0].shape[1]
     x, slopes = np.empty((nodes.shape[1], d)), np.empty((nodes.shape[1], d))
@@ -205,9 +219,10 @@ def push(elements, modulus, rate, moved, by, out):  # type: ignore[no-untyped-de
 
 @njit(**OPTIONS)
 def pull(elements, modulus, moved, weights, out, work):  # type: ignore[no-untyped-def]
-    """Add the gradient of weights times forces, at constant modulus; write that sum to ``work``.
+    """Add to ``out`` the gradient of weights (n, d) times forces at constant modulus.
 
-    With L the gradient of the weights, of (S : L) tr T - S : (L T) - S_L : (G T), S_L their stress.
+    Write each element's part of weights times forces to ``work`` (m,). With L the gradient of the
+    weights and S_L its stress, the derivative is (S : L) tr T - S : (L T) - S_L : (G T).
     """
     nodes, d = elements[1], elements[0].shape[1]
     x, slopes = np.empty((nodes.shape[1], d)), np.empty((nodes.shape[1], d))

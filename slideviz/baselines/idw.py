@@ -6,8 +6,8 @@ over all boundary nodes j with known displacement v_j; no system is solved. The 
 number of dimensions (2 in the plane, 3 in space) if not given. g_j is 1 for nodes that move and
 the factor ``fixed_weight`` for those that stay: above 1 it keeps the mesh at rest near walls,
 below 1 it lets the motion reach further. Distances are those of the working frame, so they are
-periodic where the case is. Sliding nodes go the way of pseudo sliding: edges first, then surfaces,
-each displaced by what is known before and projected.
+periodic where the case is. Sliding nodes are treated as in pseudo sliding: edges first, then
+surfaces, each displaced by the nodes known before, and projected.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ class Weights:
     Attributes
     ----------
     power : float
-        c.
+        The power c of the distance.
     fixed_weight : float
-        g_j of nodes that stay.
+        The weight g_j of nodes with displacement zero.
     """
 
     power: float
     fixed_weight: float = 1.0
 
     def of(self, values: FloatArray) -> FloatArray:
-        """Return g_j of nodes with the displacements ``values`` (n, d)."""
+        """Return g_j, (n,), of nodes with the displacements ``values`` (n, d)."""
         return np.where(np.any(values != 0, axis=1), 1.0, self.fixed_weight)
 
 
@@ -74,7 +74,7 @@ def weighted_means(
     tick
         Called between chunks with the fraction done; may raise to stop.
     """
-    # Only lengths are scaled: sine and cosine of the angle are none.
+    # Features 1 and 2 of a rotational period are sine and cosine, not lengths: they are not scaled.
     scale = np.full((4, 1), 1.0 / basis.radius)
     if basis.period > 0:
         scale[1:3] = 1.0
@@ -97,7 +97,7 @@ def weighted_means(
 
 
 def deform_idw(problem: Problem, watch: Watch, weights: Weights) -> Solution:
-    """Return the displacement as weighted means of that of the boundary.
+    """Return the solution of one step: displacements are weighted means of those of the boundary.
 
     Raises
     ------
@@ -131,15 +131,17 @@ def deform_idw(problem: Problem, watch: Watch, weights: Weights) -> Solution:
 
 @dataclass(frozen=True, eq=False)
 class WeightedField:
-    """Means of the displacements of sources, weighted with their inverse distance.
+    """Displacement field: means of the displacements of sources, by their inverse distance.
 
     Attributes
     ----------
     basis : Basis
     sources : (k, n) float64
-        Features.
+        Features of the boundary nodes.
     values, weights : (n, d), (n,) float64
+        Their displacements v_j in the frame, and g_j.
     power : float
+        c.
     """
 
     basis: Basis
@@ -169,7 +171,7 @@ def _at(
     targets: IntArray,
     weights: Weights,
 ) -> FloatArray:
-    """Return the displacements (m, d) of nodes from those of the known ones."""
+    """Return the displacements (m, d) of ``targets`` (m,), from ``values`` at ``known`` nodes."""
     field = _field(problem, known, values, weights)
     with watch.phase("evaluate") as tick:
         return field.at(problem.features[:, targets], problem.coords[targets], tick)
@@ -178,6 +180,7 @@ def _at(
 def _field(
     problem: Problem, known: IntArray, values: FloatArray, weights: Weights
 ) -> WeightedField:
+    """Return the field of ``values`` (m, d) at nodes ``known`` (m,), coinciding nodes merged."""
     nodes, values = merge(problem, known, values)
     own = weights.of(values)
     return WeightedField(problem.basis, problem.features[:, nodes], values, own, weights.power)
@@ -195,9 +198,9 @@ def _weight(squared, power):  # type: ignore[no-untyped-def]
 
 @njit(parallel=True, **OPTIONS)
 def weigh(x, c, w, g, power, out):  # type: ignore[no-untyped-def]
-    """Write the weighted means to out (3, N).
+    """Write the weighted means at targets x (4, N) to out (3, N), for the Euclidean distance.
 
-    Targets x (4, N), sources c (4, n) with values w (3, n) and weights g (n,) of their own.
+    Of values w (3, n) at sources c (4, n), with weights g (n,) besides that of the distance.
     """
     c0, c1, c2, c3 = c[0], c[1], c[2], c[3]
     w0, w1, w2 = w[0], w[1], w[2]
@@ -217,7 +220,10 @@ def weigh(x, c, w, g, power, out):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def _squares(x, c, start, count, period_over_pi, q):  # type: ignore[no-untyped-def]
-    """Write the squares of Eq. 2.15 from one target x (4,) to ``count`` sources from ``start``."""
+    """Write squared distances from one target x (4,) to ``count`` sources from ``start`` to q.
+
+    With a rotational period, as ``compiled.distances``; at least ``TINY``.
+    """
     c0, c1 = c[0, start : start + count], c[1, start : start + count]
     c2, c3 = c[2, start : start + count], c[3, start : start + count]
     r, sine, cosine, z = x[0], x[1], x[2], x[3]
@@ -229,7 +235,7 @@ def _squares(x, c, start, count, period_over_pi, q):  # type: ignore[no-untyped-
 
 @njit(**OPTIONS)
 def _weigh(q, count, power):  # type: ignore[no-untyped-def]
-    """Replace squared distances by distance^-power."""
+    """Replace the first ``count`` squared distances in q by distance^-power."""
     if power == 2.0:
         for j in range(count):
             q[j] = 1.0 / q[j]

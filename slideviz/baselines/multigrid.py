@@ -1,7 +1,7 @@
-"""Conjugate gradients, preconditioned by smoothed aggregation.
+"""Conjugate gradients, preconditioned by multigrid cycles (smoothed aggregation).
 
-pyamg makes the hierarchy from the rigid motions; the cycles run through it here, because its
-own sweeps keep the interpreter lock for seconds on large meshes, and with it a window still.
+pyamg makes the hierarchy of levels from the rigid motions. The cycles are computed here, because
+pyamg's own sweeps hold the interpreter lock for seconds on large meshes, and freeze a window.
 """
 
 from __future__ import annotations
@@ -24,29 +24,38 @@ from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.evaluate import Tick, no_tick
 
 TOLERANCE = 1e-8
-"""Fall of the residual, in the energy of the preconditioner, at which the solution is found."""
+"""Residual ratio, in the energy norm of the preconditioner, at which the iteration ends."""
 
 MAX_ITERATIONS = 300
 
 COARSE = 600
-"""Unknowns that are few enough for a dense factor."""
+"""Largest number of unknowns of the coarsest level, which has a dense factor."""
 
 RIDGE = 1e-12
-"""Added to the diagonal of the coarsest matrix, relative to it: motions that no condition holds
-(a mesh that may slide as a whole) make it singular, and then the right-hand side fits."""
+"""Added to the diagonal of the coarsest matrix, relative to it. A mesh that may slide as a whole
+makes the matrix singular; its right-hand side is consistent then."""
 
 WAIT_SECONDS = 0.1
 """Between two calls of ``tick`` while the hierarchy is made."""
 
 MAKING = 0.3
-"""The part of the work that making the hierarchy takes."""
+"""The part of the progress at which the hierarchy is made."""
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "fastmath": True}
 
 
 @dataclass(frozen=True, eq=False)
 class LinearSolution:
-    """A solution (n,), the iterations it took, and how far the residual fell."""
+    """What the iteration found.
+
+    Attributes
+    ----------
+    x : (n,) float64
+        The solution.
+    iterations : int
+    residual_ratio : float
+        Last residual over that of x = 0, in the energy norm of the preconditioner: small is good.
+    """
 
     x: FloatArray
     iterations: int
@@ -54,15 +63,23 @@ class LinearSolution:
 
     @property
     def converged(self) -> bool:
-        """Tell whether the residual fell to the tolerance."""
+        """Tell whether the residual ratio is at most `TOLERANCE`."""
         return self.residual_ratio <= TOLERANCE
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A matrix in blocks with the inverses of its diagonal, and the way to the next level.
+    """A level of the hierarchy.
 
-    ``up`` and ``down`` are None on the coarsest, which has a dense factor instead.
+    Attributes
+    ----------
+    matrix : bsr_array
+    inverse : (m, b, b) float64
+        Inverses of its diagonal blocks; empty on the coarsest level.
+    up, down : sparse matrices or None
+        Prolongation from the next coarser level, and restriction to it; None on the coarsest.
+    factor : tuple or None
+        Dense Cholesky factor, on the coarsest level only.
     """
 
     matrix: bsr_array
@@ -79,7 +96,7 @@ def solve(
     start: FloatArray,
     tick: Tick = no_tick,
 ) -> LinearSolution:
-    """Return the solution of a symmetric positive definite system.
+    """Solve a symmetric positive definite system; x = 0 where the right-hand side is zero.
 
     Parameters
     ----------
@@ -88,7 +105,7 @@ def solve(
     right, start : (n,)
         Right-hand side, and a guess of the solution.
     modes : (n, m)
-        What costs next to no energy: the rigid motions.
+        Vectors of nearly no energy: the rigid motions.
     """
     if not np.any(right):
         return LinearSolution(np.zeros_like(right), 0, 0.0)
@@ -97,10 +114,10 @@ def solve(
 
 
 def _while_ticking(work: Callable[[], list[Level]], tick: Tick) -> list[Level]:
-    """Return what ``work`` returns, calling ``tick`` meanwhile, which may raise to stop.
+    """Return what ``work`` returns; call ``tick`` while it runs in a thread. ``tick`` may raise.
 
-    pyamg's set-up of a large mesh takes seconds and asks nobody. When it is stopped it goes on
-    in its thread to its end, but nobody waits for that.
+    pyamg's set-up of a large mesh takes seconds and has no callback. When ``tick`` raises, the
+    thread runs to its end, but nobody waits for it.
     """
     found: Future[list[Level]] = Future()
 
@@ -123,10 +140,7 @@ def _while_ticking(work: Callable[[], list[Level]], tick: Tick) -> list[Level]:
 
 
 def hierarchy(matrix: bsr_array, modes: FloatArray) -> list[Level]:
-    """Return the levels of a matrix, finest first.
-
-    Parameters as of ``solve``.
-    """
+    """Return the levels of a matrix, finest first; parameters as of ``solve``."""
     import pyamg
 
     with warnings.catch_warnings():
@@ -173,14 +187,17 @@ def _product(matrix: Any, x: FloatArray) -> FloatArray:
 
 
 def _sweep(level: Level, right: FloatArray, x: FloatArray, backward: bool) -> None:
-    """Smooth x (n,) in place."""
+    """Smooth x (n,) in place by one Gauss-Seidel sweep."""
     matrix, shape = level.matrix, level.inverse.shape[:2]
     blocks = right.reshape(shape), x.reshape(shape)
     sweep(matrix.indptr, matrix.indices, matrix.data, level.inverse, *blocks, backward)
 
 
 def _cycle(levels: list[Level], right: FloatArray) -> FloatArray:
-    """Return the correction (n,) of a V-cycle: one sweep down, and the same backwards up."""
+    """Return the correction (n,) of one V-cycle for the residual ``right``.
+
+    One sweep on the way down, and one backwards on the way up, so that it is symmetric.
+    """
     level = levels[0]
     if level.factor is not None:
         return np.asarray(cho_solve(level.factor, right, check_finite=False))
@@ -200,16 +217,18 @@ def conjugate_gradients(
     *,
     tolerance: float = TOLERANCE,
 ) -> LinearSolution:
-    """Return the solution; Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1.
+    """Solve by conjugate gradients, preconditioned by V-cycles.
+
+    Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1.
 
     Parameters
     ----------
     levels
-        Of the matrix, as ``hierarchy`` makes them.
+        Of the matrix, as ``hierarchy`` returns them.
     right, start : (n,)
         Right-hand side, and a guess of the solution.
     tolerance
-        Fall of the residual at which it ends.
+        Residual ratio at which the iteration ends.
     """
     matrix = levels[0].matrix
     first = float(right @ _cycle(levels, right))
@@ -234,9 +253,10 @@ def conjugate_gradients(
 
 @njit(**_OPTIONS)
 def sweep(indptr, indices, data, inverse, right, x, backward):  # type: ignore[no-untyped-def]
-    """Make one Gauss and Seidel sweep by blocks, on x (m, b) in place.
+    """Make one Gauss-Seidel sweep by blocks on x (m, b), in place.
 
-    ``data`` (k, b, b) and ``inverse`` (m, b, b): the blocks, and the inverse of the diagonal ones.
+    ``indptr``, ``indices`` and ``data`` (k, b, b) are those of the block matrix, ``inverse``
+    (m, b, b) the inverses of its diagonal blocks.
     """
     m, b = x.shape
     left = np.empty(b)

@@ -1,8 +1,8 @@
-"""Shape functions at integration points, from scikit-fem, by the element types of SU2.
+"""Shape functions of SU2's element types at integration points, from scikit-fem.
 
 Triangles and tetrahedra have one integration point, quadrilaterals four, prisms six and
-hexahedra eight: what SU2's mesh deformation uses. There is no linear pyramid in scikit-fem, and
-none whose gradients are polynomials: a pyramid is the mean of its two divisions into two
+hexahedra eight, as in SU2's mesh deformation. scikit-fem has no linear pyramid, and no pyramid
+has shape functions with polynomial gradients: a pyramid is the mean of its two divisions into two
 tetrahedra, so that its four base corners are treated alike.
 """
 
@@ -18,7 +18,7 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, frozen_array
 PYRAMID = 14
 TETRAHEDRON = 10
 PYRAMID_PARTS = ((0, 1, 2, 4), (0, 2, 3, 4), (0, 1, 3, 4), (1, 2, 3, 4))
-"""Both divisions of a pyramid; each of the four tetrahedra counts half."""
+"""The tetrahedra of both divisions of a pyramid, by its corners; each counts half."""
 
 _CORNERS = {
     5: ((0, 0), (1, 0), (0, 1)),
@@ -33,7 +33,7 @@ _CORNERS = {
 """The corners of the reference elements in the order of SU2's (VTK's) nodes."""
 
 _ORDER = {5: 1, 9: 2, 10: 1, 12: 2}
-"""Degree of the polynomials that the integration has to get right."""
+"""Degree of the polynomials that the integration rule integrates exactly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class ReferenceShape:
 
 @cache
 def shape(vtk: int) -> ReferenceShape:
-    """Return the shape functions of an element type, in the order of SU2's nodes."""
+    """Return the shape functions of a VTK element type, in the order of SU2's nodes."""
     import skfem
 
     element = {
@@ -91,7 +91,7 @@ def _quadrature(vtk: int, element: object) -> tuple[FloatArray, FloatArray]:
 
 @dataclass(frozen=True, eq=False)
 class ShapeBlock:
-    """Elements that have one shape.
+    """The elements of a mesh that have one shape.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class ShapeBlock:
     cell : (m,) int64
         The cell of the mesh that each element is (a part of).
     share : float
-        How much each counts: 1, or 1/2 for the parts of pyramids.
+        Weight of each element: 1, or 1/2 for the parts of pyramids.
     """
 
     shape: ReferenceShape
@@ -110,7 +110,7 @@ class ShapeBlock:
 
 
 def blocks(cells: Cells) -> list[ShapeBlock]:
-    """Return all cells as elements with shape functions; pyramids in parts."""
+    """Return all cells as elements, a block for each type; pyramids as parts of tetrahedra."""
     found = []
     for vtk, (ids, nodes) in cells.by_type.items():
         if vtk == PYRAMID:

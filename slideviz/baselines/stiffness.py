@@ -1,14 +1,14 @@
-"""Stiffness matrix of the mesh as an elastic body, with its conditions, as in SU2.
+"""Stiffness matrix of the mesh as an elastic body, with its boundary conditions, as in SU2.
 
 Young's modulus of a cell is the inverse of its volume, Poisson's ratio 0.3, plane strain in two
 dimensions (SU2's DEFORM_STIFFNESS_TYPE= INVERSE_VOLUME and DEFORM_POISSONS_RATIO). Conditions
-enter while the matrix is added up, node by node: the displacement of node i is
+are eliminated during assembly, node by node: the displacement of node i is
 
     u_i = T_i z_k + g_i,      k = place_i
 
-with T_i = R_i P_k: P_k projects on the directions in which the node is free, R_i turns its
-periodic image into it. Known nodes have no place, only g_i. The matrix stays symmetric and its
-blocks stay d by d, which the multigrid solver likes.
+with T_i = R_i P_k: P_k projects on the directions in which the node is free, R_i rotates
+displacements of its representative periodic image into its own. Known nodes have no block of
+unknowns, only g_i. The matrix is symmetric with blocks d by d, as the multigrid solver needs it.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Conditions of all nodes, u_i = T_i z_k + g_i.
+    """Boundary conditions of all nodes, u_i = T_i z_k + g_i.
 
     Attributes
     ----------
     place : (n,) int64
-        Number of the block of unknowns of each node; -1 for known ones. Images share one.
+        Number of each node's block of unknowns; -1 for known nodes. Periodic images share one.
     turn : (n, d, d) float64
         T_i; the identity for most.
     plain : (n,) bool
@@ -67,8 +67,8 @@ def assemble(
     Parameters
     ----------
     points : (n, d)
-        Current positions. Folded elements count with the size of their Jacobian, so that the
-        matrix stays positive definite.
+        Current positions. Inverted elements count with the absolute value of their Jacobian, so
+        that the matrix stays positive definite.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def assemble(
 
 
 def cell_volumes(points: FloatArray, parts: list[ShapeBlock]) -> FloatArray:
-    """Return the volumes (areas) of cells, by number."""
+    """Return the volume (area in 2D) of each cell, (c,)."""
     out = np.zeros(max((int(p.cell.max(initial=-1)) + 1 for p in parts), default=0))
     for part in parts:
         each = np.empty(len(part.nodes))
@@ -115,7 +115,7 @@ def cell_volumes(points: FloatArray, parts: list[ShapeBlock]) -> FloatArray:
 
 
 def _pattern(parts: list[ShapeBlock], place: IntArray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return indptr and indices of the blocks: which unknowns share an element."""
+    """Return indptr and indices of the matrix blocks: pairs of unknowns that share an element."""
     rows, columns, offset = [], [], 0
     for part in parts:
         at = place[part.nodes]
@@ -135,7 +135,10 @@ def _pattern(parts: list[ShapeBlock], place: IntArray, count: int) -> tuple[np.n
 def _fill_held_diagonal(
     indptr: np.ndarray, indices: np.ndarray, data: FloatArray, free: FloatArray
 ) -> None:
-    """Add stiffness in the directions in which blocks of unknowns may not move, in place."""
+    """Fill the diagonal blocks of ``data`` (nnz, d, d) in the directions that ``free`` removes.
+
+    ``free`` (k, d, d) are the projections P_k. Else the matrix would be singular.
+    """
     held = np.eye(free.shape[1]) - free
     rows = np.flatnonzero(np.any(held != 0, axis=(1, 2)))
     row_of = np.repeat(np.arange(len(free)), np.diff(indptr))
@@ -147,7 +150,10 @@ def _fill_held_diagonal(
 
 @njit(**OPTIONS)
 def _jacobian(x, gradients, q, inverse):  # type: ignore[no-untyped-def]
-    """Return det J of one element at an integration point; writes J^-1 to ``inverse``."""
+    """Return det J of an element with corners x (a, d) at integration point q.
+
+    Writes J^-1 to ``inverse`` (3, 3).
+    """
     d = x.shape[1]
     J = np.zeros((3, 3))
     J[2, 2] = 1.0
@@ -181,7 +187,7 @@ def _gather(points, nodes, e, x):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def volumes(points, nodes, gradients, weights, out):  # type: ignore[no-untyped-def]
-    """Write the volumes (areas) of elements, without regard to orientation."""
+    """Write the volumes (areas) of elements to ``out`` (m,), positive for any orientation."""
     inverse = np.empty((3, 3))
     x = np.empty((nodes.shape[1], points.shape[1]))
     for e in range(len(nodes)):
@@ -193,7 +199,10 @@ def volumes(points, nodes, gradients, weights, out):  # type: ignore[no-untyped-
 
 @njit(**OPTIONS)
 def _products(x, gradients, weights, inverse, g, m):  # type: ignore[no-untyped-def]
-    """Write the integrals of grad_i N_a grad_j N_b to m (a d, a d); False without volume."""
+    """Write the integrals of grad_i N_a grad_j N_b to m (a d, a d).
+
+    Returns False for an element without volume. ``inverse`` and ``g`` are scratch.
+    """
     n, d = x.shape
     m[:] = 0.0
     for q in range(len(weights)):
@@ -215,10 +224,11 @@ def _products(x, gradients, weights, inverse, g, m):  # type: ignore[no-untyped-
 
 @njit(**OPTIONS)
 def add(elements, modulus, conditions, pattern, data, right):  # type: ignore[no-untyped-def]
-    """Add elements to the matrix and the right-hand side; the first without volume, or -1.
+    """Add elements to the matrix blocks ``data`` and the right-hand side ``right`` (k, d).
 
-    ``elements``: points, nodes, gradients and weights; ``conditions``: place, turn, plain and
-    known; ``pattern``: indptr and indices.
+    Returns the first element without volume, at which it ends, or -1. ``elements``: points, nodes,
+    gradients and weights; ``conditions``: place, turn, plain and known; ``pattern``: indptr and
+    indices.
     """
     points, nodes, gradients, weights = elements
     place, turn, plain, known = conditions
@@ -272,7 +282,7 @@ def add(elements, modulus, conditions, pattern, data, right):  # type: ignore[no
 
 @njit(**OPTIONS)
 def _into(turn, block, half, left):  # type: ignore[no-untyped-def]
-    """Replace a block by T^T block (``left``) or block T, in place."""
+    """Replace a block (d, d) by T^T block (``left``) or block T, in place; ``half`` is scratch."""
     d = len(block)
     for i in range(d):
         for j in range(d):

@@ -1,4 +1,4 @@
-"""What is checked of each design: that its result can be right, and how far it is off."""
+"""Checks of each design: whether its result can be right, and its largest error."""
 
 from __future__ import annotations
 
@@ -32,9 +32,11 @@ class Checks:
     setup : Setup
     steps : tuple of FrozenStep
     facets : dict of int to (s,) int64
-        The facets that the sliding nodes of each track are on at the reference.
+        For each track, by its index, the simplex that each of its sliding nodes is on at the
+        reference.
     least : float
-        How far nodes may go at least, in the frame.
+        A motion that nodes may make in any design, in the frame: the reference's, or an edge of
+        the moving boundary.
     """
 
     mesh: Mesh
@@ -44,12 +46,20 @@ class Checks:
     least: float
 
     def errors(self, targets: FloatArray, states: list[StepState]) -> FloatArray:
-        """Return the largest error of each design, (...,).
+        """Return the largest error of each design, (...,), in the mesh's length unit.
+
+        Parameters
+        ----------
+        targets : (..., a, d)
+            Displacements of the known nodes, in the frame.
+        states
+            After each step.
 
         Raises
         ------
         DeformError
-            Coordinates became infinite, nodes go far beyond the motion, or images apart.
+            Coordinates are infinite, nodes move much farther than the boundary, or periodic images
+            moved differently.
         """
         errors = self.off_track(value(states[-1].coords))
         for index, (step, state) in enumerate(zip(self.steps, states, strict=True), start=1):
@@ -59,10 +69,17 @@ class Checks:
         return errors
 
     def require_sound(self, index: int, part: float, targets: FloatArray, state: StepState) -> None:
-        """Raise where the results of a step cannot be right: what every run checks.
+        """Raise DeformError where the results of a step cannot be right, as in every run.
 
-        Nodes may go as far as by the reference, or by an edge of what moves: the finite difference
-        that moves one node alone by next to nothing has no other motion to be judged by.
+        Nodes may always move as far as at the reference, or by an edge of the moving boundary: so
+        a finite difference, which moves one node by next to nothing, is not refused.
+
+        Parameters
+        ----------
+        index
+            Number of the step, from 1, for the message.
+        part
+            Part of the whole displacement after the step.
         """
         shape = self.mesh.points.shape
         coords = value(state.coords).reshape(-1, *shape)
@@ -89,7 +106,7 @@ class Checks:
                     raise UnsoundError(f"step {index}: {unsound}")
 
     def require_alike(self, points: FloatArray) -> None:
-        """Raise where periodic images have moved differently."""
+        """Raise DeformError where periodic images of Cartesian points (n, d) moved differently."""
         setup = self.setup
         if not len(setup.images):
             return
@@ -100,7 +117,7 @@ class Checks:
             largest_misfit(setup.frame, setup.coords, points, setup.images)
 
     def off_track(self, coords: FloatArray) -> FloatArray:
-        """Return how far sliding nodes are off their boundary, at most, (...,)."""
+        """Return the largest distance, (...,), of a sliding node from its track, in the frame."""
         tracks, sliding = self.setup.tracks, self.setup.classes.sliding
         label, off = tracks.of_node[sliding], np.zeros(coords.shape[:-2])
         for index, facets in self.facets.items():
@@ -111,7 +128,11 @@ class Checks:
         return off
 
     def tolerance(self, designs: FloatArray) -> FloatArray:
-        """Return what errors may be, (...,): by the data reduction, or a part of the motion."""
+        """Return the allowed error of each design, (...,), in the mesh's length unit.
+
+        The tolerance of the data reduction, or a part of the largest displacement of ``designs``
+        (..., m, d).
+        """
         if self.setup.reduction is not None:
             return np.full(designs.shape[:-2], self.setup.reduction.tolerance)
         largest = np.linalg.norm(designs, axis=-1).max(axis=-1, initial=0.0)
@@ -119,7 +140,10 @@ class Checks:
 
 
 def facets_of(setup: Setup, coords: FloatArray) -> dict[int, IntArray]:
-    """Return the facets that the sliding nodes of each track are on at the reference."""
+    """Return for each track, by its index, the simplex (s,) that each of its sliding nodes is on.
+
+    ``coords`` (n, d) are in the frame.
+    """
     tracks, sliding = setup.tracks, setup.classes.sliding
     label = tracks.of_node[sliding]
     return {
@@ -129,7 +153,7 @@ def facets_of(setup: Setup, coords: FloatArray) -> dict[int, IntArray]:
 
 
 def usual_edge(setup: Setup) -> float:
-    """Return the median distance of neighbours on what moves, in the frame; 0 without any."""
+    """Return the median edge length of the moving boundary, in the frame; 0 without one."""
     facets = setup.boundary.facets
     facets = facets[np.isin(facets, setup.classes.moving).all(axis=1)]
     ends = setup.coords[np.roll(facets, -1, axis=1)] - setup.coords[facets]

@@ -1,4 +1,4 @@
-"""What a deformer keeps: number of steps and control nodes, chosen by the solver itself."""
+"""Chooses the steps and the control nodes that a deformer keeps, by running the solver."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ Tell = Callable[[Progress], None]
 def choose_steps(
     case: Case, mesh: Mesh, setup: Setup, targets: Sequence[FloatArray], tell: Tell
 ) -> tuple[tuple[FrozenStep, ...], FloatArray]:
-    """Return the steps of a deformation with their control nodes, enough for all displacements.
+    """Return steps with control nodes that suffice for all ``targets``, and the first run's points.
 
-    And the points (n, d) of the run that chose them. The number of steps is that of the first
-    displacement. The control nodes of each further one begin with those of all before.
+    The points are (n, d), deformed by the first displacement, which also chooses the number of
+    steps. The selection for each further displacement begins with the control nodes of all before.
 
     Parameters
     ----------
@@ -75,17 +75,19 @@ def choose_steps(
 
 
 def _begun(setup: Setup, stages: tuple[Levels, ...], problem: Problem, watch: Watch) -> Solution:
+    """Solve a problem whose selection begins with the rows ``stages``."""
     return setup.solve(replace(problem, stages=stages), watch)
 
 
 def _lasting(problem: Problem) -> Problem:
+    """Return the problem with its system to be tested for other data, too."""
     return replace(problem, lasting=True)
 
 
 def _reference(
     case: Case, mesh: Mesh, setup: Setup, tell: Tell
 ) -> tuple[list[float], list[Solution], FloatArray]:
-    """Return which part of the displacement a run's steps reach, their solutions, its points."""
+    """Run the solver; return the part of the displacement at each step, solutions, and points."""
     made: list[Solution] = []
 
     def solve(problem: Problem, watch: Watch) -> Solution:
@@ -99,13 +101,18 @@ def _reference(
 
 
 def _told(tell: Tell, step: int, total: int, phase: str, fraction: float) -> None:
+    """Report progress."""
     tell(Progress(step, total, phase, fraction))
 
 
 def _further(
     mesh: Mesh, setup: Setup, parts: Sequence[float], chosen: Sequence[Solution], tell: Tell
 ) -> list[Solution]:
-    """Return the solutions of the steps with the control nodes of others, and more where needed."""
+    """Run the steps for ``setup.target``; return their solutions.
+
+    Each selection begins with the control nodes of ``chosen``, the solution of the same step for
+    another displacement, and adds more where these do not suffice.
+    """
     coords, total = setup.coords, len(parts)
     made: list[Solution] = []
     lag: Lag | None = None

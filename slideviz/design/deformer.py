@@ -29,7 +29,7 @@ from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 from slideviz.rbf.images import FAR
 
 TOGETHER = 128
-"""Designs that are deformed together, and share the radial functions."""
+"""Designs that are deformed together, so that each radial function is computed once for all."""
 
 Tell = Callable[[Progress], None]
 
@@ -37,11 +37,11 @@ Tell = Callable[[Progress], None]
 class Deformer:
     """A deformation prepared once, for many displacements of the moving nodes.
 
-    Everything discrete is chosen at the reference, the (first) displacement that it is made with,
-    and kept: number of steps, control nodes, the facet, edge or vertex that each sliding node is
-    on, nearest boundary nodes and radius of the correction. So results are smooth functions of the
-    displacement, and `jvp` and `vjp` are their exact derivatives. They depend on the arguments
-    alone, to the bit. It can be pickled.
+    Everything discrete is chosen at the reference, the first displacement that the deformer is
+    made with, and kept: number of steps, control nodes, the facet, edge or vertex that each
+    sliding node is on, nearest boundary nodes and radius of the correction. So results are smooth
+    functions of the displacement, and `jvp` and `vjp` are their exact derivatives. Results depend
+    on the arguments alone, to the bit. A deformer can be pickled.
 
     Attributes
     ----------
@@ -51,17 +51,17 @@ class Deformer:
     nodes : (m,) int64
         The nodes of the moving markers, ascending.
     displacement : (m, d) float64
-        What the case's motions ask of them, in the mesh's length unit.
+        Displacement of these nodes by the case's motions, in the mesh's length unit.
     warnings : tuple of str
-        About case and mesh.
+        Warnings about case and mesh, and a note where systems are solved with twice the digits.
 
     Notes
     -----
     Displacements, directions and gradients have Cartesian components, also where the mesh repeats
     by rotation. Nodes that are periodic images of each other must be displaced alike (turned by the
-    angle of the period); the one with the lowest number counts for all of them, and gradients are
-    those with respect to moving all of them, at this one. The same holds for copies in a halo and
-    the nodes that they are copies of.
+    angle of the period). The image with the lowest number represents all: its displacement is
+    used, and its row of a gradient is the derivative with respect to moving all of them; the rows
+    of the others are zero. The same holds for copies in a halo and the nodes that they copy.
 
     Examples
     --------
@@ -93,26 +93,27 @@ class Deformer:
         displacements: FloatArray | None = None,
         progress: Tell | None = None,
     ) -> None:
-        """Choose and prepare all that is kept.
+        """Run the solver at the reference, and keep its choices.
 
         Parameters
         ----------
         mesh
             The undeformed mesh.
         case
-            Roles, motions and settings. Where ``displacements`` are given it needs no motions.
+            Roles, motions and settings. It needs no motions if ``displacements`` are given.
         displacements : (m, d) or (k, m, d), optional
-            Of the moving nodes; those of the case's motions if not given. Of several, the control
-            nodes are enough for all of them, and the first is the reference of all else.
+            Of the moving nodes; those of the case's motions if not given. If k are given, the
+            control nodes suffice for all of them, and all else is chosen at the first.
         progress
             Called often with a ``Progress``; an exception it raises ends the work at once.
 
         Raises
         ------
         CaseError, MeshError
-            The case does not fit the mesh, or displacements are not as the mesh repeats.
+            The case does not fit the mesh, or periodic images are displaced differently.
         DeformError
-            The system cannot be solved, or the method has no derivative here.
+            The system cannot be solved, the result cannot be right, or all displacements are zero
+            so that no control nodes can be selected.
 
         Warns
         -----
@@ -162,8 +163,10 @@ class Deformer:
 
         Raises
         ------
+        CaseError
+            The displacement has another shape, or numbers that are not finite.
         DeformError
-            The result cannot be right, or images are displaced differently.
+            The result cannot be right, or periodic images are displaced differently.
 
         Warns
         -----
@@ -181,11 +184,11 @@ class Deformer:
         return points
 
     def max_error(self, displacement: FloatArray) -> float | FloatArray:
-        """Return by how much boundary nodes miss what they must do, at most: a float, or (k,).
+        """Return the largest error at boundary nodes: a float, or (k,) of k designs.
 
-        What interpolation misses at the boundary nodes before they are set, or how far sliding ones
-        are off their boundary because they left the facet that they are kept on, in the mesh's
-        length unit.
+        In the mesh's length unit: the error of the interpolation at boundary nodes, before they
+        are set exactly; or the distance of a sliding node from its boundary, because it left the
+        plane of the facet that it was on at the reference. The larger of both.
         """
         found = self._deformed(self._checked(displacement, "displacement"))[1]
         return float(found) if found.ndim == 0 else found
@@ -221,24 +224,25 @@ class Deformer:
     def as_run(self) -> FloatArray | None:
         """Return the points (n, d) that ``sv.deform`` gives at the reference, to the bit.
 
-        None for systems that are nearly singular, which are solved with more digits than in a run.
+        None where a system is nearly singular: the deformer solves it with more digits than a run.
         """
         return self._as_run
 
     def refresh(self, displacement: FloatArray) -> Deformer:
-        """Return a deformer whose choices are those at another design (or at several)."""
+        """Return a deformer that is made anew with another displacement, (m, d) or (k, m, d)."""
         return Deformer(self.mesh, self.case, displacement)
 
     def _checked(self, vectors: FloatArray, name: str) -> FloatArray:
+        """Return ``vectors`` as `_shaped` does, for the shape (m, d) of the moving nodes."""
         return self._shaped(vectors, self.displacement.shape, name)
 
     def _shaped(self, vectors: FloatArray, shape: tuple[int, ...], name: str) -> FloatArray:
-        """Return finite numbers of this shape, or several of them.
+        """Return ``vectors`` as float64 of ``shape`` (n, d), or (k, n, d).
 
         Raises
         ------
         CaseError
-            They are none.
+            They have another shape, or numbers that are not finite.
         """
         try:
             out = np.asarray(vectors, np.float64)
@@ -254,14 +258,18 @@ class Deformer:
         return out
 
     def _run(self, target: Array) -> list[StepState]:
-        """Return the states after all steps."""
+        """Return the state after each step; ``target`` (..., a, d) as `Input.target` returns it."""
         states = [StepState(self._setup.coords)]
         for step in self._steps:
             states.append(step.run(states[-1], target))
         return states[1:]
 
     def _deformed(self, displacement: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return points (..., n, d), largest errors and doubts (...,), all of them checked."""
+        """Return points (..., n, d), largest errors and doubts (...,) of designs (..., m, d).
+
+        A doubt is that of a ``Solution``: the estimated error between boundary nodes. Raises
+        DeformError where a result cannot be right or images are displaced differently.
+        """
         if displacement.ndim == 2:
             target = value(self._input.target(displacement))
             states = self._run(target)
@@ -281,7 +289,10 @@ class Deformer:
         return points, errors, doubt
 
     def _together(self, displacement: FloatArray, room: FloatArray) -> FloatArray:
-        """Deform designs in one step into ``room`` (k, n, d); return their errors and doubts."""
+        """Write the points of k designs (k, m, d) to ``room`` (k, n, d), deformed in one step.
+
+        Returns their errors and doubts, (2, k). Raises as `_deformed`.
+        """
         setup, (step,) = self._setup, self._steps
         targets = value(self._input.target(displacement))
         state = step.moved(StepState(setup.coords), targets, room)
@@ -296,7 +307,7 @@ class Deformer:
         return np.stack([errors, np.broadcast_to(state.doubt, errors.shape)])
 
     def _taped(self, displacement: FloatArray) -> tuple[list[StepState], Variable, Variable]:
-        """Return the states of a design, and input and points as variables of one tape."""
+        """Return the states of a design (m, d), and its input and points as variables of a tape."""
         given = self._shaped(displacement, self.displacement.shape, "displacement")
         if given.ndim == 3:
             raise CaseError(

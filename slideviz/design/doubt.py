@@ -1,4 +1,4 @@
-"""What a deformer says of its accuracy: notes and warnings."""
+"""Notes and warnings of a deformer about its accuracy."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from slideviz.mesh.model import FloatArray
 from slideviz.rbf.refine import TRUSTED
 
 BADLY_CONDITIONED = 1e14
-"""From this condition number on, what a single node moves alone has few correct digits."""
+"""Above this condition number, the effect of moving a single node has few correct digits."""
 
 
 def largest_condition(steps: Sequence[FrozenStep]) -> float:
-    """Return the largest condition number of the systems at the reference."""
+    """Return the largest condition number of the steps' systems at the reference; or 1.0."""
     return max((step.condition for step in steps), default=1.0)
 
 
 def note_of_refinement(steps: Sequence[FrozenStep]) -> tuple[str, ...]:
-    """Return the sentence about systems that are solved with twice the digits."""
+    """Return a note about systems that are solved with twice the digits; empty if none is."""
     refined = max((step.refined for step in steps), default=0.0)
     if not refined:
         return ()
@@ -59,7 +59,7 @@ def warn_of_condition(steps: Sequence[FrozenStep]) -> None:
 
 
 def warn_of_doubt(steps: Sequence[FrozenStep], doubt: FloatArray) -> bool:
-    """Warn where the points of designs cannot be trusted, and tell whether that is so."""
+    """Warn if the doubt (...,) of a design is above `TRUSTED`; return whether it is."""
     worst = float(doubt.max(initial=0.0))
     if worst <= TRUSTED:
         return False

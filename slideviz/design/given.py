@@ -1,4 +1,4 @@
-"""How the displacement of all known nodes follows from what a deformer is given."""
+"""The map from the displacement of the moving nodes, a deformer's input, to all known nodes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from slideviz.rbf.images import Spread
 
 @dataclass(frozen=True, eq=False)
 class Input:
-    """How the displacement of known nodes follows from what is given at the moving nodes.
+    """The map from the displacement of the moving nodes to that of the known nodes.
 
     Attributes
     ----------
@@ -29,13 +29,15 @@ class Input:
     nodes : (m,) int64
         The moving nodes, ascending.
     points : (s, d) float64
-        The nodes that give theirs to all their images, undeformed.
+        The sources, undeformed: nodes whose displacement all their periodic images have.
     rows, turn : (s,) int64, (s, d, d) float64 or None
-        Whose displacement each has, by the place among the moving nodes, and how it is turned.
-    known, source : (a,) int64
-        Known nodes that move, by their place, and the one of ``points`` that each follows.
+        The moving node, by its place in ``nodes``, whose displacement each source has, and the
+        rotation of it (None: none is rotated). They differ for copies in a halo.
+    known, source : (k,) int64
+        Known nodes that move, by their place in ``setup.known``, and the source that each follows.
     others, followed : (o,) int64
-        Moving nodes, by their place, that must move as one of ``points``, and that one.
+        Moving nodes that are not sources, by their place in ``nodes``, and the source that each
+        must follow.
     """
 
     mesh: Mesh
@@ -50,7 +52,11 @@ class Input:
     followed: IntArray
 
     def target(self, vectors: Array) -> Array:
-        """Return the displacement (..., a, d) of the known nodes, in the frame."""
+        """Return the displacement (..., a, d) of the known nodes, in the frame.
+
+        From that of the moving nodes, ``vectors`` (..., m, d), Cartesian. Raises DeformError where
+        images, or copies in a halo and their originals, are displaced differently.
+        """
         setup = self.setup
         own = take(vectors, self.rows)
         if self.turn is not None:
@@ -61,12 +67,12 @@ class Input:
         return put(np.zeros(shape), self.known, take(moved, self.source))
 
     def _require_alike(self, vectors: FloatArray, moved: FloatArray) -> None:
-        """Raise where images, or copies and their originals, are displaced differently.
+        """Raise DeformError where images, or copies and their originals, are displaced differently.
 
         Parameters
         ----------
         vectors, moved : (..., m, d), (..., s, d)
-            As given, and of those that count in the frame.
+            Cartesian displacements of the moving nodes, and those of the sources in the frame.
         """
         setup, mesh = self.setup, self.mesh
         if len(self.others):
@@ -81,7 +87,7 @@ class Input:
             self._refuse(vectors)
 
     def _refuse(self, vectors: FloatArray) -> None:
-        """Raise what the solver raises where nodes that should be alike are not."""
+        """Raise the solver's error where nodes that must move alike do not; else return."""
         setup, mesh = self.setup, self.mesh
         for each in vectors.reshape(-1, *vectors.shape[-2:]):
             moved = displaced(Displacements(self.nodes, each), mesh)
@@ -92,7 +98,13 @@ class Input:
 
 
 def given_input(mesh: Mesh, setup: Setup, asked: Displacements) -> Input:
-    """Return how the displacement of known nodes follows from that of the moving nodes."""
+    """Return the map from the displacement of the moving nodes to that of the known nodes.
+
+    Raises
+    ------
+    CaseError
+        A moving node in a halo is a copy of a node that does not move.
+    """
     moved = displaced(asked, mesh)
     spread = Spread(moved.nodes, moved.vectors, setup.classes.stands)
     of_known = spread.source(setup.known)

@@ -1,4 +1,4 @@
-"""The methods to compare with on a frozen step: inverse distance weighting and elasticity."""
+"""Inverse distance weighting and linear elasticity on a frozen step."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Weighting(Method):
     """Inverse distance weighting (`slideviz.baselines.idw.deform_idw`)."""
 
     def run(self) -> Solved:
-        """Return the weighted means."""
+        """Return the displacement as weighted means, and its errors."""
         weights = self._step.weights
         assert weights is not None
         setup, nodes, values = self._setup, self._known, self._values
@@ -66,7 +66,10 @@ class Elasticity(Method):
         return Solved(displacement, None, nodes, nothing, nothing)
 
     def _balanced(self, body: Body, name: str, nodes: IntArray, values: Array) -> Array:
-        """Return the displacement of an elastic body by that of some nodes."""
+        """Return the displacement of all nodes (n, d), from ``values`` (m, d) at ``nodes`` (m,).
+
+        ``name`` tells the first solution of the step from the second.
+        """
         coords = value(self._coords)
         merged, data = self._merged(nodes, values)
         body_at = self._keep(

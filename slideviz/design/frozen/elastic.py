@@ -47,12 +47,13 @@ from slideviz.rbf.slide_rows import RANK_TOLERANCE
 from slideviz.rbf.solve import enough_threads
 
 EXACT = 1e-13
-"""Fall of the residual at which a solution is found: derivatives are to be exact."""
+"""Residual ratio at which the solver ends: derivatives are to be exact."""
 
 ENOUGH = 1e-8
-"""Fall of the residual that must be reached."""
+"""Largest residual ratio that is accepted."""
 
 Keep = Callable[[str, Callable[[], Any]], Any]
+"""As ``slideviz.design.frozen.fit.Keep``."""
 
 
 class Equilibrium:
@@ -65,11 +66,11 @@ class Equilibrium:
     coords, normals : (n, d), (q, d)
         The same positions, and the problem's normals, on a tape.
     nodes : (m,) int64
-        Nodes with known displacement, of coinciding ones the one that stands for them, ascending.
+        Nodes with known displacement, ascending; of coinciding nodes, the one that represents them.
     chosen : callable
-        Keeps what is discrete.
+        Keeps what is discrete, by name.
     name : str
-        What tells it apart from another of the same step.
+        Begins these names, to tell two solutions of one step apart.
     """
 
     def __init__(
@@ -100,7 +101,7 @@ class Equilibrium:
         Parameters
         ----------
         data : (..., m, d)
-            That of the known nodes.
+            Displacement of the known nodes, in the frame.
 
         Raises
         ------
@@ -117,7 +118,7 @@ class Equilibrium:
         return difference_from(self._body.frame, self._at, self._moved(found) + known)
 
     def _make(self) -> list[Level]:
-        """Return the levels of the matrix."""
+        """Return the multigrid levels of the stiffness matrix."""
         at = value(self._at)
         axes = np.tile(np.eye(at.shape[1])[:, None], (self._count, 1))
         held_by = [(at, value(direction)) for at, direction in self._held]
@@ -128,7 +129,7 @@ class Equilibrium:
             return hierarchy(matrix, rigid_motions(at, given))
 
     def _solved(self, right: FloatArray) -> FloatArray:
-        """Return the unknowns (k, d) for a right-hand side (k, d)."""
+        """Return the unknowns (k, d) for a right-hand side (k, d); DeformError above `ENOUGH`."""
         if not right.any():
             return np.zeros_like(right)
         start = np.zeros(right.size)
@@ -143,7 +144,7 @@ class Equilibrium:
         return found.x.reshape(right.shape)
 
     def _known(self, data: Array) -> Array:
-        """Return the Cartesian displacement (..., n, d) of known nodes, zero for others."""
+        """Return the Cartesian displacement (..., n, d) of known nodes; zero for other nodes."""
         frame, same = self._body.frame, self._same
         rows = np.flatnonzero(np.isin(same, self._nodes))
         base = take(self._coords, rows)
@@ -152,7 +153,7 @@ class Equilibrium:
         return put(self._nothing, rows, moved)
 
     def _force(self, moved: Array) -> Array:
-        """Return the forces (..., n, d) of a Cartesian displacement."""
+        """Return the nodal forces (..., n, d) of a Cartesian displacement (..., n, d)."""
         forces, u = self._forces, value(moved)
         each = partial(each_of, forces.of)
         return recorded(
@@ -166,20 +167,24 @@ class Equilibrium:
         )
 
     def _moved(self, unknown: Array) -> Array:
-        """Return the displacement (..., n, d) of unknowns (..., k, d)."""
+        """Return the displacement (..., n, d) of unknowns (..., k, d); zero for known nodes."""
         own = take(_without(unknown, self._held), self._place[self._inside])
         own = transform(self._turn[self._inside], own)
         return put(self._nothing, self._inside, own)
 
     def _collected(self, forces: Array) -> Array:
-        """Return the forces (..., k, d) on unknowns."""
+        """Return the forces (..., k, d) on the unknowns, of nodal forces (..., n, d)."""
         own = take(forces, self._inside)
         back = np.swapaxes(self._turn[self._inside], 1, 2)
         found = gather(transform(back, own), self._place[self._inside], self._count)
         return _without(found, self._held)
 
     def _directions(self, problem: Problem, normals: Array) -> list[tuple[IntArray, Array]]:
-        """Return unknowns and orthonormal directions, each unknown once in each pair."""
+        """Return pairs of blocks of unknowns (h,) and unit directions (h, d) that hold them.
+
+        A block is in a pair once. Directions of a block are orthonormal. As ``_projections`` in
+        `slideviz.baselines.conditions`, on a tape.
+        """
         rows = held_rows(problem, self._body, self._place)
         own = _cartesian(self._body.frame, take(self._coords, problem.normal_nodes), normals)
         full = join(own, rows.axis) if len(rows.axis) else own
@@ -204,7 +209,7 @@ class Equilibrium:
 
 
 def _without(vectors: Array, directions: Sequence[tuple[IntArray, Array]]) -> Array:
-    """Return vectors (..., k, d) of unknowns without their part in which these are held."""
+    """Return vectors (..., k, d) of unknowns without their part along the held directions."""
     for at, direction in directions:
         along = multiply(direction, dot(take(vectors, at), direction))
         vectors = vectors - gather(along, at, value(vectors).shape[-2])
@@ -212,11 +217,12 @@ def _without(vectors: Array, directions: Sequence[tuple[IntArray, Array]]) -> Ar
 
 
 def _longer(size: FloatArray, least: float) -> IntArray:
+    """Return the indices where ``size`` (m, 1) is above ``least``."""
     return np.flatnonzero(size[:, 0] > least)
 
 
 def _cartesian(frame: Frame, coords: Array, normals: Array) -> Array:
-    """Return Cartesian directions, as ``slideviz.baselines.conditions.cartesian_normals``."""
+    """Return what ``slideviz.baselines.conditions.cartesian_normals`` does, on a tape."""
     if not any(isinstance(x, Variable) for x in (coords, normals)):
         return cartesian_normals(frame, value(coords), value(normals))
     if not frame.cylindrical:

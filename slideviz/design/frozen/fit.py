@@ -1,4 +1,4 @@
-"""A fit with its control nodes kept: the systems of one step, solved for any displacement."""
+"""The interpolation systems of one step with given control nodes, solved for any displacement."""
 
 from __future__ import annotations
 
@@ -39,12 +39,21 @@ from slideviz.rbf.solve import NOTHING, Factor, enough_threads, extend
 from slideviz.rbf.twofold import usable
 
 Keep = Callable[[str, Callable[[], Any]], Any]
-"""Returns what is kept under a name, and makes it where there is nothing yet."""
+"""Returns the object kept under a name; calls the function to make it if there is none yet."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sum:
-    """A sum of radial functions: control nodes, weights (..., c, d), and a polynomial's tail."""
+    """A sum of radial functions, as `slideviz.rbf.problem.Interpolant`, on a tape.
+
+    Attributes
+    ----------
+    nodes : (c,) int64
+        The control nodes.
+    weights : (..., c, d)
+    tail : (..., q, d) or None
+        Coefficients of the polynomial's terms.
+    """
 
     nodes: IntArray
     weights: Array
@@ -66,6 +75,7 @@ class FrozenFit:
     Attributes
     ----------
     found : Sum or None
+        Of all rows added so far; None before any.
     doubt : (...,) float64
         As of a ``Solution``.
     """
@@ -88,11 +98,12 @@ class FrozenFit:
         features : (k, n)
             Of all nodes, at their current positions.
         chosen, fixed
-            Keep what is discrete, and what never changes because the positions do not.
+            Keep discrete choices, and what depends on positions only (in the first step, where
+            positions are always the same).
         refined
             Whether systems are solved with twice the digits.
         checked
-            Whether it is measured how wrong a solution is.
+            Whether the error of solutions is estimated (``doubt``).
         """
         self._basis, self._features, self._dim = basis, features, dim
         self._chosen, self._fixed = chosen, fixed
@@ -104,7 +115,10 @@ class FrozenFit:
         self.found: Sum | None = None
 
     def add(self, rows: TapedRows, levels: Levels, stage: str) -> None:
-        """Meet further rows too, of which those of each level are in its system."""
+        """Add rows, solve with those in ``levels`` of all rows added so far, and set ``found``.
+
+        ``stage`` begins the names of what is kept.
+        """
         if self._rows is not None:
             nodes = np.concatenate([self._rows.nodes, rows.nodes])
             rows = TapedRows(nodes, None, join(self._rows.right, rows.right))
@@ -129,7 +143,10 @@ class FrozenFit:
         *,
         room: FloatArray | None = None,
     ) -> Array:
-        """Return the displacements (..., m, d) of nodes in the frame, in ``room`` if it fits."""
+        """Return the displacements (..., m, d) of nodes in the frame.
+
+        Of ``found``, or of the fit's. ``room`` (..., m, d) is where they may be written.
+        """
         found = found or self.found
         x = self._features
         here = x if isinstance(nodes, slice) else columns(x, nodes)
@@ -153,7 +170,7 @@ class FrozenFit:
         return Sum(nodes, weights, tail)
 
     def _solved(self, rows: TapedRows, index: IntArray, level: int, stage: str) -> Sum:
-        """Return the interpolant of some rows."""
+        """Return the interpolant of ``rows``, those with the numbers ``index`` among all rows."""
         count, m = len(rows.nodes), value(rows.right).shape[-1]
         solve, extra = self._solver(rows, index, level, stage)
         right = np.zeros((*value(rows.right).shape[:-2], count + extra, m))
@@ -180,7 +197,10 @@ class FrozenFit:
         return Sum(nodes, gather(multiply(rows.normals, own), place, len(nodes)), tail)
 
     def _system_times(self, rows: TapedRows, found: FloatArray, *, extra: int) -> Array:
-        """Return the product of the system with ``found``, which is constant, where it changes."""
+        """Return the system times ``found`` (n, m), a constant, for the derivative of the system.
+
+        Zeros where the system is constant. ``extra`` of the n unknowns are the polynomial's.
+        """
         count, m = len(rows.nodes), found.shape[-1]
         if not (isinstance(self._features, Variable) or isinstance(rows.normals, Variable)):
             return np.zeros_like(found)
@@ -203,7 +223,7 @@ class FrozenFit:
     def _solver(
         self, rows: TapedRows, index: IntArray, level: int, stage: str
     ) -> tuple[Callable[[FloatArray], FloatArray], int]:
-        """Return what solves the system of some rows, and how many unknowns a polynomial adds."""
+        """Return the solver of the system of ``rows``, and how many unknowns a polynomial adds."""
         place = value(self._features)[:, rows.nodes]
         normals = None if rows.normals is None else value(rows.normals)
         if KERNELS[self._basis.kernel].polynomial:
@@ -232,7 +252,7 @@ class FrozenFit:
         place: tuple[FloatArray, FloatArray | None],
         name: str,
     ) -> Callable[[FloatArray], FloatArray]:
-        """Return what solves the blocks of a system."""
+        """Return the solver of a system in blocks; a `MeasuredSystem` if refined or checked."""
         if not (self._refined or self._checked):
             return partial(solved, blocks, factors)
         features, normals = place
@@ -244,13 +264,18 @@ class FrozenFit:
         return MeasuredSystem(blocks, self._fixed(name, make), refined=self._refined)
 
     def _factor(self, place: FloatArray, normals: FloatArray) -> Factor:
+        """Return the factor of rows with features (k, r) and directions (r, d).
+
+        Of all rows, unless refinement meets the rows that the pivot guard leaves out. Raises
+        DeformError where the system is singular (`whole`).
+        """
         system = matrix(self._basis, (place, normals))
         with enough_threads(len(system) ** 3 / 3):
             factor = extend(NOTHING, system)
             return factor if self._refined or not len(factor.dropped) else whole(system)
 
     def _extended(self, place: FloatArray, index: IntArray, level: int) -> Factor:
-        """Return the factor of full rows; that of the stage before is a part of it."""
+        """Return the factor of rows without directions, extended from that of the stage before."""
         before, factor = self._factors.get(level, (index[:0], NOTHING))
         if not np.array_equal(index[: len(before)], before):
             before, factor = index[:0], NOTHING
@@ -267,6 +292,7 @@ class FrozenFit:
     def _saddle(
         self, place: FloatArray, normals: FloatArray | None, name: str
     ) -> tuple[Callable[[FloatArray], FloatArray], int]:
+        """Return the solver of a system with polynomial, and how many unknowns it adds."""
         count = place.shape[1]
         along = linear_terms(self._basis, place)
         if normals is not None:
@@ -301,7 +327,7 @@ class FrozenFit:
 
 
 def _firsts(nodes: IntArray) -> tuple[IntArray, IntArray]:
-    """Return each node once, in the order of first occurrence, and the place of each, (r,)."""
+    """Return each of nodes (r,) once, in the order of first occurrence, and its place, (r,)."""
     unique, first, group = np.unique(nodes, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
@@ -310,6 +336,6 @@ def _firsts(nodes: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _at(names: IntArray, wanted: IntArray) -> IntArray:
-    """Return the places of rows by their names."""
+    """Return the places in ``names`` (r, 2) of the rows ``wanted`` (k, 2), (k,)."""
     place = {tuple(name): k for k, name in enumerate(names.tolist())}
     return np.array([place[tuple(name)] for name in wanted.tolist()], np.int64)

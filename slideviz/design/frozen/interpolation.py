@@ -32,25 +32,25 @@ from slideviz.rbf.methods import ROUNDING as FLAT
 from slideviz.terms import Sliding
 
 CHECKED = 1e11
-"""From this condition number on, solutions of further designs are checked as those of a run. Data
-reduction makes more of a difference than rounding."""
+"""Above this condition number, the errors of exact solutions are estimated for each design. With
+data reduction they are not: its tolerance is larger than rounding."""
 
 
 class Interpolation(Method):
     """Radial basis functions (`slideviz.rbf.methods`)."""
 
     def run(self) -> Solved:
-        """Return what the way of sliding finds."""
+        """Return the result of the method for the case's sliding (`WAYS`)."""
         return WAYS[self._step.sliding](self)
 
     def _regular(self) -> Solved:
-        """Sliding nodes follow as inner nodes do (`slideviz.rbf.methods.regular`)."""
+        """Solve without sliding (`slideviz.rbf.methods.regular`)."""
         fit = self._fit()
         self._meet(fit, self._known, self._values)
         return self._finished(fit, self._known, self._values)
 
     def _pseudo(self) -> Solved:
-        """Edges slide first, then surfaces (`slideviz.rbf.methods.pseudo_sliding`)."""
+        """Solve with pseudo sliding (`slideviz.rbf.methods.pseudo_sliding`)."""
         setup, fit = self._setup, self._fit()
         self._meet(fit, self._known, self._values)
         nodes, values = self._known, self._values
@@ -68,7 +68,7 @@ class Interpolation(Method):
         return self._finished(fit, nodes, values)
 
     def _direct(self) -> Solved:
-        """Sliding by the system itself (`slideviz.rbf.methods.direct_sliding`)."""
+        """Solve with direct sliding (`slideviz.rbf.methods.direct_sliding`)."""
         if not len(self._normal_nodes):
             return self._regular()
         setup, fit = self._setup, self._fit()
@@ -91,11 +91,12 @@ class Interpolation(Method):
         return self._finished(second, nodes, values)
 
     def _off(self, slid: FloatArray, free: FloatArray) -> IntArray:
-        """Return which slid nodes leave a straight edge of a curved surface."""
+        """Return the places of nodes that projection moves, from ``free`` to ``slid`` (m, d)."""
         gap = np.abs(slid - free).max(axis=1, initial=0.0)
         return np.flatnonzero(gap > FLAT * largest_coordinate(value(self._coords)))
 
     def _fit(self) -> FrozenFit:
+        """Return a fit of this step without rows."""
         setup = self._setup
         return FrozenFit(
             setup.basis,
@@ -108,7 +109,7 @@ class Interpolation(Method):
         )
 
     def _meet(self, fit: FrozenFit, nodes: IntArray, values: Array) -> None:
-        """Give a fit the rows of nodes with known displacement."""
+        """Add the rows of nodes with known displacement to a fit, coinciding nodes merged."""
         merged, data = self._merged(nodes, self._plus_behind(values, nodes))
         stage = f"stage {len(self._stages)}"
         fit.add(TapedRows(merged, None, data), self._stages.pop(0), stage)
@@ -141,7 +142,11 @@ class Interpolation(Method):
     def _orthonormal(
         self, nodes: IntArray, normals: Array, right: Array, rows: IntArray, keep: np.ndarray
     ) -> tuple[Array, Array]:
-        """Orthonormalise the constraints of coinciding nodes, and mark those to leave out."""
+        """Return normals and right-hand sides with those of coinciding nodes orthonormalised.
+
+        Sets ``keep`` to False where a constraint follows from others, as
+        ``slideviz.rbf.constraint_rows._orthonormalise`` does.
+        """
         for k, row in enumerate(rows.T):
             n, b = take(normals, row), take(right, row)
             for other in rows.T[:k]:
@@ -165,7 +170,10 @@ class Interpolation(Method):
         return normals, right
 
     def _finished(self, fit: FrozenFit, nodes: IntArray, values: Array) -> Solved:
-        """Evaluate at all nodes; boundary nodes are set, and what they lack is spread."""
+        """Evaluate at all nodes, set boundary nodes exactly, and spread their errors.
+
+        As ``slideviz.rbf.methods._finish``; ``values`` (..., b, d) at boundary ``nodes`` (b,).
+        """
         setup = self._setup
         displacement = self._in_room(fit.at(slice(None), room=self._room))
         errors = values - take(displacement, nodes)
@@ -191,7 +199,7 @@ class Interpolation(Method):
         return Solved(displacement, lag, nodes, most, lost, doubt=fit.doubt)
 
     def _spread(self, displacement: Array, spread: FrozenSpread, errors: Array) -> Array:
-        """Add what targets take over."""
+        """Return the displacement with the boundary correction added."""
         setup = self._setup
         means = spread.mixing(value(errors).shape[-2])
         part = self._keep("shares", lambda: shares(setup, self._coords, spread))
@@ -205,6 +213,7 @@ class Interpolation(Method):
 
 
 def _above(size: FloatArray, least: float) -> np.ndarray:
+    """Return a mask (m,) of ``size`` (m, 1) above ``least``."""
     return np.asarray(size[:, 0] > least)
 
 
@@ -213,4 +222,4 @@ WAYS: Mapping[Sliding, Callable[[Interpolation], Solved]] = {
     "ps": Interpolation._pseudo,
     "ds": Interpolation._direct,
 }
-"""The ways of sliding, as `slideviz.rbf.methods.SLIDING_METHODS` has them."""
+"""Method by the value of SLIDING_MODE, as `slideviz.rbf.methods.SLIDING_METHODS`."""

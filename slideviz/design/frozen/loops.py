@@ -19,11 +19,12 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"
 
 
 BLOCK = 256
-"""Nodes of a task: those of each design lie one after the other, and designs far apart."""
+"""Nodes of a task. A task does all designs, so that what they share stays in the cache."""
 
 
 @njit(parallel=True, **_OPTIONS)
 def _shift(start, by):  # type: ignore[no-untyped-def]
+    """Add start (n, d) to ``by`` (k, n, d), in place."""
     n = by.shape[1]
     for task in prange((n + BLOCK - 1) // BLOCK):
         for k in range(by.shape[0]):
@@ -36,6 +37,7 @@ def _shift(start, by):  # type: ignore[no-untyped-def]
 
 @njit(parallel=True, **_OPTIONS)
 def _rest(at, moved, start, before):  # type: ignore[no-untyped-def]
+    """Do what ``keep_rest`` does, for k designs."""
     n = at.shape[1]
     for task in prange((n + BLOCK - 1) // BLOCK):
         for k in range(at.shape[0]):
@@ -50,9 +52,9 @@ def _rest(at, moved, start, before):  # type: ignore[no-untyped-def]
 
 @njit(**_OPTIONS)
 def place(found, first, out):  # type: ignore[no-untyped-def]
-    """Write numbers (b, k d) of nodes from ``first`` on to their place in ``out`` (k, n, d).
+    """Write values (b, k d) of b nodes and k designs to ``out`` (k, n, d), from node ``first`` on.
 
-    In one thread, so that several may do so at once.
+    In one thread, so that several threads may call it at once.
     """
     d = out.shape[2]
     for k in range(out.shape[0]):
@@ -63,6 +65,7 @@ def place(found, first, out):  # type: ignore[no-untyped-def]
 
 @njit(parallel=True, **_OPTIONS)
 def _taken(out, targets, starts, source, weight, part, lacking):  # type: ignore[no-untyped-def]
+    """Do what ``take_over`` does, with the rows of the sparse matrix."""
     for k in prange(out.shape[0]):
         for row in range(len(targets)):
             i = targets[row]
@@ -75,6 +78,7 @@ def _taken(out, targets, starts, source, weight, part, lacking):  # type: ignore
 
 @njit(parallel=True, **_OPTIONS)
 def _farthest(moved, start, squares):  # type: ignore[no-untyped-def]
+    """Write the largest squared distance in each of p parts of the nodes to ``squares`` (p, k)."""
     for part in prange(squares.shape[0]):
         first = part * start.shape[0] // squares.shape[0]
         last = (part + 1) * start.shape[0] // squares.shape[0]
@@ -85,7 +89,7 @@ def _farthest(moved, start, squares):  # type: ignore[no-untyped-def]
                 for j in range(start.shape[1]):
                     off = moved[k, i, j] - start[i, j]
                     square += off * off
-                # What is not a number is larger than anything.
+                # NaN counts as infinite.
                 if not square <= most:
                     most = square if square == square else np.inf
             squares[part, k] = most
@@ -112,11 +116,12 @@ def _cosine(x):  # type: ignore[no-untyped-def]
 
 
 NEAR = 0.25
-"""Angle in radians up to which a few terms are enough."""
+"""Largest angle, in radians, for which ``_sine`` and ``_cosine`` are exact but for rounding."""
 
 
 @njit(parallel=True, **_OPTIONS)
 def _turn(coords, start, before, basis, origin, rate, theta0):  # type: ignore[no-untyped-def]
+    """Do what ``to_points`` does, for k designs; ``rate`` is 1 / ``frame.radius``."""
     n, d = coords.shape[1:]
     for task in prange((n + BLOCK - 1) // BLOCK):
         first, last = task * BLOCK, min(n, (task + 1) * BLOCK)
@@ -145,10 +150,11 @@ def _turn(coords, start, before, basis, origin, rate, theta0):  # type: ignore[n
 
 
 PARTS = 64
+"""Parts of the nodes in ``farthest``, which run in parallel."""
 
 
 def shift(start: FloatArray, by: FloatArray) -> FloatArray:
-    """Return ``start`` (n, d) + ``by`` (..., n, d), in its place; what rests keeps every bit."""
+    """Return ``start`` (n, d) + ``by`` (..., n, d), written to ``by``; zeros keep every bit."""
     with one_at_a_time(by.size):
         _shift(start, by.reshape(-1, *start.shape))
     return by
@@ -157,14 +163,16 @@ def shift(start: FloatArray, by: FloatArray) -> FloatArray:
 def take_over(
     out: FloatArray, targets: IntArray, means: csr_array, part: FloatArray, lacking: FloatArray
 ) -> None:
-    """Add to targets (h,) of designs ``out`` (k, n, d) their part of means of what others lack.
+    """Add the boundary correction to ``out`` (k, n, d), k designs, at the targets (h,).
 
     Parameters
     ----------
     means : (h, b)
-        The weights of those that they take over from.
+        The weights of boundary nodes in the mean that each target takes over.
     part : (h,)
+        The share of that mean that it takes over.
     lacking : (k, b, d)
+        The errors at the boundary nodes.
     """
     with one_at_a_time(len(out) * means.nnz * out.shape[-1]):
         lacking = np.ascontiguousarray(lacking)
@@ -174,7 +182,7 @@ def take_over(
 def keep_rest(
     at: FloatArray, moved: FloatArray, start: FloatArray, before: FloatArray
 ) -> FloatArray:
-    """Return points (..., n, d), in place; those with coordinates as at the start are ``before``.
+    """Return points ``at`` (..., n, d), with those of nodes at rest overwritten by ``before``.
 
     Parameters
     ----------
@@ -189,7 +197,7 @@ def keep_rest(
 
 
 def to_points(frame: Frame, coords: FloatArray, start: FloatArray, before: FloatArray) -> None:
-    """Turn coordinates (..., n, d) into points, in place; what rests is as ``before``.
+    """Turn frame coordinates (..., n, d) into points, in place; nodes at rest become ``before``.
 
     As ``frame.points`` does, but for rounding. Parameters as of ``keep_rest``.
     """
@@ -209,7 +217,7 @@ def to_points(frame: Frame, coords: FloatArray, start: FloatArray, before: Float
 
 
 def farthest(moved: FloatArray, start: FloatArray) -> FloatArray:
-    """Return how far nodes moved at most, (...,); infinite where a coordinate is no number."""
+    """Return the largest distance of a node from ``start`` (n, d), (...,); inf if any is NaN."""
     stacked = moved.reshape(-1, *start.shape)
     squares = np.empty((PARTS, len(stacked)))
     with one_at_a_time(moved.size):

@@ -1,4 +1,4 @@
-"""What the methods of a frozen step share: known nodes, and how sliding nodes go back."""
+"""Base of the methods of a frozen step: known nodes, and the projection of sliding nodes."""
 
 from __future__ import annotations
 
@@ -37,14 +37,15 @@ ROUNDING = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """What a method finds in one step.
+    """The result of a method in one step.
 
     Attributes
     ----------
     displacement : (..., n, d)
         Of all nodes, in the frame.
     lag : (..., b, d) or None
-        What the interpolants so far lack at the nodes ``of`` (b,); None without data reduction.
+        The errors that the interpolants of all steps so far left at the boundary nodes ``of``
+        (b,); None without data reduction.
     max_error, lost, doubt : (...,) float64
         As of a ``Solution``.
     """
@@ -58,7 +59,11 @@ class Solved:
 
 
 class Method(ABC):
-    """The method on one step, run once."""
+    """A method on one step, from one state; run once.
+
+    ``goal`` (..., a, d) are the coordinates of the known nodes after the step, ``room``
+    (..., n, d) or None is where the displacement of all nodes may be written.
+    """
 
     def __init__(
         self, step: FrozenStep, before: StepState, goal: Array, room: FloatArray | None
@@ -79,10 +84,13 @@ class Method(ABC):
 
     @abstractmethod
     def run(self) -> Solved:
-        """Return what the method finds."""
+        """Return the result of the step."""
 
     def _merged(self, nodes: IntArray, values: Array) -> tuple[IntArray, Array]:
-        """Return nodes (m,) and values (m, d), those of coinciding nodes as their mean."""
+        """Return one node (c,) for each group of coinciding nodes, and the mean of its values.
+
+        As ``slideviz.rbf.constraint_rows.merge``; raises DeformError where the values differ.
+        """
         same = self._setup.same_as[nodes]
         merged, first, group, count = np.unique(
             same, return_index=True, return_inverse=True, return_counts=True
@@ -97,6 +105,7 @@ class Method(ABC):
         return merged, multiply(gather(values, group, len(merged)), 1.0 / count[:, None])
 
     def _behind(self, nodes: IntArray) -> Array | None:
+        """Return the errors that all steps before left at boundary nodes (m,); None without."""
         if self._before.lag is None:
             return None
         row = np.full(len(self._setup.coords), -1)
@@ -104,10 +113,12 @@ class Method(ABC):
         return take(self._before.lag, row[nodes])
 
     def _plus_behind(self, values: Array, nodes: IntArray) -> Array:
+        """Return ``values`` plus the errors that all steps before left at nodes."""
         behind = self._behind(nodes)
         return values if behind is None else values + behind
 
     def _less_behind(self, values: Array, nodes: IntArray) -> Array:
+        """Return ``values`` less the errors that all steps before left at nodes."""
         behind = self._behind(nodes)
         return values if behind is None else values - behind
 
@@ -122,7 +133,11 @@ class Method(ABC):
         return free - gather(multiply(normals, off), at, len(nodes))
 
     def _project(self, nodes: IntArray, free: Array, name: str) -> Array:
-        """Return the displacements of nodes brought back on their boundary."""
+        """Return the displacements (..., m, d) of sliding nodes projected on their boundary.
+
+        On the plane of the facet, the line of the edge or the vertex that is closest at the
+        reference. ``name`` is that of the kept choice.
+        """
         setup, base = self._setup, take(self._coords, nodes)
         keep = self._step.choices
         anchor, matrix = keep(
@@ -143,7 +158,10 @@ class Method(ABC):
     def _tracked(
         self, nodes: IntArray, base: FloatArray, free: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return for each node a point of its primitive (m, d), and the projection on it."""
+        """Return the closest point of each displaced node (m, d), and the projection (m, d, d).
+
+        See `slideviz.rbf.projection_matrices`.
+        """
         tracks = self._setup.tracks
         label, at = tracks.of_node[nodes], base + free
         anchor, matrix = base.copy(), np.zeros((*base.shape, base.shape[1]))
@@ -157,7 +175,10 @@ class Method(ABC):
         return anchor, matrix
 
     def _ties(self, nodes: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
-        """Return copies within the domain, whom they follow, and how their vectors are turned."""
+        """Return copies among ``nodes``, the nodes that they follow, both as places, and rotations.
+
+        Rotations (t, d, d) turn displacements of the latter into those of the copies, in the frame.
+        """
         setup, halo, d = self._setup, self._setup.halo, self._setup.coords.shape[1]
         if halo is None:
             return np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, d, d))
@@ -171,7 +192,7 @@ class Method(ABC):
         return copy[both], origin[both], turn
 
     def _in_room(self, displacement: Array) -> Array:
-        """Return the displacement where it is to go."""
+        """Return the displacement, copied to the method's ``room`` if it has one."""
         if self._room is None or displacement is self._room:
             return displacement
         self._room[:] = value(displacement)
@@ -179,11 +200,12 @@ class Method(ABC):
 
 
 def _anew(_: str, make: Callable[[], Any]) -> Any:
+    """Make something each time: a ``Keep`` that keeps nothing."""
     return make()
 
 
 def _plus_unless_rounding(slid: Array, away: Array, least: float) -> Array:
-    """Return the sum; what is rounding is not added, so that nodes at rest keep every bit."""
+    """Return ``slid + away``, without rows of ``away`` up to ``least``: rest keeps every bit."""
     off = value(away)
     off = np.where(np.abs(off).max(axis=-1, keepdims=True) <= least, 0.0, off)
     return slid + (replace(away, value=off) if isinstance(away, Variable) else off)

@@ -1,4 +1,4 @@
-"""The constraints of sliding nodes on a tape: their normals where these turn with the boundary."""
+"""Constraints of sliding nodes on a tape: on curved boundaries normals depend on positions."""
 
 from __future__ import annotations
 
@@ -31,10 +31,11 @@ from slideviz.mesh.topology import TINY
 from slideviz.rbf.axis import corners as corners_of
 
 TURN = {2: np.array([[0.0, 1.0], [-1.0, 0.0]])}
+"""Rotates the direction of a segment (2D) into its normal."""
 
 
 def sliding_normals(setup: Setup, coords: Array) -> tuple[IntArray, Array]:
-    """Return nodes (q,) and unit normals (q, d) of the sliding nodes, as ``Setup.constraints``."""
+    """Return what ``Setup.constraints`` does, on a tape: nodes (q,) and unit normals (q, d)."""
     nodes, at = setup.constraints(value(coords))
     if not (setup.tracks.curved and isinstance(coords, Variable)) or not len(nodes):
         return nodes, at
@@ -49,7 +50,7 @@ def sliding_normals(setup: Setup, coords: Array) -> tuple[IntArray, Array]:
 
 
 def _owners(setup: Setup) -> IntArray:
-    """Return the node of each direction of ``_directions``."""
+    """Return the node of each direction that ``_directions`` returns."""
     node = setup.classes.cluster_node
     _, starts, size = np.unique(node, return_index=True, return_counts=True)
     keep = np.ones(len(node), bool)
@@ -60,7 +61,7 @@ def _owners(setup: Setup) -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class _Corners:
-    """The corners of facets as a linear map of the coordinates of nodes."""
+    """Computes corners of facets from the coordinates of nodes, a linear map, also on the axis."""
 
     setup: Setup
 
@@ -81,7 +82,11 @@ class _Corners:
         ]
 
     def _maps(self, nodes: IntArray, local: IntArray, table: IntArray) -> FloatArray:
-        """Return the matrices (k, f d, m d) of the corners of facets that touch the axis."""
+        """Return matrices (k, f d, m d) from coordinates of nodes to corners of facets at the axis.
+
+        Of m nodes and f facets ``local`` (f, k), renumbered; found by probing
+        `slideviz.rbf.axis.corners` with unit vectors.
+        """
         d = self.setup.coords.shape[1]
         width = table.shape[1]
         out = np.empty((width, len(table) * d, len(nodes) * d))
@@ -96,7 +101,7 @@ class _Corners:
 
 
 def _mapped(matrix: FloatArray, x: Array, d: int) -> Array:
-    """Return a matrix (f d, m d) times the entries of x (m, d), as rows (f, d)."""
+    """Return a matrix (f d, m d) times the entries of x (m, d), row by row, as (f, d)."""
     v = value(x)
     rows = len(matrix) // d
 
@@ -110,7 +115,7 @@ def _mapped(matrix: FloatArray, x: Array, d: int) -> Array:
 
 
 def _fan_normals(setup: Setup, coords: Array) -> Array:
-    """Return the unit normal of each fan, as ``slideviz.mesh.fans.fan_normals``."""
+    """Return the unit normal of each fan (m, d), as ``slideviz.mesh.fans.fan_normals``."""
     boundary, fans = setup.boundary, setup.fans
     corners = _Corners(setup).of(coords)
     if boundary.dim == 2:
@@ -132,7 +137,7 @@ def _fan_normals(setup: Setup, coords: Array) -> Array:
 
 
 def _directions(setup: Setup, normals: Array) -> Array:
-    """Return the directions of the sliding nodes, as ``slideviz.rbf.classify.directions``."""
+    """Return the directions (q, d) that ``slideviz.rbf.classify.directions`` does, on a tape."""
     classes = setup.classes
     node = classes.cluster_node
     total = unit(gather(take(normals, classes.row_fan), classes.row_cluster, len(node)))
@@ -152,7 +157,8 @@ def _directions(setup: Setup, normals: Array) -> Array:
 def _leading(rows: Array) -> Array:
     """Return the two leading right singular vectors of rows (k, 3) of rank 2.
 
-    What is left out is how they turn within the plane that they span, which no result depends on.
+    The derivative leaves out their rotation within the plane that they span, on which no result
+    depends.
     """
     a = value(rows)
     vectors, sizes = np.linalg.svd(a)[2], np.zeros(3)

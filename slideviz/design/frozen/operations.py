@@ -20,20 +20,20 @@ from slideviz.rbf.slopes import pull_positions, push_positions, sum_powers
 from slideviz.rbf.solve import enough_threads
 
 PAIRS = 1_000_000
-"""Pairs whose radial functions are in memory at a time, in each thread, when many columns share
-them: they, and what they are multiplied to, stay in the cache."""
+"""Pairs whose radial functions are in memory at a time, in each thread, when many columns of
+weights share them: the functions and their products stay in the cache."""
 
 ROWS = 256
-"""Targets of these, at most."""
+"""Largest number of targets that are in memory at a time."""
 
 
 def flat(rows: FloatArray) -> FloatArray:
-    """Return rows (..., n, c) one under the other, (m, c)."""
+    """Return ``rows`` (..., n, c) stacked as (m, c), contiguous."""
     return np.ascontiguousarray(rows.reshape(-1, rows.shape[-1]))
 
 
 def features(frame: Frame, coords: Array) -> Array:
-    """Return the features (k, n) of coordinates (n, d)."""
+    """Return the features (k, n) of coordinates (n, d), as ``Frame.features``."""
     x = value(coords)
     out = frame.features(x)
     if not isinstance(coords, Variable):
@@ -50,7 +50,7 @@ def features(frame: Frame, coords: Array) -> Array:
 
 
 def columns(x: Array, nodes: IntArray) -> Array:
-    """Return some columns of features (k, n)."""
+    """Return the columns ``nodes`` (m,) of features x (k, n), (k, m)."""
     v = value(x)
 
     def back(g: FloatArray) -> FloatArray:
@@ -62,7 +62,7 @@ def columns(x: Array, nodes: IntArray) -> Array:
 
 
 def points(frame: Frame, coords: Array) -> Array:
-    """Return the Cartesian points of coordinates (..., n, d)."""
+    """Return the Cartesian points of coordinates (..., n, d), as ``Frame.points``."""
     x = value(coords)
     if not frame.cylindrical:
         return coords
@@ -71,7 +71,7 @@ def points(frame: Frame, coords: Array) -> Array:
 
 
 def coords(frame: Frame, at: Array) -> Array:
-    """Return the coordinates of Cartesian points (..., n, d)."""
+    """Return the coordinates of Cartesian points (..., n, d), as ``Frame.coords``."""
     x = value(at)
     if not frame.cylindrical:
         return at
@@ -80,7 +80,10 @@ def coords(frame: Frame, at: Array) -> Array:
 
 
 def difference(frame: Frame, start: FloatArray, vectors: Array) -> Array:
-    """Return Cartesian displacements (..., n, d) of points (n, d) as components of the frame."""
+    """Return frame components (..., n, d) of displacements ``vectors`` of points ``start`` (n, d).
+
+    As ``Frame.difference``.
+    """
     v = value(vectors)
     full = np.broadcast_to(start, v.shape)
     out = frame.difference(flat(full), flat(v)).reshape(v.shape)
@@ -90,7 +93,7 @@ def difference(frame: Frame, start: FloatArray, vectors: Array) -> Array:
 
 
 def difference_from(frame: Frame, start: Array, vectors: Array) -> Array:
-    """Return what ``difference`` does, of points (n, d) that may be variable."""
+    """Return what ``difference`` does, where ``start`` may be a variable, too."""
     if not frame.cylindrical:
         return vectors
     x, v = value(start), value(vectors)
@@ -102,7 +105,7 @@ def difference_from(frame: Frame, start: Array, vectors: Array) -> Array:
 
 
 def _by_rows(x: Array, slopes: FloatArray) -> Link:
-    """Return what a map of rows with derivatives (n, e, d) depends on."""
+    """Return the link of a map of each row of x (..., n, d), whose derivatives are (n, e, d)."""
     return (
         x,
         lambda t: np.einsum("ned,...nd->...ne", slopes, t),
@@ -111,7 +114,7 @@ def _by_rows(x: Array, slopes: FloatArray) -> Link:
 
 
 def _turned(x: Array, out: FloatArray, slopes_of: Callable[[], FloatArray]) -> Array:
-    """Return the outcome of a map of rows with derivatives (n, e, d)."""
+    """Return ``out``, the result of a map of each row of x, recorded with its derivatives."""
     if not isinstance(x, Variable):
         return out
     return recorded(out, _by_rows(x, slopes_of()))
@@ -124,12 +127,15 @@ def radial_sum(
     weights: Array,
     room: FloatArray | None = None,
 ) -> Array:
-    """Return s (..., N, d) at features (k, N), from features (k, n) and weights (..., n, d).
+    """Return the sum of weighted radial functions (..., N, d), at targets (k, N).
+
+    Of controls (k, n); targets and controls are features.
 
     Parameters
     ----------
+    weights : (..., n, d)
     room : (..., N, d), optional
-        Where the sums of several designs go.
+        Where the sums of several designs are written.
     """
     x, c, w = value(targets), value(controls), value(weights)
 
@@ -153,7 +159,7 @@ def radial_sum(
 
 
 def each_of(work: Linear, stacked: FloatArray) -> FloatArray:
-    """Return what ``work`` makes of each of the arrays (..., n, c)."""
+    """Return ``work`` applied to each array (n, c) of ``stacked`` (..., n, c), stacked again."""
     if stacked.ndim == 2:
         return work(stacked)
     return np.stack([each_of(work, each) for each in stacked])
@@ -166,7 +172,7 @@ def many(
     weights: FloatArray,
     room: FloatArray | None = None,
 ) -> FloatArray:
-    """Return s (..., N, d) with the radial functions of each pair computed once for all weights."""
+    """Return the values of `radial_sum`; each radial function is computed once for all weights."""
     if weights.ndim == 2:
         return evaluate(basis, targets, controls, weights)
     ahead, (n, d) = weights.shape[:-2], weights.shape[-2:]
@@ -189,7 +195,7 @@ def many(
 
 
 def terms(basis: Basis, x: Array) -> Array:
-    """Return the terms (n, q) of the linear polynomial at features (k, n)."""
+    """Return the terms (n, q) of the linear polynomial at features (k, n), as ``linear_terms``."""
     v = value(x)
     out = linear_terms(basis, v)
     if not isinstance(x, Variable):
@@ -215,12 +221,12 @@ def terms(basis: Basis, x: Array) -> Array:
 def weighted_mean(
     basis: Basis, targets: Array, sources: Array, values: Array, own: FloatArray, power: float
 ) -> Array:
-    """Return means (..., N, d) of values (..., n, d), weighted with their inverse distance.
+    """Return means (..., N, d) of values (..., n, d), as ``slideviz.baselines.idw.weighted_means``.
 
     Parameters
     ----------
     own : (n,)
-        A further weight of each source.
+        The weight g_j of each source.
     """
     x, c, v = value(targets), value(sources), value(values)
 

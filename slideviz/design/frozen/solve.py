@@ -1,4 +1,4 @@
-"""Solutions with factors that are kept, of several designs at once."""
+"""Solvers of the systems of a frozen step, with kept factors, for several designs at once."""
 
 from __future__ import annotations
 
@@ -19,15 +19,16 @@ REMEDY = (
     "use DATA_REDUCTION= YES with a larger tolerance, a less smooth RBF_KERNEL such as "
     "wendland-c0, or a smaller INFLUENCE_FACTOR"
 )
+"""What to do about a badly conditioned system, in warnings."""
 
 
 class MeasuredSystem:
-    """Solves a system in blocks, and measures how wrong the fields of its solutions are.
+    """Solves a system in blocks, and estimates the errors of the fields of its solutions.
 
     Attributes
     ----------
     doubt : (...,) float64
-        Of the last solutions, as a part of their largest datum.
+        Estimated error of each of the last solutions, as a part of its largest datum.
     """
 
     def __init__(self, blocks: list[IntArray], systems: list[System], *, refined: bool) -> None:
@@ -35,7 +36,7 @@ class MeasuredSystem:
         self.doubt: FloatArray = np.zeros(())
 
     def __call__(self, right: FloatArray, *, settle: bool = False) -> FloatArray:
-        """Return the solutions (..., n, m) for right-hand sides, all at once.
+        """Return the solutions (..., n, m) for right-hand sides, and set ``doubt``.
 
         ``settle``: as of ``System.refined``.
         """
@@ -59,14 +60,14 @@ class MeasuredSystem:
         return np.ascontiguousarray(shaped).reshape(right.shape)
 
     def adjoint(self, right: FloatArray) -> FloatArray:
-        """Return the solutions of the reverse pass, which are gradients themselves.
+        """Return the solutions (..., n, m) of the reverse pass, which are gradients themselves.
 
         Warns
         -----
         ConditionWarning
-            They do not settle.
+            Refinement does not reach the accuracy `TRUSTED`.
         """
-        if not self._refined:  # what a field would lack says nothing of a gradient
+        if not self._refined:  # the error of a field is no measure for a gradient
             return solved(self._blocks, [system.factor for system in self._systems], right)
         found = self(right, settle=True)
         worst = float(self.doubt.max(initial=0.0))
@@ -83,7 +84,7 @@ class MeasuredSystem:
 
 @dataclass(frozen=True, eq=False)
 class LeastSquares:
-    """Solves a singular symmetric system of constant rank by least squares, with least weights.
+    """Solves a singular symmetric system of constant rank: least-squares solutions of least norm.
 
     Attributes
     ----------
@@ -98,7 +99,7 @@ class LeastSquares:
     rows: IntArray
 
     def __call__(self, right: FloatArray) -> FloatArray:
-        """Return the solutions (..., n, m) for right-hand sides, all at once."""
+        """Return the solutions (..., n, m) for right-hand sides (..., n, m)."""
         return self._along(right, 1.0 / self.values)
 
     def solution(self, met: Callable[[FloatArray], Array], data: Array, found: FloatArray) -> Array:
@@ -113,7 +114,7 @@ class LeastSquares:
         Parameters
         ----------
         met
-            How A v depends on all else, for a constant v (n, m).
+            Returns A v on the tape, for a constant v (n, m).
         data, found : (n, m)
             b and x.
         """
@@ -140,6 +141,7 @@ class LeastSquares:
         )
 
     def _along(self, right: FloatArray, factor: FloatArray) -> FloatArray:
+        """Return ``right`` (..., n, m) with its parts along eigenvectors times ``factor`` (k,)."""
         out = np.zeros_like(right)
         inside = self.vectors.T @ right[..., self.rows, :]
         out[..., self.rows, :] = self.vectors @ (factor[:, None] * inside)
@@ -147,7 +149,7 @@ class LeastSquares:
 
 
 def solved(blocks: list[IntArray], factors: list[Factor], right: FloatArray) -> FloatArray:
-    """Return the solutions (..., n, m) of a system in blocks with factors of all their rows."""
+    """Return the solutions (..., n, m) of a system in blocks (b,) of rows, each with its factor."""
     out = np.empty_like(right)
     for block, factor in zip(blocks, factors, strict=True):
         out[..., block, :] = columnwise(factor.solve, right[..., block, :])
@@ -155,12 +157,12 @@ def solved(blocks: list[IntArray], factors: list[Factor], right: FloatArray) -> 
 
 
 def whole(system: FloatArray) -> Factor:
-    """Return a factor of all rows of a system, also of those that the pivot guard would leave out.
+    """Return a factor of all rows of a system (n, n), without the pivot guard.
 
     Raises
     ------
     DeformError
-        The positions of a design make the system singular.
+        The system is singular at the positions of a design.
     """
     try:
         lower = np.linalg.cholesky(system)
@@ -174,7 +176,7 @@ def whole(system: FloatArray) -> Factor:
 
 
 def columnwise(solve: Callable[[FloatArray], FloatArray], right: FloatArray) -> FloatArray:
-    """Return the solutions for right-hand sides (..., n, m), all at once."""
+    """Return solutions for right-hand sides (..., n, m), by one call of ``solve`` for all."""
     n, m = right.shape[-2:]
     wide = np.moveaxis(right.reshape(-1, n, m), 0, 1).reshape(n, -1)
     with enough_threads(2.0 * n * wide.size):

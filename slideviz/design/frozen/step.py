@@ -1,9 +1,9 @@
 """One step of a deformation with everything discrete kept, for any displacement.
 
-The same mathematics as in `slideviz.rbf.methods` and `slideviz.deformation.stepping`, on a tape:
-values alone where nothing is a variable. What a step chooses is kept when it runs first, at the
-reference design: rows of the systems, primitives that nodes were projected on, nearest boundary
-nodes and radius of the correction.
+The same mathematics as in `slideviz.rbf.methods` and `slideviz.deformation.stepping`, on a tape;
+without a variable it computes values only. Discrete choices are made when the step runs first, at
+the reference design, and kept: rows of the systems, primitives that nodes are projected on,
+nearest boundary nodes and radius of the correction.
 """
 
 from __future__ import annotations
@@ -40,15 +40,15 @@ from slideviz.terms import Sliding
 
 @dataclass(frozen=True, eq=False)
 class StepState:
-    """Where a deformation is after some steps.
+    """The state of a deformation after some steps.
 
     Attributes
     ----------
     coords : (..., n, d)
         Positions in the frame.
     lag : (..., b, d) or None
-        What the interpolants so far lack at the boundary nodes ``of`` (b,); None without data
-        reduction.
+        The errors that the interpolants of all steps so far left at the boundary nodes ``of``
+        (b,); None without data reduction.
     max_error, lost, doubt : (...,) float64
         As of a ``Solution``.
     points : (..., n, d)
@@ -66,12 +66,12 @@ class StepState:
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """What is made once, by name."""
+    """A store of objects that are made once, by name."""
 
     things: dict[str, Any] = made_by(default_factory=dict)
 
     def __call__(self, name: str, make: Callable[[], Any]) -> Any:
-        """Return what has this name; it is made where there is none."""
+        """Return the object of this name; ``make`` makes it the first time."""
         if name not in self.things:
             self.things[name] = make()
         return self.things[name]
@@ -85,28 +85,29 @@ class FrozenStep:
     ----------
     setup : Setup
     mesh : Mesh
+        Undeformed.
     sliding : Sliding
     part : float
-        Of the whole displacement, after this step.
+        Part of the whole displacement that is made after this step, up to 1.
     first : bool
         Whether positions are those of the undeformed mesh, the same for all designs.
     stages : tuple of Levels
         Rows of the systems.
     dropped : (m,) int64
-        Nodes that the pivot guard left out of them.
+        Nodes that the pivot guard left out of the systems.
     condition : float
-        Estimated condition number of the last of them, at the reference.
+        Estimated condition number of the last system, at the reference.
     refined : float
-        By how much ordinary solutions would be wrong, as of a ``Solution``, where they are solved
-        with twice the digits, as at the reference; else 0.
+        Where systems are solved with twice the digits, as at the reference: the estimated error of
+        ordinary solutions, as of a ``Solution``; else 0.
     doubt : float
         As of a ``Solution``, at the reference.
     weights : Weights or None
-        Of inverse distance weighting, where that is the method.
+        Settings of inverse distance weighting, if that is the method.
     body : Body or None
-        Where it is linear elasticity.
+        The elastic body, if the method is linear elasticity.
     choices, constants : Kept
-        What is discrete, and in the first step also what follows from positions alone.
+        Discrete choices; and, used in the first step only, what depends on positions only.
     """
 
     setup: Setup
@@ -125,24 +126,24 @@ class FrozenStep:
     constants: Kept = made_by(default_factory=Kept)
 
     def run(self, before: StepState, target: Array) -> StepState:
-        """Return where nodes are after this step.
+        """Return the state after this step.
 
         Parameters
         ----------
         target : (..., a, d)
-            Displacement of the known nodes after the last step, in the frame.
+            The whole displacement of the known nodes, after the last step, in the frame.
         """
         state = self.moved(before, target)
         coords, at = self._with_points(state.coords)
         return replace(state, coords=coords, points=at)
 
     def moved(self, before: StepState, target: Array, room: FloatArray | None = None) -> StepState:
-        """Return where nodes are after this step, without points, and without copies in a halo.
+        """Return the state after this step, without points, and with copies in a halo not moved.
 
         Parameters
         ----------
         room : (..., n, d), optional
-            Where the coordinates go, for designs without a variable.
+            Where the coordinates are written, if nothing is a variable.
         """
         setup = self.setup
         goal = _shifted(setup.coords[setup.known], multiply(target, np.array([[self.part]])))
@@ -165,12 +166,13 @@ class FrozenStep:
 
     @property
     def _method(self) -> type[Method]:
+        """Return the class of the method."""
         if self.weights is not None:
             return Weighting
         return Interpolation if self.body is None else Elasticity
 
     def _with_points(self, moved: Array) -> tuple[Array, Array]:
-        """Return coordinates and points, with copies in place."""
+        """Return coordinates and Cartesian points, with copies in a halo moved, too."""
         setup, frame = self.setup, self.setup.frame
         at = _at_rest(points(frame, moved), moved, setup.coords, self.mesh.points)
         halo = self.mesh.halo
@@ -185,17 +187,14 @@ class FrozenStep:
 
 
 def _shifted(start: Array, by: Array, *, own: bool = False) -> Array:
-    """Return start + by, in the place of the latter if it is nobody else's.
-
-    Rows that do not move keep every bit.
-    """
+    """Return start + by, written to ``by`` with ``own``; adding zero keeps every bit."""
     x, u = value(start), value(by)
     out = shift(x, u if own else u.copy())
     return recorded(out, (start, lambda t: t, lambda g: g), (by, lambda t: t, lambda g: g))
 
 
 def _at_rest(at: Array, moved: Array, start: FloatArray, before: FloatArray) -> Array:
-    """Return the points, with every bit of those whose coordinates did not change."""
+    """Return points ``at``; those with coordinates ``moved`` as at the start become ``before``."""
     if at is moved:
         return at
     keep_rest(value(at), value(moved), start, before)

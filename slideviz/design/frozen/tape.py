@@ -1,9 +1,9 @@
 """A tape of array operations, each with its exact derivative, forward and in reverse.
 
-Arrays are (..., n, c): rows are nodes or constraints, columns their components, and what comes
-before are directions (or designs) that go through together. An operation takes constants (arrays)
-and variables. Without a variable it is plain NumPy and is not recorded, so that one program gives
-values and derivatives alike.
+Arrays are (..., n, c): rows are nodes or constraints, columns their components, and leading axes
+are directions (or designs) that are computed together. An operation takes constants (arrays) and
+variables. Without a variable it is plain NumPy and is not recorded, so that the same code computes
+values and derivatives.
 """
 
 from __future__ import annotations
@@ -19,13 +19,16 @@ from scipy.sparse import csr_array
 from slideviz.mesh.model import FloatArray, IntArray
 
 Linear = Callable[[FloatArray], FloatArray]
+"""A linear map of arrays (..., n, c)."""
+
 Link = tuple[Any, Linear, Linear]
-"""What an operation depends on, and its derivative: of tangents, and of adjoints back."""
+"""An argument of an operation, and the operation's derivative with respect to it: from tangents of
+the argument to those of the result, and from adjoints of the result to those of the argument."""
 
 
 @dataclass(frozen=True, eq=False)
 class Variable:
-    """The value of an operation on a tape.
+    """The result of an operation on a tape.
 
     Attributes
     ----------
@@ -71,12 +74,15 @@ class Tape:
         self._links: list[list[tuple[int, Linear, Linear]]] = []
 
     def variable(self, value: FloatArray, links: Sequence[Link] = ()) -> Variable:
-        """Return a further variable: an input, or the outcome of an operation."""
+        """Return a new variable: an input, or with ``links`` the result of an operation."""
         self._links.append([(source.place, push, pull) for source, push, pull in links])
         return Variable(value, self, len(self._links) - 1)
 
     def push(self, start: Variable, tangent: FloatArray, end: Variable) -> FloatArray:
-        """Return the change of ``end`` as ``start`` changes by ``tangent``."""
+        """Return the derivative of ``end`` as ``start`` changes by ``tangent``; forward pass.
+
+        ``tangent`` is (..., n, c) as ``start`` (n, c); the result is as ``end``.
+        """
         found: dict[int, FloatArray] = {start.place: tangent}
         for place in range(start.place + 1, end.place + 1):
             for source, push, _ in self._links[place]:
@@ -87,7 +93,10 @@ class Tape:
         return np.broadcast_to(found.get(end.place, np.zeros(shape)), shape)
 
     def pull(self, end: Variable, adjoint: FloatArray, start: Variable) -> FloatArray:
-        """Return the gradient with respect to ``start`` of a sum with weights of ``end``."""
+        """Return the gradient of ``(adjoint * end).sum()`` with respect to ``start``; reverse pass.
+
+        ``adjoint`` is (..., n, c) as ``end`` (n, c); the result is as ``start``.
+        """
         found: dict[int, FloatArray] = {end.place: adjoint}
         for place in range(end.place, start.place, -1):
             if place not in found:
@@ -106,27 +115,27 @@ def value(x: Array) -> FloatArray:
 
 
 def recorded(result: FloatArray, *links: Link) -> Array:
-    """Return the outcome of an operation; it is recorded where it depends on a variable."""
+    """Return ``result``, recorded on the tape with its links if any of them is of a variable."""
     used = [link for link in links if isinstance(link[0], Variable)]
     return used[0][0].tape.variable(result, used) if used else result
 
 
 def _stretched(tangent: FloatArray, like: FloatArray) -> FloatArray:
-    """Return a tangent with as many columns as the other term of a sum has."""
+    """Return a tangent with its one column repeated as often as ``like`` has columns."""
     return (
         tangent if tangent.shape[-1] >= like.shape[-1] else np.repeat(tangent, like.shape[-1], -1)
     )
 
 
 def _fitted(adjoint: FloatArray, like: FloatArray) -> FloatArray:
-    """Return the adjoint of an array that was stretched along its columns."""
+    """Return an adjoint, summed over columns if ``like``, the argument, has a single one."""
     if like.shape[-1] == 1 and adjoint.shape[-1] != 1:
         return adjoint.sum(axis=-1, keepdims=True)
     return adjoint
 
 
 def add(a: Array, b: Array) -> Array:
-    """Return a + b."""
+    """Return a + b; one of them may have a single column."""
     x, y = value(a), value(b)
     return recorded(
         x + y,
@@ -146,7 +155,7 @@ def multiply(a: Array, b: Array) -> Array:
 
 
 def function(x: Array, result: FloatArray, slope: FloatArray) -> Array:
-    """Return a function of each element, given its values and its derivatives."""
+    """Return ``result``, a function of each element of x, recorded with derivatives ``slope``."""
     return recorded(result, (x, lambda t: t * slope, lambda g: g * slope))
 
 
@@ -157,7 +166,7 @@ def inverse(x: Array) -> Array:
 
 
 def dot(a: Array, b: Array) -> Array:
-    """Return the scalar product of each row of a with that of b, (..., n, 1)."""
+    """Return the scalar product of each row of a with the same row of b, (..., n, 1)."""
     x, y = value(a), value(b)
 
     def along(u: FloatArray, v: FloatArray) -> FloatArray:
@@ -195,7 +204,7 @@ def unit(x: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Return the vector product of each row of a with that of b, (..., n, 3)."""
+    """Return the cross product of each row of a with the same row of b, (..., n, 3)."""
     x, y = value(a), value(b)
     return recorded(
         np.cross(x, y),
@@ -229,7 +238,7 @@ def product(a: Array, b: Array) -> Array:
 
 
 def reshape(x: Array, rows: int, columns: int) -> Array:
-    """Return the entries, row by row, as (..., rows, columns)."""
+    """Return the entries of x (..., n, c), row by row, as (..., rows, columns)."""
     n, c = value(x).shape[-2:]
     return recorded(
         value(x).reshape(*value(x).shape[:-2], rows, columns),
@@ -242,7 +251,7 @@ def reshape(x: Array, rows: int, columns: int) -> Array:
 
 
 def transpose(x: Array) -> Array:
-    """Return rows as columns."""
+    """Return x (..., n, c) with rows and columns exchanged, (..., c, n)."""
 
     def turned(t: FloatArray) -> FloatArray:
         return np.swapaxes(t, -1, -2)
@@ -251,21 +260,21 @@ def transpose(x: Array) -> Array:
 
 
 def sums(values: FloatArray, rows: IntArray, count: int) -> FloatArray:
-    """Return the sums (..., count, c) of the values (..., m, c) that belong to each row (m,)."""
+    """Return the sums (..., count, c) of ``values`` (..., m, c) with equal ``rows`` (m,)."""
     out = np.zeros((*values.shape[:-2], count, values.shape[-1]))
     np.add.at(out, (..., rows, slice(None)), values)  # type: ignore[arg-type]
     return out
 
 
 def take(x: Array, rows: IntArray) -> Array:
-    """Return some rows of x (..., n, c), as often as they are named: (..., m, c)."""
+    """Return the rows ``rows`` (m,) of x (..., n, c), (..., m, c); rows may occur repeatedly."""
     v = value(x)
     n = v.shape[-2]
     return recorded(v[..., rows, :], (x, lambda t: t[..., rows, :], lambda g: sums(g, rows, n)))
 
 
 def gather(x: Array, rows: IntArray, count: int) -> Array:
-    """Return the sums (..., count, c) of the rows of x that belong to each row."""
+    """Return the sums (..., count, c) of the rows of x (..., m, c) with equal ``rows`` (m,)."""
     v = value(x)
     return recorded(
         sums(v, rows, count), (x, lambda t: sums(t, rows, count), lambda g: g[..., rows, :])
@@ -273,7 +282,7 @@ def gather(x: Array, rows: IntArray, count: int) -> Array:
 
 
 def mixed(matrix: csr_array, x: Array) -> Array:
-    """Return a sparse matrix (m, n) times the rows of x (..., n, c)."""
+    """Return the product of a constant sparse matrix (m, n) and x (..., n, c), (..., m, c)."""
 
     def times(a: csr_array, t: FloatArray) -> FloatArray:
         n, c = t.shape[-2:]
@@ -293,7 +302,7 @@ def put(x: Array, rows: IntArray, new: Array, *, own: bool = False) -> Array:
     Parameters
     ----------
     own
-        Whether nobody else needs the values of x, so that they can be changed in their place.
+        Whether nothing else needs the values of x, so that they may be overwritten.
     """
     v, w = value(x), value(new)
     ahead = np.broadcast_shapes(v.shape[:-2], w.shape[:-2])
@@ -316,7 +325,7 @@ def put(x: Array, rows: IntArray, new: Array, *, own: bool = False) -> Array:
 
 
 def join(*parts: Array) -> Array:
-    """Return the rows of all parts, one after the other."""
+    """Return all parts (..., n_k, c), joined along their rows."""
     values = [value(part) for part in parts]
     ahead = np.broadcast_shapes(*(v.shape[:-2] for v in values))
     stops = np.cumsum([v.shape[-2] for v in values])
@@ -341,16 +350,19 @@ def join(*parts: Array) -> Array:
 def solution(
     residual: Array, found: FloatArray, solve: Linear, adjoint: Linear | None = None
 ) -> Array:
-    """Return what makes a residual zero that is linear in it, with a symmetric matrix.
+    """Return ``found`` (n, m), the solution of A x = b, recorded with its derivative -A^-1 dr.
+
+    A is symmetric.
 
     Parameters
     ----------
-    residual
-        How it depends on all else, at the solution.
+    residual : (n, m)
+        r = A x - b on the tape, for the constant x = ``found``: its value does not matter.
     found
         The solution.
     solve, adjoint : callable
-        The matrix's inverse, and the same for the reverse pass, where that has another accuracy.
+        Multiply with the inverse of A; ``adjoint`` in the reverse pass, if it needs another
+        accuracy.
     """
     back = adjoint or solve
     return recorded(found, (residual, lambda t: -solve(t), lambda g: -back(g)))

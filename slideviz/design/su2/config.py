@@ -1,6 +1,6 @@
-"""Configurations of SU2: what of them concerns a deformation and its gradients.
+"""Configuration files of SU2: their keys about a deformation and its gradients.
 
-Such a file has hundreds of keys; those that concern other things are counted and left alone.
+Such a file has hundreds of keys; the others are listed, and not read.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ ROLE_KEYS: dict[str, Role] = {
     "MARKER_PERIODIC": "periodic",
     "MARKER_DEFORM_NORMAL": "periodic",
 }
-"""What boundaries do that SU2, or ParaBlade's branch of it, lists; the later ones win."""
+"""Roles of the markers that keys of SU2, or of ParaBlade's branch of it, list; later keys win."""
 FILES = {
     "MESH_FILENAME": "mesh.su2",
     "MESH_OUT_FILENAME": "mesh_out.su2",
@@ -49,10 +49,11 @@ WORDS = {
     "FFD_FIX_J": "NONE",
     "FFD_FIX_K": "NONE",
 }
-"""Other keys of one value or list, with SU2's defaults; but what moves is held only if asked."""
+"""Other keys of one value or list, with SU2's defaults; except FFD_CONTINUITY, which is empty:
+control points are held only if the key is given."""
 LISTS = ("DV_KIND", "DV_PARAM", "DV_VALUE", "DV_MARKER", "MARKER_DEFORM_MESH")
 NOT_HERE = ("MARKER_MOVING", "MESH_FORMAT", "MESH_OUT_FORMAT", *FILES)
-"""Keys of ours that mean something else in SU2, or are read in another way."""
+"""Keys of case files that mean something else in SU2, or are read in another way."""
 OURS = {
     name: key
     for name, key in KEYS.items()
@@ -61,31 +62,32 @@ OURS = {
 SU2_CONTINUITY = "2ND_DERIVATIVE"
 """SU2's default of FFD_CONTINUITY."""
 OWN = {name for name in OURS if not name.startswith(("FFD_", "MARKER_"))}
-"""Keys of ours that no key of SU2 is like."""
+"""Keys of case files that resemble no key of SU2."""
 ALIKE, ALIKE_OWN = 0.9, 0.8
-"""From where a key that is not read may be one that is, mistyped. SU2 itself has MARKER_INTERFACE
-(0.84 of MARKER_INTERNAL), SOLUTION_FILENAME (0.895 of SOLUTION_ADJ_FILENAME) and more such."""
+"""Similarity (``difflib``, 0 to 1) from which an unread key may be a mistyped one; the second for
+keys in `OWN`. SU2 has keys as similar as MARKER_INTERFACE (0.84 to MARKER_INTERNAL) and
+SOLUTION_FILENAME (0.895 to SOLUTION_ADJ_FILENAME)."""
 CONTINUITIES = {"NO_DERIVATIVE": 1, "1ST_DERIVATIVE": 2, "2ND_DERIVATIVE": 3, "USER_INPUT": 0}
-"""FFD_CONTINUITY, and how many planes of control points it holds."""
+"""Values of FFD_CONTINUITY, and how many planes of control points each holds at a side."""
 
 
 @dataclass(frozen=True)
 class Su2Config:
-    """A configuration of SU2, as far as it concerns a deformation.
+    """A configuration of SU2: the part about a deformation.
 
     Attributes
     ----------
     case : Case
-        Roles and settings, without motions; the files of the meshes, as SU2 has them.
+        Roles, settings and the files of the meshes, without motions.
     markers : tuple of str
         The boundaries that the design variables move.
     variables : tuple of DesignVariable
-    files, words : dict
-        The values of ``FILES`` and ``WORDS``.
+    files, words : dict of str to Path, dict of str to str
+        Values of the keys in ``FILES`` and ``WORDS``.
     ignored : tuple of str
-        The keys that concern other things.
+        The keys that are not read.
     named : dict of str to str
-        The key that names each boundary with a role.
+        For each marker with a role, the key that lists it.
     """
 
     case: Case
@@ -98,7 +100,7 @@ class Su2Config:
 
     @property
     def source(self) -> Path:
-        """Return the file."""
+        """Return the path of the configuration."""
         assert self.case.source is not None
         return self.case.source
 
@@ -163,7 +165,7 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
 
 
 def _perhaps_ours(path: Path, ignored: tuple[str, ...], rows: dict[str, Entry]) -> list[str]:
-    """Return warnings about keys that nearly are those that are read here."""
+    """Return a warning for each ignored key that resembles one that is read."""
     found = []
     for key in ignored:
         close = get_close_matches(key, OWN, n=1, cutoff=ALIKE_OWN) or get_close_matches(
@@ -175,16 +177,18 @@ def _perhaps_ours(path: Path, ignored: tuple[str, ...], rows: dict[str, Entry]) 
 
 
 def _read_keys() -> set[str]:
+    """Return the names of all keys that are read."""
     formats = {"MESH_FORMAT", "MESH_OUT_FORMAT"}
     return {*OURS, *ROLE_KEYS, *FILES, *WORDS, *LISTS, *formats}
 
 
 def _with_ending(path: Path, case: Case) -> Path:
+    """Return the path of the output mesh with the ending of its format, if it has none."""
     return path if path.suffix else path.with_suffix(f".{case.mesh_out_format or 'su2'}")
 
 
 class _Reader:
-    """Reads the keys of a configuration, and notes what is wrong with them."""
+    """Reads the keys of a configuration; appends mistakes to ``problems``, fills ``named``."""
 
     def __init__(self, rows: dict[str, Entry], problems: list[Problem]) -> None:
         self.rows, self.problems = rows, problems
@@ -196,7 +200,7 @@ class _Reader:
         return default if entry is None else entry.value.strip('"') or default
 
     def names(self, key: str) -> tuple[str, ...]:
-        """Return the list of markers after a key."""
+        """Return the markers that a key lists; none if it is missing or wrong, which is noted."""
         entry = self.rows.get(key)
         if entry is None:
             return ()
@@ -208,11 +212,11 @@ class _Reader:
             return ()
 
     def note(self, entry: Entry, sentence: str) -> None:
-        """Note what is wrong with a key."""
+        """Append a sentence about a key, with its line, to the problems."""
         self.problems += [(entry.line, f"{entry.key}: {line}") for line in sentence.splitlines()]
 
     def case(self) -> tuple[Case, tuple[str, ...]]:
-        """Return roles and settings, and the boundaries that move."""
+        """Return the case with roles and settings, and the markers that move."""
         case = Case(generate_quality=False)
         roles: dict[str, Role] = {}
         for key, role in ROLE_KEYS.items():
@@ -241,7 +245,7 @@ class _Reader:
         return case, moving
 
     def formats(self) -> dict[str, str | None]:
-        """Return the formats of the meshes as a case has them."""
+        """Return the fields ``mesh_format`` and ``mesh_out_format`` of the case."""
         found: dict[str, str | None] = {}
         for key, field in (("MESH_FORMAT", "mesh_format"), ("MESH_OUT_FORMAT", "mesh_out_format")):
             entry = self.rows.get(key)
@@ -255,7 +259,7 @@ class _Reader:
         return found
 
     def check(self, words: dict[str, str]) -> None:
-        """Note values that are none, and keys of ours that do not belong here."""
+        """Note unsupported values, a missing DV_KIND, and keys that belong in a case file."""
         for key, allowed in (
             ("FFD_CONTINUITY", ("", *CONTINUITIES)),
             ("FFD_COORD_SYSTEM", ("CARTESIAN",)),

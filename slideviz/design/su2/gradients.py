@@ -18,9 +18,9 @@ from slideviz.errors import ConditionWarning, ToleranceWarning
 from slideviz.mesh.model import FloatArray, largest_coordinate
 
 DIRECTIONS = 16
-"""At a design of zeros, control nodes are chosen for so many directions together."""
+"""Most displacements for which control nodes are chosen at a design of zeros."""
 REACH = 1e-3
-"""How far these move the boundary, as a part of the mesh."""
+"""Size of these displacements, as a part of the mesh's extent."""
 
 INSUFFICIENT = (
     "; boundary nodes still get exactly their displacement, and the gradient is that of such a "
@@ -30,20 +30,20 @@ INSUFFICIENT = (
 
 @dataclass(frozen=True, eq=False)
 class Gradients:
-    """What an objective changes by at a design.
+    """Gradients of an objective at a design.
 
     Attributes
     ----------
     surface : (m, d) float64
-        Per displacement of each moving node, with all inner points following.
+        With respect to the displacement of each moving node, with all inner points following.
     variables : (v,) float64
-        Per value of each design variable.
+        With respect to the value of each design variable.
     points : (m, d) float64
-        Where the moving nodes are at the design.
+        Positions of the moving nodes at the design.
     at_design : bool
-        Whether the design is that of the configuration, and not the mesh as it is.
+        Whether the design is that of the configuration; else it is the undeformed mesh.
     source : str
-        The file of the sensitivities.
+        Path of the sensitivities.
     warnings : tuple of str
     """
 
@@ -63,11 +63,11 @@ def find_gradients(
     Raises
     ------
     SlidevizError
-        The sensitivities are not there or of another mesh, or the deformation is not possible.
+        The sensitivities are missing or of another mesh, or the deformation is not possible.
 
     Notes
     -----
-    What a `Deformer` warns of is among the warnings of the result.
+    The warnings of the `Deformer` are among the warnings of the result.
     """
     config, mesh = surface.config, surface.mesh
     found = read_sensitivities(config, mesh)
@@ -111,7 +111,7 @@ def find_gradients(
 
 @contextmanager
 def _heard(said: list[str]) -> Iterator[None]:
-    """Add what a deformer warns of to a list; other warnings go on."""
+    """Context that appends the warnings of a deformer to ``said``, and passes other warnings on."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ConditionWarning)
         warnings.simplefilter("always", ToleranceWarning)
@@ -126,7 +126,7 @@ def _heard(said: list[str]) -> Iterator[None]:
 
 
 def _difference(found: FloatArray, written: FloatArray) -> list[str]:
-    """Return the sentence about points (n, d) that are not those that ``def`` writes."""
+    """Return a sentence if ``found`` (n, d) is not what ``slideviz def`` writes; else none."""
     gap = float(np.abs(found - written).max(initial=0.0))
     if gap <= CLOSE * largest_coordinate(written):
         return []
@@ -137,7 +137,7 @@ def _difference(found: FloatArray, written: FloatArray) -> list[str]:
 def _deformer(
     surface: MovingSurface, displacement: FloatArray, progress: Callable[[Progress], None] | None
 ) -> Deformer:
-    """Return the deformation, prepared at a design."""
+    """Return a deformer made at ``displacement`` (m, d); if zero, also for `_directions`."""
     reference = displacement[None]
     if not displacement.any():
         reference = np.concatenate([reference, _directions(surface)])
@@ -147,7 +147,10 @@ def _deformer(
 
 
 def _directions(surface: MovingSurface) -> FloatArray:
-    """Return displacements (k, m, d) as large as ``REACH`` that together move as variables do."""
+    """Return k displacements (k, m, d): those of all variables, distributed on `DIRECTIONS` sums.
+
+    Each variable moves nodes by at most `REACH` times the mesh's extent.
+    """
     sums: list[FloatArray] = []
     for place in range(len(surface.config.variables)):
         slope = surface.slope(place, undeformed=True)

@@ -1,6 +1,6 @@
-"""Boundaries that a configuration of SU2 names, and the mesh may lack.
+"""Markers that a configuration of SU2 names, but the mesh does not have.
 
-One configuration often serves several meshes, so SU2 passes over boundaries that one of them lacks.
+One configuration often serves several meshes, so SU2 ignores such markers of some keys.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from slideviz.design.su2.config import ROLE_KEYS, Su2Config
 from slideviz.mesh.model import Mesh
 
 PASSED_OVER = {*ROLE_KEYS, "MARKER_DEFORM_MESH"}
-"""Keys of SU2 and its branches, whose boundaries a mesh may lack."""
+"""Keys whose markers are ignored if the mesh does not have them."""
 
 
 def on_mesh(config: Su2Config, mesh: Mesh) -> Su2Config:
-    """Return a configuration without the boundaries that SU2 passes over, with a warning each key.
+    """Return the configuration without markers that the mesh lacks, with a warning for each key.
 
     A periodic pair of which one is missing stays, and so does all that would move where all of it
     is missing: `problems_of_markers` tells them.
@@ -52,7 +52,7 @@ def problems_of_markers(config: Su2Config, mesh: Mesh) -> list[str]:
 
 
 def _warnings(config: Su2Config, mesh: Mesh, passed: dict[str, str]) -> list[str]:
-    """Return a sentence for each key."""
+    """Return a warning for each key with ignored markers; ``passed`` maps these to keys."""
     found = []
     for key in dict.fromkeys(passed.values()):
         names = [name for name in passed if passed[name] == key]

@@ -1,8 +1,8 @@
-"""Which planes of control points SU2 holds, so that a surface stays smooth where it leaves a box.
+"""Planes of control points that SU2 holds, so that a surface stays smooth where it leaves a box.
 
 FFD_CONTINUITY: the sides of a box that a moving boundary passes through are held, with none, one or
-two planes beside them. A variable that moves a control point of a held plane does nothing; one that
-moves all of an index does (SU2 8, ``CheckFFDIntersections``).
+two planes beside them. A variable that moves a control point of a held plane has no effect; one
+that moves all control points of an index (-1) has (SU2 8, ``CheckFFDIntersections``).
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ from slideviz.ffd.box import Box
 from slideviz.mesh.model import FloatArray, Mesh
 
 Planes = tuple[set[int], set[int], set[int]]
+"""Indices of planes of control points in each direction i, j, k of a box."""
 
 
 def held_planes(config: Su2Config, mesh: Mesh, box: Box, continuity: str) -> Planes:
-    """Return the held planes of each direction, with a value of FFD_CONTINUITY."""
+    """Return the planes of a box that are held; ``continuity`` is a value of FFD_CONTINUITY."""
     degrees = box.degrees
     held: Planes = (set(), set(), set())
     depth = CONTINUITIES[continuity]
@@ -47,7 +48,7 @@ def held_planes(config: Su2Config, mesh: Mesh, box: Box, continuity: str) -> Pla
 
 
 def _edges(mesh: Mesh, markers: tuple[str, ...]) -> FloatArray:
-    """Return the ends of all segments between two nodes of a facet, (e, 2, d)."""
+    """Return the ends (e, 2, d) of all segments between two nodes of a facet of some markers."""
     pairs = []
     for name in markers:
         for _, nodes in mesh.marker(name).cells.by_type.values():
@@ -58,14 +59,17 @@ def _edges(mesh: Mesh, markers: tuple[str, ...]) -> FloatArray:
 
 
 def _meets(ends: FloatArray, corners: FloatArray) -> bool:
-    """Tell whether a segment meets a side with corners (4, 3): two triangles, or in 2D a line."""
+    """Tell whether any segment (e, 2, d) meets the side of a box with ``corners`` (4, 3).
+
+    In 3D the side is two triangles, in 2D a line.
+    """
     if ends.shape[2] == 2:
         return _crossed(ends, corners[0, :2], corners[2, :2])
     return _pierced(ends, corners[[0, 1, 2]]) or _pierced(ends, corners[[3, 2, 1]])
 
 
 def _crossed(ends: FloatArray, one: FloatArray, other: FloatArray) -> bool:
-    """Tell whether a segment (e, 2, 2) meets the one between two points."""
+    """Tell whether any segment (e, 2, 2) meets the one from ``one`` to ``other``."""
 
     def side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
         return (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
@@ -75,13 +79,13 @@ def _crossed(ends: FloatArray, one: FloatArray, other: FloatArray) -> bool:
     start, end = ends[:, 0], ends[:, 1]
     across = side(one, other, start) * side(one, other, end) <= 0.0
     between = side(start, end, one) * side(start, end, other) <= 0.0
-    # Two that lie on one line have nothing on either side.
+    # Segments on the line itself do not cross it.
     apart = (side(one, other, start) == 0.0) & (side(one, other, end) == 0.0)
     return bool((across & between & ~apart).any())
 
 
 def _pierced(ends: FloatArray, triangle: FloatArray) -> bool:
-    """Tell whether a segment (e, 2, 3) meets a triangle (3, 3)."""
+    """Tell whether any segment (e, 2, 3) meets a triangle (3, 3)."""
     u, v = triangle[1] - triangle[0], triangle[2] - triangle[0]
     normal = np.cross(u, v)
     start, along = ends[:, 0] - triangle[0], ends[:, 1] - ends[:, 0]
@@ -98,7 +102,11 @@ def _pierced(ends: FloatArray, triangle: FloatArray) -> bool:
 def idle_variables(
     config: Su2Config, mesh: Mesh, boxes: dict[str, Box]
 ) -> tuple[tuple[bool, ...], list[str]]:
-    """Return which variables do nothing since their control points are held, and warnings."""
+    """Return for each variable whether it has no effect, as its control point is held; warnings.
+
+    No variable is without effect where FFD_CONTINUITY is not given, but a warning says which ones
+    SU2 would hold.
+    """
     asked = config.words["FFD_CONTINUITY"].upper()
     continuity = asked or SU2_CONTINUITY
     held = {name: held_planes(config, mesh, box, continuity) for name, box in boxes.items()}
@@ -129,12 +137,13 @@ def idle_variables(
 
 
 def _checked(variable: DesignVariable) -> tuple[int, int, int]:
-    """Return the index that SU2 looks for among the held planes."""
+    """Return the index (i, j, k) that SU2 compares with the held planes; k = 0 in 2D."""
     i, j, k = variable.index
     return (i, j, 0) if variable.kind == "FFD_CONTROL_POINT_2D" else (i, j, k)
 
 
 def _words(held: Sequence[set[int]]) -> str:
+    """Return held planes in words: ``i = 0, 1, j = 4``."""
     return ", ".join(
         f"{letter} = {', '.join(map(str, sorted(planes)))}"
         for letter, planes in zip("ijk", held, strict=True)
@@ -143,5 +152,6 @@ def _words(held: Sequence[set[int]]) -> str:
 
 
 def _listed(places: list[int]) -> str:
+    """Return numbers of variables in words, six at most."""
     more = f" and {len(places) - 6} more" if len(places) > 6 else ""
     return f"variable{'s' * (len(places) > 1)} {', '.join(map(str, places[:6]))}{more}"

@@ -12,6 +12,7 @@ from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 POSITION = Form("position", ("x", "y", "z"), flat=True)
+"""The columns of the file after the node."""
 
 
 def read_positions(
@@ -20,8 +21,8 @@ def read_positions(
     """Return the new positions of nodes, (m, d), and warnings; nodes that are not listed stay.
 
     Lines are ``index x y [z]`` in any order, with blanks, tabs or commas between; a plane mesh may
-    have a z of 0. As in SU2, nodes that are on none of the moving boundaries are passed over, but
-    not without a word.
+    have a z of 0. As in SU2, nodes that are on none of the moving boundaries are ignored, but with
+    a warning.
 
     Parameters
     ----------
@@ -31,7 +32,7 @@ def read_positions(
         Of the moving boundaries, ascending.
     mesh : Mesh
     of : str
-        What these boundaries are, for messages: ``DV_MARKER= (low)``.
+        Key and moving boundaries for messages: ``DV_MARKER= (low)``.
 
     Raises
     ------

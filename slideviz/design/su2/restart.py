@@ -14,6 +14,7 @@ from slideviz.mesh.model import FloatArray
 MAGIC = 535532
 """The first number of SU2's binary restart files."""
 NAME_BYTES = 33
+"""Length of a column's name in these files."""
 
 
 def read_restart(path: Path) -> tuple[list[str], FloatArray]:
@@ -22,7 +23,7 @@ def read_restart(path: Path) -> tuple[list[str], FloatArray]:
     Raises
     ------
     CaseError
-        It is cut off, or has what is no number.
+        The file is cut off, or has a value that is not a number.
     """
     require_ordinary(path, CaseError)
     with path.open("rb") as file:
@@ -31,7 +32,7 @@ def read_restart(path: Path) -> tuple[list[str], FloatArray]:
 
 
 def is_number(word: str) -> bool:
-    """Tell whether a word is a number."""
+    """Tell whether Python reads a word as a number."""
     try:
         float(word)
     except ValueError:

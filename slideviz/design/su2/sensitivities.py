@@ -1,4 +1,4 @@
-"""Volume sensitivities that SU2's adjoint solver leaves: read, and matched to points."""
+"""Volume sensitivities, written by SU2's adjoint solver: read, and matched to points."""
 
 from __future__ import annotations
 
@@ -65,10 +65,11 @@ SUFFIXES = {
     "TOPOL_COMPLIANCE": "topcomp",
     "STRESS_PENALTY": "stress",
 }
-"""What SU2 adds to the names of adjoint files, by objective; ``combo`` for several."""
+"""Suffixes that SU2 adds to the names of adjoint files, by objective; ``combo`` for several."""
 EXACT, CLOSE, SAME = 1e-13, 1e-8, 1e-6
-"""By how much positions in a file miss those of points, as a part of the largest coordinate: where
-they are these points and no others, from where it is doubtful, and from where they are not."""
+"""Differences of positions in a file from points, as a part of the largest coordinate: up to
+``EXACT`` the file is of these points, above ``CLOSE`` there is a warning, above ``SAME`` the file
+is of other points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +80,9 @@ class Sensitivities:
     ----------
     path : Path
     values : (n, d) float64
-        In the order of the mesh's points, or of the file where ``ordered`` is false.
+        In the order of the mesh's points; if not ``ordered``, of the rows of the file.
     points : (n, d) float64 or None
-        Where the points were.
+        Positions of the points, in the same order; None if the file has none.
     ordered : bool
     """
 
@@ -99,7 +100,7 @@ class Matched:
     ----------
     values : (n, d) float64
     at_design : bool
-        Whether they are those at the points of the design, and not of the mesh as it is.
+        Whether they were computed at the design's points; else at those of the undeformed mesh.
     warnings : tuple of str
     """
 
@@ -109,12 +110,12 @@ class Matched:
 
 
 def read_sensitivities(config: Su2Config, mesh: Mesh) -> Sensitivities:
-    """Return the sensitivities that a configuration names.
+    """Read the sensitivities that a configuration names.
 
     Raises
     ------
     CaseError
-        The file is not there, lacks columns or points, or has what is no number.
+        The file is missing, lacks columns or points, or has a value that is not a number.
     """
     path = sensitivity_file(config)
     if _is_unordered(config):
@@ -124,11 +125,12 @@ def read_sensitivities(config: Su2Config, mesh: Mesh) -> Sensitivities:
 
 
 def _is_unordered(config: Su2Config) -> bool:
+    """Tell whether DV_SENSITIVITY_FORMAT says that rows are matched by position."""
     return config.words["DV_SENSITIVITY_FORMAT"].upper() == "UNORDERED_ASCII"
 
 
 def sensitivity_file(config: Su2Config) -> Path:
-    """Return the file of the sensitivities.
+    """Return the path of the file of sensitivities.
 
     An adjoint restart has the suffix of its objective in its name, and ends with ``.csv`` or
     ``.dat``.
@@ -159,16 +161,16 @@ def sensitivity_file(config: Su2Config) -> Path:
 
 
 def match(found: Sensitivities, mesh: Mesh, design: Callable[[], FloatArray] | None) -> Matched:
-    """Return sensitivities in the order of the points, and where they were taken.
+    """Return sensitivities in the order of the mesh's points, and whether they are at the design.
 
     An adjoint solution belongs to the mesh that it was computed on: that of this design, whose
-    points (n, d) ``design`` returns (None where it moves nothing), or MESH_FILENAME itself where
-    that is deformed already, as in SU2's own loop. The points in the file tell.
+    points (n, d) ``design`` returns (None: it moves nothing), or MESH_FILENAME itself where that
+    is deformed already, as in SU2's own loop. The points in the file decide.
 
     Raises
     ------
     CaseError
-        It belongs to neither.
+        The points in the file are neither, or several rows are at one point.
     """
     if found.points is None:
         said = f"{found.path} has no coordinates: taken as those of this design"
@@ -204,7 +206,7 @@ def match(found: Sensitivities, mesh: Mesh, design: Callable[[], FloatArray] | N
 
 
 def _nearest(found: Sensitivities, points: FloatArray) -> tuple[float, np.ndarray]:
-    """Return by how much points miss those of the file, and the point of each row."""
+    """Return the largest distance of the file's points from points, and the point of each row."""
     assert found.points is not None
     if found.ordered:
         gap = np.abs(found.points - points)
@@ -256,7 +258,7 @@ def _unordered(path: Path, mesh: Mesh) -> Sensitivities:
 
 
 def _rows(path: Path) -> Iterator[list[float]]:
-    """Yield the numbers of each line; lines that begin with none are headings."""
+    """Yield the numbers of each line; lines that do not begin with a number are skipped."""
     text, _ = read_text(path, "file of sensitivities")
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.replace(",", " ").split()
@@ -269,6 +271,7 @@ def _rows(path: Path) -> Iterator[list[float]]:
 
 
 def _require_finite(path: Path, values: FloatArray) -> None:
+    """Raise CaseError if any of ``values`` (n, d) is not finite."""
     if not np.isfinite(values).all():
         row = int(np.argmax(~np.isfinite(values).all(axis=1)))
         raise CaseError(f"{path}: the sensitivity of point {row} is not finite; did SU2 diverge?")

@@ -1,6 +1,6 @@
-"""What design variables do to the moving boundaries: displacement, and its exact derivatives.
+"""Displacement of the moving boundaries by design variables, and its exact derivatives.
 
-As in SU2 each variable acts on the undeformed boundary, and what all of them do is added up.
+As in SU2 each variable acts on the undeformed boundary, and their displacements are added up.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 RIGID = ("TRANSLATION", "ROTATION", "SCALE")
+"""Kinds of variables that move boundaries as a rigid body, or scale them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +42,11 @@ class MovingSurface:
     nodes : (m,) int64
         Of all moving boundaries, ascending.
     boxes : dict of str to Box
-        Those that variables move.
+        The FFD boxes that variables move, by name.
     inside : dict of str to Embedding
-        The nodes in each box; their numbers are places among ``nodes``.
+        The nodes in each box, by their place in ``nodes``.
     idle : tuple of bool
-        The variables whose control points are held, which do nothing.
+        For each variable, whether its control point is held, so that it has no effect.
     warnings : tuple of str
     """
 
@@ -75,7 +76,7 @@ class MovingSurface:
 
     @cached_property
     def _listed(self) -> tuple[FloatArray, tuple[str, ...]]:
-        """Return positions from the file, and warnings; none where there is no SURFACE_FILE."""
+        """Return positions (m, d) of SURFACE_FILE, and warnings; the undeformed ones without it."""
         if self.config.variables[0].kind != "SURFACE_FILE":
             return self.mesh.points[self.nodes], ()
         config = self.config
@@ -83,14 +84,14 @@ class MovingSurface:
         return read_positions(config.files["DV_FILENAME"], self.nodes, self.mesh, of)
 
     def slope(self, place: int, undeformed: bool = False) -> FloatArray:
-        """Return the derivative of the displacement for the value of a variable, (m, d).
+        """Return the derivative (m, d) of the displacement with respect to a variable's value.
 
         Parameters
         ----------
         place : int
-            Of the variable.
+            Number of the variable, from 0.
         undeformed : bool
-            At the design that leaves everything in place instead of this one.
+            Whether at the design that moves nothing, instead of this one.
         """
         variable = self.config.variables[place]
         points = self.mesh.points[self.nodes]
@@ -104,7 +105,7 @@ class MovingSurface:
         return self._moved(place, replace(variable, value=1.0), points)
 
     def _moved(self, place: int, variable: DesignVariable, points: FloatArray) -> FloatArray:
-        """Return what a variable does to points (m, d)."""
+        """Return the displacement of points (m, d) by variable number ``place``."""
         value, dim = self.scale * variable.value, self.mesh.dim
         if variable.kind == "TRANSLATION":
             return np.broadcast_to(value * np.array(variable.numbers[:dim]), points.shape)
@@ -132,7 +133,7 @@ class MovingSurface:
         return case.change(motions=(motion,), warnings=warnings)
 
     def boxed(self, mesh: Mesh) -> Mesh:
-        """Return a deformed mesh with the boxes where the design has them."""
+        """Return a deformed mesh with its FFD boxes moved by the design."""
         moved = []
         for name, box in self.boxes.items():
             change = np.zeros(box.points.shape)
@@ -145,12 +146,13 @@ class MovingSurface:
 
 
 def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
-    """Return what the variables of a configuration move.
+    """Return the moving boundaries and boxes of a configuration.
 
     Raises
     ------
     CaseError
-        Boundaries or boxes are not there, a box has no such control point or no node inside.
+        Markers or boxes are missing, or a box lacks a variable's control point or has no node
+        inside.
     """
     names = tuple(dict.fromkeys(v.box for v in config.variables if v.kind in BOXED))
     known, problems = {}, problems_of_markers(config, mesh)
@@ -178,7 +180,7 @@ def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
 
 
 def at_rest(case: Case, mesh: Mesh) -> Step:
-    """Return the step of a design that moves nothing: the first of an optimiser, often."""
+    """Return the one step of a design that moves nothing: often the first of an optimiser."""
     setup = make_setup(case, mesh)
     return Step(
         index=1,
@@ -195,12 +197,12 @@ def at_rest(case: Case, mesh: Mesh) -> Step:
 
 
 def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
-    """Return the mesh with the boxes that a configuration defines, and these: FFD_SETTING.
+    """Return the mesh with the boxes that a configuration defines, and the boxes (FFD_SETTING).
 
     Raises
     ------
     CaseError
-        There are none, or a box is not possible.
+        The configuration defines no box, or a box is not possible.
     """
     contradictions = (text for _, text in ffd_contradictions(config.case))
     raise_all((*problems_of_markers(config, mesh), *contradictions))
@@ -233,7 +235,7 @@ def _problems_of_boxes(config: Su2Config, mesh: Mesh, known: dict[str, Box]) -> 
 def _embedded(
     box: Box, on: dict[str, tuple[Embedding, float]], nodes: IntArray
 ) -> tuple[Box, Embedding]:
-    """Return a box that lists its nodes on each marker, and all of them by their places."""
+    """Return the box with its nodes on each marker listed, and the nodes inside, by their place."""
     listed = {name: (found.nodes, found.uvw) for name, (found, _) in on.items() if len(found.nodes)}
     every = np.concatenate([found.nodes for found, _ in on.values()])
     uvw = np.concatenate([found.uvw for found, _ in on.values()])
@@ -243,7 +245,7 @@ def _embedded(
 
 
 def _left_behind(config: Su2Config, mesh: Mesh) -> list[str]:
-    """Return a note where the surface moves otherwise than the boxes of the mesh."""
+    """Return a note if variables move the surface, but not the FFD boxes in the mesh; or none."""
     kinds = sorted({variable.kind for variable in config.variables} - {*BOXED})
     with suppress(SlidevizError):  # a mesh whose boxes cannot be read has none that could be used
         if kinds and boxes_of(mesh):
@@ -256,7 +258,7 @@ def _left_behind(config: Su2Config, mesh: Mesh) -> list[str]:
 
 
 def _overlaps(inside: dict[str, Embedding]) -> list[str]:
-    """Return a warning where nodes are in several boxes."""
+    """Return a warning if nodes are in several boxes; or none."""
     every = [found.nodes for found in inside.values()]
     shared = sum(map(len, every)) - len(np.unique(np.concatenate([*every, np.empty(0, int)])))
     said = (
@@ -267,16 +269,18 @@ def _overlaps(inside: dict[str, Embedding]) -> list[str]:
 
 
 def _shown(point: FloatArray) -> str:
+    """Return a point in words."""
     return f"({', '.join(f'{value:.6g}' for value in point)})"
 
 
 def _turned(
     numbers: tuple[float, ...], points: FloatArray, angle_deg: float, derivative: bool = False
 ) -> FloatArray:
-    """Return the change of points (m, d) by a turn about a line, or its derivative by radians.
+    """Return the displacement of points (m, d) by a rotation about a line.
 
-    The line goes through both points of ``numbers``, in 2D along z. Rodrigues:
-    ``sin(a) k x v + (1 - cos(a)) k x (k x v)``.
+    Or, with ``derivative``, its derivative with respect to the angle in radians. The line goes
+    through both points of ``numbers``, in 2D along z. Rodrigues:
+    ``sin(a) k x v + (1 - cos(a)) k x (k x v)``. Raises CaseError where the points define no line.
     """
     dim, angle = points.shape[1], np.radians(angle_deg)
     first, second = np.array(numbers).reshape(2, 3)

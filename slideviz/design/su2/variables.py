@@ -18,12 +18,13 @@ KINDS = {
     "FFD_CONTROL_POINT_2D": "(BOX, i, j, dx, dy)",
     "FFD_CONTROL_POINT": "(BOX, i, j, k, dx, dy, dz)",
 }
-"""The kinds that are supported, and their parameters."""
+"""The supported kinds, and the form of their parameters in DV_PARAM."""
 BOXED = {"FFD_CONTROL_POINT_2D": 5, "FFD_CONTROL_POINT": 7}
 """Kinds that move a control point, and how many parameters they have."""
 NUMBERS = {"TRANSLATION": 3, "ROTATION": 6}
+"""Kinds with numbers as parameters, and how many they have."""
 ALONE = ("SURFACE_FILE", "FFD_SETTING")
-"""Kinds that stand alone: what they do is not added to anything."""
+"""Kinds that must be the only variable."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class DesignVariable:
     numbers : tuple of float
         Its parameters: a direction, two points, or the shift (dx, dy, dz) of a control point.
     box, index : str, (int, int, int)
-        The control point of those that move one; -1 is all of an index.
+        Box and control point, for kinds in ``BOXED``; an index of -1 means all.
     """
 
     kind: str
@@ -53,7 +54,7 @@ def read_variables(
 ) -> tuple[DesignVariable, ...]:
     """Return the design variables of ``DV_KIND``, ``DV_PARAM`` and ``DV_VALUE``.
 
-    What is wrong is added to the problems.
+    Mistakes are appended to ``problems``; none comes back where DV_KIND is missing or wrong.
     """
     kind_row = rows.get("DV_KIND")
     if kind_row is None:
@@ -83,7 +84,7 @@ def read_variables(
 
 
 def _values(rows: Mapping[str, Entry], kinds: list[str], problems: list[Problem]) -> list[float]:
-    """Return a value for each variable; those that stand alone need none."""
+    """Return a value for each variable; 0 where it is missing, which kinds in ``ALONE`` may be."""
     entry = rows.get("DV_VALUE")
     if entry is None:
         if kinds[0] not in ALONE:
@@ -105,7 +106,7 @@ def _values(rows: Mapping[str, Entry], kinds: list[str], problems: list[Problem]
 def _groups(
     rows: Mapping[str, Entry], kinds: list[str], problems: list[Problem]
 ) -> list[list[Word]]:
-    """Return the parameters of each variable."""
+    """Return the parameters of each variable; empty where DV_PARAM is wrong."""
     entry = rows.get("DV_PARAM")
     if entry is None:
         if any(kind in BOXED or kind in NUMBERS for kind in kinds):
@@ -129,6 +130,7 @@ def _for(number: int, what: str, kinds: list[str]) -> str:
 
 
 def _variable(kind: str, value: float, group: list[Word]) -> DesignVariable:
+    """Return the variable with the parameters ``group``; raises CaseError where they are wrong."""
     needed = f"{kind} needs {KINDS[kind]}"
     if kind in NUMBERS:
         numbers = tuple(number(word.text) for word in group)
