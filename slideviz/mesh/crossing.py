@@ -237,7 +237,7 @@ def _strike(
     for k in np.flatnonzero(depth >= -planes.margin):
         row = int(rows[k])
         begin, stop = np.searchsorted(i, i[row], "left"), np.searchsorted(i, i[row], "right")
-        if depth[k] > planes.margin or planes.part(points[k], j[begin:stop], lines[row]):
+        if depth[k] > planes.margin or planes.separates(points[k], j[begin:stop], lines[row]):
             return points[k], row
     return None
 
@@ -262,7 +262,7 @@ def _node_through(
     # Only a node with neighbours on both sides of some plane is worth the closer look.
     for node in np.unique(touches[above & below, 0]):
         others = touches[touches[:, 0] == node, 1]
-        if planes.part(points[node], others, points[edges[edges[:, 0] == node, 1]]):
+        if planes.separates(points[node], others, points[edges[edges[:, 0] == node, 1]]):
             facet = a.facet[(a.nodes == node).any(axis=1).argmax()]
             return points[node], int(facet), int(b.facet[others[0]])
     return None

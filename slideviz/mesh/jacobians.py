@@ -144,7 +144,7 @@ def spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _prism(at, count, found):  # type: ignore[no-untyped-def]
+def _write_prism(at, count, found):  # type: ignore[no-untyped-def]
     """Write what `prism_coefficients` returns into ``found`` (3, 3, ...)."""
     for c in range(count):
         a, b = edge(at, 0, 1, c), edge(at, 0, 2, c)
@@ -163,7 +163,7 @@ _NODE = np.array([[[0, 4], [3, 7]], [[1, 5], [2, 6]]])
 
 
 @njit(**OPTIONS)
-def _hexahedron(at, count, found):  # type: ignore[no-untyped-def]
+def _write_hexahedron(at, count, found):  # type: ignore[no-untyped-def]
     """Write what `hexahedron_coefficients` returns into ``found`` (3, 3, 3, ...)."""
     found[:] = 0.0
     for i in range(2):
@@ -220,10 +220,10 @@ def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ig
         sides, states = turn[here], status[here]
         states[:] = VALID
         if vtk == 12:
-            _hexahedron(at, count, found)
+            _write_hexahedron(at, count, found)
             _mark(found.reshape(27, LANES), sides, states, UNPROVEN)
         elif vtk == 13:
-            _prism(at, count, found[0])
+            _write_prism(at, count, found[0])
             _mark(found[0, 1], sides, states, UNPROVEN)
         for k in range(len(table)):
             for c in range(count):
@@ -249,7 +249,7 @@ def prism_coefficients(at: FloatArray) -> FloatArray:
     Jacobians, and the volume is the sum of all, divided by 18.
     """
     found = np.empty((3, 3, at.shape[2]))
-    _prism(np.ascontiguousarray(at), at.shape[2], found)
+    _write_prism(np.ascontiguousarray(at), at.shape[2], found)
     return found
 
 
@@ -264,5 +264,5 @@ def hexahedron_coefficients(at: FloatArray) -> FloatArray:
     J.-F. Remacle, C. Geuzaine, Geometrical validity of curvilinear finite elements, 2013).
     """
     found = np.empty((3, 3, 3, at.shape[2]))
-    _hexahedron(np.ascontiguousarray(at), at.shape[2], found)
+    _write_hexahedron(np.ascontiguousarray(at), at.shape[2], found)
     return found

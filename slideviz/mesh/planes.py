@@ -223,7 +223,7 @@ class Planes:
         """Return how far (p, d) points (p, d) of the planes ``j`` are inside each side."""
         return np.einsum("pkd,pkd->pk", x[:, None] - self.corners[j], self.inwards[j])
 
-    def part(self, x: FloatArray, near: IntArray, ends: FloatArray) -> bool:
+    def separates(self, x: FloatArray, near: IntArray, ends: FloatArray) -> bool:
         """Tell whether the surface around a point of it parts ``ends`` from each other.
 
         Close to ``x`` the surface is a fan of simplices, a cone, and each of them a plane, half

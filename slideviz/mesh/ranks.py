@@ -136,14 +136,14 @@ class Ranks(Alone):
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._tell(None)
+        self._send_all(None)
 
     @contextmanager
     def sharing(self, make: Make[Task, Result], *given: Any) -> Iterator[Do[Task, Result]]:
         """Return what does tasks on all ranks, and yields their results in order; of rank 0."""
         content = pickle.dumps((make, given), 5)
-        self._tell(True)
-        self._spread(content)
+        self._send_all(True)
+        self._broadcast(content)
         try:
             with (
                 limited(self.threads) as limit,
@@ -155,14 +155,14 @@ class Ranks(Alone):
         finally:
             while self._owing:
                 self._received(0.001)
-            self._tell(None)
+            self._send_all(None)
 
     def serve(self) -> None:
         """Do what rank 0 asks for, until it lets this rank go."""
         with limited(self.threads) as limit:
             limit()
             while self._received(0.01)[1] is not None:
-                make, given = pickle.loads(self._spread(b""))
+                make, given = pickle.loads(self._broadcast(b""))
                 with ExitStack() as stack:
                     self._serve(stack, make, given)
 
@@ -234,11 +234,11 @@ class Ranks(Alone):
         self._owing.discard(status.source)
         return status.source, self.comm.recv(source=status.source)
 
-    def _tell(self, what: object) -> None:
+    def _send_all(self, what: object) -> None:
         for rank in range(1, self.size):
             self.comm.send(what, rank)
 
-    def _spread(self, content: bytes) -> bytearray:
+    def _broadcast(self, content: bytes) -> bytearray:
         """Return what rank 0 gives, on all ranks."""
         size = self.comm.bcast(len(content))
         whole = bytearray(content) if content else bytearray(size)
