@@ -17,7 +17,7 @@ Z_AXIS = (0.0, 0.0, 1.0)
 
 
 def axis_basis(axis: Vector) -> FloatArray:
-    """Return rows e1, e2, e3 (3, 3), right-handed, with e3 along ``axis``.
+    """Return unit vectors e1, e2, e3 as rows (3, 3), right-handed, with e3 along ``axis``.
 
     Raises
     ------
@@ -29,6 +29,7 @@ def axis_basis(axis: Vector) -> FloatArray:
 
 @lru_cache(16)
 def _basis_of(*axis: float) -> FloatArray:
+    """Return what `axis_basis` does, cached: not to be written to."""
     direction = np.array(axis)
     length = np.linalg.norm(direction)
     if not length > 0:
@@ -47,10 +48,10 @@ def ordered_sum(values: NDArray) -> NDArray:
 
 
 def along(rows: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the components (n, k) of points (n, d) along rows (k, d).
+    """Return the scalar products (n, k) of points (n, d) with the vectors ``rows`` (k, d).
 
-    Added up one by one: a matrix product rounds a point by its place among the others, so that
-    renumbered nodes would have other bits.
+    The terms are added up in order: a matrix product rounds a point by its place among the others,
+    so that renumbered nodes would have other bits.
     """
     parts = [sum(x * value for x, value in zip(points.T, row, strict=True)) for row in rows]
     return np.stack(parts, axis=1)
@@ -59,14 +60,14 @@ def along(rows: FloatArray, points: FloatArray) -> FloatArray:
 def in_axis_frame(
     points: FloatArray, axis: Vector = Z_AXIS, origin: Vector = (0.0, 0.0, 0.0)
 ) -> FloatArray:
-    """Return points (n, d) as coordinates (n, 3) along e1, e2, e3 of the axis from the origin."""
+    """Return the coordinates (n, 3) of points (n, d) from ``origin``, along `axis_basis`."""
     padded = np.zeros((len(points), 3))
     padded[:, : points.shape[1]] = points
     return along(axis_basis(axis), padded - np.asarray(origin, float))
 
 
 def axis_text(axis: Vector) -> str:
-    """Return x, y or z for these unit vectors, else the components."""
+    """Return "x", "y" or "z" for a unit vector (3,) along that axis, else the components."""
     for word, unit in zip("xyz", np.eye(3), strict=True):
         if np.allclose(axis, unit):
             return word

@@ -1,4 +1,4 @@
-"""Boundary and outer surface of a mesh, cached as long as the mesh lives."""
+"""Outer surface of a mesh, with or without markers, and its `Boundary`, cached while it lives."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
 from slideviz.mesh.topology import DEFAULT_FEATURE_ANGLE_DEG, Boundary, find_boundary
 
 _MOST_PARTS = 64
-"""With more than this the surface is rough, and its edges say nothing."""
+"""Most parts that `smooth_parts` returns; a surface with more is rough, its edges no borders."""
 _WIDTH = {2: 2, 3: 4}
+"""Columns of a table of facets, by the dimension of the mesh."""
 _VTK = {2: 3, 3: 5, 4: 9}
+"""VTK identifier of a facet by its number of nodes."""
 
 _BOUNDARIES: WeakKeyDictionary[Mesh, Boundary] = WeakKeyDictionary()
 _SHELLS: WeakKeyDictionary[Mesh, IntArray] = WeakKeyDictionary()
 
 
 def outer_facets(mesh: Mesh) -> Cells:
-    """Return the sides that only one cell has, as lines, or triangles and quadrilaterals."""
+    """Return the sides that only one cell has, as lines (2D) or triangles and quadrilaterals."""
     width = _WIDTH[mesh.dim]
     tables = [np.empty((0, width), np.int64)]
     for vtk, (_, nodes) in mesh.cells.by_type.items():
@@ -38,7 +40,10 @@ def outer_facets(mesh: Mesh) -> Cells:
 
 
 def _once(keys: IntArray, n_points: int) -> IntArray:
-    """Return the rows, in order, whose key (sorted nodes, padded with -1) stands once."""
+    """Return ascending indices (k,) of the rows of ``keys`` (f, 2 or 4) that occur only once.
+
+    A row has the sorted nodes of a side, padded with -1.
+    """
     # Two nodes in one integer make the sort twice as fast; 3e9 points would be needed to overflow.
     base = n_points + 1
     packed = [(keys[:, k] + 1) * base + keys[:, k + 1] + 1 for k in range(0, keys.shape[1], 2)]
@@ -51,7 +56,10 @@ def _once(keys: IntArray, n_points: int) -> IntArray:
 
 
 def smooth_parts(mesh: Mesh, facets: Cells) -> tuple[Marker, ...]:
-    """Return the outer surface as markers, divided at its edges, the largest first.
+    """Return the outer surface as markers, divided at its feature edges, most facets first.
+
+    With more than ``_MOST_PARTS`` parts it is divided into its connected parts only, with more of
+    these or a single one not at all. No markers if there are no facets.
 
     Parameters
     ----------
@@ -85,7 +93,7 @@ def _as_cells(facets: IntArray) -> Cells:
 
 
 def boundary_of(mesh: Mesh) -> Boundary:
-    """Return the oriented boundary of a mesh, found once for opening it and for all its runs.
+    """Return the oriented boundary of all markers of a mesh; cached as long as the mesh lives.
 
     Raises
     ------
@@ -99,10 +107,10 @@ def boundary_of(mesh: Mesh) -> Boundary:
 
 
 def shell_of(mesh: Mesh) -> IntArray:
-    """Return the oriented sides of single cells, (f, 2) or (f, 4), whatever is in markers.
+    """Return the sides that only one cell has, oriented outward: nodes (f, 2) or (f, 4); cached.
 
-    They are closed where markers are not: where some boundary has none, or where cells go on
-    beyond the periodic sides, as those that SU2 adds for them.
+    They count in a marker or not, so that they enclose the mesh even where markers do not: where a
+    boundary has no marker, or where a halo continues the cells beyond the periodic sides.
     """
     found = _SHELLS.get(mesh)
     if found is None:

@@ -1,8 +1,9 @@
 """``njit`` with a checked cache on disk: damaged entries are compiled again.
 
 Numba trusts its cache: an index that was cut off (by a full disk, a killed process) ends the
-program, and so does machine code that is not what it was. Here both are sealed with a checksum,
-and a cache that can be neither read nor written costs the time to compile, and nothing else.
+program, and so does damaged machine code. Here both begin with a checksum (SHA-256), which is
+checked when they are read. Where the cache can be neither read nor written, functions are compiled
+in each process.
 """
 
 from __future__ import annotations
@@ -24,9 +25,10 @@ from numba.core.runtime import rtsys
 
 
 def _environment(module: str, constants: list, name: str) -> Environment:
-    """Return what a compiled function has of its module, as Numba does, without loading Numba's.
+    """Return the environment (globals and constants) of a compiled function, for unpickling it.
 
-    Machine code that is loaded needs nothing of them, and they take long.
+    Numba's own `_rebuild_env`, which this replaces, imports the module of the function. For
+    Numba's modules, which take long, that is not done: loaded machine code does not use them.
     """
     if module.partition(".")[0] != "numba" or module in sys.modules:
         return environment._rebuild_env(module, constants, name)
@@ -40,7 +42,7 @@ def _environment(module: str, constants: list, name: str) -> Environment:
 
 
 class _Reader(pickle.Unpickler):
-    """Reads machine code from the cache."""
+    """Unpickles machine code from the cache, with `_environment` for Numba's function."""
 
     def find_class(self, module: str, name: str) -> Any:
         if (module, name) == (environment.__name__, "_rebuild_env"):
@@ -49,7 +51,10 @@ class _Reader(pickle.Unpickler):
 
 
 class _SealedFile(IndexDataCacheFile):  # type: ignore[misc]
-    """Index and machine code of one function, each behind its checksum."""
+    """Files of one function's cache: index and machine code, each behind its checksum.
+
+    The methods replace those of Numba's class.
+    """
 
     def _load_index(self) -> dict:
         try:
@@ -77,7 +82,7 @@ class _SealedFile(IndexDataCacheFile):  # type: ignore[misc]
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
-    """The cache of one function."""
+    """The cache of one function, in files with checksums."""
 
     def __init__(self, function: Callable) -> None:
         super().__init__(function)
@@ -88,23 +93,23 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         )
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return what was compiled before, or None.
+        """Return the machine code for argument types ``sig`` from the cache, or None.
 
-        Numba would first read the declarations of all that it can compile, as compiling does by
-        itself: a quarter of a second for what machine code has no use for.
+        Numba's method first loads the declarations of all functions that it can compile, which
+        takes a quarter of a second. Compiling loads them by itself, and machine code needs none.
         """
         rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Save what was compiled, where that can be done."""
+        """Save machine code for argument types ``sig``; nothing if it cannot be written."""
         with suppress(OSError):
             super().save_overload(sig, data)
 
 
 def njit(**options: Any) -> Callable[[Callable], Any]:
-    """Return Numba's decorator ``njit`` with these options and the cache of this module."""
+    """Return Numba's decorator ``njit`` with ``options``, and always with this module's cache."""
 
     def compiled(function: Callable) -> Any:
         dispatcher = numba.njit(**options)(function)
@@ -115,16 +120,17 @@ def njit(**options: Any) -> Callable[[Callable], Any]:
 
 
 def _sealed(content: bytes) -> bytes:
+    """Return the content with its checksum before it."""
     return hashlib.sha256(content).digest() + content
 
 
 def _opened(sealed: bytes) -> bytes:
-    """Return what was sealed.
+    """Return the content that `_sealed` put a checksum before.
 
     Raises
     ------
     ValueError
-        It is not what it was.
+        The content does not have that checksum.
     """
     content = sealed[32:]
     if hashlib.sha256(content).digest() != sealed[:32]:

@@ -14,11 +14,11 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.threads import in_parts
 
 LARGEST = 1e50
-"""Coordinates that are computed with are not larger: products of several must stay numbers."""
+"""Largest absolute coordinate that is computed with, so that products of several are finite."""
 
 
 def printable(path: str | Path) -> str:
-    """Return a path as it can stand in a message, even when its name is no text."""
+    """Return a path as text for a message; bytes that are no UTF-8 become escape sequences."""
     return str(path).encode("utf-8", "backslashreplace").decode()
 
 
@@ -28,10 +28,10 @@ def path_error(path: Path, message: str) -> MeshError:
 
 
 def first_fault(cells: Cells, n_points: int) -> tuple[int, str] | None:
-    """Return the number of a wrong element and what is wrong, or None.
+    """Return the index of a wrong element and a sentence on what is wrong, or None.
 
-    Wrong are node indices that are negative or not below ``n_points``, and a node that stands
-    twice in one element.
+    Wrong are node indices that are negative or not below ``n_points``, and a node that an element
+    has twice.
     """
     flat = cells.connectivity
     if len(flat) and (flat.min() < 0 or flat.max() >= n_points):
@@ -50,7 +50,7 @@ def first_fault(cells: Cells, n_points: int) -> tuple[int, str] | None:
 
 
 def no_node(node: str, n_points: int) -> str:
-    """Return the sentence on a node of an element that does not exist."""
+    """Return the sentence of an error for an element with a ``node`` that does not exist."""
     return (
         f"node {node} does not exist: the {n_points} points are numbered "
         f"from 0 to {n_points - 1}; correct the element or the points"
@@ -58,7 +58,7 @@ def no_node(node: str, n_points: int) -> str:
 
 
 def _first_repeated(cells: Cells) -> tuple[int, int] | None:
-    """Return the first element that has a node twice, and that node."""
+    """Return the index of the first element that has a node twice, and that node, or None."""
     found: list[tuple[int, int]] = []
     for ids, nodes in cells.by_type.values():
 
@@ -74,9 +74,9 @@ def _first_repeated(cells: Cells) -> tuple[int, int] | None:
 
 
 def unused_nodes(mesh: Mesh) -> IntArray:
-    """Return the points that no cell uses, sorted: (u,).
+    """Return ascending indices (u,) of the points that no cell uses.
 
-    They do no harm here, but SU2 gives them a cell of no volume.
+    slideviz has no trouble with them, but SU2 makes control volumes of size zero around them.
     """
     used = np.zeros(len(mesh.points), bool)
     used[mesh.cells.connectivity] = True
@@ -84,7 +84,7 @@ def unused_nodes(mesh: Mesh) -> IntArray:
 
 
 def check_mesh(mesh: Mesh) -> None:
-    """Raise when a mesh cannot be used.
+    """Raise if the coordinates, elements or marker names of a mesh cannot be used.
 
     Raises
     ------
@@ -114,12 +114,12 @@ def check_mesh(mesh: Mesh) -> None:
 
 
 def check_points(mesh: Mesh) -> None:
-    """Raise when a coordinate is not finite.
+    """Raise if a coordinate is not finite.
 
     Raises
     ------
     MeshError
-        One is NaN or infinite.
+        A coordinate is NaN or infinite.
     """
     if not within(mesh.points, np.finfo(float).max):
         k = int(np.argmax(~np.isfinite(mesh.points).all(axis=1)))
@@ -130,17 +130,17 @@ def check_points(mesh: Mesh) -> None:
 
 
 def within(points: FloatArray, largest: float) -> bool:
-    """Tell whether all coordinates are numbers not larger than this."""
+    """Return whether no coordinate is NaN or larger than ``largest`` in absolute value."""
     return not points.size or bool(points.min() >= -largest and points.max() <= largest)
 
 
 def check_size(mesh: Mesh) -> None:
-    """Raise when a coordinate is too large to be computed with.
+    """Raise if a finite coordinate is too large to be computed with.
 
     Raises
     ------
     MeshError
-        One is larger than ``LARGEST``.
+        The absolute value of a coordinate is above ``LARGEST``.
     """
     if within(mesh.points, LARGEST):
         return
@@ -152,7 +152,7 @@ def check_size(mesh: Mesh) -> None:
 
 
 def too_large(name: str, k: int, point: FloatArray) -> MeshError:
-    """Return the error for a point (d,) that is too far away to be computed with."""
+    """Return the error for a ``point`` (d,), number ``k``, with a coordinate above ``LARGEST``."""
     return MeshError(
         f"{name}: point {k} is at {tuple(point.tolist())}; nothing can be computed with "
         f"coordinates larger than {LARGEST:g}, so correct it or scale the mesh"

@@ -1,7 +1,8 @@
 """Coarse surfaces: boundaries with fewer facets, for pictures that must come quickly.
 
-Nodes in one cube of a lattice become one of them. Boundaries share the choice, so that there are
-no gaps between them, and nodes at their borders come first, so that corners stay where they are.
+All nodes in one cube of a lattice are replaced by one of them. It is the same for all boundaries,
+so that there are no gaps between them, and a node at a boundary's rim where the cube has one, so
+that corners stay in place.
 """
 
 from __future__ import annotations
@@ -15,28 +16,29 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.surfaces import Surface
 
 LEAST = 30_000
-"""Facets of all boundaries together, below which nothing is made coarser."""
+"""Facets of all boundaries together, below which there are no coarse surfaces."""
 CUBES = 120
-"""Cubes along the longest side of the box around the boundaries: some pixels each."""
+"""Cubes along the longest side of the box around all boundaries; each is some pixels wide."""
 
 
 def coarse_surfaces(
     surfaces: Sequence[Surface], points: FloatArray, cubes: int | None = None
 ) -> tuple[Surface, ...]:
-    """Return the boundaries of a 3D mesh with fewer facets; none where there are few already.
+    """Return the boundaries of a 3D mesh with fewer facets.
 
     Parameters
     ----------
     surfaces : sequence of Surface
     points : (n, 3) float64
-        Of the mesh. The nodes of coarse surfaces are some of its nodes, and move with them.
+        Of the mesh. The nodes of coarse surfaces are nodes of the mesh too, and move with them.
     cubes : int, optional
-        Along the longest side; None: `CUBES`.
+        Cubes along the longest side; None: `CUBES`.
 
     Returns
     -------
     tuple of Surface
-        In the order of ``surfaces``; a facet has the owner of one of the facets it stands for.
+        In the order of ``surfaces``; a facet has the owner of one of the facets it replaces. Empty
+        for a 2D mesh, and where all have fewer than `LEAST` facets together.
     """
     if sum(len(one.facets) for one in surfaces) < LEAST or any(one.flat for one in surfaces):
         return ()
@@ -49,9 +51,10 @@ def coarse_surfaces(
 
 
 def _representatives(points: FloatArray, first: np.ndarray, cubes: int) -> IntArray:
-    """Return the point that stands for each of some points (n, 3), (n,): of its cube.
+    """Return for each of the points (n, 3) the index (n,) of the one that replaces it.
 
-    It is the nearest to the middle of those in the cube, of the ``first`` (n,) where there are.
+    It is the point nearest to the mean of those in the same cube, among those where the mask
+    ``first`` (n,) is true if the cube has any.
     """
     low, size = points.min(axis=0), float(np.ptp(points, axis=0).max()) / cubes or 1.0
     at = ((points - low) / size).astype(np.int64)
@@ -65,9 +68,12 @@ def _representatives(points: FloatArray, first: np.ndarray, cubes: int) -> IntAr
 
 
 def _coarse(surface: Surface, stands: IntArray) -> Surface:
-    """Return a surface whose nodes (u,) are replaced by others, mesh nodes (u,)."""
+    """Return a surface with mesh nodes ``stands`` (u,) in place of its nodes (u,), without a rim.
+
+    Facets that collapse, and all but one of those that become equal, are left out.
+    """
     facets = stands[surface.facets]
-    # A side of length zero goes: what is left is a triangle, whose last node stands twice.
+    # A side whose nodes became one is removed: a triangle is left, with its last node twice.
     for side in range(3):
         gone = facets[:, side] == facets[:, side + 1]
         facets[gone, side + 1 : 3] = facets[gone, side + 2 : 4]
@@ -87,9 +93,12 @@ def _coarse(surface: Surface, stands: IntArray) -> Surface:
 
 
 def _first_of_each(facets: IntArray) -> IntArray:
-    """Return the first of facets (f, 4) that go round the same nodes the same way, in order."""
+    """Return ascending indices (k,) of facets (f, 4), the first of those equal as cycles of nodes.
+
+    Facets are equal if they have the same nodes in the same cyclic order.
+    """
     begin = facets.argmin(axis=1)
-    # A triangle goes round three nodes.
+    # A triangle is a cycle of three nodes; its fourth repeats the third.
     triangle = facets[:, 2] == facets[:, 3]
     turn = np.arange(4)[None, :] + begin[:, None]
     turned = np.take_along_axis(facets, turn % np.where(triangle, 3, 4)[:, None], axis=1)

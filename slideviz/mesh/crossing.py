@@ -1,14 +1,13 @@
-"""Whether and where two boundaries pass through each other.
+"""Where the moved boundary passes through others (or one boundary through itself), if it does.
 
-A mesh whose boundaries cross cannot be deformed into a valid one, whatever the method; so this
-is asked before the deformation, of the moved boundary alone.
+If boundaries cross after their motion, no method can deform the mesh into a valid one. So this is
+tested before the deformation, with the moved boundary alone at its new place.
 
-Touching is not crossing: what goes into another boundary by no more than ``TOLERANCE`` of the
+Touching is not crossing: a boundary that goes into another by no more than ``TOLERANCE`` of the
 extent counts as lying on it. So boundaries that coincide (the two sides of a thin plate) or
-rest on one another are not reported. Where the moved boundary hangs on the other one because
-they share nodes, the facets of both that hold these nodes are not tested: those of the moved
-one lie on the other's surface only roughly, and those of the other are stretched until its
-remaining nodes have followed.
+rest on one another are not reported. Where the moved boundary shares nodes with the other one, the
+facets of both that have a shared node are not tested: those of the moved one lie only roughly on
+the other's surface, and those of the other are distorted until its remaining nodes have followed.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ CHUNK = 1024
 """Facets searched at a time, so that memory stays small and an early find ends the search."""
 
 Hit = tuple["FloatArray", int, int]
-"""A point (d,) and the two that meet there, by their numbers."""
+"""A point (d,), and the indices of the two facets (or line and simplex) that cross there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +61,7 @@ class Crossing:
 def first_crossing(
     points: FloatArray, moved: Cells, others: Sequence[tuple[str, Cells]]
 ) -> Crossing | None:
-    """Return where the moved boundary goes through the first of the others, or None.
+    """Return a place where the moved boundary crosses another, the first that it crosses, or None.
 
     Parameters
     ----------
@@ -96,11 +95,10 @@ def first_crossing(
 def swept_crossing(
     before: FloatArray, after: FloatArray, moved: Cells, others: Sequence[tuple[str, Cells]]
 ) -> Crossing | None:
-    """Return where a node of the moved boundary goes through another on its way, or None.
+    """Return where the path of a node of the moved boundary goes through another one, or None.
 
-    The way is straight, as the steps of a deformation divide it; so a body is found that has
-    jumped over a wall. Facets of the others that move themselves are not tested. For a curved
-    way ask piece by piece.
+    Paths are straight. So a body is found that has jumped over a wall. Facets of the others that
+    move themselves are not tested. For a curved path, call it for one short piece after the other.
 
     Parameters
     ----------
@@ -135,7 +133,7 @@ def swept_crossing(
 
 
 def _margin(points: FloatArray, a: FacetSimplices, b: FacetSimplices) -> float:
-    """Return ``TOLERANCE`` as a length."""
+    """Return ``TOLERANCE`` times the largest extent of both surfaces together; 0 without any."""
     used = points[np.concatenate((a.nodes, b.nodes)).ravel()]
     if not len(used):
         return 0.0
@@ -144,10 +142,10 @@ def _margin(points: FloatArray, a: FacetSimplices, b: FacetSimplices) -> float:
 
 
 def pierced(points: FloatArray, a: FacetSimplices, b: FacetSimplices, margin: float) -> Hit | None:
-    """Return where an edge or a node of ``a`` passes through ``b``, and the facets of both.
+    """Return where an edge or a node of ``a`` passes through ``b`` (point, both facets), or None.
 
-    Two surfaces cross where an edge of one goes through a simplex of the other, so this has to
-    be asked both ways.
+    Two surfaces cross where an edge of one goes through a simplex of the other, so call it with
+    both orders. ``margin`` is a length: what is as near as this only touches.
     """
     a, b = a.within(points, b, margin), b.within(points, a, margin)
     if not (len(a) and len(b)):
@@ -174,7 +172,7 @@ def pierced(points: FloatArray, a: FacetSimplices, b: FacetSimplices, margin: fl
 
 
 def self_crossing(points: FloatArray, cells: Cells) -> Hit | None:
-    """Return where an edge of a boundary goes through the boundary itself, and both facets.
+    """Return where an edge of a boundary goes through that boundary (point, both facets), or None.
 
     Facets that share a node are not compared.
 
@@ -209,7 +207,10 @@ def self_crossing(points: FloatArray, cells: Cells) -> Hit | None:
 
 
 def swept(ways: FloatArray, planes: Planes) -> Hit | None:
-    """Return where the first of some lines (w, 2, d) goes through a surface, line and simplex."""
+    """Return where the first of lines (w, 2, d) that does so goes through a surface, or None.
+
+    The indices of the hit are those of the line and of the simplex.
+    """
     for part in _chunks(len(ways)):
         lines = ways[part]
         i, j = planes.near(lines, line_normals(lines))
@@ -222,11 +223,20 @@ def swept(ways: FloatArray, planes: Planes) -> Hit | None:
 def _strike(
     planes: Planes, lines: FloatArray, height: FloatArray, i: IntArray, j: IntArray
 ) -> tuple[FloatArray, int] | None:
-    """Return a point and its row, the first where a line (p, 2, d) goes through a plane ``j``.
+    """Return the first point where a line passes through its simplex, and the row, or None.
 
-    ``height`` (p, 2) are the signed distances of the ends, which must lie clearly on both sides.
-    ``i`` is sorted: rows with the same number are all that may touch the same line. Where the
-    line hits a border of simplices, all that meet there decide together.
+    Each row is one pair of a line and a simplex near it.
+
+    Parameters
+    ----------
+    lines : (p, 2, d)
+        The ends of each line.
+    height : (p, 2)
+        Signed distances of the ends from the plane of the simplex. Only rows count whose ends lie
+        on different sides, each by more than the margin.
+    i, j : (p,)
+        Line and simplex of each row. ``i`` is sorted, and has all simplices that may touch a line:
+        where the line hits the border of one, `Planes.separates` decides by all of them.
     """
     start, end = height.T
     apart = (height.min(axis=1) < -planes.margin) & (height.max(axis=1) > planes.margin)
@@ -245,10 +255,10 @@ def _strike(
 def _node_through(
     points: FloatArray, a: FacetSimplices, b: FacetSimplices, planes: Planes, touches: IntArray
 ) -> Hit | None:
-    """Return a node of ``a`` that lies on ``b``, where ``a`` goes on on both sides.
+    """Return a node of ``a`` that lies on ``b`` and has edges to both sides of it, or None.
 
-    In structured meshes nodes often come to lie on each other exactly; then no edge crosses
-    anything. ``touches`` (t, 2): a node of ``a`` and the simplex of ``b`` that it lies on.
+    In structured meshes nodes often come to lie on each other exactly; then no edge crosses a
+    simplex. ``touches`` (t, 2) has a node of ``a`` and a simplex of ``b`` that it lies on.
     """
     touches = np.unique(touches, axis=0)
     edges = a.edges

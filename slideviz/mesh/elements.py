@@ -25,11 +25,12 @@ class ElementType:
     n_nodes, dim : int
         Number of nodes, dimension (0 for a vertex to 3).
     facets : tuple of tuple of int
-        Local nodes of each side, of dimension ``dim - 1``.
+        Local nodes of each side (dimension ``dim - 1``), with outward normal.
     edges : tuple of tuple of int
         Local nodes of each edge.
     corners : tuple of tuple of int
-        ``(k, a, b[, c])``: corner and neighbours, right-handed.
+        ``(k, a, b[, c])``: local nodes of the corner and its neighbours, right-handed; empty for
+        vertex and line.
     """
 
     vtk: int
@@ -104,6 +105,6 @@ ELEMENTS: dict[int, ElementType] = {row.vtk: row for row in _ROWS}
 """Element type by VTK identifier."""
 
 SIZES, DIMS = np.zeros(256, np.int64), np.zeros(256, np.int64)
-"""Nodes, and the dimension, of an element by VTK identifier; 0: none has it."""
+"""Number of nodes and dimension of an element type, by VTK identifier; 0 where there is no type."""
 for _row in _ROWS:
     SIZES[_row.vtk], DIMS[_row.vtk] = _row.n_nodes, _row.dim

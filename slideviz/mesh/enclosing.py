@@ -1,4 +1,4 @@
-"""What boundaries enclose: a volume, and other boundaries; kept as long as the mesh lives."""
+"""Whether boundaries enclose a volume, and which lie inside all others; cached by mesh."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.surfaces import Surface
 
 _BESIDE = 1e-6
-"""Part of a mesh's length that an enclosed boundary is at least away from its outside."""
+"""Least distance of an inner boundary from the box around all, as a part of its longest side."""
 
 
 @dataclass(frozen=True)
 class Enclosing:
-    """Whether boundaries together enclose a volume, and the names of those inside all others."""
+    """Whether boundaries enclose a volume (`is_closed`), and names of inner ones (`enclosed`)."""
 
     closed: bool
     inner: frozenset[str]
@@ -27,7 +27,7 @@ _FOUND: WeakKeyDictionary[Mesh, dict[tuple[str, ...], Enclosing]] = WeakKeyDicti
 
 
 def enclosing_of(mesh: Mesh, surfaces: Sequence[Surface]) -> Enclosing:
-    """Return what some boundaries of a mesh enclose, found once."""
+    """Return what boundaries of a mesh enclose; cached by their names as long as the mesh lives."""
     names = tuple(one.name for one in surfaces)
     kept = _FOUND.setdefault(mesh, {})
     if names not in kept:
@@ -36,7 +36,9 @@ def enclosing_of(mesh: Mesh, surfaces: Sequence[Surface]) -> Enclosing:
 
 
 def enclosed(surfaces: Sequence[Surface], points: FloatArray) -> frozenset[str]:
-    """Return the names of boundaries of a 3D mesh inside all others, as a wing in air.
+    """Return the names of boundaries of a 3D mesh that lie inside the others, as a wing in air.
+
+    Inside are those whose bounding box touches no side of the box around all.
 
     Parameters
     ----------
@@ -62,7 +64,7 @@ def enclosed(surfaces: Sequence[Surface], points: FloatArray) -> frozenset[str]:
 
 
 def is_closed(surfaces: Sequence[Surface]) -> bool:
-    """Tell whether surfaces together enclose a volume: every edge has two faces."""
+    """Return whether faces (3D) enclose a volume: each edge belongs to exactly two of them."""
     faces = [one.nodes[one.facets] for one in surfaces if one.facets.shape[1] == 4]
     if len(faces) != len(surfaces) or not faces:
         return False

@@ -1,9 +1,12 @@
-"""Fans: the facets around a node that join smoothly, and the smooth pieces that they make.
+"""Fans: the facets around a node that join smoothly; and pieces, the smooth parts of a marker.
 
-Two neighbouring facets of one marker are joined when the angle between their normals is below the
-feature angle. Around a node the joined facets form a *fan*, which has one normal; a node where
-boundaries meet, or on a feature edge, has several. Deciding this node by node, not piece by piece,
-also finds the sharp trailing edge of a profile that is one marker and closed in itself.
+Two neighbouring facets of one marker join smoothly if the angle between their normals is below the
+feature angle. Smoothly joined facets around a node form a *fan*, which has one normal; a node where
+boundaries meet, or on a feature edge, has several fans. Fans are found node by node, not piece by
+piece: so the sharp trailing edge of a profile that is one closed marker is found too.
+
+`slideviz.rbf.classify` and `slideviz.rbf.projection` apply further limits to the same angles, with
+``MERGE_FRACTION`` of the feature angle.
 """
 
 from __future__ import annotations
@@ -32,7 +35,8 @@ class Fans:
     Attributes
     ----------
     facet, node, fan : (i,) int64
-        One row for each facet and node of it: which fan the facet belongs to at that node.
+        One entry for each pair of a facet and a node of it: the fan, an index below m, that the
+        facet belongs to at that node.
     fan_node, fan_marker : (m,) int64
         The node and the marker of each fan.
     """
@@ -47,7 +51,7 @@ class Fans:
 def smooth_joints(
     boundary: Boundary, points: FloatArray, feature_angle_deg: float = DEFAULT_FEATURE_ANGLE_DEG
 ) -> NDArray[np.bool_]:
-    """Tell for each joint whether its facets are of one marker and turn by less than the angle.
+    """Return a mask (j,) of the joints of facets of one marker at less than the feature angle.
 
     Parameters
     ----------
@@ -114,7 +118,8 @@ def fan_normals(
     Parameters
     ----------
     corners : (f, k, d), optional
-        Of the facets, where they are not ``coords[boundary.facets]`` (at an axis).
+        Corners of the facets in that frame, where they are not ``coords[boundary.facets]`` (in
+        cylindrical coordinates at the axis, where a node has no angle).
     """
     x = coords[boundary.facets] if corners is None else corners
     normal = unit(corner_vectors(x))
@@ -131,7 +136,8 @@ def fan_normals(
 def _add_normals(coords, facets, x, share, normal, facet, node, fan, total):  # type: ignore[no-untyped-def]
     """Add the weighted normals (f, d) of facets with corners ``x`` to their fans' ``total``.
 
-    ``share`` (2, k) are the weights of the corners in the centre of a facet, and of a triangle.
+    ``share`` (2, k) has the weights of the corners in the centre of a facet (row 0) and of a
+    triangle that repeats its last node (row 1).
     """
     for row in range(len(facet)):
         f, squared = facet[row], 0.0
@@ -150,19 +156,19 @@ def _add_normals(coords, facets, x, share, normal, facet, node, fan, total):  # 
 def find_pieces(
     boundary: Boundary, points: FloatArray, feature_angle_deg: float = DEFAULT_FEATURE_ANGLE_DEG
 ) -> IntArray:
-    """Return the piece that each facet belongs to, (f,): smooth parts of one marker."""
+    """Return the index (f,) of the piece, a smooth part of one marker, that each facet is in."""
     smooth = smooth_joints(boundary, points, feature_angle_deg)
     a, b = boundary.joints[smooth].T
     return components(len(boundary.facets), a, b)
 
 
 def components(count: int, a: IntArray, b: IntArray) -> IntArray:
-    """Return the number of the connected part that each of ``count`` things is in, (count,).
+    """Return the index (count,) of the connected part that each of ``count`` vertices is in.
 
     Parameters
     ----------
     a, b : (m,)
-        The pairs that are connected.
+        The pairs of vertices of a graph that are connected.
     """
     label = np.arange(count)
     _unite(np.ascontiguousarray(a, np.int64), np.ascontiguousarray(b, np.int64), label)
@@ -171,10 +177,10 @@ def components(count: int, a: IntArray, b: IntArray) -> IntArray:
 
 @njit(nogil=True, cache=True)
 def _unite(a, b, label):  # type: ignore[no-untyped-def]
-    """Write the number of the part of each thing into ``label`` (count,), now 0, 1, 2 and so on.
+    """Replace ``label`` (count,), given as 0, 1, 2, ..., by the part that each vertex is in.
 
-    Parts are trees whose root is their first thing (R. E. Tarjan, Efficiency of a good but not
-    linear set union algorithm, 1975), and are numbered in the order of these.
+    Parts are trees whose root is their first vertex (R. E. Tarjan, Efficiency of a good but not
+    linear set union algorithm, 1975), and are numbered in the order of their roots.
     """
     for k in range(len(a)):
         one, two = _root(label, a[k]), _root(label, b[k])
@@ -185,12 +191,12 @@ def _unite(a, b, label):  # type: ignore[no-untyped-def]
             label[i] = count
             count += 1
         else:
-            label[i] = label[label[i]]  # of a thing before it, which has its number already
+            label[i] = label[label[i]]  # of a vertex before it, which has its number already
 
 
 @njit(nogil=True, cache=True)
 def _root(label, i):  # type: ignore[no-untyped-def]
-    """Return the root of the tree that ``i`` is in, and halve the way there."""
+    """Return the root of the tree that ``i`` is in; shorten the path there (path halving)."""
     while label[i] != i:
         label[i] = label[label[i]]
         i = label[i]

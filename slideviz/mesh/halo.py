@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
 
 FITS = 1e-5
-"""Largest mismatch of a receiver and its donor's image, as a part of the mesh's extent."""
+"""Largest distance between a receiver and its donor's image, as a part of the mesh's extent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,20 +34,20 @@ class RigidMotion:
 
 @dataclass(frozen=True, eq=False)
 class Halo:
-    """The halo of a mesh: which nodes are copies of which others, and which lie beyond its sides.
+    """The halo of a mesh: nodes that are copies of others, and the cells beyond the periodic sides.
 
     Attributes
     ----------
     receivers, donors : (h,) int64
-        Each copy, and the node that it is a copy of, which is none itself.
+        Each copy, and the node that it is a copy of. A donor is never a copy itself.
     rotations : (h, d, d) float64
-        What turns a displacement of the donor into the receiver's.
+        Matrices that turn the displacement of a donor into that of its receiver.
     outer : (o,) int64
         The receivers that belong to no cell of the domain, sorted.
     cells : (m,) bool
         The cells of the halo: those with an outer receiver.
     sides : tuple of (str, str)
-        Boundaries of the domain that are copies of another one, and that other.
+        Pairs of boundaries of the domain: the first is a copy of the second.
     """
 
     receivers: IntArray
@@ -58,7 +58,7 @@ class Halo:
     sides: tuple[tuple[str, str], ...]
 
     def follow(self, before: FloatArray, after: FloatArray) -> FloatArray:
-        """Return points (n, d) whose receivers have moved exactly as their donors did.
+        """Return ``after`` (n, d), with receivers moved as their donors, turned by their rotations.
 
         Parameters
         ----------
@@ -73,7 +73,7 @@ class Halo:
         return out
 
     def outer_mask(self, count: int) -> NDArray[np.bool_]:
-        """Return a mask (count,) of the nodes that lie beyond the sides of the domain."""
+        """Return a mask (count,) of the outer receivers; ``count`` is the number of nodes."""
         mask = np.zeros(count, bool)
         mask[self.outer] = True
         return mask
@@ -101,8 +101,10 @@ def make_halo(
     ----------
     receivers, donors : (h,)
         Each receiver once; donors may be receivers of another side (a mesh with two periods).
-    motions, which
-        The motions from donors to receivers, and the one of each pair, (h,).
+    motions : sequence of RigidMotion
+        The motions that occur, each from donors to receivers.
+    which : (h,)
+        Index into ``motions`` for each pair.
     """
     rotations = np.stack([motion.rotation for motion in motions])[which]
     sides = _sides(mesh, receivers, donors)
@@ -124,7 +126,7 @@ def make_halo(
 def _rooted(
     count: int, receivers: IntArray, donors: IntArray, rotations: FloatArray
 ) -> tuple[IntArray, FloatArray]:
-    """Return donors that are no receivers, and the rotations of the whole way from them."""
+    """Return donors (h,) and rotations (h, d, d) without chains: donors that are no receivers."""
     row = np.full(count, -1)
     row[receivers] = np.arange(len(receivers))
     donors, rotations = donors.copy(), rotations.copy()
@@ -137,9 +139,10 @@ def _rooted(
 
 
 def _sides(mesh: Mesh, receivers: IntArray, donors: IntArray) -> tuple[tuple[str, str], ...]:
-    """Return the boundaries whose elements are copies of those of another, and that other.
+    """Return pairs of names: a boundary whose elements are copies of another's, and that other.
 
-    The elements of inflow and outflow within the halo are copies of others of the same boundary.
+    Inflow and outflow, whose elements in the halo are copies of others of the same boundary, are
+    no such pairs.
     """
     donor = np.arange(len(mesh.points))
     donor[receivers] = donors
@@ -160,7 +163,7 @@ def _sides(mesh: Mesh, receivers: IntArray, donors: IntArray) -> tuple[tuple[str
 
 
 def _touching(cells: Cells, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell which cells (m,) have one of the nodes (n,)."""
+    """Return a mask (m,) of the cells that have any node of the mask ``nodes`` (n,)."""
     mask = np.zeros(len(cells), bool)
     for ids, table in cells.by_type.values():
         mask[ids] = nodes[table].any(axis=1)
@@ -168,9 +171,9 @@ def _touching(cells: Cells, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def without_halo(mesh: Mesh) -> tuple[Mesh, IntArray | None]:
-    """Return the domain alone, all points kept in their places, and its cells' ids (k,).
+    """Return the mesh without its halo's cells, and the indices (k,) that its cells had before.
 
-    None for the ids where there is no halo: then they are those of the mesh.
+    All points stay, with their numbers. Without a halo: the same mesh and None.
     """
     halo = mesh.halo
     if halo is None:
@@ -187,7 +190,10 @@ def without_halo(mesh: Mesh) -> tuple[Mesh, IntArray | None]:
 
 
 def fit_motion(before: FloatArray, after: FloatArray) -> RigidMotion:
-    """Return the rigid motion that brings points (k, d) nearest to others (Kabsch 1976)."""
+    """Return the rigid motion of ``before`` (k, d) nearest to ``after`` (k, d) in the mean square.
+
+    Reflections are excluded (Kabsch 1976).
+    """
     here, there = before.mean(axis=0), after.mean(axis=0)
     u, _, vt = np.linalg.svd((before - here).T @ (after - there))
     flip = np.ones(before.shape[1])

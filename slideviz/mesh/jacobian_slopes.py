@@ -1,6 +1,8 @@
-"""Derivatives of the skew and size of cells by their nodes, compiled.
+"""Derivatives of ln f_ss (size-skew quality) of cells by their nodes, compiled.
 
-Arrays have the cells last inside of the loops, as in `slideviz.mesh.jacobians`.
+The formula is in `slideviz.mesh.quality_derivative`. They differentiate `jacobians.corners`
+and `jacobians.spreads`, and must follow their branches by element type. As there, a dimension
+``...`` is that of the cells, ``LANES`` at a time.
 """
 
 from __future__ import annotations
@@ -32,9 +34,10 @@ def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: i
     powers : (2,)
         Exponents of spread and Jacobian, ``EXPONENTS`` of the metric and type.
     sums : (m,)
-        Sums of the corner Jacobians of the undeformed cells; infinity for no factor of size.
+        Sums of the corner Jacobians of the undeformed cells; infinity where there are none: then
+        the derivative is that of ln f_skew.
     out : (m, n, d)
-        No numbers where a corner Jacobian is not positive.
+        Meaningless (possibly NaN) where a corner Jacobian is not positive.
     """
     at = np.empty((points.shape[1], nodes.shape[1], LANES))
     slope = np.empty_like(at)
@@ -59,7 +62,10 @@ def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: i
 
 @njit(**OPTIONS)
 def _weights(alpha, spread, turn, powers, sums):  # type: ignore[no-untyped-def]
-    """Replace Jacobians and spreads (k, ...) by the derivatives of ln f_ss by each of them."""
+    """Replace Jacobians and spreads (k, ...) by the derivatives of ln f_ss by each of them.
+
+    The others are as in `write_slopes`, for these cells.
+    """
     terms = np.empty(len(alpha))
     for c in range(len(turn)):
         total = whole = 0.0
@@ -79,13 +85,16 @@ def _weights(alpha, spread, turn, powers, sums):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _power(base, exponent):  # type: ignore[no-untyped-def]
-    """Return a power; that of one takes no time."""
+    """Return ``base ** exponent``; exponent 1 is a shortcut."""
     return base if exponent == 1.0 else base**exponent
 
 
 @njit(**OPTIONS)
 def _pull_plane(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
-    """Add the derivatives by nodes (2, n, ...), from those by Jacobians and spreads (k, ...)."""
+    """Add the derivatives of ln f_ss by the nodes of plane cells to ``slope`` (2, n, ...).
+
+    ``alpha`` and ``spread`` (k, ...) are its derivatives by Jacobians and spreads (`_weights`).
+    """
     for k in range(len(table)):
         o, i, j = table[k, 0], table[k, 1], table[k, 2]
         for c in range(count):
@@ -108,7 +117,7 @@ def _pull_plane(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no
 
 @njit(**OPTIONS)
 def _pull_solid(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
-    """Add the derivatives by nodes (3, n, ...), as `_pull_plane`."""
+    """Add the derivatives by nodes to ``slope`` (3, n, ...), as `_pull_plane` for 3D cells."""
     for k in range(len(table)):
         o, i, j, h = table[k, 0], table[k, 1], table[k, 2], table[k, 3]
         for c in range(count):
@@ -128,7 +137,10 @@ def _pull_solid(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no
 
 @njit(inline="always", **OPTIONS)
 def _spread_slopes(vtk, x, y, z):  # type: ignore[no-untyped-def]
-    """Return the derivatives of a corner's spread by its three edges."""
+    """Return the derivatives of a corner's spread by its three edges, a triple each.
+
+    Their formulas are those of `jacobians.spreads`, differentiated.
+    """
     if vtk == 10:
         return (
             (3 * x[0] - y[0] - z[0], 3 * x[1] - y[1] - z[1], 3 * x[2] - y[2] - z[2]),
@@ -155,21 +167,23 @@ def _spread_slopes(vtk, x, y, z):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def add_to_points(nodes, weights, slopes, lane, lanes, out):  # type: ignore[no-untyped-def]
-    """Add the weighted slopes of cells to their points, to those of one lane of many.
+    """Add ``weights * slopes`` of cells to their points in ``out``, for the points of one lane.
 
-    Lanes share no point, so that threads can add at once, and each point gets its terms in the
-    order of the cells however many there are.
+    Lanes are shares of the points, one for each thread. No point is in two lanes, so that threads
+    can add at the same time, and each point gets its terms in the order of the cells, whatever
+    the number of lanes.
 
     Parameters
     ----------
     nodes, slopes : (m, n), (m, n, d)
-        The nodes of cells of one type, and derivatives by them.
+        The nodes of cells of one type, and the derivatives of a value of each cell by them.
     weights : (w, m)
-        Cells whose weights are all zero are passed over.
+        Factors of these derivatives, for w sums. A cell whose weights are all zero adds nothing,
+        even if its slopes are NaN.
     lane, lanes : int
-        Which share of the points, of how many.
+        Number of this lane, from 0, and of all lanes.
     out : (w, N, d)
-        What is added to.
+        The sums, for all N points.
     """
     for c in range(nodes.shape[0]):
         wanted = False

@@ -1,7 +1,8 @@
 """Corner Jacobians and Bernstein coefficients of the Jacobian determinant of cells, compiled.
 
 Arrays here have the cells last, ``(..., m)``, so that every inner loop runs over contiguous memory
-and is vectorised. ``at`` is (d, n, m): the coordinates of the n nodes of m cells of one type.
+and is vectorised. In compiled functions m is ``LANES``, of which ``count`` are in use. ``at`` is
+(d, n, m): the coordinates of the n nodes of m cells of one type. ``table`` is ``CORNERS[vtk]``.
 """
 
 from __future__ import annotations
@@ -19,24 +20,20 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import FloatArray, Mesh
 
 OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
+"""Options of `njit` for the loops over cells; division by zero gives inf or NaN."""
 
 LANES = 64
-"""Cells that a loop works on at a time: what it keeps of them stays in the first-level cache."""
+"""Cells that a loop works on at a time, so that their arrays stay in the first-level cache."""
 
 VALID, INVERTED, UNPROVEN = range(len(CELL_STATES))
 """Codes of a cell's status: its place in `slideviz.terms.CELL_STATES`."""
 
 CORNERS = {vtk: np.array(row.corners, np.int64) for vtk, row in ELEMENTS.items() if row.corners}
+"""``ElementType.corners`` (k, 3) in 2D, (k, 4) in 3D, by VTK identifier."""
 
 
 def check_cells(mesh: Mesh) -> None:
-    """Raise if the mesh has no cells, cells of another dimension, or nodes out of range.
-
-    Raises
-    ------
-    MeshError
-        Any of these.
-    """
+    """Raise MeshError if a mesh has no cells, cells of another dimension, or nodes out of range."""
     if not len(mesh.cells):
         raise MeshError(f"{mesh.name} has no cells; a quality needs at least one")
     for vtk, (ids, _) in mesh.cells.by_type.items():
@@ -57,7 +54,10 @@ def check_cells(mesh: Mesh) -> None:
 
 @njit(**OPTIONS)
 def gather(points, nodes, first, count, at):  # type: ignore[no-untyped-def]
-    """Write the coordinates of ``count`` cells from ``first`` on into ``at`` (d, n, LANES)."""
+    """Write the coordinates of ``count`` cells, from number ``first`` on, into ``at``.
+
+    ``points`` are (N, d), ``nodes`` of the cells (m, n).
+    """
     for c in range(count):
         for j in range(nodes.shape[1]):
             node = nodes[first + c, j]
@@ -67,7 +67,7 @@ def gather(points, nodes, first, count, at):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def edge(at, start, stop, c):  # type: ignore[no-untyped-def]
-    """Return the edge between two nodes of one cell, a triple."""
+    """Return the vector, a triple, from local node ``start`` to ``stop`` of cell ``c``."""
     return (
         at[0, stop, c] - at[0, start, c],
         at[1, stop, c] - at[1, start, c],
@@ -97,7 +97,8 @@ def half_sum(a, b):  # type: ignore[no-untyped-def]
 def corners(at, table, count, alpha):  # type: ignore[no-untyped-def]
     """Write the corner Jacobians (thesis Eq. 2.39 to 2.42, Table 2.3) into ``alpha`` (k, ...).
 
-    They are the determinants of the edges that leave each corner.
+    They are the determinants of the edges that leave each corner. `jacobian_slopes` has their
+    derivatives.
     """
     for k in range(len(table)):
         o, i, j = table[k, 0], table[k, 1], table[k, 2]
@@ -115,9 +116,10 @@ def corners(at, table, count, alpha):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
-    """Write what the skew compares each corner Jacobian with into ``spread`` (k, ...).
+    """Write the spread of each corner into ``spread`` (k, ...).
 
-    What that is for each type, `slideviz.mesh.metrics` says.
+    The skew compares the corner Jacobian with it; `slideviz.mesh.metrics` defines it for each type,
+    `jacobian_slopes` has its derivatives.
     """
     for k in range(len(table)):
         o, i, j = table[k, 0], table[k, 1], table[k, 2]
@@ -145,7 +147,7 @@ def spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def _write_prism(at, count, found):  # type: ignore[no-untyped-def]
-    """Write what `prism_coefficients` returns into ``found`` (3, 3, ...)."""
+    """Write the coefficients that `prism_coefficients` describes into ``found`` (3, 3, ...)."""
     for c in range(count):
         a, b = edge(at, 0, 1, c), edge(at, 0, 2, c)
         p, q = edge(at, 3, 4, c), edge(at, 3, 5, c)
@@ -164,7 +166,7 @@ _NODE = np.array([[[0, 4], [3, 7]], [[1, 5], [2, 6]]])
 
 @njit(**OPTIONS)
 def _write_hexahedron(at, count, found):  # type: ignore[no-untyped-def]
-    """Write what `hexahedron_coefficients` returns into ``found`` (3, 3, 3, ...)."""
+    """Write those that `hexahedron_coefficients` describes into ``found`` (3, 3, 3, ...)."""
     found[:] = 0.0
     for i in range(2):
         for j in range(2):
@@ -197,7 +199,7 @@ def write_corners(points, nodes, table, alpha):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ignore[no-untyped-def]
-    """Write corner Jacobians, spreads and status of cells of one type, in one pass.
+    """Write corner Jacobians, spreads and a first status of cells of one type, in one pass.
 
     Parameters
     ----------
@@ -205,9 +207,12 @@ def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ig
         (N, d), (m, n), and ``CORNERS[vtk]``.
     turn : (m,) int8
         1, or -1 for a cell that is numbered the other way round: a factor of its Jacobians.
-    alpha, spread, status : (k, m), (k, m), (m,) uint8
-        ``INVERTED`` where a corner Jacobian is not a positive number, ``UNPROVEN`` where another
-        coefficient of a prism or a hexahedron is not, and else ``VALID``.
+    alpha, spread : (k, m)
+        Written: corner Jacobians times ``turn``, and spreads.
+    status : (m,) uint8
+        Written: ``INVERTED`` where a corner Jacobian is not a positive number; ``UNPROVEN`` where
+        another coefficient of a prism or a hexahedron is not, which
+        `slideviz.mesh.validity.decide_unproven` is still to decide; else ``VALID``.
     """
     at = np.empty((points.shape[1], nodes.shape[1], LANES))
     found = np.empty((3, 3, 3, LANES))
@@ -228,13 +233,13 @@ def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ig
         for k in range(len(table)):
             for c in range(count):
                 alpha[k, first + c] *= sides[c]
-        # After the coefficients: a corner decides, be it negative or no number.
+        # After the coefficients, for a corner that is negative or NaN decides.
         _mark(alpha[:, here], np.ones_like(sides), states, INVERTED)
 
 
 @njit(**OPTIONS)
 def _mark(values, sides, states, as_):  # type: ignore[no-untyped-def]
-    """Set the states (m,) where one of the values (k, m) is not positive or infinite."""
+    """Set ``states`` (m,) to ``as_`` where not all ``values * sides`` (k, m) are in 0 < v < inf."""
     for k in range(len(values)):
         for c in range(len(states)):
             value = values[k, c] * sides[c]

@@ -3,10 +3,11 @@
 Triangle, quadrilateral, tetrahedron and hexahedron are Knupp's (thesis Eq. 2.45 to 2.48). For
 the prism and the pyramid no such metric was published that we know of: theirs are our own.
 
-Every function returns (m,), at most 1 up to rounding and 1 for the ideal cell, from the *spread*
-(k, m) of the corners and their Jacobians ``alpha`` (k, m), all positive. The spread, which
-`slideviz.mesh.jacobians.measure` writes, is made of the edges that leave a corner: the product of
-their lengths for quadrilaterals, prisms and hexahedra, and for the others what is said below.
+Every function returns the skew (m,) of cells: 1 for the ideal cell, else less (up to rounding).
+Given are the *spread* (k, m) of each cell's k corners and their Jacobians ``alpha`` (k, m), all
+positive. The spread is found by `slideviz.mesh.jacobians.spreads` from the edges that leave a
+corner. For quadrilaterals, prisms and hexahedra it is the product of their lengths; for the other
+types their functions state it, where λij is the scalar product of edges i and j.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ Skew = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 def total(a: FloatArray) -> FloatArray:
-    """Return the sum over the first axis, term by term.
+    """Return the sum over the first axis, terms added up in order.
 
     ``a.sum(axis=0)`` adds pairwise where there is a single cell, so that the last bit of a result
     would depend on the size of the parts.
@@ -32,20 +33,22 @@ def total(a: FloatArray) -> FloatArray:
 
 
 def _triangle(spread: FloatArray, alpha: FloatArray) -> FloatArray:
-    """With the spread ``λ11 + λ22 - λ12``."""
+    """Knupp's (thesis Eq. 2.45), with the spread ``λ11 + λ22 - λ12``."""
     return np.sqrt(3) * alpha[0] / spread[0]
 
 
 def _tetrahedron(spread: FloatArray, alpha: FloatArray) -> FloatArray:
-    """With the spread ``3/2 (λ11 + λ22 + λ33) - λ12 - λ23 - λ13``."""
+    """Knupp's, with the spread ``3/2 (λ11 + λ22 + λ33) - λ12 - λ23 - λ13``."""
     return 3 * np.cbrt(2 * alpha[0] ** 2) / spread[0]
 
 
 def _quadrilateral(spread: FloatArray, alpha: FloatArray) -> FloatArray:
+    """Knupp's: the harmonic mean of ``alpha / spread``, the sines of the corners."""
     return 4 / total(spread / alpha)
 
 
 def _hexahedron(spread: FloatArray, alpha: FloatArray) -> FloatArray:
+    """Knupp's: the harmonic mean of ``(alpha / spread)^(2/3)`` over the corners."""
     return 8 / total(np.cbrt((spread / alpha) ** 2))
 
 
@@ -55,22 +58,22 @@ def _hexahedron_rbf_slide(spread: FloatArray, alpha: FloatArray) -> FloatArray:
 
 
 def _prism(spread: FloatArray, alpha: FloatArray) -> FloatArray:
-    """Ours: as the hexahedron, but 1 for a right prism of any height on equal sides."""
+    """Our own: as the hexahedron, scaled to 1 for a right prism on an equilateral triangle."""
     return 6 / total(np.cbrt(0.75 * (spread / alpha) ** 2))
 
 
 def _pyramid(spread: FloatArray, alpha: FloatArray) -> FloatArray:
-    """Ours: harmonic mean over the base corners of ``3 det(T)^(2/3) / ‖T‖²``, T = W⁻¹ A.
+    """Our own: harmonic mean over the base corners of ``3 det(T)^(2/3) / ‖T‖²``, T = W⁻¹ A.
 
-    W has the edges of the pyramid with equal sides, rows (1, 0, 0), (0, 1, 0) and
-    (1/2, 1/2, 1/√2); so the rows of T are e₁, e₂ and √2 (e₃ - (e₁ + e₂) / 2), and the spread is
-    ``‖T‖²``. Unlike the other types this is a *shape*: it is lower for a tall or a flat pyramid
-    as well.
+    A has the edges e₁, e₂, e₃ at a corner as rows, W those of the pyramid with equal edges,
+    (1, 0, 0), (0, 1, 0) and (1/2, 1/2, 1/√2). So the rows of T are e₁, e₂ and
+    √2 (e₃ - (e₁ + e₂) / 2), and the spread is ``‖T‖²``. Unlike the skew of prisms and hexahedra
+    it depends on the height too: it is below 1 for a tall or a flat pyramid.
     """
     return 4 / total(spread / (3 * np.cbrt(2 * alpha**2)))
 
 
-KNUPP: dict[int, Skew] = {
+KNUPP: dict[int, Skew] = {  # by VTK identifier
     5: _triangle,
     9: _quadrilateral,
     10: _tetrahedron,
@@ -82,7 +85,7 @@ METRICS: Mapping[Metric, Mapping[int, Skew]] = {
     "knupp": KNUPP,
     "rbf-slide": {**KNUPP, 12: _hexahedron_rbf_slide},
 }
-"""Formula by metric and VTK identifier."""
+"""Function of the skew, by metric and VTK identifier."""
 
 _THIRDS = 2 / 3
 _EXPONENTS: dict[int, tuple[float, float]] = {
@@ -97,8 +100,8 @@ EXPONENTS: Mapping[Metric, Mapping[int, tuple[float, float]]] = {
     "knupp": _EXPONENTS,
     "rbf-slide": {**_EXPONENTS, 12: (1, 1)},
 }
-"""Exponents a, b of the same formulas: each is a constant divided by ``Σ_k spread_kᵃ / alpha_kᵇ``.
+"""Exponents a, b of the functions in ``METRICS``, by which the skew is differentiated.
 
-With them the derivative of the skew needs no formula of its own
+Each function is a constant divided by ``Σ_k spread_kᵃ / alpha_kᵇ``
 (`slideviz.mesh.quality_derivative`).
 """

@@ -22,7 +22,7 @@ IntArray = NDArray[np.int64]
 
 
 def sealed(values: NDArray) -> NDArray:
-    """Return the same numbers read-only, without a copy: nobody else must write to them."""
+    """Return a read-only view of ``values``, which the caller must not write to afterwards."""
     view = values.view()
     view.flags.writeable = False
     return view
@@ -38,7 +38,7 @@ def frozen_array(values: ArrayLike, dtype: type) -> NDArray:
 
 
 def column_bounds(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the smallest and the largest of each column of points (n, d): (d,), (d,)."""
+    """Return the smallest and the largest coordinates (d,), (d,) of points (n, d)."""
     # One column after the other is five times as fast as all at once.
     return np.array([c.min() for c in points.T]), np.array([c.max() for c in points.T])
 
@@ -50,7 +50,7 @@ def largest_coordinate(points: FloatArray) -> float:
 
 
 def sorted_nodes(nodes: IntArray) -> IntArray:
-    """Return the nodes that stand in an array of any shape, sorted, each once: (u,)."""
+    """Return the nodes that an array of any shape contains, ascending, each once: (u,)."""
     used = np.zeros(nodes.max(initial=-1) + 1, bool)
     used[nodes] = True
     return np.flatnonzero(used)
@@ -111,7 +111,7 @@ class Cells:
 
     @cached_property
     def by_type(self) -> dict[int, tuple[IntArray, IntArray]]:
-        """For each VTK identifier present: element ids (m_t,), nodes (m_t, n_t)."""
+        """Indices (m_t,) and nodes (m_t, n_t) of the elements of each type, by VTK identifier."""
         found = {}
         alike = len(self) > 0 and self.types.min() == self.types.max()
         present = self.types[:1] if alike else np.flatnonzero(np.bincount(self.types))
@@ -128,7 +128,7 @@ class Cells:
 
     @cached_property
     def nodes(self) -> IntArray:
-        """Return the indices of all nodes used, sorted, each once: (u,)."""
+        """Return the indices of all nodes used, ascending, each once: (u,)."""
         return sealed(sorted_nodes(self.connectivity))
 
     def __repr__(self) -> str:
@@ -138,7 +138,7 @@ class Cells:
         return f"Cells({found})"
 
     def take(self, which: IntArray | NDArray[np.bool_]) -> Cells:
-        """Return some of the elements, by numbers (k,) in their order, or by a mask (m,)."""
+        """Return elements by indices ``which`` (k,), in that order, or by a mask (m,)."""
         sizes = np.diff(self.offsets)
         if which.dtype == bool:
             entries = np.repeat(which, sizes)
@@ -149,7 +149,7 @@ class Cells:
         return Cells.from_types(self.types[which], self.connectivity[entries])
 
     def same_as(self, other: Cells) -> bool:
-        """Tell whether both hold the same elements in the same order."""
+        """Return whether both have the same types and connectivity."""
         return np.array_equal(self.types, other.types) and np.array_equal(
             self.connectivity, other.connectivity
         )
@@ -164,19 +164,20 @@ class Marker:
 
     @property
     def nodes(self) -> IntArray:
-        """Return the indices of its nodes, sorted, each once: (u,)."""
+        """Return the indices of its nodes, ascending, each once: (u,)."""
         return self.cells.nodes
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """The numbers of points and cells in the mesh that a mesh is a part of, and how many it has.
+    """Where the points and cells of a part of a mesh are in the whole mesh.
 
     Attributes
     ----------
     points, cells : (n,), (m,) int64
-        Ascending.
+        Index in the whole mesh of each point and cell of the part, ascending.
     n_points, n_cells : int
+        Numbers of points and cells of the whole mesh.
     """
 
     points: IntArray
@@ -187,20 +188,21 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Origin:
-    """What a mesh keeps of its file besides points, cells and boundaries, for writing it again.
+    """What a mesh keeps of its file besides points, cells and boundaries, to write it back.
 
-    Each format that keeps something has a class of its own.
+    A format whose files have more than that has a subclass of its own.
 
     Attributes
     ----------
     ending : str
-        Of the files whose format it is; "" where nothing is kept.
+        File name ending of the format, with its dot; "" where no more of the file is kept.
     ffd : bytes or None
-        The boxes for free-form deformation that an SU2 file gets in place of those it had.
+        Text of the boxes for free-form deformation that an SU2 file gets in place of those it had;
+        None: those it had.
     ffd_at : tuple of range
-        The lines of the file, from 0, on which its boxes stand, if that is known.
+        The lines of the file, from 0, that its boxes are on, if that is known.
     ffd_elsewhere : dict of str to int
-        The boxes that other zones of the file have, and their zones.
+        Names of the boxes that other zones of the file have, and the numbers of these zones.
     """
 
     ending: ClassVar[str] = ""
@@ -222,19 +224,20 @@ class Mesh:
     markers : tuple of Marker
         The named boundaries, in file order.
     origin : Origin
-        What is kept of the file it was read from.
+        What else of its file is kept, to write it back.
     name : str
-        Where it came from, for messages.
+        Name of its file or sample, for messages.
     zone, zones : int
         Number of this zone in the file (from 1) and of all its zones.
     source : Path or None
-        The file it was read from, which is not overwritten without being asked to.
+        The file it was read from, which is overwritten only on request.
     halo : Halo or None
         Copies of cells beyond the periodic sides, which only follow the cells they copy.
     remarks : tuple of str
-        What was found odd when reading, a sentence each.
+        Warnings of the reader, a sentence each.
     part : Part or None
-        Of which mesh it is a part: only what is needed of one that is larger than memory.
+        For a mesh that is only a part of another (its skin, where that is larger than memory):
+        where its points and cells are in the whole.
     """
 
     points: FloatArray
@@ -262,7 +265,7 @@ class Mesh:
 
     @property
     def dim(self) -> int:
-        """Return 2 or 3."""
+        """Return the dimension of the points, 2 or 3."""
         return int(self.points.shape[1])
 
     @cached_property
@@ -272,7 +275,7 @@ class Mesh:
 
     @cached_property
     def extent(self) -> float:
-        """Return the largest extent over the Cartesian axes, without the halo."""
+        """Return the longest side of the bounding box of the points, without the halo."""
         if self.halo is None:
             low, high = self.bounds
         else:
@@ -298,15 +301,21 @@ class Mesh:
         raise MeshError(f"no marker {name!r}; the mesh has {', '.join(self.marker_names)}")
 
     def number(self, node: int) -> int:
-        """Return the number that a node has for people: that in its file."""
+        """Return the number that a node has in its file, for messages."""
         return node if self.part is None else int(self.part.points[node])
 
     def cell_number(self, cell: int) -> int:
-        """Return the number that a cell has for people: that in its file."""
+        """Return the number that a cell has in its file, for messages."""
         return cell if self.part is None else int(self.part.cells[cell])
 
     def with_points(self, points: ArrayLike) -> Mesh:
-        """Return the same mesh at other points, (n, d)."""
+        """Return the same mesh with other ``points`` (n, d).
+
+        Raises
+        ------
+        MeshError
+            They have another shape than those of the mesh.
+        """
         moved = np.asarray(points, np.float64)
         if moved.shape != self.points.shape:
             raise MeshError(f"points have shape {moved.shape}; needed is {self.points.shape}")

@@ -1,4 +1,8 @@
-"""The nearest of some points, found without a search tree where no two are in question."""
+"""Nearest points, found by a sort along one direction where that is enough, else by a tree.
+
+All points are projected onto the direction ``OBLIQUE``. Points near each other have projections
+near each other; so where few projections are, few distances need be computed.
+"""
 
 from __future__ import annotations
 
@@ -8,24 +12,26 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.threads import cores
 
 OBLIQUE = np.array([1.0, 0.6180339887, 0.4142135624])
-"""A direction of no symmetry: points of a mesh seldom look in one place along it."""
+"""A direction of no symmetry: points of a mesh seldom have the same projection onto it."""
 CROWDED = 16
-"""Points that look near each, on average, from which a tree is faster."""
+"""Candidates for each point, on average, above which a tree is faster."""
 
 
 def nearest(
     points: FloatArray, at: FloatArray, bound: float, likely: float
 ) -> tuple[FloatArray, IntArray]:
-    """Return the distance (m,) of the nearest point and its number (m,), as SciPy's cKDTree does.
+    """Return distance (m,) and index (m,) of the point nearest to each place, as SciPy's cKDTree.
 
     Parameters
     ----------
     points, at : (n, d), (m, d)
-        The points, and where they are looked for.
+        The points, and the places that a point is looked for at.
     bound : float
-        Only nearer ones are found; for others the distance is infinite and the number n.
+        Largest distance that is looked for. Where no point is nearer, the distance is infinite and
+        the index n.
     likely : float
-        Where one is probably nearer than this, and alone. Otherwise it takes longer.
+        A distance within which each place probably has exactly one point: then no tree is built.
+        The result does not depend on it.
     """
     found = _alone(points, at, min(bound, likely))
     if found is not None and (bound <= likely or np.isfinite(found[0]).all()):
@@ -37,9 +43,9 @@ def nearest(
 
 
 def crowded(points: FloatArray, apart: float) -> IntArray:
-    """Return the points, by numbers (k,), that may have another nearer than ``apart``; few others.
+    """Return ascending indices (k,) of points that may have another within ``apart``.
 
-    Of most meshes none is left for a slower search.
+    No other point has one. They are candidates for an exact search; most meshes have none.
     """
     seen = points @ OBLIQUE[: points.shape[1]]
     order = np.argsort(seen)
@@ -48,12 +54,18 @@ def crowded(points: FloatArray, apart: float) -> IntArray:
 
 
 def _margin(seen: FloatArray, apart: float) -> float:
-    """Return how far apart points look at most that are so near, rounding included."""
+    """Return the largest difference of the projections ``seen`` of points within ``apart``.
+
+    The length of ``OBLIQUE`` and rounding are included.
+    """
     return 2.0 * apart + 1e-14 * float(np.abs(seen).max(initial=0.0))
 
 
 def _alone(points: FloatArray, at: FloatArray, reach: float) -> tuple[FloatArray, IntArray] | None:
-    """Return what `nearest` does where no place has two points within reach, else None."""
+    """Return what `nearest` does with ``bound=reach``, or None where that needs a tree.
+
+    That is where a place has two points within reach, or there are too many candidates.
+    """
     seen, from_here = (x @ OBLIQUE[: x.shape[1]] for x in (points, at))
     margin = max(_margin(seen, reach), _margin(from_here, reach))
     order = np.argsort(seen)

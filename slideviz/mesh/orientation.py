@@ -1,8 +1,8 @@
-"""Orientation of cells: which way round each is numbered, found from its neighbours.
+"""Orientation of cells: which way round the nodes of each are numbered, found from its neighbours.
 
-A cell that is numbered clockwise has a negative volume as a folded cell has. What tells them
-apart is the facet it shares with a neighbour: two cells numbered alike traverse it in opposite
-directions, whatever their shape.
+A cell that is numbered the other way round (in 2D clockwise) has a negative volume, and so has a
+folded cell. They differ at the facet shared with a neighbour: two cells that are numbered the same
+way traverse it in opposite directions, whatever their shape.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ _REFERENCES: WeakKeyDictionary[Mesh, tuple[FloatArray, NDArray[np.int8]]] = Weak
 
 
 def reference_of(mesh: Mesh) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Return what cells are compared with: sums of corner Jacobians (m,), and their signs (m,).
+    """Return what deformed cells are compared with: sums of corner Jacobians (m,), and signs (m,).
 
-    The sums have the signs that `orientation` gives. Both are found once, and kept as long as the
-    mesh lives.
+    The signs are those of `orientation`; the sums are multiplied by them, so that they are positive
+    but for folded cells. Both are cached as long as the mesh lives.
     """
     found = _REFERENCES.get(mesh)
     if found is None:
@@ -44,7 +44,7 @@ def reference_of(mesh: Mesh) -> tuple[FloatArray, NDArray[np.int8]]:
 
 
 def corner_sums(mesh: Mesh) -> FloatArray:
-    """Return (m,) sums of each cell's corner Jacobians, in the numbering of the file."""
+    """Return the sum (m,) of each cell's corner Jacobians, without `orientation`'s sign."""
     sums = np.empty(len(mesh.cells))
     for vtk, (ids, nodes) in mesh.cells.by_type.items():
         sums[ids] = _sums_of(mesh.points, vtk, nodes)
@@ -52,7 +52,7 @@ def corner_sums(mesh: Mesh) -> FloatArray:
 
 
 def _sums_of(points: FloatArray, vtk: int, nodes: IntArray) -> FloatArray:
-    """Return (m,) what `corner_sums` does, of cells (m, n) of one type."""
+    """Return the sums (m,) of `corner_sums` for cells of one type, ``nodes`` (m, n)."""
     sums, table = np.empty(len(nodes)), CORNERS[vtk]
 
     def add(part: slice) -> None:
@@ -65,7 +65,7 @@ def _sums_of(points: FloatArray, vtk: int, nodes: IntArray) -> FloatArray:
 
 
 def orientation(cells: Cells, sums: FloatArray) -> NDArray[np.int8]:
-    """Return (m,) 1, or -1 where a cell is numbered the other way round.
+    """Return a sign (m,) of each cell: 1, or -1 if it is numbered the other way round.
 
     Where all ``sums`` have one sign, all cells are taken to be numbered alike, without a look
     at their neighbours (which takes a second for 250,000 cells). Otherwise the cells of each
@@ -89,11 +89,12 @@ def orientation(cells: Cells, sums: FloatArray) -> NDArray[np.int8]:
 
 
 def _consistent(cells: Cells) -> tuple[NDArray[np.int8], IntArray]:
-    """Return signs (m,) that agree within each connected part, and the part (m,) of each cell.
+    """Return signs (m,) that make all cells of a connected part agree, and the part (m,) of each.
 
-    The graph has every cell twice, as numbered and reversed; neighbours that agree link equal
-    copies, others link unequal ones. A part then falls apart into two mirror images. Where it
-    does not (a cell is its own mirror image), no numbering agrees and the file's is kept.
+    The graph has each cell twice, as numbered and reversed. Neighbours that agree are linked as
+    numbered to as numbered, reversed to reversed; others as numbered to reversed. So each part of
+    the mesh becomes two components that are mirror images. Where it becomes one (as for a Möbius
+    strip), no signs agree, and all are 1.
     """
     from slideviz.mesh.fans import components
 
@@ -109,7 +110,10 @@ def _consistent(cells: Cells) -> tuple[NDArray[np.int8], IntArray]:
 
 
 def _neighbours(cells: Cells) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
-    """Return pairs of cells with a common facet (p,), (p,), and whether they agree (p,)."""
+    """Return pairs of cells with a common facet (p,), (p,), and a mask (p,) of those that agree.
+
+    Two cells agree if they traverse the facet in opposite directions.
+    """
     owners, facets, turns = [], [], []
     for ids, nodes, turn in facets_of(cells):
         padded = np.full((len(nodes), 4), -1, np.int64)
@@ -121,13 +125,16 @@ def _neighbours(cells: Cells) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
     order = np.lexsort(facet.T)
     owner, facet, turn = owner[order], facet[order], turn[order]
     same = np.concatenate(([False], (facet[1:] == facet[:-1]).all(axis=1), [False]))
-    # A facet of three cells or more tells nothing: only pairs that stand alone are used.
+    # Only facets of exactly two cells are used.
     start = np.flatnonzero(same[1:-1] & ~same[:-2] & ~same[2:])
     return owner[start], owner[start + 1], turn[start] != turn[start + 1]
 
 
 def facets_of(cells: Cells) -> Iterator[tuple[IntArray, IntArray, NDArray[np.bool_]]]:
-    """Yield facets of cells: cell (k,), nodes (k, n), ascending, and direction (k,) of each."""
+    """Yield facets of cells, in tables: cell (k,), sorted nodes (k, n) and direction (k,) of each.
+
+    The direction is a boolean that differs for the two ways to traverse the same nodes.
+    """
     for vtk, (ids, nodes) in cells.by_type.items():
         for local in ELEMENTS[vtk].facets:
             facet = nodes[:, local]
@@ -135,6 +142,6 @@ def facets_of(cells: Cells) -> Iterator[tuple[IntArray, IntArray, NDArray[np.boo
             rows, size = np.arange(len(facet)), len(local)
             after = facet[rows, (least + 1) % size]
             before = facet[rows, (least - 1) % size]
-            # Two nodes: after and before are one, and which comes first is the direction.
+            # With two nodes after and before are the same; the direction is which comes first.
             turn = after < before if size > 2 else least == 0
             yield ids, np.sort(facet, axis=1), turn

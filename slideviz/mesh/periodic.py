@@ -1,6 +1,7 @@
 """Periodic pairs: two boundaries that are images of each other, matched node by node.
 
-What becomes of all images of one node in a deformation is in `slideviz.rbf.images`.
+Which markers are periodic comes from the case, never from the mesh file; the transformation is
+found by the nodes. `slideviz.rbf.images` has the sets of nodes that are images of each other.
 """
 
 from __future__ import annotations
@@ -20,14 +21,16 @@ from slideviz.mesh.nearest import nearest
 from slideviz.terms import PeriodicKind, PeriodicType
 
 TOLERANCE = 1e-5
-"""Largest mismatch of a node and its image, as a fraction of the mesh's largest extent."""
+"""Largest distance between a node's image and its partner, as a fraction of `Mesh.extent`."""
 
 _KINDS: dict[PeriodicType, tuple[PeriodicKind, ...]] = {
     "auto": ("translational", "rotational"),
     "translational": ("translational",),
     "rotational": ("rotational",),
 }
+"""Kinds of transformation to try, in that order, by ``PERIODIC_TYPE``."""
 _AXES = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+"""Axes of rotation that `find_pairs` tries, in that order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +47,7 @@ class Pair:
     angle : float
         Rotation in radians about ``axis`` through ``origin``; zero when translational.
     axis, origin : (3,) tuple of float
+        Direction of the axis of rotation, and a point on it; without effect when translational.
     nodes : (k, 2) int64
         Each node of ``first`` and its image.
     mismatch : float
@@ -62,7 +66,7 @@ class Pair:
 
     @property
     def period(self) -> float:
-        """Return the length (translational) or the angle in radians (rotational), positive."""
+        """Return the period, positive: a length (translational) or an angle in radians."""
         if self.kind == "rotational":
             return abs(self.angle)
         return float(np.linalg.norm(self.vector))
@@ -83,7 +87,7 @@ def match(
     axis: Sequence[float] = Z_AXIS,
     origin: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Pair:
-    """Return how marker ``second`` is the image of ``first``.
+    """Return the pair of two markers, ``second`` being the image of ``first``.
 
     ``auto`` tries a translation, then a rotation about the given axis.
 
@@ -126,10 +130,12 @@ def _match_kind(
     origin: Sequence[float],
     bound: float = np.inf,
 ) -> tuple[Pair | None, float]:
-    """Return the best pair of one kind and its largest mismatch (inf when not one to one).
+    """Return the best pair of one kind, whether it matches or not, and its largest mismatch.
 
-    Nodes are looked for within ``bound`` of the images only: where there is none, there is no
-    pair. That is a hundred times faster for boundaries that are far from matching.
+    The mismatch is infinite if the nodes are not one to one, the transformation is (nearly) none,
+    or a translation has nodes in common. Nodes are looked for within ``bound`` of the images only:
+    where there is none, the result is (None, inf). That is a hundred times faster for boundaries
+    that are far from matching.
     """
     a, b = (mesh.marker(name).nodes for name in (first, second))
     xa, xb = mesh.points[a], mesh.points[b]
@@ -175,8 +181,8 @@ def pair_up(
 ) -> tuple[Pair, ...]:
     """Return the pairs that the named markers form, whatever their order.
 
-    All have one transformation, or its inverse: where a marker matches several others (two
-    halves of a straight side), the partner is chosen so that they do.
+    All pairs have the same transformation, or its inverse: where a marker matches several others
+    (two halves of a straight side), its partner is chosen so.
 
     Raises
     ------
@@ -190,7 +196,7 @@ def pair_up(
         )
 
     def pairs_of(rest: Sequence[str], model: Pair | None) -> tuple[Pair, ...] | None:
-        """Return pairs of all the rest that agree with the model, or None."""
+        """Return pairs of all of ``rest`` that agree with ``model``, or None if there are none."""
         if not rest:
             return ()
         for second in rest[1:]:
@@ -224,9 +230,9 @@ def _left_over(
     axis: Sequence[float],
     origin: Sequence[float],
 ) -> MeshError:
-    """Return the error for markers that have no partner; it names the pairs that match, too.
+    """Return the error for markers without a partner; it names the pairs that do match, too.
 
-    Without any pair, the error is ``first``.
+    If no pair matches, it is the error ``first``.
     """
     good: list[Pair] = []
     alone, why = list(names), "they are no images of each other; choose other markers"
@@ -251,7 +257,10 @@ def _left_over(
 
 
 def _agree(one: Pair, other: Pair) -> bool:
-    """Tell whether two pairs have the same transformation or its inverse."""
+    """Return whether two pairs have the same transformation or its inverse.
+
+    The axes of two rotations are not compared.
+    """
     if one.kind != other.kind:
         return False
     if one.kind == "rotational":
@@ -261,7 +270,7 @@ def _agree(one: Pair, other: Pair) -> bool:
 
 
 def _differ(mesh: Mesh, one: Pair, other: Pair) -> MeshError:
-    """Return the error for two pairs that have different transformations."""
+    """Return the error that says that two pairs have different transformations."""
     return MeshError(
         f"{mesh.name}: the periodic pairs {one.first!r}, {one.second!r} ({one.describe()}) and "
         f"{other.first!r}, {other.second!r} ({other.describe()}) differ; only one period is "
@@ -272,9 +281,9 @@ def _differ(mesh: Mesh, one: Pair, other: Pair) -> MeshError:
 def find_pairs(mesh: Mesh, going_on: Callable[[], object] = lambda: None) -> tuple[Pair, ...]:
     """Return pairs of markers that match, each marker in one pair at most.
 
-    Translations are tried first, then rotations about z, x and y through 0. A guess, to be
-    confirmed: the opposite sides of every box match. ``going_on`` is called before each try;
-    what it raises ends the search.
+    Translations are tried first, then rotations about z, x and y through 0. The pairs are a guess,
+    to be confirmed by the user: the opposite sides of every box match. ``going_on`` is called
+    before each try; what it raises ends the search.
 
     Raises
     ------

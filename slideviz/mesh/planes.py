@@ -1,9 +1,9 @@
-"""Boundaries as simplices, their planes, and a tree of bounding boxes to find those near a point.
+"""Boundaries as simplices, their planes, and a tree of bounding boxes to find those near a query.
 
-`Surface` has the lines (2D) or triangles (3D) of a boundary; `Planes` measures distances from them
-and says which sides they part; `BoxTree` finds near ones for many queries at once. Facets of one
-mesh differ in size by factors of a million, so that a search by distance between their centres
-finds far too many; boxes adapt to each.
+`FacetSimplices` has the lines (2D) or triangles (3D) of a boundary; `Planes` measures distances
+from them and says whether they separate points; `BoxTree` finds near ones for many queries at
+once. Facets of one mesh differ in size by factors of a million, so that a search by distance
+between their centres finds far too many; boxes adapt to each.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ if TYPE_CHECKING:
 
 
 LEAF = 4
-"""Most items under the last boxes of the tree."""
+"""Most boxes in a leaf of `BoxTree`."""
 
 ANGLE = 1e-6
-"""A direction that is off a simplex by less than this angle, in radians, lies in it."""
+"""Largest angle, in radians, between a simplex and a direction that counts as lying in it."""
 
 
 @dataclass(frozen=True, eq=False)
 class FacetSimplices:
-    """Simplices in the order of the facets that they are part of.
+    """The lines (2D) or triangles (3D) that facets are divided into, in the order of the facets.
 
     Attributes
     ----------
     nodes : (s, d) int64
-        Two or three nodes each.
+        The mesh nodes of each simplex: two in 2D, three in 3D.
     facet : (s,) int64
-        The element each is part of: a quadrilateral is two triangles.
+        Index of the facet that each is part of: a quadrilateral is two triangles.
     """
 
     nodes: IntArray
@@ -48,7 +48,7 @@ class FacetSimplices:
 
     @classmethod
     def of(cls, cells: Cells, dim: int) -> FacetSimplices:
-        """Return the simplices of a boundary of a mesh of dimension ``dim``.
+        """Return the simplices of the facets ``cells`` of a mesh of dimension ``dim``.
 
         Raises
         ------
@@ -78,7 +78,7 @@ class FacetSimplices:
         return FacetSimplices(self.nodes[wanted], self.facet[wanted])
 
     def without(self, nodes: IntArray) -> FacetSimplices:
-        """Return the surface without the facets that have any of ``nodes``."""
+        """Return the simplices without those of facets that have any of ``nodes`` (k,)."""
         marked = np.zeros(max(self.nodes.max(initial=0), nodes.max(initial=0)) + 1, bool)
         marked[nodes] = True
         held = np.zeros(int(self.facet.max(initial=0)) + 1, bool)
@@ -86,7 +86,10 @@ class FacetSimplices:
         return self.keep(~held[self.facet])
 
     def within(self, points: FloatArray, other: FacetSimplices, margin: float) -> FacetSimplices:
-        """Return the simplices that the box around ``other`` touches; points are (n, d)."""
+        """Return the simplices whose bounding boxes touch the one around all of ``other``.
+
+        ``points`` are (n, d); boxes up to the length ``margin`` from each other touch.
+        """
         if not len(other):
             return other
         low, high = column_bounds(points[other.nodes.ravel()])
@@ -96,7 +99,7 @@ class FacetSimplices:
 
     @property
     def edges(self) -> IntArray:
-        """Return the edges in both directions, sorted, each once: (e, 2)."""
+        """Return the nodes (e, 2) of all edges, in both directions, sorted, each once."""
         size = self.nodes.shape[1]
         pairs = [(i, k) for i in range(size) for k in range(size) if i != k]
         return np.unique(self.nodes[:, pairs].reshape(-1, 2), axis=0)
@@ -104,14 +107,14 @@ class FacetSimplices:
 
 @dataclass(frozen=True, eq=False)
 class BoxTree:
-    """A complete binary tree over boxes.
+    """A complete binary tree over axis-parallel boxes, the *items*.
 
     Attributes
     ----------
     order : (s,) int64
-        The items as the leaves hold them, filled up with -1.
+        Indices of the items in the order of the leaves, filled up with -1.
     levels : tuple of ((k, d), (k, d))
-        Low and high corners of the boxes, from the root (k = 1) to the items (k = s).
+        Low and high corners of the boxes of each level, from the root (k = 1) to the items (k = s).
     """
 
     order: IntArray
@@ -125,7 +128,7 @@ class BoxTree:
         order = np.concatenate((np.arange(n), np.full((LEAF << depth) - n, -1)))
         centre = 0.5 * (low + high)
         for level in range(depth):
-            # Each block is cut in two at the median of its longest axis.
+            # Each block is split at the median along its longest axis.
             block = order.reshape(1 << level, -1)
             at = centre[block]
             axis = (at.max(axis=1) - at.min(axis=1)).argmax(axis=1)
@@ -143,18 +146,20 @@ class BoxTree:
     def near(
         self, corners: FloatArray, axes: FloatArray, margin: float
     ) -> tuple[IntArray, IntArray]:
-        """Return pairs (p,), (p,) of a query and an item that its box, and it, may touch.
+        """Return indices (p,), (p,) of queries and items: the pairs that may touch.
+
+        Their bounding boxes touch, and the item's box touches the planes that the query lies in.
 
         Parameters
         ----------
         corners : (q, k, d)
             Points whose convex hull is the query.
         axes : (q, c, d)
-            Unit vectors in whose direction a query has no width: a box off the plane through
-            its first corner is not near. This spares large queries that are oblique to the
-            coordinate axes most of the search.
+            Unit normals of the planes that a query lies in, through its first corner. A box off
+            such a plane is not near, which shortens the search for large queries that are oblique
+            to the coordinate axes.
         margin : float
-            What is as far off as this is near.
+            Length up to which what lies apart counts as touching.
         """
         low, high = boxes(corners)
         low, high = low - margin, high + margin
@@ -177,20 +182,21 @@ class BoxTree:
 
 @dataclass(frozen=True, eq=False)
 class Planes:
-    """A surface at some points, with its search tree.
+    """The planes of a surface's simplices at given points of its nodes, with a search tree.
 
     Attributes
     ----------
     corners : (s, d, d) float64
         The corners of the simplices.
     normals : (s, d) float64
-        Unit normals; not a number where a simplex is flat, so that nothing meets it.
+        Unit normals; NaN where a simplex is degenerate, so that all comparisons with it fail.
     inwards : (s, d, d) float64
-        For each corner the unit normal, within the simplex, of the side that begins there.
+        For each corner a unit vector in the plane of the simplex, pointing inward: in 3D normal to
+        the side that begins there, in 2D along the line.
     tree : BoxTree
         The boxes around the simplices.
     margin : float
-        What is as near as this lies on the surface.
+        Length up to which a point off the surface counts as lying on it.
     """
 
     corners: FloatArray
@@ -201,7 +207,7 @@ class Planes:
 
     @classmethod
     def of(cls, points: FloatArray, surface: FacetSimplices, margin: float) -> Planes:
-        """Return the planes of a surface that is not empty, with its nodes at ``points``."""
+        """Return the planes of a surface that is not empty, with the mesh's ``points`` (n, d)."""
         corners = points[surface.nodes]
         sides = np.roll(corners, -1, axis=1) - corners
         upright = normals(corners)
@@ -210,7 +216,7 @@ class Planes:
         return cls(corners, upright, _unit(inwards), tree, margin)
 
     def near(self, corners: FloatArray, axes: FloatArray) -> tuple[IntArray, IntArray]:
-        """Return sorted pairs of a query and a simplex that may touch (see `BoxTree.near`)."""
+        """Return the pairs of `BoxTree.near` with this margin, sorted by query, then simplex."""
         i, j = self.tree.near(corners, axes, self.margin)
         order = np.lexsort((j, i))
         return i[order], j[order]
@@ -220,25 +226,30 @@ class Planes:
         return np.einsum("pkd,pd->pk", x - self.corners[j, :1], self.normals[j])
 
     def depths(self, x: FloatArray, j: IntArray) -> FloatArray:
-        """Return how far (p, d) points (p, d) of the planes ``j`` are inside each side."""
+        """Return distances (p, d) of points (p, d) from the sides of simplices ``j`` (p,).
+
+        They are positive inside. Each point lies in the plane of its simplex.
+        """
         return np.einsum("pkd,pkd->pk", x[:, None] - self.corners[j], self.inwards[j])
 
     def separates(self, x: FloatArray, near: IntArray, ends: FloatArray) -> bool:
-        """Tell whether the surface around a point of it parts ``ends`` from each other.
+        """Return whether, close to its point ``x``, the surface lies between any two of ``ends``.
 
-        Close to ``x`` the surface is a fan of simplices, a cone, and each of them a plane, half
-        a plane or a wedge. Two directions lie on different sides of a fan that is closed around
-        ``x`` where a path between them crosses it an odd number of times. The paths go by way of
-        each of several fixed directions; around an open border they disagree.
+        Close to ``x`` the surface is a cone: each simplex there is a plane, half a plane or a
+        wedge. If the cone is closed around ``x``, two directions lie on different sides of it where
+        a path between them crosses it an odd number of times. The paths go by way of each
+        of several fixed directions. If it is open (``x`` on a border), the paths give different
+        answers, and the result is False.
 
         Parameters
         ----------
         x : (d,)
             A point on the surface.
         near : (p,)
-            The simplices among which are those that hold ``x``.
+            Simplices; all that contain ``x`` must be among them.
         ends : (r, d)
-            Other points, which give directions only. One along the surface is on neither side.
+            Other points, of which only the directions from ``x`` count. Those along the surface are
+            on neither side, and left out.
         """
         here = np.broadcast_to(x, (len(near), len(x)))
         depth = self.depths(here, near)
@@ -264,13 +275,13 @@ class Planes:
 
 
 def boxes(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the lowest and highest coordinates of some corners (s, k, d): (s, d), (s, d)."""
+    """Return the bounding boxes of s sets of corners (s, k, d): low, high, each (s, d)."""
     each = corners.swapaxes(0, 1)  # one corner after the other is four times as fast
     return reduce(np.minimum, each), reduce(np.maximum, each)
 
 
 def normals(corners: FloatArray) -> FloatArray:
-    """Return unit normals (s, d) of simplices (s, d, d); not a number where one is flat."""
+    """Return unit normals (s, d) of simplices (s, d, d); NaN where one is degenerate."""
     side = corners[:, 1:] - corners[:, :1]
     if corners.shape[2] == 2:
         return _unit(np.stack((-side[:, 0, 1], side[:, 0, 0]), axis=1))
@@ -278,18 +289,22 @@ def normals(corners: FloatArray) -> FloatArray:
 
 
 def line_normals(ways: FloatArray) -> FloatArray:
-    """Return unit vectors (w, c, d) normal to lines (w, 2, d): one in 2D, three in 3D."""
+    """Return unit vectors (w, c, d) normal to lines (w, 2, d): c is 1 in 2D, 3 in 3D.
+
+    In 3D they are normal to a coordinate axis each as well; NaN where the line is along it.
+    """
     if ways.shape[2] == 2:
         return normals(ways)[:, None]
     return _unit(np.cross((ways[:, 1] - ways[:, 0])[:, None], np.eye(3)))
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
+    """Return vectors (..., d) at length 1; NaN for those of length 0."""
     with np.errstate(invalid="ignore"):
         return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-# Directions that are special to no mesh, spread over all sides.
+# Random directions (8, d), with no relation to any mesh, that paths in `Planes.separates` go by.
 _VIA: dict[int, NDArray[np.float64]] = {
     d: _unit(np.random.default_rng(7).normal(size=(8, d))) for d in (2, 3)
 }

@@ -1,8 +1,8 @@
 """Size-skew quality of cells, and how many are inverted (thesis section 2.7; Knupp 2003).
 
 ``f_ss = √f_size · f_skew`` (De Boer, Van der Schoot, Bijl 2007), all in 0 to 1, 1 is best.
-``f_size`` compares with the undeformed cell: ``min(τ, 1/τ)``, τ the ratio of the sums of corner
-Jacobians. ``f_skew`` is that of `slideviz.mesh.metrics`.
+``f_size`` compares with the undeformed cell: ``min(τ, 1/τ)``, where τ is the sum of the cell's
+corner Jacobians over that of the undeformed cell. ``f_skew`` is that of `slideviz.mesh.metrics`.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Quality:
         where it is not positive) or ``UNPROVEN`` (a hexahedron that is neither).
     signs : (m,) int8
         1, or -1 for a cell that is numbered the other way round.
-    metric : str
+    metric : {"knupp", "rbf-slide"}
         ``knupp``, or ``rbf-slide``: hexahedra with exponent 1 instead of 2/3 in ``f_skew``, as
         the program of the thesis has it, for comparison with its figures.
     halo : (m,) bool or None
@@ -78,7 +78,7 @@ class Quality:
 
     @property
     def counted(self) -> NDArray[np.bool_] | slice:
-        """Return which cells the numbers of the whole mesh are of: an index of the values."""
+        """Return an index (slice or mask) into ``values`` that leaves out the halo's cells."""
         return slice(None) if self.halo is None else ~self.halo
 
     @cached_property
@@ -112,6 +112,7 @@ class Quality:
         return self._with(VALID)
 
     def _with(self, status: int) -> int:
+        """Return the number of cells with a status, without those of the halo."""
         return int(np.count_nonzero(self.status[self.counted] == status))
 
     def worst(self, n: int) -> IntArray:
@@ -120,7 +121,7 @@ class Quality:
         return ids[np.argsort(self.values[ids], kind="stable")[: max(n, 0)]]
 
     def inverted_cells(self, n: int) -> IntArray:
-        """Return the ids of the first ``n`` inverted cells."""
+        """Return the ids, ascending, of the first ``n`` inverted cells, without the halo's."""
         found = self.status == INVERTED
         return np.flatnonzero(found if self.halo is None else found & ~self.halo)[:n]
 
@@ -162,8 +163,8 @@ def quality(
     mesh : Mesh
         The deformed mesh.
     reference : Mesh, optional
-        The undeformed mesh, with the same cells; without it ``size`` is 1. It also tells which
-        way round each cell is numbered.
+        The undeformed mesh, with the same cells; without it ``size`` is 1 for all cells that are
+        not inverted. The signs of the cells are found from it, too.
     metric : {"knupp", "rbf-slide"}
         See `Quality`.
     going_on : callable
@@ -242,7 +243,10 @@ def _of_cells(
     sums: FloatArray,
     metric: Metric,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.uint8]]:
-    """Return size, skew and status (m,) of cells of one type, ``nodes`` (m, n)."""
+    """Return size, skew and status (m,) of cells of one type, ``nodes`` (m, n).
+
+    ``sums`` (m,) are the sums of the corner Jacobians of the undeformed cells.
+    """
     table, status = CORNERS[vtk], np.empty(len(nodes), np.uint8)
     alpha, spread = np.empty((2, len(table), len(nodes)))
     measure(vtk, points, nodes, table, signs, alpha, spread, status)
@@ -252,7 +256,7 @@ def _of_cells(
     good = status != INVERTED
     with np.errstate(all="ignore"):
         size = np.where(good, _ratio(total(alpha), sums), 0.0)
-        # 1 is the bound of every formula; rounding must not leave the histogram.
+        # 1 is the bound of every formula; a value above it by rounding would be in no bin.
         skew = np.where(good, np.minimum(METRICS[metric][vtk](spread, alpha), 1.0), 0.0)
     return size, skew, status
 

@@ -2,12 +2,12 @@
 
 Where all corners are positive, each metric is a constant divided by ``Σ_k t_k``, with
 ``t_k = s_kᵃ / α_kᵇ`` of the spread s and the Jacobian α of corner k
-(`slideviz.mesh.metrics.EXPONENTS`). So, with ``θ_k = t_k / Σ t``, the logarithm of size-skew
-changes by
+(`slideviz.mesh.metrics.EXPONENTS`). So, with ``θ_k = t_k / Σ t``, the differential of the
+logarithm of size-skew (``f_ss``, `slideviz.mesh.quality`) is
 
     d ln f_ss = Σ_k θ_k (b dα_k / α_k - a ds_k / s_k) ± ½ Σ_k dα_k / Σ_k α_k
 
-+ for a cell that is smaller than the undeformed one, - for one that is larger.
+with + for a cell that is smaller than the undeformed one, - for one that is larger.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.quality import Quality
 
 FOLDED_AT_ONCE = 4096
-"""Inverted cells whose coefficients are worked on together; each has up to 27."""
+"""Inverted cells whose coefficients (up to 27 each) are in memory at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +50,12 @@ class QualityDerivative:
     the minimum, and not below it by more than the factor ``n^(-1/p)``, n the number of cells
     about as bad as the worst (0.96 for ten and p = 50).
 
-    While cells are inverted, the quality is 0 and tells no way out. There it is
-    ``-(Σ |b|^p)^(1/p)`` instead: b are the corner Jacobians that are not positive, as multiples of
-    the undeformed cell's mean one; of a prism or hexahedron that is folded inside, between
-    positive corners, the coefficients of its proof of validity that are not positive. So it is
-    finite, 0 or below as long as a cell is inverted, steeper the further it is folded, and its
-    derivative points to where it unfolds. It is continuous where a corner folds.
+    Inverted cells have quality 0, whose derivative leads nowhere. While a cell is inverted, the
+    smooth minimum is ``-(Σ |b|^p)^(1/p)`` instead: b are the corner Jacobians that are not
+    positive, divided by the mean corner Jacobian of the undeformed cell; for a prism or hexahedron
+    that is folded inside, between positive corners, the Bernstein coefficients that are not
+    positive. So it is finite, 0 or below as long as a cell is inverted, lower the further cells are
+    folded, and its derivative points to where they unfold. It is continuous where a corner folds.
 
     Attributes
     ----------
@@ -64,9 +64,9 @@ class QualityDerivative:
     minimum, mean : float
         The smooth minimum, and the mean as `Quality` has it, where inverted cells count as 0.
     of_minimum, of_mean : (n, d) float64
-        Their derivatives by the points, per unit of length. Inverted cells have none in the mean.
-        A cell that is as large as the undeformed one has ``min(τ, 1/τ)`` at its kink: its
-        derivative is 0 there, the mean of both sides. Else all are exact.
+        Their derivatives by the points, per unit of length. Inverted cells add nothing to that of
+        the mean. Where a cell is as large as the undeformed one, at the kink of ``min(τ, 1/τ)``,
+        its factor of size adds 0, the mean of both sides. Else all are exact.
     """
 
     p: float
@@ -83,7 +83,7 @@ def derivative_of(
     p: float,
     going_on: Callable[[], object] = lambda: None,
 ) -> QualityDerivative:
-    """Return the derivatives of a mesh's quality.
+    """Return the smooth minimum and the mean of a mesh's quality, with their derivatives.
 
     Parameters
     ----------
@@ -92,8 +92,8 @@ def derivative_of(
     found : Quality
         Its quality.
     sums : (m,) or None
-        Sums of the corner Jacobians of the undeformed cells; None if there is no undeformed mesh:
-        there is no factor of size then, and Jacobians are not made multiples of any other.
+        Sums of the corner Jacobians of the undeformed cells. None if there is no undeformed mesh:
+        there is no factor of size then, and Jacobians of inverted cells are not divided by a mean.
     p : float
         The exponent of the smooth minimum.
     going_on : callable
@@ -136,7 +136,7 @@ def derivative_of(
 
 
 def _check(mesh: Mesh, found: Quality, sums: FloatArray | None) -> None:
-    """Raise MeshError where there is nothing to differentiate."""
+    """Raise MeshError if a point is not finite, or an undeformed cell has no positive volume."""
     wrong = ~np.isfinite(mesh.points).all(axis=1)
     if wrong.any():
         node = int(wrong.argmax())
@@ -158,7 +158,10 @@ def _check(mesh: Mesh, found: Quality, sums: FloatArray | None) -> None:
 def _smooth_minimum(
     values: FloatArray, counted: NDArray[np.bool_], p: float
 ) -> tuple[float, FloatArray]:
-    """Return ``(Σ q^-p)^(-1/p)``, and its derivatives by ln q (m,)."""
+    """Return ``(Σ q^-p)^(-1/p)`` of the values q of ``counted`` cells, and its derivatives by ln q.
+
+    The derivatives are (m,), 0 for cells that are not counted.
+    """
     # A product of tiny factors may have become 0.
     q = np.maximum(values[counted], np.finfo(float).tiny)
     least = float(q.min())
@@ -177,7 +180,10 @@ def _add_slopes(
     gradients: FloatArray,
     going_on: Callable[[], object],
 ) -> None:
-    """Add the derivatives of ln f_ss of all cells, times ``weights`` (w, m), to (w, n, d)."""
+    """Add the derivatives of ln f_ss of all cells, times ``weights`` (w, m), to ``gradients``.
+
+    ``gradients`` are (w, n, d): one sum over the cells for each of w sets of weights.
+    """
     lanes = cores()
     batch = PART * max(8, 2 * lanes)
     with ThreadPoolExecutor(lanes) as pool:
@@ -194,7 +200,7 @@ def _add_slopes(
 def _slopes(
     mesh: Mesh, found: Quality, sums: FloatArray | None, vtk: int, ids: IntArray, nodes: IntArray
 ) -> FloatArray:
-    """Return the derivatives (m, n, d) of ln f_ss of some cells of one type by their nodes."""
+    """Return the derivatives (m, n, d) of ln f_ss of cells ``ids`` (m,) by their nodes (m, n)."""
     table, powers = CORNERS[vtk], np.array(EXPONENTS[found.metric][vtk], float)
     turn = found.signs[ids]
     before = np.full(len(ids), np.inf) if sums is None else sums[ids]
@@ -216,7 +222,7 @@ def _unfold(
     p: float,
     gradient: FloatArray,
 ) -> float:
-    """Return the smooth minimum while ``folded`` (m,) cells are, and add its derivative (n, d)."""
+    """Return the smooth minimum for ``folded`` cells (mask (m,)); add its derivative to (n, d)."""
     parts = []
     for vtk, (ids, nodes) in mesh.cells.by_type.items():
         of_type = np.flatnonzero(folded[ids])
@@ -226,14 +232,14 @@ def _unfold(
             if sums is not None:
                 scale *= len(CORNERS[vtk]) / sums[ids[some]]
             parts.append((vtk, nodes[some], scale))
-    # Factors of ``scale`` are signs and positive numbers: what is not positive stays so.
+    # ``scale`` times a cell's Jacobians, as its sign is in it, is positive where the cell is valid.
     depths = [_depths(vtk, _at(mesh, nodes), scale) for vtk, nodes, scale in parts]
     deepest = max(float(depth.max()) for depth in depths)
     if deepest > 0:
         shares = [np.where(depth > 0, depth / deepest, 0.0) for depth in depths]
         norm = sum(float((share**p).sum()) for share in shares) ** (1 / p)
         shares = [np.where(share > 0, (share / norm) ** (p - 1), 0.0) for share in shares]
-    else:  # all flat to the last bit: none goes before the others
+    else:  # all are exactly 0: equal shares
         norm = 1.0
         flat = sum(int((depth == 0).sum()) for depth in depths)
         shares = [(depth == 0) / flat for depth in depths]
@@ -248,7 +254,10 @@ def _at(mesh: Mesh, nodes: IntArray) -> FloatArray:
 
 
 def _coefficients(vtk: int, at: FloatArray) -> FloatArray:
-    """Return (k, m): the corner Jacobians first, then the inner coefficients of the proof."""
+    """Return coefficients (k, m): corner Jacobians, then the other Bernstein coefficients.
+
+    Prisms and hexahedra alone have others than the corner Jacobians.
+    """
     count = at.shape[2]
     jacobians = np.empty((len(CORNERS[vtk]), count))
     corners(at, CORNERS[vtk], count, jacobians)
@@ -261,10 +270,10 @@ def _coefficients(vtk: int, at: FloatArray) -> FloatArray:
 
 
 def _depths(vtk: int, at: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return how far below zero each coefficient of inverted cells is, (k, m); -1 if it is not.
+    """Return minus each scaled coefficient (k, m) of inverted cells, and -1 for positive ones.
 
-    Inner coefficients count only where all corners are positive: they may be negative in a valid
-    cell, and would make a step where the first corner folds.
+    Coefficients that are no corner Jacobians count only where all of these are positive: they may
+    be negative in a valid cell, and there would be a jump where the first corner folds.
     """
     found = -scale * _coefficients(vtk, at)
     found[~(found >= 0)] = -1.0
@@ -276,8 +285,9 @@ def _depths(vtk: int, at: FloatArray, scale: FloatArray) -> FloatArray:
 def _pull(vtk: int, at: FloatArray, weights: FloatArray) -> FloatArray:
     """Return the derivatives (m, n, d) of ``Σ_k weights_k coefficients_k`` by the nodes.
 
-    A determinant has one factor of each coordinate in each of its terms. So its derivative by one
-    coordinate of a node is the determinant with that coordinate 1 there and 0 at the others.
+    ``weights`` are (k, m). A coefficient is linear in all x coordinates together, and so in y and
+    z. So its derivative by one coordinate of a node is the coefficient with that coordinate 1 there
+    and 0 at the cell's other nodes.
     """
     d, n, m = at.shape
     out = np.empty((m, n, d))

@@ -1,9 +1,9 @@
-"""Ranks: processes, also of several machines, that share the work on the parts of large files.
+"""Ranks: MPI processes, also on several machines, that share the work on the parts of large files.
 
-Rank 0 is the program; it alone decides, prints and names files. Where it works part by part, all
-ranks open the files and take the next part whenever they are free. What they find comes back in
-the order of the parts, so that nothing depends on how many there are: one alone runs the same
-code. Between such work the others wait, without taking time of a processor.
+Rank 0 runs the program; it alone decides, prints and names files. Where it works part by part, all
+ranks open the files, and get the next part whenever they are free. Their results come back in
+the order of the parts, so that no result depends on the number of ranks: a single process runs the
+same code. Between such work the other ranks sleep.
 """
 
 from __future__ import annotations
@@ -27,29 +27,33 @@ if TYPE_CHECKING:
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 Make = Callable[..., AbstractContextManager[Callable[[Task], Result]]]
+"""What makes a worker: a context manager with the function that does one task."""
 Do = Callable[[Sequence[Task]], Iterator[Result]]
+"""A function that does tasks, in parallel, and yields their results in order."""
 
 AHEAD = 4
-"""Parts for each rank whose results may wait for one before them."""
+"""Results for each rank, at most, that wait for the result of an earlier part."""
 PIECE = 1 << 30
-"""Bytes of one message: MPI counts them in 32 bits."""
+"""Most bytes of one message: MPI counts them in 32 bits."""
 
 
 class Alone:
-    """One process, which does all parts by itself, as many at a time as it has cores."""
+    """A single process without MPI, which does as many parts at a time as it has cores."""
 
     size = 1
 
     @contextmanager
     def sharing(self, make: Make[Task, Result], *given: Any) -> Iterator[Do[Task, Result]]:
-        """Return what does tasks, and yields their results in order.
+        """Context with a function that does tasks and yields their results in order.
 
         Parameters
         ----------
         make : callable
-            A function of a module, called with ``given`` by each rank: a context with what does
-            one task, from any thread. It opens files itself; ``given``, tasks and results go from
-            rank to rank.
+            A function at the top level of a module. Each rank calls it with ``given``; it returns a
+            context manager with the function that does one task, in any thread, and opens the files
+            it needs by itself.
+        given : object
+            Arguments of ``make``; they, tasks and results are pickled if there are several ranks.
         """
         threads = cores()
         with make(*given) as work, at_most(1), ThreadPoolExecutor(threads) as pool:
@@ -62,7 +66,7 @@ class Alone:
 def _in_order(
     pool: ThreadPoolExecutor, work: Callable[[Task], Result], tasks: Sequence[Task], threads: int
 ) -> Iterator[Result]:
-    """Yield the results of tasks; each thread has the next one before it is asked for."""
+    """Yield the results of tasks in order; up to two tasks for each thread are done ahead."""
     ahead: deque[Future[Result]] = deque()
     for task in tasks:
         ahead.append(pool.submit(work, task))
@@ -73,18 +77,21 @@ def _in_order(
 
 
 ALONE = Alone()
+"""The default where no ranks are given."""
 
 
 @dataclass(eq=False)
 class Ranks(Alone):
-    """Processes that MPI connects; ``with`` it, rank 0 works and lets the others go at the end.
+    """Processes that MPI connects. Rank 0 works in ``with ranks:``; the others call `serve`.
 
     Attributes
     ----------
     comm : Intracomm
-        Of slideviz alone.
+        A communicator that only slideviz uses.
     threads : int
-        Of each rank, while all work: the cores of its machine, divided by the ranks there.
+        Threads of each rank, while all work: the cores of its machine, divided by the ranks there.
+    _owing : set of int
+        Ranks with a task whose result rank 0 has not received.
     """
 
     comm: Intracomm
@@ -93,12 +100,12 @@ class Ranks(Alone):
 
     @classmethod
     def joined(cls, launched: int) -> Ranks:
-        """Return the processes that were launched, this one of them.
+        """Return the ranks of the ``launched`` processes; all of them have to call it.
 
         Raises
         ------
         SlidevizError
-            They are not connected: no mpi4py, or one of another MPI than the launcher.
+            mpi4py or an MPI library is missing, or is of another MPI than the launcher.
         """
         try:
             from mpi4py import MPI
@@ -129,7 +136,7 @@ class Ranks(Alone):
 
     @property
     def rank(self) -> int:
-        """Return the number of this one, from 0."""
+        """Return the number of this process, from 0."""
         return int(self.comm.rank)
 
     def __enter__(self) -> Ranks:
@@ -140,7 +147,10 @@ class Ranks(Alone):
 
     @contextmanager
     def sharing(self, make: Make[Task, Result], *given: Any) -> Iterator[Do[Task, Result]]:
-        """Return what does tasks on all ranks, and yields their results in order; of rank 0."""
+        """Context with a function that does tasks on all ranks and yields their results in order.
+
+        Only rank 0 calls it; `Alone.sharing` has the parameters.
+        """
         content = pickle.dumps((make, given), 5)
         self._send_all(True)
         self._broadcast(content)
@@ -158,7 +168,7 @@ class Ranks(Alone):
             self._send_all(None)
 
     def serve(self) -> None:
-        """Do what rank 0 asks for, until it lets this rank go."""
+        """Do tasks for rank 0 in each of its `sharing` contexts, until its ``with ranks:`` ends."""
         with limited(self.threads) as limit:
             limit()
             while self._received(0.01)[1] is not None:
@@ -167,6 +177,10 @@ class Ranks(Alone):
                     self._serve(stack, make, given)
 
     def _serve(self, stack: ExitStack, make: Make[Any, Any], given: tuple[Any, ...]) -> None:
+        """Do the tasks of one `sharing` context, and send each result or error to rank 0.
+
+        If ``make`` fails, its error is the answer to each task.
+        """
         fault, work = None, None
         try:
             work = stack.enter_context(make(*given))
@@ -185,6 +199,10 @@ class Ranks(Alone):
     def _results(
         self, pool: ThreadPoolExecutor, work: Callable[[Task], Result], tasks: Sequence[Task]
     ) -> Iterator[Result]:
+        """Yield the results of tasks in order; rank 0 does tasks too, in the thread of ``pool``.
+
+        Raises the error of a task in its place.
+        """
         idle = list(range(1, self.size))
         own: Future[None] | None = None
         found: dict[int, tuple[Any, BaseException | None]] = {}
@@ -219,9 +237,9 @@ class Ranks(Alone):
                 yield result
 
     def _received(self, pause: float, other: Future[None] | None = None) -> tuple[int, Any]:
-        """Return who sent a message and what, or nothing when ``other`` is done before.
+        """Wait for a message and return its sender and content, or (0, None) if ``other`` is done.
 
-        MPI itself would wait in a loop that takes a core.
+        Between looks it sleeps, at most ``pause`` seconds: MPI's own wait would keep a core busy.
         """
         from mpi4py import MPI
 
@@ -235,11 +253,12 @@ class Ranks(Alone):
         return status.source, self.comm.recv(source=status.source)
 
     def _send_all(self, what: object) -> None:
+        """Send a message from rank 0 to all others."""
         for rank in range(1, self.size):
             self.comm.send(what, rank)
 
     def _broadcast(self, content: bytes) -> bytearray:
-        """Return what rank 0 gives, on all ranks."""
+        """Return on all ranks the ``content`` of rank 0; the others call it with empty content."""
         size = self.comm.bcast(len(content))
         whole = bytearray(content) if content else bytearray(size)
         for at in range(0, size, PIECE):
@@ -247,7 +266,7 @@ class Ranks(Alone):
         return whole
 
     def _portable(self, problem: Exception) -> Exception:
-        """Return an error that rank 0 can raise."""
+        """Return an error that can be pickled; for a missing file, one that names the rank."""
         if isinstance(problem, FileNotFoundError):
             return MeshError(
                 f"{problem.filename}: not there for rank {self.rank} on {os.uname().nodename}; "
@@ -261,10 +280,10 @@ class Ranks(Alone):
 
 
 def _threads_of(near: Comm) -> int:
-    """Return the threads for each of the ranks ``near``, those of one machine.
+    """Return the number of threads for each of the ranks ``near``, which are on one machine.
 
-    All may use all its cores then: a launcher binds each to some, but rank 0 needs them where it
-    works alone.
+    It also lets each process run on all cores that any of them has: a launcher binds each to a
+    few, but rank 0 needs all where it works alone.
     """
     if not hasattr(os, "sched_setaffinity"):  # no Linux
         return max(1, (os.cpu_count() or 1) // near.size)
@@ -275,7 +294,10 @@ def _threads_of(near: Comm) -> int:
 
 @contextmanager
 def limited(threads: int) -> Iterator[Callable[[], None]]:
-    """Return what limits the thread that calls it, in a context where all keep to fewer threads."""
+    """Context that limits BLAS and `cores` to ``threads``, with a function that limits Numba.
+
+    Numba's limit holds for the thread that calls that function.
+    """
     from numba import config, set_num_threads
     from threadpoolctl import threadpool_limits
 

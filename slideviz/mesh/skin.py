@@ -1,8 +1,9 @@
-"""The skin of a mesh: its boundary and the cells at it, read from a file without the rest.
+"""The skin of a mesh: its boundary and the cells at it, read without keeping the rest in memory.
 
-Roles, periodic pairs, classification, the choice of control nodes and their weights are found by
-the boundary alone. So the skin is an ordinary mesh, with fewer nodes and cells, whose order is
-that of the whole. It has the outermost nodes too, by which the extent is the same.
+Roles, periodic pairs, classification, the choice of control nodes and their weights depend on
+the boundary alone. So they are found by the skin: an ordinary mesh with fewer nodes and cells, in
+the order of the whole one. It also has the nodes of lowest and highest coordinates, so that its
+extent is that of the whole.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ Index = slice | IntArray
 def read_skin(
     path: Path, zone: int | None, progress: Tick = lambda _: None, ranks: Alone = ALONE
 ) -> Mesh:
-    """Return the skin of a zone of an SU2 binary mesh; the whole of it is read and checked.
+    """Return the skin of a zone of an SU2 binary mesh; the whole zone is read and checked.
+
+    ``zone`` is counted from 1; None: the first.
 
     Raises
     ------
@@ -88,7 +91,10 @@ def read_skin(
 
 
 def _told(tick: Tick, begin: float, end: float, count: int) -> Callable[[Any], Any]:
-    """Return what passes on each of ``count`` things, and tells that it came."""
+    """Return a function that returns its argument, and with each of ``count`` calls ticks.
+
+    The fraction told to ``tick`` rises from ``begin`` to ``end``.
+    """
     done = 0
 
     def passed(thing: Any) -> Any:
@@ -102,9 +108,16 @@ def _told(tick: Tick, begin: float, end: float, count: int) -> Callable[[Any], A
 
 @dataclass(frozen=True, eq=False)
 class _Near:
-    """The cells of a block, from the ``first`` on, that may have a side on the boundary.
+    """Cells of a block of the file that may have a side on the boundary.
 
-    ``types`` (k,), ``nodes`` and ``ids`` (k,) are theirs; ``every`` has the numbers of all cells.
+    Attributes
+    ----------
+    first : int
+        Place in the file of the block's first cell.
+    types, nodes, ids : (k,), flat, (k,)
+        Of the cells that may have a side on the boundary: VTK identifiers, nodes, numbers.
+    every : slice or (b,)
+        The numbers of all cells of the block.
     """
 
     first: int
@@ -118,7 +131,11 @@ class _Near:
 def _cells_near(
     path: Path, zone: int | None, boundary: IntArray
 ) -> Iterator[Callable[[int], _Near]]:
-    """Return what reads the cells at a boundary (nodes, (k,)), a block at a time."""
+    """Context with a function that reads one block of cells and returns those near the boundary.
+
+    ``boundary`` (k,) are the boundary's nodes; the function's argument is the place of the block's
+    first cell.
+    """
     with path.open("rb") as file:
         source = BinaryFile(path, file)
         place = find_zone(source, zone)
@@ -140,7 +157,7 @@ def _cells_near(
 
 
 def index_of(ids: IntArray) -> Index:
-    """Return ids (k,) as a slice where they are consecutive, which reads faster; else as given."""
+    """Return ids (k,) as a slice if they are consecutive, which indexes faster; else as given."""
     first = int(ids[0])
     if np.array_equal(ids, np.arange(first, first + len(ids))):
         return slice(first, first + len(ids))
@@ -150,7 +167,10 @@ def index_of(ids: IntArray) -> Index:
 def _cells_at(
     source: BinaryFile, place: ZonePlace, found: Iterator[_Near]
 ) -> tuple[Cells, IntArray]:
-    """Return the cells that may have a side on the boundary, and their numbers."""
+    """Return the cells that may have a side on the boundary, ordered by their numbers, and these.
+
+    Raises MeshError if two blocks have a cell of the same number.
+    """
     kept: list[_Near] = []
     seen = np.zeros(place.cells.count, bool)
     for near in found:
@@ -172,7 +192,10 @@ def _cells_at(
 
 
 def _check_block(source: BinaryFile, place: ZonePlace, block: ElementBlock, cells: Cells) -> None:
-    """Raise where a cell of a block has a node twice, or its index is no number or another's."""
+    """Raise MeshError if a cell of a block has wrong nodes, or an index out of range or used twice.
+
+    ``cells`` are those of ``block``.
+    """
     if not np.array_equal(block.ids, np.arange(block.first, block.first + len(block.ids))):
         wrong = block.ids.view(np.uint64) >= place.cells.count
         _, first, count = np.unique(block.ids, return_index=True, return_counts=True)
@@ -185,6 +208,7 @@ def _check_block(source: BinaryFile, place: ZonePlace, block: ElementBlock, cell
 
 
 def _twice(source: BinaryFile, place: ZonePlace, element: int, index: int) -> MeshError:
+    """Return the error for an element whose index is out of range or used twice."""
     return _cell_error(
         source,
         place,
@@ -195,19 +219,24 @@ def _twice(source: BinaryFile, place: ZonePlace, element: int, index: int) -> Me
 
 
 def _cell_error(source: BinaryFile, place: ZonePlace, element: int, message: str) -> MeshError:
+    """Return the error for an element, with the byte in the file where it begins."""
     at = source.count(place.cells.offsets + element * source.width, "an offset")
     return source.error(place.cells.entries + at * source.width, f"element {element}: {message}")
 
 
 Outer = dict[tuple[int, str], tuple[int, FloatArray]]
-"""The outermost points: number and place, by axis and side."""
+"""Number and coordinates (d,) of outermost points, by axis (0 to 2) and side ("low", "high")."""
 
 
 @contextmanager
 def _points_near(
     path: Path, zone: int | None
 ) -> Iterator[Callable[[tuple[int, IntArray]], tuple[FloatArray, Outer]]]:
-    """Return what reads a block of points: those of some nodes (k,) in it, and the outermost."""
+    """Context with a function that reads one block of points.
+
+    Its argument is the number of the block's first point, and ascending nodes (k,) in the block. It
+    returns their points (k, d) and the outermost points of the block.
+    """
     with path.open("rb") as file:
         source = BinaryFile(path, file)
         place = find_zone(source, zone)
@@ -231,7 +260,10 @@ def _points_of(
     numbers: IntArray,
     found: Iterator[tuple[FloatArray, Outer]],
 ) -> tuple[IntArray, FloatArray]:
-    """Return the numbers of nodes with the outermost ones among them, and their points (k, d)."""
+    """Return ``numbers`` with those of the outermost points of all, sorted, and the points (k, d).
+
+    ``found`` are the results of `_points_near` for the blocks in order.
+    """
     blocks: list[FloatArray] = [np.empty((0, place.dim))]
     outer: Outer = {}
     for block, ends in found:
@@ -258,5 +290,5 @@ def _points_of(
 
 
 def _renumbered(cells: Cells, numbers: IntArray) -> Cells:
-    """Return cells with the places of their nodes in ``numbers`` (k,)."""
+    """Return cells whose nodes are replaced by their indices in ``numbers`` (k,), ascending."""
     return Cells.from_types(cells.types, np.searchsorted(numbers, cells.connectivity))

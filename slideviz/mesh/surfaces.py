@@ -1,4 +1,4 @@
-"""The parts of a mesh that can be drawn, as arrays: boundaries (2D: lines; 3D: faces)."""
+"""Surfaces: the boundaries of a mesh as arrays to be drawn (2D: lines; 3D: faces)."""
 
 from __future__ import annotations
 
@@ -37,24 +37,24 @@ class Surface:
 
     @property
     def flat(self) -> bool:
-        """Tell whether it is a line, of a 2D mesh."""
+        """Return whether it is the boundary of a 2D mesh, made of lines."""
         return self.facets.shape[1] == 2
 
 
 def padded(points: FloatArray) -> FloatArray:
-    """Return points (n, d) as (n, 3), z = 0 where there is none."""
+    """Return points (n, d) as (n, 3), with z = 0 if d = 2."""
     if points.shape[1] == 3:
         return points
     return np.column_stack([points, np.zeros(len(points))])
 
 
 def lifted(points: FloatArray, by: float) -> FloatArray:
-    """Return points (n, d) as (n, 3), moved along z by so much."""
+    """Return points (n, d) as (n, 3), moved along z by the length ``by``."""
     return padded(points) + np.array([0.0, 0.0, by])
 
 
 def facet_connectivity(facets: IntArray) -> IntArray:
-    """Return facets as VTK's flat list: count, nodes, count, nodes and so on."""
+    """Return facets (f, 2 or 4) as VTK's flat array: for each its number of nodes, then these."""
     if facets.shape[1] == 2:
         return np.column_stack([np.full(len(facets), 2), facets]).ravel()
     triangle = facets[:, 2] == facets[:, 3]
@@ -65,7 +65,7 @@ def facet_connectivity(facets: IntArray) -> IntArray:
 
 
 def find_surfaces(mesh: Mesh) -> tuple[Surface, ...]:
-    """Return every boundary of the mesh.
+    """Return a surface for each marker of the mesh, in their order.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def find_surfaces(mesh: Mesh) -> tuple[Surface, ...]:
 
 
 def _rim(facets: IntArray) -> IntArray:
-    """Return the edges that occur once among faces (f, 4)."""
+    """Return the edges (r, 2), nodes sorted, that only one of the faces (f, 4) has; none in 2D."""
     if facets.shape[1] == 2:
         return np.empty((0, 2), np.int64)
     edges = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)

@@ -1,4 +1,4 @@
-"""The skin of an SU2 text mesh, read from its binary form."""
+"""The skin of an SU2 text mesh, read from an SU2 binary mesh made of it before."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ from slideviz.mesh.threads import Tick
 
 
 def skin_of_text(text: Text, path: Path, tick: Tick, ranks: Alone = ALONE) -> Mesh:
-    """Return the skin of a text mesh, whose binary form is at ``path``."""
+    """Return the skin of a zone of a text mesh, whose conversion to a binary mesh is at ``path``.
+
+    Names, zone and source are those of the text. Raises MeshError as `read_skin`, naming the text.
+    """
     zone = text.zone
     with told_of(text, path):
         skin = read_skin(path, None, tick, ranks)
@@ -37,7 +40,7 @@ def skin_of_text(text: Text, path: Path, tick: Tick, ranks: Alone = ALONE) -> Me
 
 @contextmanager
 def told_of(text: Text, path: Path) -> Iterator[None]:
-    """Return a context whose errors name a text, and not its binary form at ``path``."""
+    """Context in which a `MeshError` on the binary file ``path`` names the text it was made of."""
     try:
         yield
     except MeshError as problem:

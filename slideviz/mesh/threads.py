@@ -1,7 +1,8 @@
 """Work on long arrays in parts, on all cores.
 
-A part is small enough for its temporary arrays to stay in the cache, and NumPy and compiled loops
-leave the interpreter to others meanwhile. What a part gives must not depend on where it begins.
+A part is small enough for its temporary arrays to stay in the cache. NumPy and compiled loops
+release the interpreter's lock, so that threads run in parallel. The result for a row must not
+depend on where its part begins.
 """
 
 from __future__ import annotations
@@ -13,15 +14,16 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 
 Tick = Callable[[float], object]
-"""Is told the fraction that is done; may raise to stop."""
+"""A callback for progress, called with the fraction done; what it raises ends the work."""
 
 PART = 16384
 """Rows of a part."""
 _most = [sys.maxsize]
+"""Limits of `at_most` contexts that are open, the innermost last."""
 
 
 def cores() -> int:
-    """Return the number of threads to work with: as many as Numba uses, unless fewer are left."""
+    """Return the number of threads to work with: Numba's, or the limit of `at_most` if lower."""
     from numba import get_num_threads
 
     return min(int(get_num_threads()), _most[-1])
@@ -29,7 +31,7 @@ def cores() -> int:
 
 @contextmanager
 def at_most(threads: int) -> Iterator[None]:
-    """Return a context in which `cores` is not above that, for other processes need theirs."""
+    """Context in which `cores` is at most ``threads``, as other processes use the other cores."""
     _most.append(threads)
     try:
         yield
@@ -74,6 +76,6 @@ def in_parts(
 
 
 def give_back() -> None:
-    """Give freed memory back to the system, which the C library of Linux keeps for later."""
+    """Return freed memory to the system; the C library of Linux would keep it for later use."""
     with suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)

@@ -20,7 +20,9 @@ from slideviz.mesh.threads import in_parts
 from slideviz.mesh.unique_rows import row_groups, sorted_in_rows
 
 DEFAULT_FEATURE_ANGLE_DEG = 40.0
+"""Angle in degrees between smoothly joined facets; also the default in `Case.feature_angle_deg`."""
 TINY = float(np.finfo(float).tiny)
+"""Smallest normal float: a divisor in place of 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,7 @@ class Boundary:
 
 
 def find_boundary(mesh: Mesh) -> Boundary:
-    """Return the oriented boundary of a mesh, without that of its halo.
+    """Return the oriented boundary of a mesh, without the facets that belong to its halo.
 
     Raises
     ------
@@ -91,9 +93,9 @@ def find_boundary(mesh: Mesh) -> Boundary:
 
 
 def _by_position(points: FloatArray, joint_nodes: IntArray) -> IntArray:
-    """Return the nodes of joints (j, dim - 1) ordered by their last coordinate, then the others.
+    """Return nodes (j, dim - 1) of joints, each row ordered by last coordinate, then the others.
 
-    Their numbers, by which they are ordered, decide only between nodes in one place.
+    Given are rows ordered by node number; that order stays for nodes at the same place.
     """
     if joint_nodes.shape[1] == 1:
         return joint_nodes
@@ -105,16 +107,21 @@ def _by_position(points: FloatArray, joint_nodes: IntArray) -> IntArray:
 
 
 def _padded(nodes: IntArray, width: int) -> IntArray:
-    """Return the table with its last column repeated up to ``width`` columns."""
+    """Return the table (m, k) with its last column repeated up to ``width`` columns."""
     missing = width - nodes.shape[1]
     return np.hstack([nodes, np.repeat(nodes[:, -1:], missing, axis=1)]) if missing else nodes
 
 
 def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
-    """Return the cell each facet is a side of, (f,).
+    """Return the index (f,) of the cell that each facet (f, k) is a side of.
 
-    Only cells whose side lies wholly on boundary nodes are looked at, so that the cost follows
-    the boundary, not the volume.
+    ``marker_of`` (f,) is for the message. Only sides whose nodes are all on the boundary are
+    compared, so that the cost grows with the boundary, not with the volume.
+
+    Raises
+    ------
+    MeshError
+        A facet is no side of any cell.
     """
     on_boundary = np.zeros(len(mesh.points), bool)
     on_boundary[facets.ravel()] = True
@@ -147,7 +154,7 @@ def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
 
 
 def _touch(nodes: IntArray, chosen: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
-    """Tell which cells, nodes (m, n), have so many chosen nodes at least, (m,)."""
+    """Return a mask (m,) of cells (m, n) with at least ``least`` nodes in the mask ``chosen``."""
     found = np.empty(len(nodes), bool)
     in_parts(lambda part: _mark(nodes[part], chosen, least, found[part]), len(nodes))
     return found
@@ -155,6 +162,7 @@ def _touch(nodes: IntArray, chosen: NDArray[np.bool_], least: int) -> NDArray[np
 
 @njit(nogil=True, cache=True)
 def _mark(nodes, chosen, least, found):  # type: ignore[no-untyped-def]
+    """Write the mask that `_touch` returns into ``found`` (m,)."""
     for row in range(len(nodes)):
         count = 0
         for node in nodes[row]:
@@ -163,7 +171,7 @@ def _mark(nodes, chosen, least, found):  # type: ignore[no-untyped-def]
 
 
 def _canonical_triangles(table: IntArray) -> IntArray:
-    """Return sorted rows (a, b, c, d) with a repeated node moved to the end."""
+    """Return sorted rows (f, 4) of nodes, with a node that is there twice moved to the end."""
     out = table.copy()
     for column in (0, 1):
         twice = out[:, column] == out[:, column + 1]
@@ -173,7 +181,10 @@ def _canonical_triangles(table: IntArray) -> IntArray:
 
 
 def _turn_outward(mesh: Mesh, facets: IntArray, owner: IntArray) -> IntArray:
-    """Return the facets with the node order that makes their normals point out of the owner."""
+    """Return facets (f, k), nodes reversed where needed, whose normals point out of their owner.
+
+    ``owner`` (f,) is the cell of each.
+    """
     inward, cells = np.empty(len(facets), bool), mesh.cells
     _face_inward(mesh.points, facets, owner, cells.offsets, cells.connectivity, inward)
     turned = facets.copy()
@@ -188,7 +199,10 @@ def _turn_outward(mesh: Mesh, facets: IntArray, owner: IntArray) -> IntArray:
 
 @njit(nogil=True, cache=True)
 def _face_inward(points, facets, owner, offsets, connectivity, inward):  # type: ignore[no-untyped-def]
-    """Tell for each facet (f, k) whether its normal, of this node order, points into its cell."""
+    """Write into ``inward`` (f,) whether the normal of a facet, as ordered, points into its cell.
+
+    ``owner`` (f,) is the cell; ``offsets`` and ``connectivity`` are those of `Cells`.
+    """
     dim, width = points.shape[1], facets.shape[1]
     out, along, across = np.zeros(3), np.zeros(3), np.zeros(3)
     for f in range(len(facets)):
@@ -213,7 +227,7 @@ def _face_inward(points, facets, owner, offsets, connectivity, inward):  # type:
 
 
 def facet_vectors(coords: FloatArray, facets: IntArray) -> FloatArray:
-    """Return a normal of each facet, (f, d), as long as the facet is large (2D) or twice that.
+    """Return a normal (f, d) of each facet: its length is the line's (2D) or twice the area (3D).
 
     In 3D it is the cross product of the diagonals, which for a triangle with its last node
     repeated is the cross product of two sides.
@@ -222,7 +236,7 @@ def facet_vectors(coords: FloatArray, facets: IntArray) -> FloatArray:
 
 
 def corner_vectors(x: FloatArray) -> FloatArray:
-    """Return what ``facet_vectors`` does, from the corners of the facets (f, k, d)."""
+    """Return what `facet_vectors` does, given the corners ``x`` (f, k, d) of the facets."""
     if x.shape[1] == 2:
         t = x[:, 1] - x[:, 0]
         return np.stack([t[:, 1], -t[:, 0]], axis=1)
@@ -241,10 +255,10 @@ def unit(vectors: FloatArray) -> FloatArray:
 
 
 def find_joints(facets: IntArray, dim: int) -> tuple[IntArray, IntArray]:
-    """Return pairs of facets that share a node (2D) or an edge (3D), and what they share.
+    """Return pairs (j, 2) of facets that share a node (2D) or an edge (3D), and its nodes.
 
-    Joints of more than two facets (a thin plate, a non-manifold edge) are left out: nothing is
-    smooth there.
+    The nodes are (j, dim - 1), by number. Nodes and edges of more than two facets (a thin plate, a
+    non-manifold edge) are left out: there facets never join smoothly.
     """
     count, width = facets.shape
     facet, above = np.repeat(np.arange(count), width), int(facets.max(initial=0)) + 1

@@ -1,7 +1,7 @@
-"""Unique rows of tables of nodes, found faster than by ``numpy.unique`` with an axis.
+"""Equal rows of tables of nodes, found faster than by ``numpy.unique`` with an axis.
 
-``numpy.unique`` with an axis compares rows as records and lets no other thread run meanwhile: a
-window stood still for 50 ms with the sides of 20,000 cells. Numbers are sorted faster, too.
+``numpy.unique`` with an axis compares rows as records, which is slower than sorting numbers, and
+lets no other thread run meanwhile: the window froze for 50 ms with the sides of 20,000 cells.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from slideviz.mesh.model import IntArray
 
 
 def sorted_in_rows(table: IntArray) -> IntArray:
-    """Return each row of a table (r, k) sorted: of few columns ten times as fast as by a sort."""
+    """Return a table (r, k) with sorted rows; ten times as fast as `numpy.sort` for few columns."""
     columns = list(table.T)
     for last in range(len(columns) - 1, 0, -1):
         for k in range(last):
@@ -32,8 +32,8 @@ def row_groups(table: IntArray) -> IntArray:
     Returns
     -------
     (r,) int64
-        From 0 in the order of the rows if they were sorted, as the inverse of
-        ``numpy.unique(table, axis=0)``.
+        0 for the lowest row in lexicographic order, 1 for the next other one, and so on: the
+        inverse of ``numpy.unique(table, axis=0)``.
     """
     table = np.asarray(table, np.int64)
     if not table.size:

@@ -11,7 +11,9 @@ hexa     27 Bézier coefficients bound the determinant; where they do not decide
          cell is cut in eight, up to ``LEVELS`` times, and else it stays *unproven*
 ======== =============================================================================
 
-"Exact" and "proof" are meant up to the rounding of double precision.
+"Exact" and "proof" are meant up to the rounding of double precision. The first three rows, and
+cells whose coefficients are all positive, are decided by `slideviz.mesh.jacobians.measure`;
+`decide_unproven` decides the others.
 """
 
 from __future__ import annotations
@@ -36,8 +38,9 @@ LEVELS = 6
 """How often a hexahedron is cut before it is called unproven."""
 
 Status = NDArray[np.uint8]
+"""Codes (m,) ``VALID``, ``INVERTED`` or ``UNPROVEN``."""
 
-# Coefficients of a quadratic on the first and on the second half of its interval.
+# Matrices that turn the coefficients of a quadratic into those on each half of its interval.
 _HALVES = np.array(
     [
         [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.25, 0.5, 0.25]],
@@ -47,7 +50,7 @@ _HALVES = np.array(
 
 
 def decide_unproven(vtk: int, at: FloatArray, signs: NDArray[np.int8]) -> Status:
-    """Return the status (m,) of cells whose corners are positive, but not all coefficients.
+    """Return the status (m,) of cells with positive corner Jacobians, but not all coefficients.
 
     Parameters
     ----------
@@ -61,16 +64,17 @@ def decide_unproven(vtk: int, at: FloatArray, signs: NDArray[np.int8]) -> Status
     if vtk == 12:
         return subdivide(hexahedron_coefficients(at) * signs)
     low, middle, top = prism_coefficients(at) * signs
-    # The quadratic with these coefficients touches zero where middle = -√(low · top).
+    # A quadratic with these coefficients has minimum zero if middle = -√(low · top).
     least = middle + np.sqrt(low * top)
     return np.where((least > 0).all(axis=0), VALID, INVERTED).astype(np.uint8)
 
 
 def subdivide(coefficients: FloatArray, levels: int = LEVELS) -> Status:
-    """Return the status (m,) of triquadratic polynomials, Bézier ``coefficients`` (3, 3, 3, m).
+    """Return the status (m,) of triquadratic polynomials with Bézier coefficients (3, 3, 3, m).
 
-    Each is cut into eight parts, ``levels`` times; a part with only positive coefficients is
-    positive, and a part's corner coefficients are values of the polynomial.
+    ``VALID`` means positive in the whole unit cube. It is cut into eight parts, ``levels`` times; a
+    part with only positive coefficients is positive, and its corner coefficients are values of the
+    polynomial, of which one that is not positive decides for ``INVERTED``.
     """
     inverted = np.zeros(coefficients.shape[-1], bool)
     owner = np.arange(coefficients.shape[-1])

@@ -18,7 +18,7 @@ from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.io.cleanup import draft
 from slideviz.mesh.io.file_checks import require_no_input
 
-_REMEDIES = {
+_REMEDIES = {  # reason and remedy by errno
     errno.ENOENT: "the folder does not exist; create it first",
     errno.ENOTDIR: "a part of the path is a file, not a folder; choose another folder",
     errno.EACCES: "no permission to write there; choose another folder or change its permissions",
@@ -36,7 +36,7 @@ _REMEDIES = {
 def atomic_write(
     path: str | Path, error: type[SlidevizError] = MeshError, replaces: Path | None = None
 ) -> Iterator[BinaryIO]:
-    """Return a binary file to write; it takes the place of ``path`` when the block ends well.
+    """Context with a binary file to write, which replaces ``path`` at the end.
 
     When the block raises, whatever was at ``path`` stays as it was and the temporary file is
     removed. A symbolic link stays a link, and an existing file keeps its permissions.
@@ -82,12 +82,14 @@ def atomic_write(
 def require_writable(
     path: str | Path, error: type[SlidevizError] = MeshError, replaces: Path | None = None
 ) -> None:
-    """Check that a file could be written now, before the work that leads to it; nothing is left.
+    """Raise if a file cannot be written now; called before the work whose result it is to hold.
+
+    A temporary file is made beside it and removed. Parameters are those of `atomic_write`.
 
     Raises
     ------
     SlidevizError
-        It cannot be written, as for `atomic_write`.
+        The file cannot be written, as for `atomic_write`.
     """
     require_no_input(Path(path), error, replaces)
     real = Path(os.path.realpath(path))
@@ -100,7 +102,13 @@ def require_writable(
 
 
 def mode_of(path: Path) -> int | None:
-    """Return the permission bits of an existing file that may be replaced, or None."""
+    """Return the permission bits of an existing file, or None if there is none.
+
+    Raises
+    ------
+    OSError
+        It may not be replaced: it is a folder, a device, a pipe or write-protected.
+    """
     if not path.exists():
         return None
     if path.is_dir():
@@ -114,10 +122,11 @@ def mode_of(path: Path) -> int | None:
 
 
 def _is_ours(name: object, target: Path, temporary: Path | None) -> bool:
+    """Return whether the file name of an error is that of the target or its temporary file."""
     return str(name) in {str(target), str(temporary), os.path.realpath(target)}
 
 
 def reason_of(problem: OSError) -> str:
-    """Return why something cannot be written, and the remedy."""
+    """Return in words why a file cannot be written, with the remedy for the usual reasons."""
     text = problem.strerror or str(problem)
     return _REMEDIES.get(problem.errno or 0, text)

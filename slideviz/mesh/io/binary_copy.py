@@ -1,7 +1,8 @@
-"""An SU2 text mesh as SU2's binary, made piece by piece: what reads parts of a mesh reads that.
+"""The binary form of an SU2 text mesh: an SU2 binary mesh, written piece by piece.
 
-Where a number stands in a text is known only after all before it, in the binary at once. Nothing
-but the boundary is ever in memory, and every mistake of the text is found, as by its reader.
+The place of a number in a text is known only after reading all before it; in a binary it is
+computed. So parts of a text mesh are read from its binary form. Only the boundary is ever in memory
+as a whole, and every mistake of the text is found, as by its reader.
 """
 
 from __future__ import annotations
@@ -36,28 +37,32 @@ from slideviz.mesh.ranks import ALONE, Alone
 HEAD = 8
 """Bytes before the first zone."""
 PIECES = 16
-"""Pieces of a text, each about a megabyte, that are one part of the work."""
+"""Pieces of a text, each about a megabyte, in one task."""
 _Task = tuple[str, int, int]
-"""``cells`` or ``points``, the first of their pieces, and the one after the last."""
+"""``cells`` or ``points``, index of the first piece, and of the one after the last."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Where a text mesh stands in its binary form.
+    """The layout of the binary form of a text mesh: at which byte each part begins.
+
+    `slideviz.mesh.io.su2b.layout` describes the format.
 
     Attributes
     ----------
     text : Text
+        The text mesh.
     width : int
         Bytes of a count or an index, 4 or 8.
     named : bool
-        Whether the markers have their names, and not numbers, which always fit.
+        Whether the file gets the names of the markers; else numbers, which always fit.
     before : (p + 1, t) int64
-        How many elements of each type stand before each piece, and in all.
+        Number of elements of each type before each of the p pieces, and in the last row of all.
+        Types are in the order of ``SORTED``.
     begin : int
-        The first byte of its zone.
+        First byte of its zone.
     number : int
-        The number of its zone.
+        Number of its zone.
     """
 
     text: Text
@@ -69,12 +74,12 @@ class Plan:
 
     @property
     def conn(self) -> np.dtype:
-        """Return the type of counts and indices."""
+        """Return the data type of counts and indices."""
         return np.dtype(f"<u{self.width}")
 
     @property
     def point(self) -> np.dtype:
-        """Return the type of a point."""
+        """Return the data type of a point: its coordinates and its index."""
         return np.dtype([("x", "<f8", (self.text.zone.dim,)), ("i", self.conn)])
 
     @property
@@ -84,12 +89,12 @@ class Plan:
 
     @property
     def entries(self) -> int:
-        """Return the first byte of the list of the elements."""
+        """Return the first byte of the list of the elements (type, nodes, index of each)."""
         return self.offsets + self.width * (self.text.n_cells + 1)
 
     @property
     def length(self) -> int:
-        """Return the numbers in the list of the elements."""
+        """Return how many numbers the list of the elements has."""
         return int(self.before[-1] @ _WIDTHS)
 
     @property
@@ -115,25 +120,27 @@ class Plan:
         return self.markers + 4 + sum(sizes)
 
     def names(self) -> list[bytes]:
-        """Return the names of the markers as they stand in the file."""
+        """Return the names of the markers as bytes of the file, filled up to ``NAME_BYTES``."""
         markers = self.text.zone.markers
         return [padded((m.name if self.named else str(k)).encode()) for k, m in enumerate(markers)]
 
 
 _WIDTHS = SIZES[list(SORTED)] + 2
-"""Numbers of an element in the list, by type in SU2's order."""
+"""How many numbers an element has in the list, by type in the order of ``SORTED``."""
 
 
 def planned(text: Text, *, is_result: bool, begin: int = HEAD, number: int = 1) -> Plan:
-    """Return where a text mesh stands in its binary form.
+    """Return the layout of the binary form of a text mesh.
 
     Parameters
     ----------
+    text : Text
+        The text mesh.
     is_result : bool
-        Whether the binary is to be a mesh of its own, as `slideviz.convert` makes it; if not, it
-        is as short as can be.
+        Whether the binary is made for users, as by `slideviz.convert`: with the markers' names and
+        8 bytes for each index. If not, markers have numbers, and indices 4 bytes where they fit.
     begin, number : int
-        The first byte and the number of its zone.
+        First byte and number of its zone.
     """
     pieces = text.zone.elements
     before = np.zeros((len(pieces) + 1, len(SORTED)), np.int64)
@@ -144,12 +151,12 @@ def planned(text: Text, *, is_result: bool, begin: int = HEAD, number: int = 1) 
 
 
 def _counted(text: Text) -> IntArray:
-    """Return the number of elements of each type in each piece, (p, t)."""
+    """Return the number (p, t) of elements of each type (as ``SORTED``) in each piece."""
     from slideviz.mesh.io.su2.loops import count_types
 
     pieces, rows = text.zone.elements, text.n_cells
     out = np.zeros((len(pieces), len(SORTED)), np.int64)
-    # The smallest and the largest element of a dimension: if all are that, nothing need be read.
+    # The types with fewest and most nodes: if all elements are one of these, the total tells it.
     for vtk in (5, 9) if text.zone.dim == 2 else (10, 12):
         if sum(piece.nodes for piece in pieces) == rows * SIZES[vtk]:
             out[:, SORTED.index(vtk)] = [piece.rows for piece in pieces]
@@ -165,9 +172,9 @@ def _counted(text: Text) -> IntArray:
 
 
 def fill(plan: Plan, path: Path, progress: Progress, ranks: Alone = ALONE) -> bytes:
-    """Write the binary form of a text into a file of its size; return its head, which is left out.
+    """Write the binary form of a text into an existing file of its size, but for the file's head.
 
-    The head is that of a file of this zone alone.
+    Returns the head (``HEAD`` bytes) for a file with only this zone; the caller writes it.
 
     Raises
     ------
@@ -207,12 +214,16 @@ def fill(plan: Plan, path: Path, progress: Progress, ranks: Alone = ALONE) -> by
 
 
 def _silent(_: float) -> None:
-    pass
+    """Ignore the progress."""
 
 
 @contextmanager
 def _filling(plan: Plan, path: Path, synced: bool) -> Iterator[Callable[[_Task], IntArray]]:
-    """Return what writes the pieces of a task."""
+    """Context with a function that writes the pieces of a task and returns their results.
+
+    These are the results of `_put_cells` or `_put_points`, (k, ...). ``synced``: the bytes are on
+    the disk when the function returns.
+    """
     out = os.open(path, os.O_WRONLY)
 
     def work(task: _Task) -> IntArray:
@@ -230,7 +241,7 @@ def _filling(plan: Plan, path: Path, synced: bool) -> Iterator[Callable[[_Task],
 
 
 def _put_cells(plan: Plan, out: int, k: int) -> int:
-    """Write the elements of a piece, those of each type to their like."""
+    """Write the elements of piece ``k``, sorted by type, to file descriptor ``out``; return 0."""
     text = plan.text
     piece = text.zone.elements[k]
     types, nodes = np.empty(piece.rows, np.uint8), np.empty(piece.nodes, np.int64)
@@ -253,7 +264,10 @@ def _put_cells(plan: Plan, out: int, k: int) -> int:
 
 
 def _put_points(plan: Plan, out: int, k: int) -> IntArray:
-    """Write the points of a piece; return what `fill_points` does."""
+    """Write the points of piece ``k`` to the file descriptor ``out``; return as `fill_points`.
+
+    Raises MeshError if a coordinate is too large.
+    """
     text = plan.text
     piece = text.zone.points[k]
     points = np.empty((piece.rows, text.zone.dim))
@@ -268,6 +282,7 @@ def _put_points(plan: Plan, out: int, k: int) -> IntArray:
 
 
 def _put(out: int, at: int, content: NDArray) -> None:
+    """Write the bytes of an array to the file descriptor ``out``, from byte ``at`` on."""
     left = content.view(np.uint8).data
     while left:
         written = os.pwrite(out, left, at)

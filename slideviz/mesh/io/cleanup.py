@@ -1,8 +1,8 @@
-"""Clean-up of what must not outlive the program: drafts of files, and programs it started.
+"""Clean-up of what must not outlive the program: drafts of files, and processes it started.
 
-A draft is a temporary file or folder beside what it is to become. Its name tells the machine and
-the process that it belongs to, so that the next one that writes to the same folder can remove
-what a process left that was killed.
+A draft is a temporary file or folder in the folder of the file it is to become. Its name has the
+machine and the process that it belongs to. So drafts of a process that was killed are removed by
+the next one that writes to the same folder.
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ from pathlib import Path
 from typing import Protocol
 
 PREFIX = ".slideviz-"
+"""Beginning of the names of all drafts."""
 _SUFFIX = ".tmp"
+"""Ending of the names of all drafts."""
 
 
 class Process(Protocol):
-    """A program that was started, as of `subprocess.Popen`."""
+    """A running process that this program started, as `subprocess.Popen`."""
 
     def kill(self) -> None:
         """End it at once."""
@@ -29,16 +31,20 @@ class Process(Protocol):
 
 
 NOTHING_LEFT = "nothing half-written is left"
+"""The answer of `left` where no partial file is kept."""
 _drafts: set[Path] = set()
+"""Files and folders to remove when the program ends early."""
 _processes: set[Process] = set()
+"""Processes to kill when the program ends early."""
 _kept: dict[Path, str] = {}
+"""Partial files that stay then, and the sentence on each for the user."""
 
 
 @contextmanager
 def draft(folder: Path, is_folder: bool = False) -> Iterator[Path]:
-    """Return a new path in a folder for a draft; what is there at the end is removed.
+    """Context with a new path in a folder for a draft; what is at that path is removed at the end.
 
-    Drafts that dead processes of this machine left in the folder are removed, too.
+    At the beginning, drafts of dead processes of this machine are removed from the folder.
 
     Parameters
     ----------
@@ -50,7 +56,7 @@ def draft(folder: Path, is_folder: bool = False) -> Iterator[Path]:
     Raises
     ------
     OSError
-        The folder of drafts cannot be made.
+        The draft is a folder, and cannot be made.
     """
     _sweep(folder)
     path = folder / f"{_owned(os.getpid())}{os.urandom(8).hex()}{_SUFFIX}"
@@ -66,7 +72,7 @@ def draft(folder: Path, is_folder: bool = False) -> Iterator[Path]:
 
 @contextmanager
 def ended(process: Process) -> Iterator[None]:
-    """Return a context after which, however it ends, the program does not run any more."""
+    """Context at whose end the process is killed, if it still runs, and waited for."""
     _processes.add(process)
     try:
         yield
@@ -87,7 +93,7 @@ def clean_up() -> None:
 
 @contextmanager
 def removed_at_stop(path: Path) -> Iterator[None]:
-    """Return a context in which a file is removed at the end of the process, until it is kept."""
+    """Context in which a file is removed if the program ends, unless `keep` is called for it."""
     _drafts.add(path)
     try:
         yield
@@ -97,18 +103,18 @@ def removed_at_stop(path: Path) -> Iterator[None]:
 
 
 def keep(path: Path, words: str) -> None:
-    """Leave a partial file when the process ends, and say so in these words."""
+    """Let a partial file stay if the program ends; `left` returns these ``words`` for the user."""
     _drafts.discard(path)
     _kept[path] = words
 
 
 def left() -> str:
-    """Return in words what is left when the process ends now."""
+    """Return the words of `keep` on the latest partial file that stays, else `NOTHING_LEFT`."""
     return next(reversed(_kept.values()), NOTHING_LEFT)
 
 
 def is_alive(pid: str) -> bool:
-    """Tell whether a process of that number runs; what is no number is none."""
+    """Return whether a process with the number ``pid`` runs; False if it is no number."""
     try:
         os.kill(int(pid), 0)
     except (ValueError, OverflowError, ProcessLookupError):
@@ -119,15 +125,15 @@ def is_alive(pid: str) -> bool:
 
 
 def _owned(pid: int | str) -> str:
-    """Return the beginning of the names of a process's drafts."""
+    """Return the beginning of the names of the drafts of process ``pid`` on this machine."""
     return f"{PREFIX}{_machine()}-{pid}-"
 
 
 def _machine() -> str:
-    """Return what tells apart machines, and containers with process numbers of their own.
+    """Return a name of this machine and its process namespace, that of a container.
 
-    They may see the same folder, and a process of another machine is not dead for being unknown
-    on this one.
+    Several machines may use the same folder, and a process that does not exist on this one may run
+    on another.
     """
     name = "".join(sign if sign.isalnum() else "_" for sign in os.uname().nodename)[:40]
     try:
@@ -137,7 +143,7 @@ def _machine() -> str:
 
 
 def _sweep(folder: Path) -> None:
-    """Remove the drafts of dead processes of this machine; those of others are not ours."""
+    """Remove the drafts of dead processes of this machine, and no others, from a folder."""
     mine = _owned("").removesuffix("-")
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
@@ -149,6 +155,7 @@ def _sweep(folder: Path) -> None:
 
 
 def _remove(path: Path) -> None:
+    """Remove a file, or a folder with all in it, if that can be done."""
     with suppress(OSError):
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path, ignore_errors=True)

@@ -17,6 +17,7 @@ from slideviz.mesh.io.su2b.write import su2b_blocks
 from slideviz.mesh.model import Mesh, Origin
 
 _ZONED = {".su2": "su2", ".su2b": "su2b"}
+"""Formats with several zones, by file name ending."""
 
 
 @takes(source=FILE, target=FILE)
@@ -78,7 +79,7 @@ def convert(
 
 
 def _zones(kind: str, *meshes: Mesh) -> Iterator[bytes]:
-    """Yield a file of several zones."""
+    """Yield the bytes, in blocks, of a file of ``kind`` su2 or su2b with a zone for each mesh."""
     if kind == "su2b":
         yield from su2b_blocks(*meshes)
         return

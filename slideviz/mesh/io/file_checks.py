@@ -1,9 +1,10 @@
-"""Checks of files: only ordinary ones are read, and no input is written over unasked.
+"""Checks of files: only ordinary ones are read, and no input is overwritten unless that was asked.
 
 A pipe may never come to an end, and a device gives bytes without end.
 
-Whoever runs the work (a command, a window) says which files are its inputs; whatever writes asks
-here first. The same file may have many names: by links, by ``./``, by another folder.
+A command or window declares its input files (`protected`), and each writer calls
+`require_no_input`. Files are compared and not names: links, ``./`` and other paths give one file
+many names.
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.check import printable
 
 Inputs = Mapping[Path, str]
-"""What each file is, in words: ``the input mesh``."""
+"""Input files, and what each is in words: ``the input mesh``."""
 _known: list[Callable[[], Inputs]] = []
 
 
 @contextmanager
 def protected(inputs: Callable[[], Inputs]) -> Iterator[None]:
-    """Return a context in which these files are written over only where that was asked for."""
+    """Context in which `require_no_input` refuses to overwrite files that ``inputs`` returns."""
     _known.append(inputs)
     try:
         yield
@@ -36,7 +37,7 @@ def protected(inputs: Callable[[], Inputs]) -> Iterator[None]:
 def require_no_input(
     path: Path, error: type[SlidevizError], replaces: Path | None = None, remedy: str = ""
 ) -> None:
-    """Raise when a file that is to be written is an input.
+    """Raise if a file that is to be written is an input, declared by `protected`.
 
     Parameters
     ----------
@@ -45,14 +46,14 @@ def require_no_input(
     error : type of SlidevizError
         The class of error to raise.
     replaces : Path, optional
-        The input that may be written over.
+        The input that may be overwritten.
     remedy : str
-        What helps; to choose another name when left out.
+        The remedy in the message; to choose another name when left out.
 
     Raises
     ------
     SlidevizError
-        It is an input.
+        It is an input other than ``replaces``.
     """
     if replaces is not None and same_file(path, replaces):
         return
@@ -64,7 +65,7 @@ def require_no_input(
 
 
 def same_file(path: Path, other: Path) -> bool:
-    """Tell whether two names are of one file, which need not exist yet."""
+    """Return whether two paths lead to the same file, which need not exist yet."""
     if os.path.realpath(path) == os.path.realpath(other):
         return True
     try:
@@ -74,14 +75,14 @@ def same_file(path: Path, other: Path) -> bool:
 
 
 def require_ordinary(path: Path, error: type[SlidevizError]) -> int:
-    """Return how many bytes an ordinary file has, without opening it: some devices act on that.
+    """Return the size in bytes of an ordinary file, without opening it: some devices react to that.
 
     Raises
     ------
     SlidevizError
         It is a device or a pipe; ``error`` is the class.
     OSError, ValueError
-        There is none, or it is a folder.
+        There is no such file, or it is a folder.
     """
     found = path.stat()
     if stat.S_ISDIR(found.st_mode):
@@ -92,7 +93,7 @@ def require_ordinary(path: Path, error: type[SlidevizError]) -> int:
 
 
 def require_length(path: Path, error: type[SlidevizError], what: str, most: int) -> None:
-    """Check a file as `require_ordinary`, and that it has so many bytes at most.
+    """Raise as `require_ordinary`, or ``error`` if a file has more than ``most`` bytes.
 
     ``what`` is the kind of file, for the message: ``case file``.
     """

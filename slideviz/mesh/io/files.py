@@ -1,4 +1,4 @@
-"""Mesh files: SU2 by our own reader and writer, all others through meshio."""
+"""Reading and writing mesh files, by slideviz's own code or, for most formats, meshio."""
 
 from __future__ import annotations
 
@@ -23,7 +23,9 @@ from slideviz.mesh.model import Mesh
 from slideviz.terms import FILE_FORMATS, FileFormat
 
 _SNIFFED_BYTES = 1 << 16
+"""Bytes of a file that are searched for ``NDIME=``."""
 _UNSURE = ("", ".txt", ".dat", ".mesh", ".grid")
+"""Endings of files that may be SU2's, depending on their content."""
 _NDIME = re.compile(rb"^\s*NDIME\s*=", re.IGNORECASE | re.MULTILINE)
 
 
@@ -82,7 +84,13 @@ def read(
 
 
 def format_of(path: Path, given: FileFormat | None) -> FileFormat | None:
-    """Return the SU2 format of a file: as given, by ending or, as that may not say, by content."""
+    """Return the SU2 format of a file as ``given``, or by ending and content; None if neither is.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read, or is no ordinary file.
+    """
     ending = path.suffix.lower()
     try:
         require_ordinary(path, MeshError)
@@ -102,7 +110,7 @@ def format_of(path: Path, given: FileFormat | None) -> FileFormat | None:
 
 
 def usual_ending(mesh: Mesh) -> str:
-    """Return the ending that a mesh is offered to be saved with."""
+    """Return the ending, as ``.su2``, that is proposed for saving a mesh."""
     return mesh.origin.ending or ".su2"
 
 
@@ -184,7 +192,7 @@ def _write_other(
     point_data: dict[str, NDArray],
     replaces: Path | None,
 ) -> None:
-    """Write a mesh in a format that is none of SU2's, by its ending."""
+    """Write a mesh in the format of the path's ending, which is none of SU2's."""
     ending = path.suffix.lower()
     if ending == ".cgns":
         from slideviz.mesh.io.cgns.write import write_cgns
@@ -221,7 +229,7 @@ def _named(path: str | Path, file_format: FileFormat | None) -> Path:
 
 
 def is_source(path: Path, mesh: Mesh) -> bool:
-    """Tell whether a path is that of the file that a mesh was read from, which is still there."""
+    """Return whether ``path`` is the file that a mesh was read from, and that still exists."""
     try:
         return mesh.source is not None and path.samefile(mesh.source)
     except OSError:
@@ -230,7 +238,7 @@ def is_source(path: Path, mesh: Mesh) -> bool:
 
 
 def _checked(mesh: Mesh, cell_data: Mapping[str, ArrayLike]) -> dict[str, NDArray]:
-    """Return the cell data as arrays of the right length."""
+    """Return the cell data as arrays; raise MeshError if one does not fit the number of cells."""
     values = {name: np.asarray(given) for name, given in cell_data.items()}
     for name, array in values.items():
         if array.ndim not in (1, 2) or len(array) != len(mesh.cells):

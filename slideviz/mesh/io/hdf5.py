@@ -1,7 +1,8 @@
 """Writing HDF5 files whole or not at all, with errors that say why.
 
-The library below crashes the process when it closes a file that could not be written, as on a full
-disk. So it writes through a file whose writing never fails, and that keeps what went wrong.
+The HDF5 library crashes the process when it closes a file that could not be written, as on a full
+disk. So it writes through a Python file object whose methods never fail, but keep the first error
+to be raised afterwards.
 """
 
 from __future__ import annotations
@@ -22,9 +23,17 @@ if TYPE_CHECKING:
 
 
 class Hdf5Draft:
-    """An HDF5 file that is being written: ``tree`` is its root.
+    """An HDF5 file that is being written, and the Python file object that h5py writes it through.
 
-    It is also the file that HDF5 writes to: reading, writing and places as of Python's files.
+    ``tree`` is the root of the HDF5 file. Errors of writing are kept, and raised by `require`. The
+    other methods are those of a Python file that h5py calls.
+
+    Parameters
+    ----------
+    path : Path
+        The file that the draft is to replace, for messages.
+    draft : Path
+        The existing file that is written.
     """
 
     tree: h5py.File
@@ -35,12 +44,12 @@ class Hdf5Draft:
         self._problem: OSError | None = None
 
     def require(self) -> None:
-        """Raise when something could not be written.
+        """Raise if anything could not be written so far.
 
         Raises
         ------
         MeshError
-            The first that could not, with the remedy.
+            With the reason of the first failure, and the remedy.
         """
         if self._problem is not None:
             reason = reason_of(self._problem)
@@ -51,7 +60,7 @@ class Hdf5Draft:
         self._file.close()
 
     def write(self, data: bytes | memoryview) -> int:
-        """Write what can be written."""
+        """Write bytes unless a write failed before; return their number, even if this one fails."""
         rest = memoryview(data).cast("B")
         size = len(rest)
         try:
@@ -62,7 +71,7 @@ class Hdf5Draft:
         return size
 
     def readinto(self, buffer: WriteableBuffer) -> int:
-        """Read what there is; the rest of the buffer becomes zeros."""
+        """Fill a buffer from the file, beyond its end with zeros; return the buffer's size."""
         rest = memoryview(buffer).cast("B")
         size = len(rest)
         while len(rest):
@@ -74,21 +83,21 @@ class Hdf5Draft:
         return size
 
     def read(self, size: int) -> bytes:
-        """Return so many bytes, as `readinto` gives them."""
+        """Return ``size`` bytes from the file, beyond its end zeros."""
         buffer = bytearray(size)
         self.readinto(buffer)
         return bytes(buffer)
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Go to a place and return it."""
+        """Go to a position in the file and return it."""
         return self._file.seek(offset, whence)
 
     def tell(self) -> int:
-        """Return the place."""
+        """Return the position in the file."""
         return self._file.tell()
 
     def truncate(self, size: int) -> int:
-        """Make the file that long, where it can be."""
+        """Set the length of the file and return it, even if this fails."""
         try:
             self._file.truncate(size)
         except OSError as problem:
@@ -96,23 +105,23 @@ class Hdf5Draft:
         return size
 
     def flush(self) -> None:
-        """Do nothing: nothing is kept back."""
+        """Do nothing: the file has no buffer."""
 
 
 @contextmanager
 def hdf5_write(
     path: Path, replaces: Path | None = None, source: Path | None = None
 ) -> Iterator[Hdf5Draft]:
-    """Return an HDF5 file to write; it takes the place of ``path`` when the block ends well.
+    """Context with an HDF5 file to write, which replaces ``path`` at the end if nothing was raised.
 
     Parameters
     ----------
     path : Path
         The file to write.
     replaces : Path, optional
-        The input that may be written over.
+        The input that may be overwritten.
     source : Path, optional
-        The file that it begins as a copy of; it begins empty when left out.
+        A file whose copy the new one is at first; when left out it is empty.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Work on the blocks of a file on all cores, its results in order."""
+"""Tasks done on all cores, with results in order."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Result = TypeVar("Result")
 
 
 def in_order(work: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Result]:
-    """Yield what ``work`` returns for each task, in order; what it raises comes in order, too.
+    """Yield what ``work`` returns for each task, in order; raise its error in place of a result.
 
-    It is done in as many threads as Numba uses, a few tasks ahead, so that many large results do
-    not pile up.
+    Tasks are done in as many threads as `cores`, at most twice as many ahead: so results that
+    nobody took yet do not fill the memory.
     """
     threads = min(cores(), len(tasks))
     if threads < 2:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def private_folder(folder: Path) -> Path:
-    """Return a folder that only its owner may enter; it is made where there is none.
+    """Make a folder if there is none, let only its owner enter it, and return it.
 
     Raises
     ------
@@ -19,7 +19,7 @@ def private_folder(folder: Path) -> Path:
 
 
 def private_file(path: Path) -> None:
-    """Let only the owner read and write a file; it is made, empty, where there is none.
+    """Make an empty file if there is none, and let only its owner read and write it.
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""The bytes of a file that is read piece by piece, and perhaps once more when it is written again.
+"""Sources: the bytes of files that are read piece by piece, and again when a copy is written.
 
-A large file is not kept in memory but open: replacing it by another of its name, as `atomic_write`
-does, or removing it leaves what is open as it was. Only who changes it in its place changes it
-here, which is noticed. It is not mapped into memory, for a mapped file that is cut off ends the
-program.
+A small file is kept in memory, a large one is kept open. Removing an open file, or replacing it by
+another of the same name as `atomic_write` does, leaves its bytes readable. Writing into it changes
+them, which `Source` notices. It is not memory-mapped: if a mapped file is cut off, the program
+crashes.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from slideviz.errors import MeshError
 from slideviz.mesh.check import path_error
 
 KEPT_BYTES = 1 << 26
-"""Files up to this size are kept in memory: they may change while the mesh is worked on."""
+"""Files up to this size are kept in memory, so that they may change while the mesh is in use."""
 
 
 class Source:
-    """The bytes of a file.
+    """The bytes of a file; a slice of it returns some of them.
 
     Attributes
     ----------
@@ -39,18 +39,18 @@ class Source:
         self.size = len(content) if isinstance(content, bytes) else self._stamp[0]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return what makes it again in another process: a large file is opened there, too."""
+        """Return what pickle makes a copy from: the bytes, or how to open a large file again."""
         if self._content is not None:
             return Source, (self.path, self._content)
         return _again, (self.path.absolute(), self._stamp)
 
     def __getitem__(self, part: slice) -> bytes:
-        """Return a range of the bytes; may be called from several threads.
+        """Return a range of the bytes; may be called from several threads at once.
 
         Raises
         ------
         MeshError
-            The system does not give them, or the file was changed since it was opened.
+            They cannot be read, or the file has become shorter since it was opened.
         """
         if self._file is None:
             assert self._content is not None
@@ -68,7 +68,7 @@ class Source:
         return pieces[0] if len(pieces) == 1 else b"".join(pieces)
 
     def require_same(self) -> None:
-        """Raise when the file was changed since it was opened.
+        """Raise if the size or time stamp of an open file changed since it was opened.
 
         Raises
         ------
@@ -79,6 +79,7 @@ class Source:
             raise self.changed()
 
     def _now(self) -> tuple[int, int]:
+        """Return size and time stamp (ns) of an open file; 0, 0 for one that is kept in memory."""
         if self._file is None:
             return 0, 0
         found = os.fstat(self._file.fileno())
@@ -90,7 +91,7 @@ class Source:
 
 
 def open_source(path: Path) -> Source:
-    """Return the bytes of a file.
+    """Return the source of a file: its bytes, or the open file if it is larger than ``KEPT_BYTES``.
 
     Raises
     ------
@@ -109,7 +110,10 @@ def open_source(path: Path) -> Source:
 
 
 def _again(path: Path, stamp: tuple[int, int]) -> Source:
-    """Return the bytes of a file that is open in another process, and must be the same still."""
+    """Return the source of a file that another process has open; raise MeshError if it changed.
+
+    ``stamp`` has its size and time stamp when it was opened there.
+    """
     source = open_source(path)
     if source._now() != stamp:
         raise source.changed()
@@ -117,7 +121,7 @@ def _again(path: Path, stamp: tuple[int, int]) -> Source:
 
 
 def unreadable(path: Path, problem: OSError | ValueError) -> MeshError:
-    """Return the error for a file that the system does not give."""
+    """Return the error, with its remedy, for a file that cannot be opened or read."""
     if isinstance(problem, FileNotFoundError | NotADirectoryError | ValueError):
         return path_error(path, "there is no such file; check the name and the folder")
     if isinstance(problem, IsADirectoryError):

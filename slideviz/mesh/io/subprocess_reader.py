@@ -1,8 +1,8 @@
 """Subprocess reader: meshes of other formats than SU2 are read in a process of their own.
 
-Some readers of meshio run for hours on a wrong count, ask for all memory, or crash with the
-library below them. In a process of its own that costs nobody anything: it has limits of time and
-memory, it can be stopped at any moment, and the window stays alive meanwhile.
+Some readers of meshio run for hours on a wrong count, allocate all memory, or crash in a C library.
+A process of its own has limits of time and memory, can be stopped at any moment, and leaves the
+window responsive.
 """
 
 from __future__ import annotations
@@ -28,24 +28,27 @@ from slideviz.mesh.model import Cells, Marker, Mesh, Origin, frozen_array
 
 CGNS = ".cgns"
 
+# Limits of the process: several times what the slowest of meshio's readers needs.
 _SECONDS = 20
 _SECONDS_PER_BYTE = 20e-6
 _MEMORY = 8 << 30
 _MEMORY_PER_BYTE = 200
-"""Several times what the slowest of meshio's readers needs."""
 _TICK_SECONDS = 0.05
+"""Seconds between two calls of the progress function."""
 _BYTES_PER_SECOND = 5e6
+"""Speed of reading that the progress assumes."""
 _CHUNK_BYTES = 1 << 20
 _SET_DEATH_SIGNAL = 1
+"""``PR_SET_PDEATHSIG`` of Linux's ``prctl``."""
 
 
 def read_in_subprocess(path: Path, progress: Progress) -> Mesh:
-    """Return the mesh of a file, as ``read_cgns`` or, of other endings, ``read_with_meshio`` does.
+    """Return the mesh of a file, read by `read_cgns` if it ends in .cgns, else `read_with_meshio`.
 
     Raises
     ------
     MeshError
-        As these, and when the reader takes too long, or crashes.
+        As these functions, and if the process takes too long, crashes or does not start.
     """
     begun = time.monotonic()
     expected = 1.0 + path.stat().st_size / _BYTES_PER_SECOND
@@ -79,6 +82,7 @@ def read_in_subprocess(path: Path, progress: Progress) -> Mesh:
 def _started(
     path: Path, command: list[str], environment: dict[str, str]
 ) -> subprocess.Popen[bytes]:
+    """Return the process of a command, its output a pipe; raise MeshError if it does not start."""
     try:
         return subprocess.Popen(
             command,
@@ -95,14 +99,14 @@ def _started(
 
 
 def _limits(size: int) -> tuple[int, int]:
-    """Return the seconds and the bytes of memory that a file of that size may need."""
+    """Return the limits, seconds and bytes of memory, for reading a file of ``size`` bytes."""
     present = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     memory = min(_MEMORY + _MEMORY_PER_BYTE * size, 0.8 * present)
     return int(_SECONDS + _SECONDS_PER_BYTE * size), int(memory)
 
 
 def _unpacked(path: Path, answer: bytes, code: int) -> Mesh:
-    """Return the mesh that the reader sent, or raise what it said."""
+    """Return the mesh that the process sent, or raise MeshError with its message or exit code."""
     if code == -signal.SIGXCPU:
         raise path_error(
             path,
@@ -132,14 +136,15 @@ def _unpacked(path: Path, answer: bytes, code: int) -> Mesh:
 
 
 def _library(path: Path) -> str:
+    """Return the name of the library that reads a file, for messages."""
     return "HDF5" if path.suffix.lower() == CGNS else "meshio"
 
 
 def main() -> None:
-    """Read a file and send it through the standard output.
+    """Read a mesh and write it, pickled, to the standard output: the program of the subprocess.
 
-    The arguments are the number of the process that waits for it, seconds, bytes of memory, and
-    the path.
+    Its command-line arguments are the parent's process number, the limits (seconds and bytes of
+    memory), and the path. If the file cannot be read, it writes the message of the error instead.
     """
     _die_with(int(sys.argv[1]))
     # Whatever prints must not get into the answer.
@@ -166,7 +171,7 @@ def main() -> None:
 
 
 def _limit(seconds: int, memory: int) -> None:
-    """Let the system end this process after so many seconds, and refuse it more bytes."""
+    """Let the system end this process after ``seconds`` of CPU time; limit its memory (bytes)."""
     import resource  # POSIX only
 
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
@@ -174,7 +179,7 @@ def _limit(seconds: int, memory: int) -> None:
 
 
 def _die_with(parent: int) -> None:
-    """Let the system end this process when the one that waits for it is killed."""
+    """Let the system end this process when the process ``parent`` ends; end now if it has."""
     with suppress(OSError, AttributeError):  # other systems than Linux have no such call
         ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
     if os.getppid() != parent:  # it was killed before
@@ -182,6 +187,7 @@ def _die_with(parent: int) -> None:
 
 
 def _too_large(path: Path) -> MeshError:
+    """Return the error for a file whose reading needs more memory than the limit."""
     return path_error(
         path,
         "cannot be read: it needs more memory than a file of this size should; check its counts, "

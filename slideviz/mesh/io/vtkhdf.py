@@ -1,13 +1,14 @@
 """Writing VTKHDF files: the format of VTK and ParaView on HDF5, version 2.1.
 
 A mesh is a collection of blocks: ``volume`` with the cells, and under ``boundaries`` one for each
-marker, by its name, as other readers of ParaView give boundaries; so they are shown, hidden and
-extracted by name. (The cells of a VTU file are all in one grid, with numbers for the boundaries,
-for such a file has no blocks.) A series has its topology once, and points and values of each step
-behind each other; ``Steps`` says where each begins.
+marker, with its name, so that ParaView shows, hides and extracts boundaries by name. (A VTU file
+has no blocks: all its cells are in one grid, with numbers for the boundaries.) A series of steps
+has its topology once, and the points and values of all steps in one array, one step after the
+other; the group ``Steps`` has the row where each begins.
 
-The cells of a large mesh are in partitions, behind each other, so that each process of a parallel
-ParaView reads some of them. Each has its own points: those between two partitions stand in both.
+The cells of a large mesh are in partitions, one after the other, so that each process of a
+parallel ParaView reads some of them. Each has its own points: those between two partitions are in
+both.
 """
 
 from __future__ import annotations
@@ -33,16 +34,24 @@ _VERSION = (2, 1)
 _VOLUME = "volume"
 _CHUNK_ROWS = 1 << 16
 PARTITION = 1 << 20
-"""Cells of a partition, at most."""
+"""Most cells of a partition."""
 
 Values = Mapping[str, NDArray]
+"""Arrays by name, a row for each cell or point."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """A block of the collection: its group, how many partitions and how many cells it has.
+    """A block of the collection.
 
-    ``nodes`` are those of its partitions in the mesh, one partition behind the other.
+    Attributes
+    ----------
+    group : h5py.Group
+        Its group in the file.
+    nodes : (n,) int64
+        The mesh nodes of its points, one partition after the other.
+    partitions, count : int
+        Numbers of its partitions and of its cells.
     """
 
     group: h5py.Group
@@ -52,7 +61,10 @@ class _Block:
 
 
 class StepSeries:
-    """A VTKHDF file of the steps of a mesh, which grows by `add`."""
+    """A VTKHDF file that is being written: `add` each step, then `end`.
+
+    Where ``is_series`` is false, it is the file of a single mesh without steps: `add` once.
+    """
 
     def __init__(self, draft: Hdf5Draft, blocks: Sequence[_Block], is_series: bool) -> None:
         self._draft = draft
@@ -61,7 +73,7 @@ class StepSeries:
         self._times: list[float] = []
 
     def add(self, points: FloatArray, cell_data: Values, point_data: Values) -> None:
-        """Write the next step, whose time is its number from 0.
+        """Write the next step, whose time is its number (0 for the first).
 
         Parameters
         ----------
@@ -89,7 +101,7 @@ class StepSeries:
         self._times.append(float(len(self._times)))
 
     def _append(self, group: h5py.Group, name: str, rows: NDArray) -> None:
-        """Put rows behind those of the steps before."""
+        """Append rows to a dataset, behind those of earlier steps; make it if there is none."""
         if not self._is_series:
             group.create_dataset(name, data=rows)
             return
@@ -104,7 +116,7 @@ class StepSeries:
         data[len(data) - len(rows) :] = rows
 
     def end(self) -> None:
-        """Say where each step begins; the file is complete."""
+        """Write where each step begins, which completes the file."""
         if not self._is_series:
             return
         count = len(self._times)
@@ -126,7 +138,7 @@ class StepSeries:
 
 @contextmanager
 def vtkhdf_series(path: Path, mesh: Mesh, replaces: Path | None = None) -> Iterator[StepSeries]:
-    """Return a file that steps of a mesh are added to; it is there when the block ends well.
+    """Context with a file to add steps of a mesh to, which replaces ``path`` at the end.
 
     Raises
     ------
@@ -140,7 +152,7 @@ def vtkhdf_series(path: Path, mesh: Mesh, replaces: Path | None = None) -> Itera
 def write_vtkhdf(
     path: Path, mesh: Mesh, cell_data: Values, point_data: Values, replaces: Path | None = None
 ) -> None:
-    """Write one mesh, with values on its cells and points.
+    """Write one mesh to a VTKHDF file, with values on its cells and points.
 
     Raises
     ------
@@ -155,6 +167,7 @@ def write_vtkhdf(
 def _collection(
     path: Path, mesh: Mesh, replaces: Path | None, is_series: bool
 ) -> Iterator[StepSeries]:
+    """Context with a new file that has blocks and topology of a mesh, but no points yet."""
     with hdf5_write(path, replaces) as draft:
         # ParaView shows the assembly in the order in which it was made.
         root = draft.tree.create_group("VTKHDF", track_order=True)
@@ -177,7 +190,10 @@ def _collection(
 def _add_block(
     root: h5py.Group, tree: h5py.Group, name: str, cells: Cells, nodes: IntArray
 ) -> _Block:
-    """Add a block with its topology to the collection, and its name to the assembly."""
+    """Add a block with its topology to the collection ``root`` and to the assembly ``tree``.
+
+    ``nodes`` (n,) are the mesh nodes of the block, ascending; each partition has only its own.
+    """
     import h5py
 
     group = root.create_group(name)
@@ -189,8 +205,8 @@ def _add_block(
     group["NumberOfCells"] = np.array([len(part) for _, part in partitions], np.int64)
     sizes = [len(part.connectivity) for _, part in partitions]
     group["NumberOfConnectivityIds"] = np.array(sizes, np.int64)
-    # Prisms are numbered as in SU2 since VTK 9.7 (vtk!12988): so its CGNS reader gives them, their
-    # volumes are positive and their sides look outward. VTU files have the order from before.
+    # Prisms are numbered as in SU2, which is VTK's order since 9.7 (vtk!12988): their volumes are
+    # positive and their normals outward. VTU files have the order from before.
     group["Types"] = cells.types
     group["Offsets"] = np.concatenate([part.offsets for _, part in partitions])
     group["Connectivity"] = np.concatenate(
@@ -201,7 +217,7 @@ def _add_block(
 
 
 def _partitions(cells: Cells) -> list[tuple[IntArray, Cells]]:
-    """Return cells in partitions: the nodes of each (k,), sorted, and its cells."""
+    """Return for each partition its nodes (k,), ascending, and its cells (with mesh nodes)."""
     edges = [*range(0, len(cells), PARTITION), len(cells)]
     parts = [
         Cells.from_types(cells.types[a:b], cells.connectivity[cells.offsets[a] : cells.offsets[b]])
@@ -211,23 +227,24 @@ def _partitions(cells: Cells) -> list[tuple[IntArray, Cells]]:
 
 
 def _typed(group: h5py.Group, kind: str) -> None:
-    """Say what a group is; VTK reads only texts of a fixed length."""
+    """Set the attributes ``Version`` and ``Type`` of a group, as a text of fixed length for VTK."""
     group.attrs["Version"] = np.array(_VERSION, np.int64)
     group.attrs.create("Type", np.bytes_(kind), dtype=f"S{len(kind)}")
 
 
 def _in_space(rows: NDArray) -> NDArray:
-    """Return points or vectors, (n, 2) or (n, 3), with three components."""
+    """Return points or vectors (n, 2) or (n, 3) as (n, 3), filled up with zeros."""
     return np.pad(rows, ((0, 0), (0, 3 - rows.shape[1]))) if rows.shape[1] < 3 else rows
 
 
 def _clean(name: str) -> str:
-    """Return a name that HDF5 takes: ``/`` would divide it, and dots are places."""
+    """Return a name that HDF5 allows: without ``/``, which is its separator, and not only dots."""
     clean = name.replace("/", "_").replace("\0", "_")
     return clean if clean.strip(".") else f"_{clean}"
 
 
 def _free(name: str, taken: set[str]) -> str:
+    """Return the name, with a number added if it is taken or has a meaning in VTKHDF."""
     number, free = 1, name
     while free in taken or free == "Assembly":
         number += 1

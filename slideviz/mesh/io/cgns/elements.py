@@ -24,7 +24,7 @@ TRI_9 TRI_10 QUAD_12 QUAD_16 TETRA_16 TETRA_20 PYRA_21 PYRA_29 PYRA_30 PENTA_24 
 PENTA_40 HEXA_32 HEXA_56 HEXA_64 BAR_5 TRI_12 TRI_15 QUAD_P4_16 QUAD_25 TETRA_22 TETRA_34
 TETRA_35 PYRA_P4_29 PYRA_50 PYRA_55 PENTA_33 PENTA_66 PENTA_75 HEXA_44 HEXA_98 HEXA_125
 """.split()  # noqa: SIM905  (a list of names would be 57 lines)
-"""ElementType_t by number."""
+"""Names of ``ElementType_t`` by number."""
 _VTK = {"NODE": 1, "BAR_2": 3, "TRI_3": 5, "QUAD_4": 9, "TETRA_4": 10, "PYRA_5": 14, "PENTA_6": 13}
 _VTK["HEXA_8"] = 12
 _TYPES = {_NAMES.index(name): vtk for name, vtk in _VTK.items()}
@@ -35,23 +35,32 @@ _MIXED = _NAMES.index("MIXED")
 
 @dataclass(frozen=True, eq=False)
 class CgnsElements:
-    """Elements of an unstructured zone with their numbers in it, from 1, rising: (m,)."""
+    """Elements of an unstructured zone.
+
+    Attributes
+    ----------
+    cells : Cells
+        The m elements, of any dimension.
+    numbers : (m,) int64
+        Their numbers in the zone, from 1, ascending.
+    section : (m,) int64
+        Index of the section that each is in.
+    """
 
     cells: Cells
     numbers: IntArray
     section: NDArray[np.int64]
-    """Which of the sections each is in, (m,)."""
 
     def where(self, mask: NDArray[np.bool_]) -> CgnsElements:
-        """Return those of a mask (m,)."""
+        """Return the elements where the mask (m,) is true."""
         return CgnsElements(self.cells.take(mask), self.numbers[mask], self.section[mask])
 
 
 def grid_cells(shape: Sequence[int], points: FloatArray) -> Cells:
     """Return the cells of a structured zone.
 
-    Blocks may be left-handed, which is no fault of them: their cells are numbered the other way
-    round, so that their volumes are positive.
+    Blocks may be left-handed, which CGNS allows: their cells are numbered the other way round, so
+    that their volumes are positive.
 
     Parameters
     ----------
@@ -74,9 +83,9 @@ def grid_cells(shape: Sequence[int], points: FloatArray) -> Cells:
 
 
 def grid_nodes(along: Sequence[IntArray], shape: Sequence[int]) -> IntArray:
-    """Return the numbers of the nodes at all combinations of indices, the first fastest: (n,).
+    """Return the numbers (n,) of a grid's nodes at all combinations of indices, i running fastest.
 
-    ``along`` are the indices in each direction, from 0.
+    ``along`` has the indices in each direction, from 0; ``shape`` the grid's number of nodes.
     """
     steps = np.cumprod([1, *shape[:-1]])
     found = np.zeros(1, np.int64)
@@ -91,7 +100,7 @@ def read_sections(zone: Node, n_points: int) -> tuple[CgnsElements, list[Node]]:
     Raises
     ------
     MeshError
-        A section has elements that are not linear, or is wrong.
+        A section has elements that are not linear, or it contradicts itself or another one.
     """
     nodes = zone.children("Elements_t")
     if not nodes:
@@ -115,7 +124,10 @@ def read_sections(zone: Node, n_points: int) -> tuple[CgnsElements, list[Node]]:
 
 
 def _section(node: Node, n_points: int) -> tuple[int, Cells]:
-    """Return the number of the first element of a section, and its elements."""
+    """Return the number of the first element of a section, and its elements, or raise MeshError.
+
+    ``n_points`` is the number of the zone's vertices.
+    """
     kind = int(node.whole(2)[0])
     name = _NAMES[kind] if 0 <= kind < len(_NAMES) else str(kind)
     if kind not in _TYPES and kind != _MIXED:
@@ -152,7 +164,10 @@ def _section(node: Node, n_points: int) -> tuple[int, Cells]:
 
 
 def _mixed(node: Node, flat: IntArray, count: int) -> tuple[IntArray, IntArray]:
-    """Return the types of elements, (m,), and their nodes: each type stands before its nodes."""
+    """Return the types (m,) and nodes (k,) of the elements of a MIXED section, or raise MeshError.
+
+    In its array ``flat`` each element's type precedes its nodes; ``count`` is m.
+    """
     # A damaged range must not ask for more memory than the file has numbers.
     places, at, sizes = np.empty(min(count, len(flat)), np.int64), 0, _SIZES.tolist()
     kinds = memoryview(np.ascontiguousarray(flat).data)

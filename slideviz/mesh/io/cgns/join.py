@@ -1,7 +1,7 @@
-"""Interfaces between the zones of a CGNS file, and the one mesh that joined zones are.
+"""Interfaces between the zones of a CGNS file, by which zones are joined to a single mesh.
 
-Nodes that two zones share by a one-to-one interface become one. Periodic interfaces and those
-that are not one to one (mixing planes, overset grids) stay open: their faces are boundaries.
+Nodes that two zones share by a one-to-one interface are merged. Periodic interfaces and those
+that are not one to one (mixing planes, overset grids) are left open: their faces are boundaries.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from slideviz.mesh.io.cgns.zone import CgnsZone, faces_by_number, facets_of
 from slideviz.mesh.model import Cells, FloatArray, IntArray
 
 JOINED = 1e-6
-"""Nodes of an interface may lie apart by this fraction of the extent, as rounded to R4."""
+"""Largest distance of merged nodes, as a fraction of the extent: R4 coordinates are rounded so."""
 _ONE_TO_ONE = "Abutting1to1"
 
 
@@ -34,11 +34,11 @@ class Interface:
     zone, donor : int
         Numbers of the zones.
     pairs : ((m,), (m,)) or None
-        Nodes in the zone and in the donor that are one; None where it is not one to one.
+        Nodes of the zone and of the donor that are the same point; None if it is not to be joined.
     period : tuple of float
-        Centre and angles of the rotation, and translation; empty where it is not periodic.
+        Centre and angles of the rotation, and translation; empty if it is not periodic.
     why : str
-        Why it cannot be joined.
+        Reason why it cannot be joined, for a remark; empty if it can, or is periodic.
     """
 
     node: Node
@@ -49,7 +49,7 @@ class Interface:
     why: str = ""
 
     def gap(self, zones: Sequence[CgnsZone]) -> float:
-        """Return the largest distance between nodes that are one."""
+        """Return the largest distance between the two nodes of a pair."""
         assert self.pairs is not None
         here, there = self.pairs
         apart = zones[self.zone].points[here] - zones[self.donor].points[there]
@@ -58,19 +58,30 @@ class Interface:
 
 @dataclass(frozen=True, eq=False)
 class Joined:
-    """Zones as one mesh: points (n, p), the number of each zone's nodes there, what stays open."""
+    """Zones joined to one mesh.
+
+    Attributes
+    ----------
+    points : (n, p) float64
+        Points of the mesh.
+    numbers : tuple of (n_z,) int64
+        For each zone, the index in ``points`` of each of its vertices.
+    open : tuple of Interface
+        Interfaces that are not joined.
+    parts : (z,) int64
+        Index of the connected part of the mesh that each zone is in.
+    """
 
     points: FloatArray
     numbers: tuple[IntArray, ...]
     open: tuple[Interface, ...]
     parts: IntArray
-    """The connected part that each zone is in."""
 
 
 def join(zones: Sequence[CgnsZone]) -> Joined:
-    """Return the zones of a base as one mesh.
+    """Return the zones of a base, joined by their interfaces.
 
-    A node that several zones have is where the first of them has it.
+    A node of several zones gets the coordinates of the first of them.
 
     Raises
     ------
@@ -99,7 +110,10 @@ def join(zones: Sequence[CgnsZone]) -> Joined:
 
 
 def _numbered(labels: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the first place of each label, in order (k,), and the number there of all (n,)."""
+    """Return the indices (k,) where each label occurs first, ascending, and new labels (n,).
+
+    New labels count the labels (n,) in the order of their first occurrence.
+    """
     found, first = np.unique(labels, return_index=True)
     order = np.argsort(first)
     number = np.empty(len(found), np.int64)
@@ -110,7 +124,7 @@ def _numbered(labels: IntArray) -> tuple[IntArray, IntArray]:
 def _interfaces(
     zones: Sequence[CgnsZone], zone: int, names: dict[str, int], tolerance: float
 ) -> list[Interface]:
-    """Return the interfaces of a zone."""
+    """Return the interfaces of a zone, given by index; ``names`` has the index of each zone."""
     found = []
     for group in zones[zone].node.children("ZoneGridConnectivity_t"):
         for node in group.children("GridConnectivity1to1_t", "GridConnectivity_t"):
@@ -127,6 +141,10 @@ def _interfaces(
 def _interface(
     zones: Sequence[CgnsZone], node: Node, zone: int, donor: int, tolerance: float
 ) -> Interface:
+    """Return an interface of a node; one whose nodes lie apart by more than ``tolerance`` is open.
+
+    Raises MeshError if it is wrong.
+    """
     period = _period(node)
     if period:
         return Interface(node, zone, donor, None, period)
@@ -149,7 +167,7 @@ def _interface(
 
 
 def _period(node: Node) -> tuple[float, ...]:
-    """Return the numbers of a periodicity, empty where there is none."""
+    """Return centre, angles and translation of a periodic interface; empty if it is none."""
     holder = node.child("GridConnectivityProperty_t")
     periodic = None if holder is None else holder.child("Periodic_t")
     if periodic is None:
@@ -166,10 +184,10 @@ def _period(node: Node) -> tuple[float, ...]:
 
 
 def _blocks_meet(zone: CgnsZone, donor: CgnsZone, node: Node) -> tuple[IntArray, IntArray]:
-    """Return the nodes of two structured zones that meet in a range of each.
+    """Return the nodes (m,), (m,) of two structured zones that an interface declares the same.
 
-    SIDS, "1-to-1 Interface Connectivity": index2 = T (index1 - begin1) + begin2, where the column
-    j of T has the sign of Transform[j] in the row that its magnitude names.
+    SIDS, "1-to-1 Interface Connectivity": index2 = T (index1 - begin1) + begin2, where column
+    j of T has only one entry: the sign of Transform[j], in row abs(Transform[j]).
     """
     if zone.sides is not None or donor.sides is not None:
         raise node.fault("is for structured zones only; export it as GridConnectivity_t")
@@ -201,7 +219,10 @@ def _blocks_meet(zone: CgnsZone, donor: CgnsZone, node: Node) -> tuple[IntArray,
 
 
 def _lists_meet(zone: CgnsZone, donor: CgnsZone, node: Node) -> tuple[IntArray, IntArray]:
-    """Return the nodes of two zones that lists of vertices, or of faces, say to be one."""
+    """Return the nodes (m,), (m,) of two zones that an interface's lists declare the same.
+
+    Lists are of vertices, or of faces, whose nodes are then paired by distance.
+    """
     other = node.needed("IndexArray_t", "PointListDonor")
     where = node.word("GridLocation_t", "Vertex", "GridLocation")
     if where != "Vertex":
@@ -219,7 +240,7 @@ def _lists_meet(zone: CgnsZone, donor: CgnsZone, node: Node) -> tuple[IntArray, 
 
 
 def _vertices(zone: CgnsZone, node: Node) -> IntArray:
-    """Return the vertices of an interface, in their order."""
+    """Return the vertices (m,) of an interface in its zone, in the order of its list or range."""
     given = node.child("IndexArray_t", "PointList")
     if given is not None:
         return zone.nodes_at(given, given.whole(-1, len(zone.shape)))
@@ -232,7 +253,10 @@ def _vertices(zone: CgnsZone, node: Node) -> IntArray:
 def _nearest(
     zone: CgnsZone, faces: Cells, donor: CgnsZone, others: Cells
 ) -> tuple[IntArray, IntArray]:
-    """Return the nodes of faces, and for each the nearest node of other faces."""
+    """Return the nodes (m,) of faces of a zone, and for each the donor's nearest node (m,).
+
+    These are nodes of the faces ``others`` of the donor.
+    """
     from scipy.spatial import KDTree
 
     here, there = faces.nodes, others.nodes

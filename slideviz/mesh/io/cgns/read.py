@@ -1,8 +1,8 @@
 """Reading CGNS meshes: the zones of a base as one mesh, with its boundaries.
 
-Read with h5py and not with VTK's reader: that one does not give one-to-one interfaces nor where
-each coordinate is in the file, which writing needs, and a mesh needs no VTK elsewhere. The
-standard is the SIDS (CGNS 4), mapped onto HDF5.
+Read with h5py: VTK's reader returns neither one-to-one interfaces nor where each coordinate is in
+the file, which writing needs; and meshes need no VTK elsewhere. The standard is the SIDS (CGNS 4),
+mapped onto HDF5.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ class CgnsForm(Origin):
     Attributes
     ----------
     datasets : tuple of tuple of str
-        For each zone the datasets of its coordinates.
+        For each zone the paths of the datasets of its coordinates.
     numbers : tuple of (n_z,) int64
-        For each zone the points of the mesh that its vertices are.
+        For each zone the index of each of its vertices among the points of the mesh.
     points : (n, d) float64
         The points as read.
     """
@@ -48,10 +48,10 @@ class CgnsForm(Origin):
 def read_cgns(path: Path) -> Mesh:
     """Return the mesh of a CGNS file based on HDF5: all zones of its base.
 
-    Boundaries are the families of boundary conditions, or where these have none the conditions'
-    own names; where a zone has no conditions, its sections of boundary elements; without those,
-    the outer surface divided at its edges. Open interfaces are boundaries by their names, all of
-    one period as one.
+    Boundaries are the families of boundary conditions, named by the condition where it has no
+    family; for a zone without conditions, its sections of boundary elements; if there are none of
+    these at all, the outer surface divided at its edges. Open interfaces are boundaries with their
+    names, those of the same period together.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def read_cgns(path: Path) -> Mesh:
 
 
 def _base(root: Node) -> Node:
-    """Return the only base that has zones."""
+    """Return the base that has zones; raise MeshError if none or several have."""
     bases = root.children("CGNSBase_t")
     full = [base for base in bases if base.children("Zone_t")]
     if len(full) == 1:
@@ -90,6 +90,7 @@ def _base(root: Node) -> Node:
 
 
 def _mesh(path: Path, base: Node, zones: Sequence[CgnsZone], joined: Joined) -> Mesh:
+    """Return the mesh of joined zones, with its boundaries; raise MeshError if it is unusable."""
     cells = _renumbered([zone.cells for zone in zones], joined.numbers)
     dim = zones[0].dim
     points = (
@@ -107,7 +108,10 @@ def _mesh(path: Path, base: Node, zones: Sequence[CgnsZone], joined: Joined) -> 
 
 
 def _renumbered(parts: Sequence[Cells], numbers: Sequence[IntArray]) -> Cells:
-    """Return cells of zones as cells of the mesh."""
+    """Return the cells of all zones together, with the mesh's node numbers.
+
+    ``numbers`` are those of `Joined`.
+    """
     flats = [number[part.connectivity] for part, number in zip(parts, numbers, strict=True)]
     return Cells.from_types(np.concatenate([part.types for part in parts]), np.concatenate(flats))
 
@@ -115,7 +119,7 @@ def _renumbered(parts: Sequence[Cells], numbers: Sequence[IntArray]) -> Cells:
 def _markers(
     mesh: Mesh, base: Node, zones: Sequence[CgnsZone], joined: Joined
 ) -> tuple[tuple[Marker, ...], tuple[str, ...]]:
-    """Return the boundaries, and what is odd about them."""
+    """Return the boundaries, and remarks (sentences) on those that are empty or not joined."""
     groups: dict[str, list[Cells]] = {}
     remarks: list[str] = []
     inner: Cells | None = None
@@ -153,7 +157,7 @@ def _markers(
 def _of_conditions(zone: CgnsZone, nodes: Sequence[Node]) -> list[tuple[Node, Cells]]:
     """Return the facets of each boundary condition of a zone.
 
-    Of those given by vertices, the smallest gets a facet that is in several.
+    A facet of several conditions that are given by vertices goes to the one with fewest.
     """
     regions = {node: region_of(zone, node) for node in nodes}
     by_nodes = {node: at for node, at in regions.items() if not isinstance(at, Cells)}
@@ -173,7 +177,7 @@ def _family(base: Node, node: Node) -> str:
 def _add_open(
     groups: dict[str, list[Cells]], remarks: list[str], zones: Sequence[CgnsZone], joined: Joined
 ) -> None:
-    """Add the facets of open interfaces that are in no boundary condition."""
+    """Add the facets of open interfaces that are in no group yet, and remarks on these."""
     known = _together([part for parts in groups.values() for part in parts])
     names: dict[object, str] = {}
     taken = list(groups)
@@ -201,7 +205,7 @@ def _free_name(one: Interface, taken: Sequence[str]) -> str:
 
 
 def _together(parts: Sequence[Cells]) -> Cells:
-    """Return all cells in one."""
+    """Return the cells of all parts as one."""
     if not parts:
         return Cells.from_blocks([])
     return Cells.from_types(
@@ -211,7 +215,7 @@ def _together(parts: Sequence[Cells]) -> Cells:
 
 
 def among(facets: Cells, others: Cells) -> NDArray[np.bool_]:
-    """Tell for each facet, (m,), whether one of the others has the same nodes."""
+    """Return a mask (m,) of the facets that have the same nodes as any of the others."""
     tables = []
     for cells in (facets, others):
         table = np.zeros((len(cells), 4), np.int64)

@@ -1,9 +1,9 @@
 """The tree of nodes of a CGNS file, as the manual "CGNS/HDF5" maps it onto HDF5.
 
 A node is a group with the attributes ``name``, ``label`` (its kind, such as ``Zone_t``) and
-``type``; its value is the dataset ``" data"`` in it. Fortran's order of indices is C's here: the
-first index of the standard is the last axis of the dataset. A node of type ``LK`` stands for
-another one, to which ``" link"`` leads.
+``type``; its value is the dataset ``" data"`` in it. Axes are reversed: the first index in the
+standard, in Fortran's order, is the last axis of the dataset. A node of type ``LK`` is a link to
+another node, which is at ``" link"`` in it.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ _LINK = " link"
 
 @contextmanager
 def cgns_file(path: Path) -> Iterator[Node]:
-    """Return the root of a CGNS file, as long as the block lasts.
+    """Context with the root node of an open CGNS file.
 
     Raises
     ------
     MeshError
-        It is no HDF5 file, or whatever the library below finds wrong with it in the block.
+        It is no HDF5 file, or h5py raises any other error in the block.
     """
     import h5py
 
@@ -65,7 +65,7 @@ def cgns_file(path: Path) -> Iterator[Node]:
 class Node:
     """A node of the tree: the file, its group in it, and its path, ``/Base/Zone/ZoneBC``.
 
-    The path is that of the link where one leads to the node.
+    The path of a node found by a link is that of the link.
     """
 
     file: Path
@@ -74,12 +74,12 @@ class Node:
 
     @property
     def name(self) -> str:
-        """Return its own name."""
+        """Return the last part of its path."""
         return self.path.rpartition("/")[2]
 
     @property
     def label(self) -> str:
-        """Return its kind, ``Zone_t``; empty where it has none."""
+        """Return its kind, as ``Zone_t``; "" if it has none."""
         return _words(self.group.attrs.get("label", b""))
 
     def fault(self, message: str) -> MeshError:
@@ -87,7 +87,13 @@ class Node:
         return path_error(self.file, f"{self.path or '/'}: {message}")
 
     def children(self, *labels: str) -> list[Node]:
-        """Return the children of these kinds, in their order in the file."""
+        """Return the children whose kind is one of ``labels``, in their order in the file.
+
+        Raises
+        ------
+        MeshError
+            A link leads to no node.
+        """
         import h5py
 
         found = []
@@ -115,7 +121,7 @@ class Node:
         return next((node for node in found if not names or node.name in names), None)
 
     def needed(self, label: str, *names: str) -> Node:
-        """Return the first such child.
+        """Return the first child of a kind, with one of these names if any are given.
 
         Raises
         ------
@@ -129,12 +135,12 @@ class Node:
         return node
 
     def value(self) -> NDArray:
-        """Return its value.
+        """Return its value, with the axes as in the dataset.
 
         Raises
         ------
         MeshError
-            It has none.
+            It has no value.
         """
         import h5py
 
@@ -144,7 +150,13 @@ class Node:
         return np.asarray(data[()])
 
     def text(self) -> str:
-        """Return its value as a text, without the spaces and zeros that fill it up."""
+        """Return its value as text, without the spaces and zero bytes at its end.
+
+        Raises
+        ------
+        MeshError
+            The value is no text, or there is none.
+        """
         data = self.value()
         if data.dtype.kind not in "iuS":
             raise self.fault(
@@ -153,12 +165,12 @@ class Node:
         return _words(data.tobytes() if data.dtype.kind == "S" else data.astype("u1").tobytes())
 
     def whole(self, *shape: int) -> IntArray:
-        """Return its value as whole numbers of a shape, -1 for any length.
+        """Return its value as integers, reshaped to ``shape``; -1 in it is any length.
 
         Raises
         ------
         MeshError
-            They are no whole numbers, or others in number.
+            The value is not of integers, or does not fit the shape.
         """
         data = self.value()
         if data.dtype.kind not in "iu":
@@ -175,12 +187,13 @@ class Node:
             ) from None
 
     def word(self, label: str, default: str, *names: str) -> str:
-        """Return the text of a child, or another where there is no such child."""
+        """Return the text of the child that `child` returns, or ``default`` if there is none."""
         node = self.child(label, *names)
         return default if node is None else node.text()
 
 
 def _words(value: object) -> str:
+    """Return the printable part of a text in HDF5, up to its first zero byte, stripped."""
     raw = value if isinstance(value, bytes) else str(value).encode("utf-8", "surrogateescape")
     text = raw.partition(b"\0")[0].decode("utf-8", "backslashreplace")
     return "".join(sign for sign in text if sign.isprintable()).strip()

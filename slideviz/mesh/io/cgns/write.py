@@ -1,6 +1,6 @@
 """Writing CGNS meshes: a copy of the file that the mesh was read from, with other coordinates.
 
-So solutions, units, families, connectivities and whatever else is in it stay as they are.
+All else in the file (solutions, units, families, connectivities) is copied.
 """
 
 from __future__ import annotations
@@ -18,15 +18,16 @@ from slideviz.mesh.model import FloatArray, Mesh
 
 
 def write_cgns(path: Path, mesh: Mesh, replaces: Path | None = None) -> None:
-    """Write a mesh that was read from a CGNS file as another one.
+    """Write a mesh that was read from a CGNS file as a copy of that file with its points.
 
-    Points that have not moved keep the bits of each zone; those that have are rounded to the type
-    that the file has, R4 or R8.
+    Coordinates that did not change keep the bits of the file; others are rounded to the file's
+    type, R4 or R8.
 
     Raises
     ------
     MeshError
-        The mesh is from no CGNS file, that file is no more as it was, or this cannot be written.
+        The mesh was not read from a CGNS file, that file was changed, or the new one cannot be
+        written.
     """
     form, source = require_cgns(path, mesh)
     try:
@@ -41,12 +42,14 @@ def write_cgns(path: Path, mesh: Mesh, replaces: Path | None = None) -> None:
 
 
 def require_cgns(path: Path, mesh: Mesh) -> tuple[CgnsForm, Path]:
-    """Return where the coordinates of a mesh are, and the file.
+    """Return where the coordinates of a mesh are in the CGNS file it was read from, and that file.
+
+    ``path`` is the file to write, for messages.
 
     Raises
     ------
     MeshError
-        It was read from no CGNS file, so it cannot be written as one.
+        It was not read from a CGNS file, so it cannot be written as one.
     """
     form, source = mesh.origin, mesh.source
     if not (isinstance(form, CgnsForm) and source and len(mesh.points) == len(form.points)):
@@ -59,7 +62,11 @@ def require_cgns(path: Path, mesh: Mesh) -> tuple[CgnsForm, Path]:
 
 
 def _replace(path: Path, source: Path, tree: h5py.File, form: CgnsForm, points: FloatArray) -> None:
-    """Put the points into the copy of the file."""
+    """Write ``points`` (n, d) into the copy of the file, whose root is ``tree``.
+
+    Raises MeshError if the coordinates there are not those that were read, or if the new ones are
+    too large for their type. ``path`` is the new file, ``source`` the one it is a copy of.
+    """
     tolerance = JOINED * float(np.ptp(form.points, axis=0).max())
     for names, numbers in zip(form.datasets, form.numbers, strict=True):
         for axis, name in enumerate(names):
@@ -83,6 +90,7 @@ def _replace(path: Path, source: Path, tree: h5py.File, form: CgnsForm, points: 
 
 
 def _changed(path: Path, source: Path, name: str) -> Exception:
+    """Return the error for a file whose dataset ``name`` changed after the mesh was read."""
     return path_error(
         path,
         f"cannot be written: {printable(source)}, of which it is a copy, was changed after the "

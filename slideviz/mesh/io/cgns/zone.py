@@ -1,4 +1,4 @@
-"""Zones of a CGNS file, each with its own numbering, and the regions of their boundaries."""
+"""Zones of a CGNS file, each with its own node numbers, and the facets of their boundaries."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from slideviz.mesh.io.meshio.markers import in_node_sets
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 
 _AXES = ("CoordinateX", "CoordinateY", "CoordinateZ")
+# Values of GridLocation: vertices; facets, by the dimension of the cells; those across i, j, k.
 _BY_NODES = "Vertex"
 _BY_FACETS = {2: ("EdgeCenter", "FaceCenter"), 3: ("FaceCenter",)}
 _BY_DIRECTION = ("IFaceCenter", "JFaceCenter", "KFaceCenter")
@@ -42,11 +43,11 @@ class CgnsZone:
     cells : Cells
         Its cells.
     sides : CgnsElements or None
-        The elements of one dimension less, of an unstructured zone.
+        Elements of an unstructured zone with one dimension less; None for a structured zone.
     sections : tuple of Node
-        Its sections of elements.
+        Its sections of elements; empty for a structured zone.
     datasets : tuple of str
-        The datasets of the coordinates.
+        Paths of the datasets of the p coordinates.
     """
 
     node: Node
@@ -64,11 +65,14 @@ class CgnsZone:
 
     @cached_property
     def outer(self) -> Cells:
-        """Return its facets that only one of its cells has."""
+        """Return the facets that only one cell of the zone has."""
         return outer_facets(Mesh(self.points[:, : self.dim], self.cells))
 
     def nodes_at(self, node: Node, indices: IntArray) -> IntArray:
-        """Return the numbers of vertices from 0, (m,), at their indices from 1, (m, len(shape))."""
+        """Return the numbers (m,), from 0, of vertices at ``indices`` (m, len(shape)), from 1.
+
+        Raises MeshError, which names ``node``, if an index is out of range.
+        """
         bad = ((indices < 1) | (indices > self.shape)).any(axis=1)
         if bad.any():
             raise node.fault(
@@ -113,7 +117,10 @@ def read_zone(node: Node, dim: int, physical: int) -> CgnsZone:
 
 
 def _points(zone: Node, shape: tuple[int, ...], count: int) -> tuple[FloatArray, tuple[str, ...]]:
-    """Return the vertices, (n, count), and the paths of their datasets."""
+    """Return the vertices (n, count) of a zone, and the paths of their datasets.
+
+    Raises MeshError if a coordinate is missing, is of another type or shape, or is not finite.
+    """
     grid = zone.needed("GridCoordinates_t", "GridCoordinates")
     if (rind := grid.child("Rind_t")) is not None and rind.whole(-1).any():
         raise rind.fault(
@@ -149,7 +156,9 @@ def _points(zone: Node, shape: tuple[int, ...], count: int) -> tuple[FloatArray,
 
 
 def region_of(zone: CgnsZone, node: Node) -> Cells | IntArray:
-    """Return what a boundary condition or an interface is on: its facets, or its vertices.
+    """Return the facets, or the vertices (k,), that a boundary condition or interface is on.
+
+    Raises MeshError if the node is wrong.
 
     Parameters
     ----------
@@ -193,7 +202,10 @@ def region_of(zone: CgnsZone, node: Node) -> Cells | IntArray:
 
 
 def facets_of(zone: CgnsZone, node: Node) -> Cells:
-    """Return the facets of a boundary condition or interface, in the zone's numbers."""
+    """Return the facets of a boundary condition or interface, with the zone's node numbers.
+
+    If it is given by vertices, they are the outer facets that have no other vertices.
+    """
     region = region_of(zone, node)
     if isinstance(region, Cells):
         return region
@@ -201,7 +213,7 @@ def facets_of(zone: CgnsZone, node: Node) -> Cells:
 
 
 def faces_by_number(zone: CgnsZone, node: Node, numbers: IntArray) -> Cells:
-    """Return the facets with these numbers of elements, or of a range of them.
+    """Return the facets whose element numbers are ``numbers`` or, of a range node, in its range.
 
     Raises
     ------
@@ -228,7 +240,11 @@ def faces_by_number(zone: CgnsZone, node: Node, numbers: IntArray) -> Cells:
 
 
 def _range_faces(zone: CgnsZone, node: Node, where: str, corners: IntArray) -> Cells:
-    """Return the faces of a range of indices from 1, (2, d), of a structured zone."""
+    """Return the faces of a structured zone in the range of indices ``corners`` (2, d), from 1.
+
+    ``where`` is the GridLocation of the indices. Empty for a range of vertices that is a line or a
+    point; MeshError if it is no face.
+    """
     low, high = corners
     flat = np.flatnonzero(low == high)
     if where in _BY_DIRECTION:
@@ -262,7 +278,10 @@ def _range_faces(zone: CgnsZone, node: Node, where: str, corners: IntArray) -> C
 
 
 def _listed_faces(zone: CgnsZone, node: Node, where: str, indices: IntArray) -> Cells:
-    """Return faces of a structured zone that are listed one by one."""
+    """Return the faces of a structured zone at ``indices`` (m, d), from 1, across one direction.
+
+    It is that of the GridLocation ``where``. Raises MeshError if ``where`` is another one.
+    """
     if where not in _BY_DIRECTION:
         raise node.fault(
             f"lists faces of a structured zone at {where}, which does not tell their direction; "
@@ -275,7 +294,10 @@ def _listed_faces(zone: CgnsZone, node: Node, where: str, indices: IntArray) -> 
 
 
 def _faces(zone: CgnsZone, axis: int, first: IntArray) -> Cells:
-    """Return the faces across an axis, from the vertex of each with the lowest indices."""
+    """Return the faces of a structured zone across ``axis`` (0 to 2 for i, j, k).
+
+    ``first`` (m,) is the vertex of each face with the lowest indices.
+    """
     steps = np.delete(np.cumprod([1, *zone.shape[:-1]]), axis)
     corners = [0, steps[0]] if zone.dim == 2 else [0, steps[0], steps.sum(), steps[1]]
     return Cells.from_blocks([(3 if zone.dim == 2 else 9, first[:, None] + np.array(corners))])

@@ -1,7 +1,7 @@
 """Reading meshes of other formats through meshio.
 
-A mesh that was sent by somebody must not make the program read whatever it names on this disk:
-other files that it names are followed into its own folder only, links of HDF5 not at all.
+A mesh file from somebody else must not make the program read any file of this disk: files that it
+names are read only if they are in its own folder, external links of HDF5 not at all.
 """
 
 from __future__ import annotations
@@ -38,20 +38,21 @@ MESHIO_TYPES = {
     "wedge": 13,
     "pyramid": 14,
 }
+"""VTK identifier by meshio's name of an element type."""
 _FLAT = 1e-9
-"""A mesh is flat when it is thinner than this fraction of its extent."""
+"""Largest range of z, as a fraction of the extent, of a mesh in the xy-plane."""
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _INCLUDE = re.compile(rb"^\*INCLUDE\b[^=\n]*=([^\n]*)", re.IGNORECASE | re.MULTILINE)
 _MOST_FILES = 100
-"""Files that may be named in a row, each by the one before: they may name each other."""
+"""Most files that are searched for names of further files: two may name each other."""
 
 
 def read_with_meshio(path: Path, progress: Progress) -> Mesh:
     """Return the mesh of a file that meshio reads.
 
-    Cells of the highest dimension are the mesh; those of one dimension less are its boundaries,
-    named as the file names them. A file without named boundaries gets its outer surface, divided
+    Its cells are those of the highest dimension; those of one dimension less are its boundaries,
+    with the names of the file. A file without named boundaries gets its outer surface, divided
     at its edges: ``boundary_1``, ``boundary_2`` and so on, the largest first.
 
     Raises
@@ -71,7 +72,7 @@ def read_with_meshio(path: Path, progress: Progress) -> Mesh:
 
 
 def _mesh(path: Path, data: meshio.Mesh) -> Mesh:
-    """Return our mesh of meshio's."""
+    """Return the mesh that meshio read as a `Mesh`, or raise MeshError."""
     blocks = [
         _block(path, cells.type, cells.data, index)
         for index, cells in enumerate(data.cells)
@@ -96,7 +97,7 @@ def _mesh(path: Path, data: meshio.Mesh) -> Mesh:
 
 
 def _block(path: Path, name: str, nodes: object, index: int) -> MeshioBlock:
-    """Return a block of cells of one type that slideviz knows."""
+    """Return a block of meshio's cells; MeshError if their type ``name`` or nodes are unusable."""
     if name not in MESHIO_TYPES:
         kind = "has many sides" if name.startswith(("poly", "pixel")) else "is of high order"
         raise path_error(
@@ -116,7 +117,7 @@ def _block(path: Path, name: str, nodes: object, index: int) -> MeshioBlock:
 
 
 def _points(path: Path, data: meshio.Mesh, cells: Cells) -> FloatArray:
-    """Return the points (n, 2) or (n, 3), of which the cells use no others."""
+    """Return the points (n, 2) or (n, 3); MeshError for another shape or wrong nodes of cells."""
     points = np.asarray(data.points, float)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise path_error(
@@ -129,7 +130,7 @@ def _points(path: Path, data: meshio.Mesh, cells: Cells) -> FloatArray:
 
 
 def flattened(path: Path, points: FloatArray, cells: Cells) -> FloatArray:
-    """Return the first two columns of points that all have one z."""
+    """Return x and y (n, 2) of points (n, 3); MeshError if those of cells differ in z."""
     used = points[cells.nodes]
     if np.ptp(used[:, 2]) > _FLAT * np.ptp(used, axis=0).max():
         raise path_error(
@@ -141,7 +142,7 @@ def flattened(path: Path, points: FloatArray, cells: Cells) -> FloatArray:
 
 
 def require_own(path: Path) -> None:
-    """Raise when a file names others that do not lie beside it.
+    """Raise if a file, or one that it names, names files that are not in its folder.
 
     Raises
     ------
@@ -167,7 +168,10 @@ def require_own(path: Path) -> None:
 
 
 def _named(path: Path) -> Iterator[tuple[str, Path]]:
-    """Yield the names of files that a file has, and where meshio would look for them."""
+    """Yield each name of another file in a file, and the path that meshio would read for it.
+
+    Raises MeshError for an external link of HDF5.
+    """
     with path.open("rb") as file:
         is_hdf5 = file.read(len(_HDF5)) == _HDF5
     if is_hdf5:
@@ -181,6 +185,7 @@ def _named(path: Path) -> Iterator[tuple[str, Path]]:
 
 
 def _of_xdmf(path: Path) -> Iterator[tuple[str, Path]]:
+    """Yield the same as `_named` for an XDMF file."""
     try:
         items = [item for _, item in ET.iterparse(path) if item.tag == "DataItem"]
     except ET.ParseError:
@@ -195,12 +200,12 @@ def _of_xdmf(path: Path) -> Iterator[tuple[str, Path]]:
 
 
 def _place(path: Path) -> Path:
-    """Return a path without ``..`` or links in its folder; the file itself may be a link."""
+    """Return a path with its folder resolved (no ``..``, no links); its last part stays."""
     return Path(os.path.realpath(path.parent)) / path.name
 
 
 def _require_no_links(path: Path) -> None:
-    """Raise where an HDF5 file takes something from another file."""
+    """Raise MeshError if an HDF5 file has a link to, or numbers in, another file."""
     import h5py
 
     with h5py.File(path, "r") as file:
@@ -222,7 +227,7 @@ def _require_no_links(path: Path) -> None:
                     )
                 if isinstance(thing, h5py.Group):
                     key = h5py.h5o.get_info(thing.id).addr
-                    if key not in seen:  # a group may hold one that it lies in
+                    if key not in seen:  # a group may contain one of its own parents
                         seen.add(key)
                         groups.append(thing)
 

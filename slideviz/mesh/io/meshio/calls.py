@@ -1,6 +1,6 @@
-"""Calls of meshio whose failures are one ``MeshError``.
+"""Calls of meshio, with any failure raised as a ``MeshError``.
 
-meshio itself prints, ends the process on some errors and raises whatever it meets.
+meshio prints, on some errors ends the process, and raises errors of any class.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ _STREAMS = threading.Lock()
 
 
 def formats_of(path: Path) -> list[str]:
-    """Return the names of meshio's formats that fit the ending of the file.
+    """Return the names of meshio's formats that have the file's ending, the likeliest first.
 
     Raises
     ------
     MeshError
-        There is none.
+        There is no such format.
     """
     import meshio
 
@@ -51,12 +51,13 @@ def formats_of(path: Path) -> list[str]:
 
 @contextmanager
 def meshio_errors(path: Path, what: str) -> Iterator[None]:
-    """Return a context in which meshio neither prints nor ends the process.
+    """Context in which meshio neither prints nor ends the process.
 
     Raises
     ------
     MeshError
-        Whatever the block raises, as one sentence: ``path: cannot be <what>: ...``.
+        In place of any error of the block, as one sentence: ``path: cannot be <what>: ...``. A
+        MeshError or MemoryError is raised as it is.
     """
     said = StringIO()
     try:
@@ -84,12 +85,12 @@ def meshio_errors(path: Path, what: str) -> Iterator[None]:
 
 
 def load(path: Path, formats: list[str]) -> meshio.Mesh:
-    """Return what meshio reads from the file in the first of the formats that it can be.
+    """Return meshio's mesh of a file, read in the first of ``formats`` that succeeds.
 
     Raises
     ------
     MeshError
-        It is none of them; the message is that of the first.
+        It can be read in none of them; the message is that of the first.
     """
     import meshio
 

@@ -16,9 +16,11 @@ if TYPE_CHECKING:
     import meshio
 
 Groups = dict[str, list[tuple[int, IntArray]]]
+"""Blocks of boundary elements, VTK identifier and nodes (m, n), by the name of the boundary."""
 Name = TypeVar("Name")
 
-# The numbers that formats put on cells, the telling ones first, and how to name a nameless one.
+# Cell data with the number of a boundary, in order of preference, and the word before a number
+# without a name.
 _TAGS = {
     "marker": "marker",
     "gmsh:physical": "physical",
@@ -29,15 +31,15 @@ _TAGS = {
     "netgen:index": "index",
     "gmsh:geometrical": "geometrical",
 }
-# The numbers that a table of names in the file is about.
+# Cell data whose numbers a table in the file names.
 _NAMED = ("marker", "gmsh:physical", "cell_tags", "netgen:index")
-# Here 0 means that the element is in no group.
+# Cell data in which 0 means that the element is in no group.
 _ZERO_IS_NONE = ("marker", "gmsh:physical", "cell_tags")
 
 
 @dataclass(frozen=True, eq=False)
 class MeshioBlock:
-    """Elements of one type: where in meshio's list, VTK identifier, nodes (m, n)."""
+    """Elements of one type: index in meshio's list of blocks, VTK identifier, nodes (m, n)."""
 
     index: int
     vtk: int
@@ -47,9 +49,9 @@ class MeshioBlock:
 def find_markers(mesh: Mesh, data: meshio.Mesh, sides: Sequence[MeshioBlock]) -> tuple[Marker, ...]:
     """Return the boundaries of a mesh.
 
-    Looked for, in this order: named sets of boundary elements, numbers on boundary elements
-    (with names where the file has them), named sets of points. Where there is nothing of these
-    the outer surface is divided at its edges.
+    They are found by the first of these that the file has: named sets of boundary elements, numbers
+    on boundary elements (with names where the file has them), named sets of points. Without any,
+    they are the parts of the outer surface, divided at its edges.
 
     Parameters
     ----------
@@ -68,7 +70,7 @@ def find_markers(mesh: Mesh, data: meshio.Mesh, sides: Sequence[MeshioBlock]) ->
 
 
 def _by_cell_sets(data: meshio.Mesh, sides: Sequence[MeshioBlock]) -> Groups:
-    """Return the elements in each named set of cells."""
+    """Return the boundary elements in each named set of cells."""
     groups: Groups = {}
     for name, members in data.cell_sets.items():
         if name is not None and name.startswith("gmsh:"):
@@ -82,7 +84,7 @@ def _by_cell_sets(data: meshio.Mesh, sides: Sequence[MeshioBlock]) -> Groups:
 
 
 def _by_tags(mesh: Mesh, data: meshio.Mesh, sides: Sequence[MeshioBlock]) -> Groups:
-    """Return the elements with each number of the first cell data that has any."""
+    """Return boundary elements grouped by the first cell data that has numbers of groups."""
     others = [key for key in data.cell_data if key not in _TAGS]
     for key in [*_TAGS, *others]:
         values = _numbers(data, key, sides)
@@ -103,7 +105,10 @@ def _by_tags(mesh: Mesh, data: meshio.Mesh, sides: Sequence[MeshioBlock]) -> Gro
 
 
 def _numbers(data: meshio.Mesh, key: str, sides: Sequence[MeshioBlock]) -> list[NDArray] | None:
-    """Return the whole numbers on each block of boundary elements, or None."""
+    """Return the integers (m,) of cell data ``key`` on each block of boundary elements, or None.
+
+    None if there are none, or nearly all differ: then they are identifiers, not groups.
+    """
     if not sides or key not in data.cell_data:
         return None
     values = [np.asarray(data.cell_data[key][block.index]) for block in sides]
@@ -118,7 +123,7 @@ def _numbers(data: meshio.Mesh, key: str, sides: Sequence[MeshioBlock]) -> list[
 
 
 def _names(data: meshio.Mesh, dim: int) -> dict[int, list[str]]:
-    """Return the names of each number on elements of a dimension."""
+    """Return the names in the file for each number of a group of elements of dimension ``dim``."""
     found: dict[int, list[str]] = {}
     for name, value in data.field_data.items():
         pair = np.ravel(value)
@@ -130,13 +135,17 @@ def _names(data: meshio.Mesh, dim: int) -> dict[int, list[str]]:
 
 
 def _add(groups: Groups, name: str | None, vtk: int, nodes: IntArray) -> None:
+    """Add elements to the group of a name, cleaned of what is not printable, or ``unnamed``."""
     # Readers give None to a set that its file does not name.
     clean = "".join(c for c in name or "" if c.isprintable()).strip() or "unnamed"
     groups.setdefault(clean, []).append((vtk, nodes))
 
 
 def _by_point_sets(mesh: Mesh, data: meshio.Mesh, facets: Cells) -> tuple[Marker, ...]:
-    """Return the outer facets whose nodes are all in a named set of points."""
+    """Return a marker for each named set of points: the outer facets with all their nodes in it.
+
+    Sets without such facets are left out.
+    """
     groups: Groups = {}
     for name, parts in in_node_sets(len(mesh.points), facets, data.point_sets).items():
         for vtk, nodes in parts:
@@ -147,9 +156,10 @@ def _by_point_sets(mesh: Mesh, data: meshio.Mesh, facets: Cells) -> tuple[Marker
 def in_node_sets(
     n_points: int, facets: Cells, sets: Mapping[Name, ArrayLike]
 ) -> dict[Name, list[tuple[int, IntArray]]]:
-    """Return for each set of nodes the facets whose nodes are all in it, as blocks.
+    """Return for each set of nodes the facets with all their nodes in it, as blocks of one type.
 
-    A facet goes to the smallest set that has it, so that a set of all points takes nothing away.
+    A facet goes only to the smallest of such sets, so that a set of all points takes none from
+    the others.
     """
     free = np.ones(len(facets), bool)
     found: dict[Name, list[tuple[int, IntArray]]] = {name: [] for name in sets}
@@ -166,5 +176,6 @@ def in_node_sets(
 
 
 def _rows(cells: Cells) -> Iterator[tuple[int, IntArray, IntArray]]:
+    """Yield VTK identifier, element indices (m,) and nodes (m, n) of each type."""
     for vtk, (ids, nodes) in cells.by_type.items():
         yield vtk, ids, nodes

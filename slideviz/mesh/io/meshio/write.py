@@ -1,4 +1,4 @@
-"""Writing meshes in other formats than SU2: VTU, VTKHDF and CGNS here, the rest by meshio.
+"""Writing meshes as VTU, by our own code, or in one of meshio's formats, by meshio.
 
 meshio writes VTU too, but reorders cells of mixed type and loses the names of boundaries.
 """
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 
 _NAMES = {vtk: name for name, vtk in MESHIO_TYPES.items()}
+# Name of the cell data with the numbers of the boundaries, by format; else "marker".
 _TAG = {
     "gmsh": "gmsh:physical",
     "med": "cell_tags",
@@ -37,17 +38,18 @@ _TAG = {
     "ugrid": "ugrid:ref",
 }
 _NAMED = ("gmsh", "netgen")
-"""The formats in which a table names the numbers."""
+"""The formats with a table of names for these numbers."""
 _WRITTEN_AS = {"gmsh": "gmsh22"}
-"""The older form of Gmsh's files has a group on each element, and more programs read it."""
+"""Name of the version that meshio is to write; Gmsh 2.2 has a group on each element."""
 _EXACT = 1e-12
-"""Coordinates may differ by this fraction of the extent: the last digits of a text format."""
+"""Largest error of a coordinate in a written file, as a fraction of the extent."""
 
 _TYPES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "u1": "UInt8"}
 _BLOCK_BYTES = 3 << 18
 """A multiple of 3, so that the encoded blocks join."""
-# Until VTK 9.7 (vtk!12988) the first triangle of a prism faced outward. Files do not tell, and what
-# else reads VTU files (older ParaView, meshio) has it so still; VTKHDF files have the new order.
+# Order of a prism's nodes in VTU files. Until VTK 9.7 (vtk!12988) the first triangle faced outward.
+# Files do not say which order they have; other readers (older ParaView, meshio) expect this one.
+# VTKHDF files have the new order.
 _PRISM = np.array([0, 2, 1, 3, 5, 4])
 
 
@@ -60,9 +62,9 @@ def write_other_format(
 ) -> None:
     """Write a mesh as VTU, or in the format of meshio that the ending names.
 
-    Only VTU files get the point data. Names of boundaries are kept in these, in Gmsh, MED and
-    Abaqus files; other formats get numbers at most. What meshio wrote is read again and
-    compared, for it leaves out what a format cannot hold.
+    Only VTU files get the point data. VTU, Gmsh, MED and Abaqus files have the names of
+    boundaries; other formats have their numbers at most. What meshio wrote is read again and
+    compared, for meshio leaves out what a format cannot hold.
 
     Raises
     ------
@@ -95,6 +97,10 @@ def write_other_format(
 
 
 def _write(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
+    """Write meshio's mesh to ``trial``, in a folder of its own, in the format ``name``.
+
+    Raises MeshError, which names ``path``, if it cannot be written or needs several files.
+    """
     import meshio
 
     # Without this XDMF puts the numbers in a second file.
@@ -109,7 +115,7 @@ def _write(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
 
 
 def _compare(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
-    """Raise when the file does not hold all that should be in it."""
+    """Raise MeshError, which names ``path``, if the file ``trial`` lacks some of ``data``."""
     try:
         found = load(trial, [name])
     except MeshError as problem:
@@ -138,7 +144,10 @@ def _compare(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
 
 
 def _to_meshio(mesh: Mesh, cell_data: Mapping[str, NDArray], name: str) -> meshio.Mesh:
-    """Return meshio's form of the mesh, one block for each type of element."""
+    """Return the mesh for meshio and its format ``name``, a block for each type of element.
+
+    Blocks of cells come first, then those of boundary elements, whose cell data are NaN.
+    """
     import meshio
 
     points = np.zeros((len(mesh.points), 3))
@@ -179,7 +188,7 @@ def _to_meshio(mesh: Mesh, cell_data: Mapping[str, NDArray], name: str) -> meshi
 
 
 def _boundary_blocks(mesh: Mesh) -> list[tuple[int, NDArray, NDArray]]:
-    """Return for each type of boundary element: type, nodes (m, n), number of marker (m,)."""
+    """Return for each type of boundary element: type, nodes (m, n), number of marker from 1 (m,)."""
     found: dict[int, list[tuple[NDArray, NDArray]]] = {}
     for number, marker in enumerate(mesh.markers, 1):
         for vtk, (_, nodes) in marker.cells.by_type.items():
@@ -247,7 +256,10 @@ def vtu_blocks(
 
 
 def _in_vtk_order(nodes: IntArray, offsets: IntArray, types: NDArray[np.uint8]) -> IntArray:
-    """Return the connectivity with the nodes of prisms in VTK's order."""
+    """Return the connectivity with the nodes of prisms in the order of VTU files.
+
+    ``offsets`` (m,) are where the nodes of each element end.
+    """
     first = offsets[types == 13][:, None] - len(_PRISM)
     turned = nodes.copy()
     turned[first + np.arange(len(_PRISM))] = nodes[first + _PRISM]
@@ -255,7 +267,7 @@ def _in_vtk_order(nodes: IntArray, offsets: IntArray, types: NDArray[np.uint8]) 
 
 
 def _array(name: str, values: NDArray) -> Iterator[bytes]:
-    """Yield one array, uncompressed: its length in bytes and its bytes in base64."""
+    """Yield the XML of one array, uncompressed: its length and its bytes in base64."""
     kind = values.dtype.str[1:]
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
     yield (

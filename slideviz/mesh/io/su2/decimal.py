@@ -1,8 +1,8 @@
-"""Decimal numbers in text, compiled: to the nearest float64, as `float` of the same word.
+"""Conversion of decimal numbers in text to the nearest float64, compiled.
 
-Clinger's exact case (1990), else Lemire's product with a power of five of 128 bits (Number Parsing
-at a Gigabyte per Second, 2021). What is left over, one number in billions, and whatever is no
-plain decimal number, is not converted here: the caller asks Python.
+The result is that of Python's `float`. Method: product with a power of five of 128 bits (D. Lemire,
+Number Parsing at a Gigabyte per Second, 2021). Where that does not decide (one number in billions),
+and for words that are no plain decimal numbers, no result is returned: the caller uses Python.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from slideviz.mesh.caching import njit
 OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
 
 _LEAST, _MOST = -342, 308
-"""Below and above these powers of ten, any 19 digits are zero or infinite."""
+"""Powers of ten beyond which a number of 19 digits is zero or infinite."""
 _DIGITS = 19
-"""So many decimal digits fit into 64 bits."""
+"""How many decimal digits fit into 64 bits."""
 
 
 def _powers_of_five() -> NDArray[np.uint64]:
-    """Return the first 128 bits of 5^q, high and low: (651, 2)."""
+    """Return the first 128 bits of 5^q for q from _LEAST to _MOST: (651, 2), high and low 64."""
     rows = []
     for q in range(_LEAST, _MOST + 1):
         power = 5 ** abs(q)
         if q < 0:
             size = power.bit_length()
-            # From 5^-27 on down the quotient is rounded up, for it never is exact.
+            # For q below -27 the quotient is rounded up, for it is never exact.
             power = (1 << (size + 127 if q >= -27 else 2 * size + 128)) // power + 1
         shift = power.bit_length() - 128
         first = power >> shift if shift > 0 else power << -shift
@@ -50,7 +50,7 @@ _HIDDEN = np.uint64(1 << 52)
 
 @njit(inline="always", **OPTIONS)
 def _product(a, b):  # type: ignore[no-untyped-def]
-    """Return the high and the low 64 bits of a product."""
+    """Return the high and the low 64 bits of the product of two uint64."""
     a0, a1, b0, b1 = a & _LOW, a >> _U32, b & _LOW, b >> _U32
     low, middle = a0 * b0, a1 * b0
     middle += low >> _U32
@@ -60,9 +60,9 @@ def _product(a, b):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def nearest_bits(digits, q):  # type: ignore[no-untyped-def]
-    """Return the bits of the float64 next to digits x 10^q, or all ones when in doubt.
+    """Return the bits (uint64) of the float64 nearest to digits x 10^q, or all ones if undecided.
 
-    In doubt are also numbers that are subnormal or infinite.
+    Undecided are also numbers that are subnormal or infinite.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def nearest_bits(digits, q):  # type: ignore[no-untyped-def]
     power = ((217706 * q) >> 16) + 63 + np.int64(top) - shift + 1023
     if power <= 0:
         return _ALL
-    # Exactly between two numbers: the even one.
+    # Exactly between two float64: the even one.
     halfway = low <= _U1 and -4 <= q <= 23 and mantissa & _U3 == _U1
     if halfway and mantissa << down == high:
         mantissa &= ~_U1
@@ -109,20 +109,27 @@ def nearest_bits(digits, q):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def ends(code):  # type: ignore[no-untyped-def]
-    """Tell whether a byte ends a word: a blank of any kind, or a comment."""
+    """Return whether a byte ends a word: a blank, a line break or ``%`` (begin of a comment)."""
     return code == 32 or 9 <= code <= 13 or code == 37
 
 
 @njit(**OPTIONS)
 def decimal(text, at, bits, k):  # type: ignore[no-untyped-def]
-    """Put the number that begins at ``at`` into place k, and return where it ends, or -1.
+    """Write the bits of the number that begins at ``text[at]`` to ``bits[k]``; return its end.
+
+    The result is -1, and nothing is written, if it is no plain number or `nearest_bits` is
+    undecided.
 
     Parameters
     ----------
     text : (b,) uint8
-        A line break is its last byte.
-    values, bits : (v,) float64, (v,) uint64
-        The same memory.
+        The text; its last byte is a line break.
+    at : int
+        Index of the first byte of the number.
+    bits : (v,) uint64
+        Receives the bits of the float64.
+    k : int
+        The place in ``bits``.
     """
     sign = np.uint64(text[at] == 45) << _U63
     at += (text[at] == 45) | (text[at] == 43)
@@ -158,7 +165,10 @@ def decimal(text, at, bits, k):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _digits(text, at, value):  # type: ignore[no-untyped-def]
-    """Return the value of decimal digits after those of ``value``, modulo 2^64, and their end."""
+    """Append the decimal digits from ``text[at]`` on to ``value``, modulo 2^64.
+
+    Returns the new value and where the digits end.
+    """
     digit = np.uint64(text[at]) - U48
     while digit < U10:
         value = value * U10 + digit
@@ -169,7 +179,10 @@ def _digits(text, at, value):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def _first_digits(text, at):  # type: ignore[no-untyped-def]
-    """Return the first digits of a long number, the power of ten, and whether more follow."""
+    """Return the first 19 digits of a long number, its power of ten, and whether more follow.
+
+    Leading zeros do not count. The number begins at ``text[at]``; its exponent is not read.
+    """
     value, count, q, point, more = _U0, 0, 0, False, False
     while True:
         digit = np.uint64(text[at]) - U48
@@ -189,7 +202,10 @@ def _first_digits(text, at):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _exponent(text, at):  # type: ignore[no-untyped-def]
-    """Return where an exponent ends, and its value; -1 where it is none, or endless."""
+    """Return where the exponent from ``text[at]`` on ends, and its value.
+
+    The end is -1 if there are no digits, or more than five.
+    """
     down = text[at] == 45
     if down or text[at] == 43:
         at += 1

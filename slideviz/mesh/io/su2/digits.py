@@ -1,7 +1,7 @@
-"""Compiled loops that print SU2 files: rows of elements and of points, and points into old rows.
+"""Compiled loops that write rows of SU2 files: elements, points, and new coordinates in old rows.
 
-The digits of coordinates come from orjson, which prints an array as ``[[0.5,-1e-7],[2.0,0.1]]``
-with as few digits as identify each float64.
+The digits of coordinates come from orjson, which writes an array as ``[[0.5,-1e-7],[2.0,0.1]]``
+with as few digits as identify each float64. Texts are arrays of bytes, (b,) uint8.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from slideviz.mesh.io.su2.loops import is_numeric
 
 @njit(inline="always", **OPTIONS)
 def _print_whole(value, out, at):  # type: ignore[no-untyped-def]
-    """Print a whole number, not negative, and return where it ends."""
+    """Write a whole number, not negative, from ``out[at]`` on; return where it ends."""
     stop, rest = at + 1, value
     while rest >= 10:
         rest //= 10
@@ -29,14 +29,14 @@ def _print_whole(value, out, at):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def print_cells(types, offsets, nodes, first, out):  # type: ignore[no-untyped-def]
-    """Print a row for each element: type, nodes, and its index.
+    """Write a row for each element, type, nodes and index, into ``out``; return its length.
 
     Parameters
     ----------
     types, offsets, nodes : (m,), (m + 1,), (k,)
-        The elements; the offsets are those of ``nodes``, but for a constant.
+        The elements; only differences of the offsets are used.
     first : int
-        The index of the first; below 0 where they have none.
+        The index of the first element; if negative, rows get no index.
     out : (b,) uint8
         Receives the text.
 
@@ -62,7 +62,10 @@ def print_cells(types, offsets, nodes, first, out):  # type: ignore[no-untyped-d
 
 @njit(inline="always", **OPTIONS)
 def _copy_number(numbers, j, out, at):  # type: ignore[no-untyped-def]
-    """Copy a number of orjson's, and return where the next begins, and where the copy ends."""
+    """Copy the number at ``numbers[j]``, orjson's text, to ``out[at]``.
+
+    Returns where the next number begins in ``numbers``, and where the copy ends in ``out``.
+    """
     while numbers[j] != 44 and numbers[j] != 93:
         out[at] = numbers[j]
         j += 1
@@ -74,14 +77,14 @@ def _copy_number(numbers, j, out, at):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def print_points(numbers, dim, first, out):  # type: ignore[no-untyped-def]
-    """Print a row for each point: coordinates and its index.
+    """Write a row for each point, coordinates and index, into ``out``; return its length.
 
     Parameters
     ----------
     numbers : (c,) uint8
-        The coordinates, as orjson prints them.
+        The coordinates, as orjson writes them.
     dim, first : int
-        Coordinates of each, index of the first.
+        Number of coordinates of a point; index of the first point.
     out : (b,) uint8
         Receives the text.
 
@@ -105,23 +108,24 @@ def print_points(numbers, dim, first, out):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def print_changed(text, numbers, changed, out):  # type: ignore[no-untyped-def]
-    """Print the text with those coordinates replaced that changed.
+    """Copy ``text`` to ``out`` with the coordinates that changed replaced.
 
     Parameters
     ----------
     text : (b,) uint8
-        Lines, with the points on those that have numbers.
+        Whole lines; those that begin with a number are points.
     numbers : (c,) uint8
-        The coordinates, as orjson prints them.
+        All m x d coordinates of the points, as orjson writes them.
     changed : (m, d) bool
-        Which of them changed.
+        The coordinates to replace.
     out : (b + c,) uint8
         Receives the text.
 
     Returns
     -------
     rows, n_bytes : int
-        The number of rows, m if the text is what it was, and of bytes.
+        Number of points in the text, -1 if more than m: if it is not m, the file was changed. And
+        number of bytes in ``out``.
     """
     i, j, at, row = 0, 2, 0, 0
     while i < len(text):
