@@ -12,6 +12,7 @@ from slideviz.errors import MeshError
 from slideviz.mesh.model import FloatArray
 
 Vector = Sequence[float] | FloatArray
+"""Three numbers."""
 
 Z_AXIS = (0.0, 0.0, 1.0)
 

@@ -19,7 +19,9 @@ _VTK = {2: 3, 3: 5, 4: 9}
 """VTK identifier of a facet by its number of nodes."""
 
 _BOUNDARIES: WeakKeyDictionary[Mesh, Boundary] = WeakKeyDictionary()
+"""Results of `boundary_of`."""
 _SHELLS: WeakKeyDictionary[Mesh, IntArray] = WeakKeyDictionary()
+"""Results of `shell_of`."""
 
 
 def outer_facets(mesh: Mesh) -> Cells:

@@ -45,6 +45,7 @@ class _Reader(pickle.Unpickler):
     """Unpickles machine code from the cache, with `_environment` for Numba's function."""
 
     def find_class(self, module: str, name: str) -> Any:
+        """Return the object of that name, as pickle asks for it."""
         if (module, name) == (environment.__name__, "_rebuild_env"):
             return _environment
         return super().find_class(module, name)
@@ -57,6 +58,7 @@ class _SealedFile(IndexDataCacheFile):  # type: ignore[misc]
     """
 
     def _load_index(self) -> dict:
+        """Return the cache's entries by argument types; empty if missing, damaged or outdated."""
         try:
             sealed = Path(self._index_path).read_bytes()
             version, stamp, overloads = pickle.loads(_opened(sealed))
@@ -65,11 +67,13 @@ class _SealedFile(IndexDataCacheFile):  # type: ignore[misc]
         return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
 
     def _save_index(self, overloads: dict) -> None:
+        """Write the cache's entries by argument types."""
         content = self._dump((self._version, self._source_stamp, overloads))
         with self._open_for_write(self._index_path) as file:
             file.write(_sealed(content))
 
     def _load_data(self, name: str) -> Any:
+        """Return the machine code in the file ``name``; raise OSError if it is damaged."""
         try:
             content = _opened(Path(self._data_path(name)).read_bytes())
             return _Reader(io.BytesIO(content)).load()
@@ -77,6 +81,7 @@ class _SealedFile(IndexDataCacheFile):  # type: ignore[misc]
             raise OSError(str(problem)) from problem  # Numba compiles it and writes it again
 
     def _save_data(self, name: str, data: Any) -> None:
+        """Write machine code to the file ``name``."""
         with self._open_for_write(self._data_path(name)) as file:
             file.write(_sealed(self._dump(data)))
 

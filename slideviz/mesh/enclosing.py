@@ -24,6 +24,7 @@ class Enclosing:
 
 
 _FOUND: WeakKeyDictionary[Mesh, dict[tuple[str, ...], Enclosing]] = WeakKeyDictionary()
+"""Results of `enclosing_of`, by names of boundaries."""
 
 
 def enclosing_of(mesh: Mesh, surfaces: Sequence[Surface]) -> Enclosing:

@@ -21,6 +21,7 @@ from slideviz.mesh.model import FloatArray
 from slideviz.terms import Metric
 
 Skew = Callable[[FloatArray, FloatArray], FloatArray]
+"""A function of spread and Jacobians (k, m) that returns the skew (m,)."""
 
 
 def total(a: FloatArray) -> FloatArray:
@@ -88,7 +89,7 @@ METRICS: Mapping[Metric, Mapping[int, Skew]] = {
 """Function of the skew, by metric and VTK identifier."""
 
 _THIRDS = 2 / 3
-_EXPONENTS: dict[int, tuple[float, float]] = {
+_EXPONENTS: dict[int, tuple[float, float]] = {  # of KNUPP
     5: (1, 1),
     9: (1, 1),
     10: (1, _THIRDS),

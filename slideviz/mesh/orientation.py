@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import Cells, FloatArray, IntArray
 
 _REFERENCES: WeakKeyDictionary[Mesh, tuple[FloatArray, NDArray[np.int8]]] = WeakKeyDictionary()
+"""Results of `reference_of`."""
 
 
 def reference_of(mesh: Mesh) -> tuple[FloatArray, NDArray[np.int8]]:

@@ -1,1 +1,1 @@
-"""Sample cases: mesh generators, and the table of the samples."""
+"""Samples: generated meshes, each with a case that deforms it, and their table ``SAMPLES``."""

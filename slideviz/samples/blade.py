@@ -1,6 +1,7 @@
-"""The turbine blade of ``passage`` and ``stator``, and the channel around it.
+"""The turbine blade of the samples ``passage`` and ``stator``, and the channel around it.
 
-The blade has a parabolic camber line and rounded ends; the channel has a hole for the O-grid.
+The blade has a parabolic camber line and rounded ends. The channel (H-grid) has a rectangular hole
+of cells, which the O-grid around the blade fills. Lengths are in axial chords.
 """
 
 from __future__ import annotations
@@ -14,17 +15,20 @@ from slideviz.mesh.model import FloatArray, IntArray
 
 NOSE = (0.05, 0.04)
 TAIL = (0.07, 0.012)
-"""Part of the nodes drawn to the end, as a length, and the distance over which it fades."""
+"""Concentration of nodes at leading and trailing edge: strength, and distance over which it fades.
+
+Both are lengths; `_spread` adds strength x arctan(arc length / distance) to the arc length.
+"""
 
 
 @dataclass(frozen=True)
 class BladeSection:
-    """A blade and the channel it stands in. The axial chord is 1, from x = 0.
+    """The shape of a blade and of the channel around it; its axial chord is 1, from x = 0.
 
     Attributes
     ----------
     angles_deg : (float, float)
-        Of the camber line against the x axis, at the leading and at the trailing edge.
+        Angles of the camber line to the x axis, at the leading and at the trailing edge.
     thickness : (float, float, float)
         a, b, c of the half thickness sqrt(x (1 - x)) (a + b (1 - x)^c). The root rounds both
         ends: the radii are (a + b)^2 / 2 in front and a^2 / 2 behind.
@@ -45,11 +49,11 @@ class BladeSection:
 
 
 PASSAGE = BladeSection()
-"""Of the sample ``passage``."""
+"""The section of the sample ``passage``."""
 
 
 def camber(x: FloatArray, section: BladeSection = PASSAGE) -> FloatArray:
-    """Return y of the camber line, with its tangents before x = 0 and behind x = 1."""
+    """Return y of the camber line at x, continued by its tangents below 0 and above 1."""
     first, last = np.tan(np.radians(section.angles_deg))
     inside = np.clip(x, 0.0, 1.0)
     ahead, behind = np.minimum(x, 0.0), np.maximum(x - 1.0, 0.0)
@@ -57,10 +61,9 @@ def camber(x: FloatArray, section: BladeSection = PASSAGE) -> FloatArray:
 
 
 def blade_nodes(lower: int, upper: int, section: BladeSection = PASSAGE) -> FloatArray:
-    """Return the nodes counter-clockwise from the leading edge: (lower + upper, 2).
+    """Return the nodes of the blade counter-clockwise from the leading edge: (lower + upper, 2).
 
-    ``lower`` edges lead along the pressure side to the trailing edge, ``upper`` back along the
-    suction side.
+    The pressure side has ``lower`` edges, the suction side ``upper``.
     """
     phi = np.linspace(0.0, np.pi, 20001)
     there = _spread(_surface(phi, -1.0, section), lower)
@@ -69,7 +72,10 @@ def blade_nodes(lower: int, upper: int, section: BladeSection = PASSAGE) -> Floa
 
 
 def _surface(phi: FloatArray, side: float, section: BladeSection) -> FloatArray:
-    """Return the points of one side at x = (1 - cos phi) / 2: (m, 2)."""
+    """Return points (m, 2) of one side, at x = (1 - cos phi) / 2 on the camber line.
+
+    ``side`` is -1 for the pressure side, 1 for the suction side.
+    """
     x = (1 - np.cos(phi)) / 2
     a, b, c = section.thickness
     half = side * np.sin(phi) / 2 * (a + b * (1 - x) ** c)
@@ -80,7 +86,7 @@ def _surface(phi: FloatArray, side: float, section: BladeSection) -> FloatArray:
 
 
 def _spread(curve: FloatArray, edges: int) -> FloatArray:
-    """Return ``edges`` + 1 points of a fine curve (m, 2), denser at its ends."""
+    """Return ``edges + 1`` points on a fine curve (m, 2), denser at its ends by NOSE and TAIL."""
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=0).T))])
     weight = arc + NOSE[0] * np.arctan(arc / NOSE[1])
     weight -= TAIL[0] * np.arctan((arc[-1] - arc) / TAIL[1])
@@ -90,15 +96,15 @@ def _spread(curve: FloatArray, edges: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class Shares:
-    """Shares of the cells (as for 36 along the inflow), and how the O-grid is turned in its hole.
+    """Relative numbers of cells, and how the O-grid is turned in its hole; `counts` scales them.
 
     Attributes
     ----------
     ahead, along, behind, beside, layers : int
-        As of `Counts`.
+        As of `GridCounts`, for 36 cells along the inflow.
     nose, tail : float
-        Where the lines of leading and trailing edge meet the first and the last side of the
-        hole, over its length: 0 is the corner on the pressure side.
+        Where the grid lines from leading and trailing edge end on the first and the last side of
+        the hole, as a part of the side's length: 0 is the corner on the pressure side.
     """
 
     ahead: int = 20
@@ -111,7 +117,7 @@ class Shares:
 
 
 PASSAGE_SHARES = Shares()
-"""Of the sample ``passage``; they leave its cells nearly orthogonal."""
+"""The shares of the sample ``passage``, with which its cells are nearly orthogonal."""
 
 
 @dataclass(frozen=True)
@@ -121,13 +127,14 @@ class GridCounts:
     Attributes
     ----------
     ahead, along, behind : int
-        Of the channel in x: before, beside and behind the hole.
+        In the channel along x: before, beside and behind the hole.
     below, beside, above : int
-        Of the channel in y, likewise.
+        In the channel along y: below, beside and above the hole.
     layers : int
-        Of the O-grid, away from the blade.
+        In the O-grid, away from the blade.
     nose, tail : int
-        Beside the hole, from its lower corners to the lines of leading and trailing edge.
+        On the first and last side of the hole, from the lower corner to the grid line from leading
+        and trailing edge.
     """
 
     ahead: int
@@ -142,7 +149,7 @@ class GridCounts:
 
     @property
     def lower(self) -> int:
-        """Return the cells on the pressure side of the blade."""
+        """Return the number of cells on the pressure side of the blade."""
         return self.nose + self.along + self.tail
 
 
@@ -152,7 +159,7 @@ def counts(size: int, shares: Shares = PASSAGE_SHARES) -> GridCounts:
     Raises
     ------
     CaseError
-        There are too few to follow the blade.
+        ``size`` is below 12, too few to follow the blade.
     """
     if size < 12:
         raise CaseError(f"size {size} is too coarse for the blade; needed are 12 cells or more")
@@ -175,7 +182,7 @@ def counts(size: int, shares: Shares = PASSAGE_SHARES) -> GridCounts:
 
 
 def channel_numbers(n: GridCounts) -> IntArray:
-    """Return the node number at each place of the channel, -1 inside the hole."""
+    """Return the node number at each place (i, j) of the channel along x and y, -1 in the hole."""
     shape = (n.ahead + n.along + n.behind + 1, n.below + n.beside + n.above + 1)
     kept = np.ones(shape, bool)
     kept[n.ahead + 1 : n.ahead + n.along, n.below + 1 : n.below + n.beside] = False
@@ -183,7 +190,10 @@ def channel_numbers(n: GridCounts) -> IntArray:
 
 
 def channel_points(n: GridCounts, section: BladeSection = PASSAGE) -> FloatArray:
-    """Return the channel's nodes with straight lines, hole included: (m, 2)."""
+    """Return nodes (m, 2) at all places of the channel, also in the hole, before smoothing.
+
+    Lines in y are straight; those in x follow the camber line.
+    """
     first, last, half = section.hole
     x = _pieces((section.ends[0], first, last, section.ends[1]), (n.ahead, n.along, n.behind))
     y = _pieces((-section.pitch / 2, -half, half, section.pitch / 2), (n.below, n.beside, n.above))
@@ -192,7 +202,7 @@ def channel_points(n: GridCounts, section: BladeSection = PASSAGE) -> FloatArray
 
 
 def _pieces(places: tuple[float, ...], cells: tuple[int, ...]) -> FloatArray:
-    """Return points that divide each piece between two places into its number of cells."""
+    """Return coordinates (m,) that divide each interval between ``places`` into equal ``cells``."""
     starts = [
         np.linspace(a, b, count, endpoint=False)
         for a, b, count in zip(places[:-1], places[1:], cells, strict=True)

@@ -1,17 +1,16 @@
 """The sample ``passage``, one blade of a linear turbine cascade, and the grid of ``stator``.
 
 An O-grid lies around the blade, in a rectangular hole of a channel of quadrilaterals (H-grid).
-Both are drawn with straight lines first and then smoothed as one, with the
-nodes of the periodic sides free and moving in pairs. The smooth mesh is the one that minimises the
-sum over all cell corners of
+Both are made with straight lines first and then smoothed together; nodes of the periodic sides
+move in pairs. The smooth mesh minimises the sum over all cell corners of
 
     (rho |a|^2 + |b|^2 / rho) / (2 a x b)
 
 where a and b are the edges at the corner, the discrete counterpart of solving Winslow's
 equations (S. A. Ivanenko, A. A. Charakhch'yan, "Curvilinear grids of convex quadrilaterals",
 USSR Comput. Maths. Math. Phys. 28, 1988). The denominator is a barrier: a cell can never fold. At
-a free boundary the minimum leaves the lines orthogonal to it. The aspect ratio rho, wanted
-for |b| / |a|, draws cells to the wall.
+boundaries whose nodes slide, the grid lines of the minimum are orthogonal to them. rho, the wanted
+ratio |b| / |a|, makes cells thin at the wall.
 """
 
 from __future__ import annotations
@@ -35,12 +34,13 @@ from slideviz.samples.blade import (
 )
 
 WALL = 0.05
-"""Height of the cells at the blade over that of the O-grid's outermost ones."""
+"""Height of the O-grid's cells at the blade, divided by that of its outermost ones."""
 LINE, QUADRILATERAL = 3, 9
+"""VTK identifiers."""
 
-# Edges (ax, ay, bx, by): a x b = e S e / 2.
+# For edges e = (ax, ay, bx, by): a x b = e S e / 2 with this matrix S.
 _CROSS = np.array([[0, 0, 0, 1], [0, 0, -1, 0], [0, -1, 0, 0], [1, 0, 0, 0]], float)
-# Corner, neighbour and neighbour coordinates to edges.
+# From the coordinates (x, y) of a corner and its two neighbours to these edges.
 _EDGES = np.array(
     [[-1, 0, 1, 0, 0, 0], [0, -1, 0, 1, 0, 0], [-1, 0, 0, 0, 1, 0], [0, -1, 0, 0, 0, 1]], float
 )
@@ -48,11 +48,12 @@ _EDGES = np.array(
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """The cells of O-grid and channel, whatever the section.
+    """The node numbers of O-grid and channel, which do not depend on the shape of the blade.
 
     Attributes
     ----------
     n : GridCounts
+        Numbers of cells.
     number : (i, j) int
         Node at each place of the channel, -1 inside the hole.
     ring : (layers + 1, k) int
@@ -67,7 +68,7 @@ class Grid:
     quads: IntArray
 
     def sides(self) -> dict[str, IntArray]:
-        """Return the edges (k, 2) of blade, inflow, outflow, and the periodic sides."""
+        """Return the edges (k, 2) of blade, inflow, outflow and periodic sides, by name."""
         number = self.number
         return {
             "blade": np.column_stack([self.ring[0], np.roll(self.ring[0], -1)]),
@@ -79,7 +80,7 @@ class Grid:
 
 
 def passage_mesh(size: int) -> Mesh:
-    """Return the smoothed mesh, with ``size`` cells along the inflow.
+    """Return the mesh of the sample ``passage``, with ``size`` cells along the inflow.
 
     Raises
     ------
@@ -113,14 +114,14 @@ def passage_case() -> Case:
 
 
 def make_grid(n: GridCounts) -> Grid:
-    """Return the grid of so many cells."""
+    """Return the grid with these numbers of cells."""
     number = channel_numbers(n)
     ring = _ring(n, number)
     return Grid(n, number, ring, _quads(n, number, ring))
 
 
 def straight_points(grid: Grid, section: BladeSection) -> FloatArray:
-    """Return nodes on straight lines (m, 2), to start from."""
+    """Return the nodes (m, 2) of a grid before smoothing; lines from the blade are straight."""
     channel = channel_points(grid.n, section)[grid.number.ravel() >= 0]
     rim = channel[grid.ring[-1]]
     blade = blade_nodes(grid.n.lower, len(rim) - grid.n.lower, section)
@@ -129,7 +130,10 @@ def straight_points(grid: Grid, section: BladeSection) -> FloatArray:
 
 
 def smoothed(grid: Grid, points: FloatArray, tolerance: float = 1e-7) -> FloatArray:
-    """Return the points (m, 2) smoothed as `smooth` does it."""
+    """Return the points (m, 2) of a grid smoothed by `smooth`, with thin cells at the blade.
+
+    Nodes of the blade are fixed, those of the sides as `_unknowns` has them.
+    """
     heights = np.diff(layer_parts(grid.n))
     heights /= heights[-1]
     n_channel = len(grid.quads) - grid.ring[1:].size
@@ -139,7 +143,7 @@ def smoothed(grid: Grid, points: FloatArray, tolerance: float = 1e-7) -> FloatAr
 
 
 def layer_parts(n: GridCounts) -> FloatArray:
-    """Return how far out each row of the O-grid lies, from 0 to 1: (layers + 1,)."""
+    """Return the place (layers + 1,) of O-grid rows, from the blade (0) to the hole's rim (1)."""
     heights = WALL ** (np.arange(n.layers)[::-1] / (n.layers - 1))
     return np.concatenate([[0.0], np.cumsum(heights) / heights.sum()])
 
@@ -147,7 +151,7 @@ def layer_parts(n: GridCounts) -> FloatArray:
 def _ring(n: GridCounts, number: IntArray) -> IntArray:
     """Return the nodes of the O-grid, from the blade out, counter-clockwise: (layers + 1, k).
 
-    Column 0 starts at the leading edge, on the hole's first side.
+    Column 0 is the grid line from the leading edge to the hole's first side.
     """
     hole = number[n.ahead : n.ahead + n.along + 1, n.below : n.below + n.beside + 1]
     rim = np.concatenate([hole[:-1, 0], hole[-1, :-1], hole[:0:-1, -1], hole[0, :0:-1]])
@@ -170,10 +174,10 @@ def _quads(n: GridCounts, number: IntArray, ring: IntArray) -> IntArray:
 
 
 def _unknowns(n_points: int, number: IntArray, ring: IntArray) -> IntArray:
-    """Return which coordinates are free, as ``smooth`` wants it: (n, 2).
+    """Return the number (n, 2) of each coordinate's unknown, -1 if fixed (``dof`` of `smooth`).
 
-    The blade is fixed, inflow and outflow slide along their line, and the second periodic side
-    moves as the first.
+    The blade is fixed, nodes of inflow and outflow move in y only, and those of the second periodic
+    side as those of the first.
     """
     free = np.ones((n_points, 2), bool)
     free[ring[0]] = False
@@ -185,14 +189,14 @@ def _unknowns(n_points: int, number: IntArray, ring: IntArray) -> IntArray:
 
 
 def _line(nodes: IntArray) -> IntArray:
-    """Return the edges of a row of nodes: (k, 2)."""
+    """Return the edges (k, 2) between neighbours in a row of nodes (k + 1,)."""
     return np.column_stack([nodes[:-1], nodes[1:]])
 
 
 def smooth(
     points: FloatArray, quads: IntArray, rho: FloatArray, dof: IntArray, tolerance: float = 1e-7
 ) -> FloatArray:
-    """Return the points at which the functional is smallest, by Newton's method.
+    """Return the points (n, 2) that minimise the functional (see above), by Newton's method.
 
     Parameters
     ----------
@@ -201,12 +205,12 @@ def smooth(
     quads : (m, 4)
         Nodes of the cells, counter-clockwise.
     rho : (m,)
-        Length of edges 1-2 and 3-0 that is wanted over that of 0-1 and 2-3.
+        Wanted length of a cell's edges 1-2 and 3-0, divided by that of its edges 0-1 and 2-3.
     dof : (n, 2)
         Number of the unknown that moves each coordinate, -1 where it is fixed. Coordinates with
         the same number move alike.
     tolerance : float
-        Ends when a step moves no node by more, in the unit of length.
+        It ends when a step moves no coordinate by more than this length.
     """
     corners = np.concatenate([np.roll(quads, -k, axis=1)[:, [0, 1, 3]] for k in range(4)])
     ratio = np.concatenate([rho, 1 / rho, rho, 1 / rho])
@@ -228,7 +232,10 @@ def smooth(
 
 
 def _energy(xyz: FloatArray, ratio: FloatArray) -> float:
-    """Return the functional, infinite where a corner (k, 3, 2) is folded."""
+    """Return the functional, infinite if a corner is folded.
+
+    ``xyz`` (k, 3, 2) has each corner with its neighbours, ``ratio`` (k,) its rho.
+    """
     edges = xyz.reshape(-1, 6) @ _EDGES.T
     cross = np.einsum("ki,ij,kj->k", edges, _CROSS, edges) / 2
     if cross.min() <= 0:
@@ -237,12 +244,16 @@ def _energy(xyz: FloatArray, ratio: FloatArray) -> float:
 
 
 def _stretch(edges: FloatArray, ratio: FloatArray) -> FloatArray:
+    """Return the functional's numerator (k,) for edges (k, 4): rho |a|^2 + |b|^2 / rho."""
     a, b = edges[:, :2], edges[:, 2:]
     return ratio * np.einsum("ki,ki->k", a, a) + np.einsum("ki,ki->k", b, b) / ratio
 
 
 def _newton_step(xyz: FloatArray, ratio: FloatArray, unknown: IntArray, n: int) -> FloatArray:
-    """Return the Newton step (n,), with the Hessian of each corner made positive."""
+    """Return the Newton step (n,) of all unknowns; negative eigenvalues of Hessians become 0.
+
+    ``unknown`` (k, 6) has the number of the unknown of each coordinate of ``xyz`` (k, 3, 2).
+    """
     edges = xyz.reshape(-1, 6) @ _EDGES.T
     scale = np.column_stack([ratio, ratio, 1 / ratio, 1 / ratio])
     num, num1 = _stretch(edges, ratio), 2 * scale * edges
@@ -262,7 +273,7 @@ def _newton_step(xyz: FloatArray, ratio: FloatArray, unknown: IntArray, n: int) 
 
 
 def _solve(hessian: FloatArray, gradient: FloatArray, unknown: IntArray, n: int) -> FloatArray:
-    """Return the step from the corners' Hessians (k, 6, 6) and gradients (k, 6)."""
+    """Return the step (n,) from the corners' Hessians (k, 6, 6) and gradients (k, 6), summed up."""
     free = unknown >= 0
     right = np.bincount(unknown[free], gradient[free], minlength=n)
     rows, columns = np.broadcast_arrays(unknown[:, :, None], unknown[:, None, :])

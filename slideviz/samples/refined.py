@@ -1,4 +1,8 @@
-"""Nodes of a fine grid around a blade from those of a coarse one, by splines on each block."""
+"""Interpolation of a fine grid around a blade from a coarse one, by splines on each block.
+
+Blocks are the eight rectangles of the channel around the hole, and the four parts of the O-grid at
+the hole's sides.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +17,9 @@ from slideviz.samples.passage import Grid, layer_parts
 
 
 def refined(coarse: Grid, points: FloatArray, fine: Grid, section: BladeSection) -> FloatArray:
-    """Return the fine grid's nodes (m, 2), at the same relative places as the coarse one's.
+    """Return the nodes (m, 2) of the fine grid, interpolated from ``points`` of the coarse one.
 
-    Blade nodes are put onto the blade, and the O-grid above them moves along.
+    Nodes of the blade are moved onto it, those of the O-grid with them, less the further out.
     """
     found = np.full((int(fine.quads.max()) + 1, 2), np.nan)
     places = [_channel_knots(grid.n) for grid in (coarse, fine)]
@@ -42,7 +46,7 @@ def refined(coarse: Grid, points: FloatArray, fine: Grid, section: BladeSection)
 
 
 def _channel_knots(n: GridCounts) -> tuple[list[int], list[int]]:
-    """Return where the blocks of the channel begin and end, in both directions."""
+    """Return the indices of grid lines between the blocks of the channel, in both directions."""
     along = np.cumsum([0, n.ahead, n.along, n.behind]).tolist()
     return along, np.cumsum([0, n.below, n.beside, n.above]).tolist()
 
@@ -53,7 +57,7 @@ def _ring_knots(n: GridCounts) -> list[int]:
 
 
 def _spline(block: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-    """Return a block (a, b, 2) resampled to another number of nodes: (*shape, 2)."""
+    """Return a block of points (a, b, 2) resampled by cubic splines: (*shape, 2)."""
     x, y = (np.linspace(0, 1, size) for size in block.shape[:2])
     new_x, new_y = (np.linspace(0, 1, size) for size in shape)
     kx, ky = min(3, len(x) - 1), min(3, len(y) - 1)

@@ -7,25 +7,26 @@ import numpy as np
 from slideviz.mesh.model import FloatArray
 
 TWIST_DEG = -8.0
-"""Turn about the stacking line at the shroud; none at the hub."""
+"""Rotation about the stacking line at the shroud; 0 at the hub."""
 LEAN_DEG = -3.0
-"""Shift in theta at the shroud; none at the hub. So far that the blade leaves its old passage."""
+"""Shift in theta at the shroud, which moves the blade out of its old passage; 0 at the hub."""
 BUMPS, SEED = 40, 41
+"""Number of bumps, and seed of their random places, widths and heights."""
 HEIGHT, WIDTH = 6e-4, (3e-3, 9e-3)
-"""Greatest height of a bump, and its least and greatest radius, in the unit of length."""
+"""Greatest height of a bump, and its least and greatest radius, in the mesh's length unit."""
 
 
 def reshaped(points: FloatArray, radii: tuple[float, float], stack_z: float) -> FloatArray:
-    """Return the displacement of blade nodes, which keeps their distance from the axis: (k, 3).
+    """Return the displacement (k, 3) of blade nodes, which keeps their distance from the axis.
 
     Parameters
     ----------
     points : (k, 3)
         Nodes of the blade; the axis is z.
     radii : (float, float)
-        Hub and shroud.
+        Radii of hub and shroud.
     stack_z : float
-        Where the line that the twist turns about meets theta = 0.
+        z of the stacking line, which has theta = 0.
     """
     r, theta = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
     z, arc = points[:, 2], r * theta
@@ -40,7 +41,10 @@ def reshaped(points: FloatArray, radii: tuple[float, float], stack_z: float) -> 
 
 
 def _bumps(points: FloatArray) -> FloatArray:
-    """Return the sum of smooth bumps around random nodes' places, in r theta: (k,)."""
+    """Return the sum (k,) of Gaussian bumps at points (k, 3), a length along theta.
+
+    Their centres are random in the bounding box of the points.
+    """
     random = np.random.default_rng(SEED)
     low, high = points.min(axis=0), points.max(axis=0)
     total = np.zeros(len(points))

@@ -1,10 +1,10 @@
-"""Edge lengths of the triangles in the sample ``turbine-row``, and triangles of such points.
+"""Edge lengths of the triangles in the sample ``turbine-row``, and triangulation of its points.
 
     h(x) = h0 (1 + (m - 1) (1 - exp(-k D / (m - 1))))
 
-D is the distance from the layer around the vane or from the wake, whose own D grows slowly
-downstream; m is what far triangles measure over those at the layer. The neighbouring vanes count
-alike, so that the periodic sides get the same nodes. The triangles between given points are
+h0 is the edge length at the layer of quadrilaterals around the vane, m the ratio of that far away
+to it. D is the distance from the layer, or from the wake plus `WAKE` times the way downstream.
+Neighbouring vanes count, too, so that both periodic sides get the same nodes. Triangles are
 Delaunay's, relaxed towards equilateral ones.
 """
 
@@ -21,23 +21,23 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.samples.vane import AHEAD, CHORD, LENGTH, camber, camber_line, pitch
 
 ROUNDS, SWEEPS = 8, 6
-"""Triangulations anew while relaxing, and moves of all points within each."""
+"""Number of triangulations in `relax`, and of moves of all points with each."""
 
 SLOPE = 350.0
-"""k, per unit of length."""
+"""k in the formula, per unit of length: the slope of h / h0 at D = 0."""
 WAKE = 0.3
-"""D on the wake over the way from the trailing edge."""
+"""D on the wake, divided by the way from the trailing edge."""
 SHAPE = (150, 250)
-"""Grid points in x and y of a tabulated size."""
+"""Grid points in x and y of the table of edge lengths."""
 
 
 def triangulate(points: FloatArray, edges: IntArray) -> IntArray:
-    """Return the Delaunay triangles (m, 3), counter-clockwise, left of the boundary's edges.
+    """Return the Delaunay triangles (m, 3) of a domain, counter-clockwise.
 
     Parameters
     ----------
     points : (n, 2)
-        Those of the boundary and those inside.
+        Points of the boundary and inside.
     edges : (e, 2)
         The boundary, closed, with the domain on its left.
     """
@@ -54,11 +54,11 @@ def triangulate(points: FloatArray, edges: IntArray) -> IntArray:
 
 
 def relax(points: FloatArray, fixed: int, edges: IntArray) -> tuple[FloatArray, IntArray]:
-    """Return the points with all after the first ``fixed`` moved, and their triangles.
+    """Return the relaxed points (n, 2), of which the first ``fixed`` stay, and their triangles.
 
     A point moves to the mean of its triangles' centroids, weighted by the square root of the area:
-    between Laplacian smoothing, which ignores the size, and centroidal patches, which
-    make all areas alike.
+    a compromise between Laplacian smoothing, which ignores the size, and weights by the area,
+    which make all areas equal. ``edges`` are the boundary's, as of `triangulate`.
     """
     for _ in range(ROUNDS):
         triangles = triangulate(points, edges)
@@ -68,6 +68,7 @@ def relax(points: FloatArray, fixed: int, edges: IntArray) -> tuple[FloatArray, 
 
 
 def _sweep(points: FloatArray, triangles: IntArray, fixed: int) -> FloatArray:
+    """Return the points with all after the first ``fixed`` moved once, as `relax` says."""
     at = points[triangles]
     (ax, ay), (bx, by) = (at[:, 1] - at[:, 0]).T, (at[:, 2] - at[:, 0]).T
     weight = np.sqrt(np.abs(ax * by - ay * bx))
@@ -80,7 +81,10 @@ def _sweep(points: FloatArray, triangles: IntArray, fixed: int) -> FloatArray:
 
 
 def inside(places: FloatArray, points: FloatArray, edges: IntArray) -> NDArray[np.bool_]:
-    """Tell which places (k, 2) the edges go round an odd number of times: (k,)."""
+    """Return a mask (k,) of the places (k, 2) inside the closed edges (e, 2) between points (n, 2).
+
+    Inside is where the edges go round an odd number of times.
+    """
     odd = np.zeros(len(places), bool)
     (x0, y0), (x1, y1) = points[edges[:, 0]].T, points[edges[:, 1]].T
     order = np.argsort(places[:, 1], kind="stable")
@@ -101,7 +105,7 @@ class Sizing:
     Attributes
     ----------
     low, step : (2,)
-        First grid point, and distance of grid points in x and y.
+        First grid point, and distances of grid points in x and y.
     table : (nx, ny)
         Edge length at the grid points.
     """
@@ -111,21 +115,21 @@ class Sizing:
     table: FloatArray
 
     def at(self, points: FloatArray) -> FloatArray:
-        """Return the edge length at points (k, 2), bilinear between grid points: (k,)."""
+        """Return the edge length (k,) at points (k, 2), bilinear between grid points."""
         place = (points - self.low) / self.step
         found: FloatArray = map_coordinates(self.table, place.T, order=1, mode="nearest")
         return found
 
 
 def find_sizing(rim: FloatArray, triangles: float) -> Sizing:
-    """Return the edge lengths that need about so many triangles.
+    """Return edge lengths with which about so many triangles fill the channel, choosing m.
 
     Parameters
     ----------
     rim : (k, 2)
-        The outermost nodes of the layer, in order.
+        The outermost nodes of the layer around the vane, in order.
     triangles : float
-        How many equilateral ones are to fill the channel outside the layer.
+        Number of equilateral triangles in the channel outside the layer.
     """
     shortest = float(np.mean(np.hypot(*(np.roll(rim, -1, axis=0) - rim).T)))
     x = np.linspace(-AHEAD, LENGTH - AHEAD, SHAPE[0])
@@ -150,7 +154,7 @@ def find_sizing(rim: FloatArray, triangles: float) -> Sizing:
 
 
 def _growth(far: FloatArray, most: float) -> FloatArray:
-    """Return h / h0 at the distances ``far``."""
+    """Return h / h0 at distances D, ``far``, for m = ``most``."""
     span = most - 1
     if abs(span) < 1e-9:
         return np.ones_like(far)
@@ -158,7 +162,10 @@ def _growth(far: FloatArray, most: float) -> FloatArray:
 
 
 def _distance(points: FloatArray, rim: FloatArray) -> FloatArray:
-    """Return D of points (k, 2): 0 on the rim and inside of it (k,)."""
+    """Return D (k,) of points (k, 2), from the nodes of the rim (r, 2) and the wake of any vane.
+
+    Inside the rim it has no meaning.
+    """
     best = np.full(len(points), np.inf)
     s, *line = camber_line()
     wake = s > CHORD

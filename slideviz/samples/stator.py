@@ -1,12 +1,12 @@
 """The sample ``stator``: a passage of an annular turbine stator (in the manner of thesis 4.2.3).
 
 The grid of ``passage``, an O-grid in a channel, is smoothed at three radii in the plane of z
-and r theta; between them z and theta are quadratic in r. The annulus has the extents of the
-thesis's Aachen stator; its blade is our own. A fine grid is a smoothed coarse one with cubic
-splines on each of its blocks; one of more than five million cells is that without further
-smoothing. Nodes and cells follow from the planes and the layer alone, so that any part of a mesh
-can be made without the rest of it. The variant ``optimise`` moves the blade as an optimiser might:
-twist, lean and bumps.
+and r theta; between them z and theta are quadratic in r. The annulus has the dimensions of the
+thesis's Aachen stator; its blade is our own. A fine grid is interpolated from a smoothed coarse one
+(`slideviz.samples.refined`) and smoothed, the finest are not smoothed again. Nodes and cells are
+computed from these planes by their numbers, so that any part of a mesh can be made without the
+rest. The displacement moves the blade as an optimiser might: twist, lean and bumps
+(`slideviz.samples.reshaping`).
 """
 
 from __future__ import annotations
@@ -30,32 +30,39 @@ from slideviz.samples.structured import LARGEST, QUADRILATERAL, mesh_of, zone_of
 from slideviz.samples.thesis import FILE
 
 SIZES = (5_000, 5_000_000)
+"""Least and largest number of cells of a mesh in memory."""
 BLADES = 41
+"""Number of blades on the circumference (thesis Table 4.13)."""
 RADII = (0.25, 0.275, 0.3)
+"""Radii of hub, middle and shroud (thesis Table 4.13)."""
 DEPTH = 0.1143
-"""Blades on the circumference, hub, middle and shroud, and extent in z (thesis Table 4.13)."""
+"""Extent of the mesh in z (thesis Table 4.13)."""
 LEADING_EDGE, CHORD = 0.035, 0.045
 """z of the leading edge, and extent of the blade in z."""
 STACK = 0.4
-"""Part of the chord at which the sections stand above each other."""
+"""Place of the stacking line, which all sections have at theta = 0, as a part of the chord."""
 ANGLES_DEG = ((4.0, -47.0), (7.0, -50.0), (10.0, -53.0))
-"""Of the camber line at hub, middle and shroud: the twist."""
+"""`BladeSection.angles_deg` at hub, middle and shroud: a twisted blade."""
 THICKNESS = (0.08, 0.17, 1.4)
+"""`BladeSection.thickness` at all radii."""
 HOLE = (-0.12, 1.12, 0.16)
+"""`BladeSection.hole` at all radii."""
 SHARES = Shares(ahead=26, along=50, behind=25, nose=0.5, tail=0.15)
+"""Relative numbers of cells."""
 COARSE = 24
-"""Cells along the inflow of the finest grid that is smoothed from straight lines."""
-FINEST, SPLINED = 126, 48
-"""Cells along the inflow of the finest grid that is smoothed, and of the one that the nodes of
-finer ones are interpolated from."""
+"""Most cells along the inflow of a grid that is smoothed from straight lines."""
+FINEST = 126
+"""Most cells along the inflow of a grid that is smoothed."""
+SPLINED = 48
+"""Cells along the inflow of the smoothed grid that finer ones than FINEST are interpolated from."""
 RADIAL = 0.62
-"""Cells in r over those along the inflow."""
+"""Number of cells in r, divided by that along the inflow."""
 ROUGH = 1e-3
-"""Step of the smoothing of a finer grid at which it ends, in chords."""
+"""Tolerance of `smooth` for interpolated grids, in chords."""
 
 
 def stator_mesh(size: int) -> Mesh:
-    """Return the mesh of about ``size`` hexahedra.
+    """Return the mesh of the sample ``stator``, of about ``size`` hexahedra.
 
     Raises
     ------
@@ -71,7 +78,7 @@ def stator_mesh(size: int) -> Mesh:
 
 
 def stator_zone(size: int) -> tuple[ZoneContent, Displacements]:
-    """Return what a file of the mesh is written from, block by block, and its displacement.
+    """Return the zone to write to a file block by block, and the displacement of the blade.
 
     Raises
     ------
@@ -88,14 +95,16 @@ def stator_zone(size: int) -> tuple[ZoneContent, Displacements]:
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """The smoothed grids at three radii, and the layers of cells between hub and shroud.
+    """A `Structured` grid of smoothed grids at three radii, stacked between hub and shroud.
 
     Attributes
     ----------
     grid : Grid
+        Node numbers of a plane.
     planes : (3, m, 2) float64
         z and theta of the nodes at ``RADII``.
     layers : int
+        Number of cells in r.
     """
 
     grid: Grid
@@ -114,9 +123,9 @@ class Stack:
         return len(self.grid.quads) * self.layers
 
     def points(self, nodes: IntArray) -> FloatArray:
-        """Return the coordinates of nodes (k, 3), which are numbered from hub to shroud.
+        """Return the coordinates (k, 3) of nodes (k,), which are numbered from hub to shroud.
 
-        Layers are half as high at hub and shroud as in the middle, more or less.
+        Layers at hub and shroud have about a third of the height of those in the middle.
         """
         layer, column = np.divmod(nodes, self.planes.shape[1])
         part = np.linspace(0.0, 1.0, self.layers + 1)
@@ -130,7 +139,7 @@ class Stack:
         return np.stack([radius * np.cos(theta), radius * np.sin(theta), z], axis=1)
 
     def cells(self, ids: IntArray) -> IntArray:
-        """Return the nodes of cells (k, 8)."""
+        """Return the nodes (k, 8) of cells (k,)."""
         layer, place = np.divmod(ids, len(self.grid.quads))
         nodes = self.planes.shape[1]
         shroud = self._shroud[place] + (nodes * layer)[:, None]
@@ -138,11 +147,11 @@ class Stack:
 
     @property
     def _shroud(self) -> IntArray:
-        """Return the cells of a plane, right-handed as seen from outside, where the shroud is."""
+        """Return the cells (q, 4) of a plane, counter-clockwise as seen from outside the shroud."""
         return self.grid.quads[:, ::-1]
 
     def markers(self) -> tuple[Marker, ...]:
-        """Return the boundaries."""
+        """Return the boundaries, the blade first."""
         nodes = self.planes.shape[1]
         walls = {"HUB": self.grid.quads, "SHROUD": self._shroud + self.layers * nodes}
         for name, (low, high) in _sides(self.grid).items():
@@ -153,7 +162,7 @@ class Stack:
 
 
 def stator_stack(size: int) -> Stack:
-    """Return the grids that a mesh of about ``size`` hexahedra is made from."""
+    """Return the stack of about ``size`` hexahedra; grids are smoothed, which may take long."""
     grid, layers = _grid_of(size)
     sections = zip(RADII, ANGLES_DEG, strict=True)
     return Stack(
@@ -162,7 +171,7 @@ def stator_stack(size: int) -> Stack:
 
 
 def stator_case() -> Case:
-    """Return the case of thesis section 4.2.3, whose hub and shroud follow the blade."""
+    """Return the case of thesis section 4.2.3; nodes of hub and shroud move as those inside."""
     return Case(
         roles={
             "BLADE": "moving",
@@ -182,34 +191,37 @@ def stator_case() -> Case:
 
 
 def stator_displacement(nodes: IntArray, points: FloatArray) -> Displacements:
-    """Return the displacement of nodes (k,) of the blade at points (k, 3): twist, lean, bumps."""
+    """Return the displacement (twist, lean, bumps) of the blade's nodes (k,), at points (k, 3)."""
     stack_z = LEADING_EDGE + STACK * CHORD
     return Displacements(nodes, reshaped(points, (RADII[0], RADII[-1]), stack_z))
 
 
 def _sides(grid: Grid) -> dict[str, tuple[IntArray, IntArray]]:
-    """Return the edges' first and second nodes on the sides of a plane, by marker."""
+    """Return first and second node (k,), (k,) of the edges on the sides of a plane, by marker."""
     names = {"blade": "BLADE", "inflow": "INFLOW", "outflow": "OUTFLOW"}
     names |= {"periodic_1": "PER1", "periodic_2": "PER2"}
     return {names[side]: (edges[:, 0], edges[:, 1]) for side, edges in grid.sides().items()}
 
 
 def _grid_of(size: int) -> tuple[Grid, int]:
-    """Return the grid of a plane, and the layers between hub and shroud, for ``size`` cells."""
+    """Return the grid of a plane, and the number of layers, for about ``size`` hexahedra."""
     along = next(n for n in range(12, 1000) if _cells(n) * RADIAL * (n + 0.5) > size)
     grid = make_grid(counts(along, SHARES))
     return grid, max(round(size / len(grid.quads)), 1)
 
 
 def _cells(along: int) -> int:
-    """Return the cells of a plane with ``along`` cells along the inflow."""
+    """Return the number of cells of a plane with ``along`` cells along the inflow."""
     n = counts(along, SHARES)
     channel = (n.ahead + n.along + n.behind) * along - n.along * n.beside
     return channel + 2 * n.layers * (n.along + n.beside)
 
 
 def _plane(grid: Grid, radius: float, angles_deg: tuple[float, float]) -> FloatArray:
-    """Return z and theta of the smoothed grid on the cylinder of that radius: (m, 2)."""
+    """Return z and theta (m, 2) of the smoothed grid on the cylinder of that radius.
+
+    ``angles_deg`` are those of `BladeSection`.
+    """
     pitch = 2 * np.pi * radius / BLADES / CHORD
     ends = (-LEADING_EDGE / CHORD, (DEPTH - LEADING_EDGE) / CHORD)
     section = BladeSection(angles_deg, THICKNESS, pitch, ends, HOLE)
@@ -228,6 +240,9 @@ def _plane(grid: Grid, radius: float, angles_deg: tuple[float, float]) -> FloatA
 
 
 def _repeated(cells: IntArray, nodes: int, layers: int) -> IntArray:
-    """Return the cells of the first layer in all layers: (layers * k, n)."""
+    """Return the elements (k, n) of the first layer repeated in all layers: (layers * k, n).
+
+    ``nodes`` is the number of nodes in a plane.
+    """
     shift = nodes * np.arange(layers)[:, None, None]
     return (cells + shift).reshape(-1, cells.shape[1])

@@ -1,6 +1,6 @@
-"""Structured grids whose nodes and cells follow from their numbers: in memory, or block by block.
+"""Structured grids, whose points and cells are computed from their numbers.
 
-Any part of such a mesh can be made without the rest of it, so its file can be larger than memory.
+Any part of such a mesh can be made without the rest, so that its file can be larger than memory.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ from slideviz.mesh.io.su2b.write import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 
 LINE, QUADRILATERAL, HEXAHEDRON = 3, 9, 12
+"""VTK identifiers."""
 LARGEST = 200_000_000
-"""Cells of a mesh that is written block by block."""
+"""Most cells of a mesh that is written block by block."""
 
 
 class Structured(Protocol):
-    """A grid of quadrilaterals (2D) or hexahedra (3D)."""
+    """A grid of quadrilaterals (2D) or hexahedra (3D), parts of which are computed on demand."""
 
     @property
     def dim(self) -> int:
@@ -35,23 +36,23 @@ class Structured(Protocol):
         """Return the number of cells."""
 
     def points(self, nodes: IntArray) -> FloatArray:
-        """Return the coordinates of nodes (k,): (k, d)."""
+        """Return the coordinates (k, d) of nodes (k,)."""
 
     def cells(self, ids: IntArray) -> IntArray:
-        """Return the nodes of cells (k,): (k, 4 or 8)."""
+        """Return the nodes (k, 4) in 2D, (k, 8) in 3D, of cells (k,)."""
 
     def markers(self) -> tuple[Marker, ...]:
         """Return the boundaries."""
 
 
 def mesh_of(grid: Structured, name: str) -> Mesh:
-    """Return the whole mesh."""
+    """Return the whole mesh of a grid."""
     cells = Cells.from_blocks([(_element(grid), grid.cells(np.arange(grid.n_cells)))])
     return Mesh(grid.points(np.arange(grid.n_points)), cells, grid.markers(), name=name)
 
 
 def zone_of(grid: Structured) -> ZoneContent:
-    """Return what a file of the mesh is written from, block by block.
+    """Return the zone of a grid's mesh, to be written to a file block by block.
 
     Raises
     ------
@@ -80,4 +81,5 @@ def zone_of(grid: Structured) -> ZoneContent:
 
 
 def _element(grid: Structured) -> int:
+    """Return the VTK identifier of the cells."""
     return QUADRILATERAL if grid.dim == 2 else HEXAHEDRON

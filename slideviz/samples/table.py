@@ -32,10 +32,9 @@ class Sample:
     mesh : Mesh
         The undeformed mesh.
     case : Case
-        Its files are named as if they were in the current folder; ``write_sample`` puts them
-        into another.
+        The case; its files are named as if they were in the current folder.
     displacement : Displacements or None
-        What the case's displacement file is to hold, where it has one.
+        The content of the case's displacement file; None if it has none.
     """
 
     name: str
@@ -46,7 +45,10 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class StreamedSample:
-    """A sample as ``Sample``, but for its mesh, which can be of any size: ``zone`` makes blocks."""
+    """A sample whose mesh, of any size, is made while it is written: ``zone`` makes its parts.
+
+    Case and displacement are as in `Sample`.
+    """
 
     zone: ZoneContent
     case: Case
@@ -55,22 +57,22 @@ class StreamedSample:
 
 @dataclass(frozen=True)
 class SampleKind:
-    """A kind of sample: its maker, and the words for it.
+    """A kind of sample, a row of ``SAMPLES``.
 
     Attributes
     ----------
     about : str
-        What it is, for people.
+        What it is, in words for users.
     size : int
-        The usual size.
+        The default size.
     make : callable
         Returns the sample of a name, a size and a variant.
     variants : tuple of str
-        How it can move, the default first. ``file``: as a displacement file; ``motion``: the same
-        by MOTION keys; ``translate``: the case of thesis Figure 4.4, which moves the block close
+        Names of its motions, the default first. ``file``: by a displacement file; ``motion``: the
+        same by MOTION keys; ``translate``: that of thesis Figure 4.4, which moves the block close
         to two sides; ``flat``: that of Figure 4.14, without a component in z.
     stream : callable or None
-        The same, with a mesh that is made while it is written.
+        Returns the same as a `StreamedSample`; None if that is not possible.
     """
 
     about: str
@@ -81,22 +83,27 @@ class SampleKind:
 
 
 def _thesis(name: str, size: int, variant: str) -> Sample:
+    """Return a square, polar, hexahedral or cylindrical sample (``make`` of `SampleKind`)."""
     return Sample(name, *thesis_case(name, size, variant))
 
 
 def _streamed_thesis(name: str, size: int, variant: str) -> StreamedSample:
+    """Return the same as `_thesis` with a mesh made while it is written."""
     return StreamedSample(*thesis_zone(name, size, variant))
 
 
 def _passage(name: str, size: int, _variant: str) -> Sample:
+    """Return the sample ``passage``, which has one variant only."""
     return Sample(name, passage_mesh(size), passage_case())
 
 
 def _turbine_row(name: str, size: int, _variant: str) -> Sample:
+    """Return the sample ``turbine-row``, which has one variant only."""
     return Sample(name, row_mesh(size), row_case(size))
 
 
 def _stator(name: str, size: int, _variant: str) -> Sample:
+    """Return the sample ``stator``, which has one variant only."""
     mesh = stator_mesh(size)
     nodes = mesh.marker("BLADE").nodes
     moved = stator_displacement(nodes, mesh.points[nodes])
@@ -104,6 +111,7 @@ def _stator(name: str, size: int, _variant: str) -> Sample:
 
 
 def _streamed_stator(_name: str, size: int, _variant: str) -> StreamedSample:
+    """Return the same as `_stator` with a mesh made while it is written."""
     zone, displacement = stator_zone(size)
     return StreamedSample(zone, stator_case(), displacement)
 
@@ -180,7 +188,7 @@ def sample(name: str, size: int | None = None, variant: str | None = None) -> Sa
 
 
 def _row(name: str, variant: str | None) -> tuple[SampleKind, str]:
-    """Return the kind of sample of a name, and the variant."""
+    """Return the row of a sample, and the variant, by default its first; raise CaseError."""
     if name not in SAMPLES:
         hint = nearest(name, SAMPLES)
         raise CaseError(f"no sample {name!r}; the samples are {', '.join(SAMPLES)}{hint}")
@@ -253,14 +261,17 @@ def write_sample(
 
 
 def _write_blocks(mesh: Path, zone: ZoneContent, overwrite: bool) -> None:
-    """Write a mesh as SU2's binary, block by block."""
+    """Write a mesh as SU2's binary, block by block, to the path ``mesh``."""
     with atomic_write(mesh, MeshError, mesh if overwrite else None) as file:
         for block in chain(file_head(1), zone_blocks(zone, 1)):
             file.write(block)
 
 
 def _in_folder(case: Case, folder: Path, name: str, ending: str) -> Case:
-    """Return the case with its files in that folder."""
+    """Return the case with mesh, output and displacement files in a folder.
+
+    ``name`` is that of the sample, ``ending`` that of the mesh files, without dot.
+    """
     motions = tuple(
         replace(motion, path=folder / motion.path) if isinstance(motion, FromFile) else motion
         for motion in case.motions
@@ -270,6 +281,6 @@ def _in_folder(case: Case, folder: Path, name: str, ending: str) -> Case:
 
 
 def _displacement_text(table: Displacements) -> str:
-    """Return the lines of a displacement file that reads back bit for bit."""
+    """Return the text of a displacement file, with all digits of its numbers."""
     rows = zip(table.nodes.tolist(), table.vectors.tolist(), strict=True)
     return "".join("\t".join([str(node), *map(repr, row)]) + "\n" for node, row in rows)

@@ -1,7 +1,8 @@
 """The thesis's square, polar, hexahedral and cylindrical samples (sections 4.1 and 4.2).
 
-All four are one structured grid of n cells in each direction, with the cells of a block in the
-middle taken out, and differ only in where its nodes lie. The block moves as in chapter 4.
+All four are a structured grid of n cells in each direction, without the cells of a block in the
+middle. They differ in dimension and in the coordinates of the nodes. The block moves as in
+chapter 4.
 """
 
 from __future__ import annotations
@@ -21,30 +22,32 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.samples.structured import LINE, QUADRILATERAL, mesh_of, zone_of
 from slideviz.terms import Role
 
+# Dimension by sample; the sectors among them; the periodic sides.
 DIMENSIONS = {"square": 2, "polar": 2, "hexahedron": 3, "cylindrical": 3}
 POLAR = ("polar", "cylindrical")
 PERIODIC = ("LOWER", "UPPER")
 SHIFT = (-0.2, -0.3, 0.2)
-"""Of the block of square and cube, after its turn by 60 degrees about z (Figures 4.3, 4.15)."""
+"""Translation of the block, after a rotation by 60 degrees about z (Figures 4.3 and 4.15)."""
 TRANSLATION = (-0.35, -0.43)
-"""Of the block in the test of robustness, in five steps (Figure 4.4)."""
+"""Translation of the block in the test of robustness, in five steps (Figure 4.4)."""
 FILE = Path("displacement.txt")
+"""Name of the displacement file of a sample."""
 
 BLOCK_LENGTH, BLOCK_HEIGHT = 0.2, 0.04
-"""Of the block, as parts of the domain (thesis Tables 4.1 and 4.9)."""
+"""Size of the block, as parts of the domain's (thesis Tables 4.1 and 4.9)."""
 SIDES = ("LEFT", "RIGHT", "LOWER", "UPPER", "FRONT", "BACK")
-"""Markers of the first and last layer along each axis."""
+"""Markers of the sides: first and last along each axis."""
 _RING = ((0, 0), (1, 0), (1, 1), (0, 1))
 _CORNERS = {
     1: ((0,), (1,)),
     2: _RING,
     3: tuple((*corner, up) for up in (0, 1) for corner in _RING),
 }
-"""Steps from a cell's place in the grid to its corners, in SU2's order."""
+"""Corners of a cell as steps along each axis, in SU2's order, by dimension."""
 
 
 def thesis_case(name: str, size: int, variant: str) -> tuple[Mesh, Case, Displacements | None]:
-    """Return mesh, case and, unless ``variant`` is ``motion``, the displacement file's content.
+    """Return mesh, case and the displacement file's content, None if ``variant`` is ``motion``.
 
     ``variant`` is one of ``SAMPLES[name].variants``.
 
@@ -60,7 +63,7 @@ def thesis_case(name: str, size: int, variant: str) -> tuple[Mesh, Case, Displac
 def thesis_zone(
     name: str, size: int, variant: str
 ) -> tuple[ZoneContent, Case, Displacements | None]:
-    """Return the same, but for the mesh: what its file is written from, block by block.
+    """Return the same as `thesis_case`, with a zone to write block by block in place of the mesh.
 
     Raises
     ------
@@ -72,6 +75,7 @@ def thesis_zone(
 
 
 def _case(grid: Layout, variant: str) -> tuple[Case, Displacements | None]:
+    """Return the case of a grid, and the content of its displacement file or None."""
     motions = _motions(grid.dim, variant)
     case = Case(
         roles=_roles(grid.markers()),
@@ -90,13 +94,13 @@ def _case(grid: Layout, variant: str) -> tuple[Case, Displacements | None]:
 
 
 def _roles(markers: tuple[Marker, ...]) -> dict[str, Role]:
-    """Return the roles of sliding sides with periodic displacement (Figures 4.6 and 4.17)."""
+    """Return the roles: sliding or periodic sides, moving block (thesis Figures 4.6 and 4.17)."""
     roles: dict[str, Role] = {marker.name: "sliding" for marker in markers}
     return roles | dict.fromkeys(PERIODIC, "periodic") | {"BLOCK": "moving"}
 
 
 def _motions(dim: int, variant: str) -> tuple[Motion, ...]:
-    """Return what moves the block of the square (dim 2) or the cube (dim 3)."""
+    """Return the motions of the block of the square (dim 2) or the cube (dim 3)."""
     if variant == "translate":
         return (Translate("BLOCK", TRANSLATION),)
     shift = (*SHIFT[:2], 0.0) if variant == "flat" else SHIFT[:dim]
@@ -104,9 +108,9 @@ def _motions(dim: int, variant: str) -> tuple[Motion, ...]:
 
 
 def _polar_shift(points: FloatArray) -> FloatArray:
-    """Return the displacement by 0.2 in r, -10 degrees and, in 3D, 0.2 in z: (k, d).
+    """Return the displacement (k, d) of points (k, d) by 0.2 in r, -10 degrees and 0.2 in z (3D).
 
-    A shift in r turns its direction with the angle, so no sequence of motions is the same.
+    The direction of the shift in r depends on the angle, so that no motions of a case describe it.
     """
     x, y = points[:, :2].T
     radius, angle = np.hypot(x, y) + 0.2, np.arctan2(y, x) - np.radians(10.0)
@@ -116,15 +120,17 @@ def _polar_shift(points: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class HollowGrid:
-    """The places of a grid, m in each direction, without those in a box; numbered in order.
+    """Numbers of the places of a grid, m in each direction, without those in a box.
 
-    The first axis is fastest; ``linear`` counts the places in the box, too.
+    The *linear index* of a place counts all places, the first axis fastest; its *number* only those
+    outside the box, in the same order.
 
     Attributes
     ----------
     m : int
+        Places in each direction.
     start, stop : tuple of int
-        The box takes the places ``start[a]`` to ``stop[a] - 1`` along axis a.
+        The box has the places ``start[a]`` to ``stop[a] - 1`` along axis a.
     """
 
     m: int
@@ -133,17 +139,17 @@ class HollowGrid:
 
     @property
     def size(self) -> int:
-        """Return how many places there are outside the box."""
+        """Return the number of places outside the box."""
         return int(self.m ** len(self.start)) - len(self._gaps) * self._length
 
     def number(self, linear: IntArray) -> IntArray:
-        """Return the numbers of places by their linear index, -1 in the box."""
+        """Return the numbers of places with linear indices of any shape; -1 in the box."""
         before = np.searchsorted(self._gaps, linear, side="right")
         ends = np.concatenate([[0], self._gaps + self._length])
         return np.where(linear < ends[before], -1, linear - before * self._length)
 
     def linear(self, numbers: IntArray) -> IntArray:
-        """Return the linear indices of numbered places."""
+        """Return the linear indices (k,) of places with ``numbers`` (k,)."""
         shift = self._gaps - np.arange(len(self._gaps)) * self._length
         return numbers + np.searchsorted(shift, numbers, side="right") * self._length
 
@@ -154,7 +160,7 @@ class HollowGrid:
 
     @cached_property
     def _gaps(self) -> IntArray:
-        """Return the linear index of the first place of each row of the box, rising."""
+        """Return the linear indices (b,), ascending, of the first place of each row of the box."""
         first = np.array([self.start[0]])
         for axis in range(1, len(self.start)):
             steps = np.arange(self.start[axis], self.stop[axis]) * self.m**axis
@@ -164,14 +170,14 @@ class HollowGrid:
 
 @dataclass(frozen=True)
 class Layout:
-    """The nodes and cells of an n x n (x n) grid with a block taken out.
+    """A `Structured` grid of n x n (x n) cells, without those of a block.
 
     Attributes
     ----------
     n, dim : int
-        Cells in each direction; directions.
+        Cells in each direction; dimension.
     start, stop : tuple of int
-        The block takes the cells ``start[a]`` to ``stop[a] - 1`` along axis a.
+        The block has the cells ``start[a]`` to ``stop[a] - 1`` along axis a.
     polar : bool
         Whether it is a sector of 30 degrees instead of a square or a cube.
     """
@@ -193,9 +199,9 @@ class Layout:
         return self._cells.size
 
     def points(self, nodes: IntArray) -> FloatArray:
-        """Return the coordinates of nodes (k, d).
+        """Return the coordinates (k, d) of nodes (k,).
 
-        The sector has r from 0.2 to 1 and z from 0 to 0.8.
+        Square and cube have side 1; the sector has r from 0.2 to 1 and z from 0 to 0.8.
         """
         parts = _places(self._nodes.linear(nodes), self.n + 1, self.dim) / self.n
         if not self.polar:
@@ -205,13 +211,13 @@ class Layout:
         return np.column_stack([flat, 0.8 * parts[:, 2:]])
 
     def cells(self, ids: IntArray) -> IntArray:
-        """Return the nodes of quadrilaterals or hexahedra (k, 4 or 8), first axis fastest."""
+        """Return the nodes (k, 4 or 8) of cells (k,), numbered with the first axis fastest."""
         first = _places(self._cells.linear(ids), self.n, self.dim) @ self._strides
         steps: IntArray = np.array(_CORNERS[self.dim])
         return self._nodes.number(first[:, None] + steps @ self._strides)
 
     def block_nodes(self) -> IntArray:
-        """Return the nodes on the surface of the block, sorted: (b,)."""
+        """Return the nodes (b,) on the surface of the block, ascending."""
         box = self._grid(self._spans()).ravel()
         return np.sort(box[box >= 0])
 
@@ -231,43 +237,46 @@ class Layout:
 
     @cached_property
     def _nodes(self) -> HollowGrid:
-        """Return the places of nodes: those inside the block are left out."""
+        """Return the numbering of nodes: those inside the block are left out."""
         return HollowGrid(self.n + 1, tuple(a + 1 for a in self.start), self.stop)
 
     @cached_property
     def _cells(self) -> HollowGrid:
+        """Return the numbering of cells."""
         return HollowGrid(self.n, self.start, self.stop)
 
     @property
     def _strides(self) -> IntArray:
+        """Return the step (d,) of a node's linear index along each axis."""
         return (self.n + 1) ** np.arange(self.dim)
 
     def _spans(self) -> list[tuple[int, int]]:
+        """Return first and last node place of the block along each axis."""
         return list(zip(self.start, self.stop, strict=True))
 
     def _grid(self, spans: list[tuple[int, int]]) -> IntArray:
-        """Return the node numbers of a box of places, its ends included, -1 inside the block."""
+        """Return node numbers (i, j[, k]) of a box of places, ends included; -1 in the block."""
         axes = np.meshgrid(*[np.arange(a, b + 1) for a, b in spans], indexing="ij")
         places: IntArray = np.stack(axes, axis=-1)
         return self._nodes.number(places @ self._strides)
 
     def _face(self, spans: list[tuple[int, int]], axis: int, end: int) -> IntArray:
-        """Return the elements of one side of a box, first axis fastest: (k, 2 or 4)."""
+        """Return the elements (k, 2 or 4) of one side of a box, first or last across an axis."""
         at = spans[axis][end]
         side = [*spans[:axis], (at, at), *spans[axis + 1 :]]
         return _corners(self._grid(side).squeeze(axis))
 
 
 def layout(name: str, n: int) -> Layout:
-    """Return the grid with the block in its middle.
+    """Return the grid of a sample with n cells in each direction, the block in its middle.
 
-    The block is 0.2 n cells long and 0.04 n wide, as the thesis has it for 25 and 200; for
-    another n it has the nearest numbers of cells, at least one, that leave it in the middle.
+    The block is 0.2 n cells long and 0.04 n wide, as in the thesis for 25 and 200; for another n
+    it has the nearest numbers of cells, at least one, with which it can be in the middle.
 
     Raises
     ------
     CaseError
-        The grid is too small to hold a block that does not touch its sides.
+        n is below 3, so that the block would touch the sides.
     """
     if n < 3:
         raise CaseError(f"size {n} leaves no room for the block; needed are 3 cells or more")
@@ -279,19 +288,19 @@ def layout(name: str, n: int) -> Layout:
 
 
 def _places(linear: IntArray, m: int, dim: int) -> IntArray:
-    """Return the indices along each axis of places in a grid of m in each direction: (k, d)."""
+    """Return the indices (k, d) along each axis of places with linear indices (k,), m in each."""
     return np.column_stack([linear // m**axis % m for axis in range(dim)])
 
 
 def _centred(length: float, n: int) -> int:
-    """Return the whole number nearest to ``length``, at least 1, as even or odd as n."""
+    """Return the whole number of the parity of n that is nearest to ``length``, at least 1."""
     low = int(length) - (int(length) - n) % 2
     nearest = low if length - low <= low + 2 - length else low + 2
     return nearest if nearest >= 1 else nearest + 2
 
 
 def _corners(number: IntArray) -> IntArray:
-    """Return the nodes of each line, quadrilateral or hexahedron of a grid: (m, 2^d)."""
+    """Return the nodes (m, 2^d) of each line, quadrilateral or hexahedron of a grid of nodes."""
     parts = [
         number[
             tuple(

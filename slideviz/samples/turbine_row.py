@@ -1,12 +1,12 @@
 """The sample ``turbine-row``: a linear supersonic cascade (thesis section 4.1.3).
 
 A layer of quadrilaterals lies around the vane, and triangles fill the rest of the channel. At
-the default size the numbers are those of thesis Table 4.7, to a few per cent.
+the default size the numbers of cells are those of thesis Table 4.7, to a few per cent.
 
 The points of the triangles come from an advancing front. Every accepted point proposes the corners
 of a hexagon around it, and then those of a second one turned by 30 degrees; a proposal is accepted
-when no point is too near. The hexagon is turned to the point's parent, so that rows of triangles
-run along the boundary they started from. The idea is that of J. Slak and G. Kosec, "On generation
+when no point is too near. The hexagon has a corner opposite to the point's parent, so that rows of
+triangles are parallel to the boundary. The idea is that of J. Slak and G. Kosec, "On generation
 of node distributions for meshless PDE discretizations", SIAM J. Sci. Comput. 41, 2019.
 """
 
@@ -23,23 +23,29 @@ from slideviz.samples.sizing import Sizing, find_sizing, relax
 from slideviz.samples.vane import AHEAD, LENGTH, camber_line, pitch, vane_layers
 
 LINE, TRIANGLE, QUADRILATERAL = 3, 5, 9
+"""VTK identifiers."""
 CELLS, AROUND, LAYERS = 224_180, 1315, 25
-"""Thesis Tables 4.7 and 4.8; the layers follow from their numbers by Euler's formula."""
+"""Cells of the mesh, nodes around the vane, and layers of quadrilaterals at the default size.
+
+The first two are those of thesis Tables 4.7 and 4.8; the third follows by Euler's formula.
+"""
 SIZES = (5_000, 5_000_000)
+"""Least and largest number of cells."""
 CALIBRATION = 1.035
-"""Equilateral triangles to ask for, over those that the advancing front then makes."""
+"""Number of equilateral triangles to ask for, divided by that which the front then makes."""
 TOLERANCE = 1e-6
-"""Of the data reduction: half the height of the thinnest cells at the default size."""
+"""Tolerance of the data reduction: half the height of the thinnest cells at the default size."""
 MANY = 50_000
-"""Cells from which on the case asks for data reduction."""
+"""Number of cells above which the case has data reduction."""
 
 NEAREST = 0.78
-"""Least distance of two points over the edge length wanted there."""
+"""Least distance of two points, divided by the wanted edge length there."""
+# Directions of a point's proposals in the order of trial, from that of its parent to it.
 _TURNS = np.radians([0.0, 60.0, -60.0, 120.0, -120.0, 180.0, 30.0, -30.0, 90.0, -90.0, 150.0])
 
 
 def row_mesh(size: int) -> Mesh:
-    """Return the mesh of about ``size`` cells.
+    """Return the mesh of the sample ``turbine-row``, of about ``size`` cells.
 
     Raises
     ------
@@ -75,7 +81,7 @@ def row_mesh(size: int) -> Mesh:
 def row_case(size: int) -> Case:
     """Return the case of thesis Figure 4.11: the vane 7 % larger, and 0.001 lower.
 
-    A mesh of many cells gets data reduction.
+    With more than `MANY` cells it has data reduction.
     """
     return Case(
         roles={
@@ -95,9 +101,9 @@ def row_case(size: int) -> Case:
 
 
 def _channel(sizing: Sizing) -> tuple[dict[str, IntArray], FloatArray]:
-    """Return the edges of each side (e, 2), the domain on their left, and the nodes (n, 2).
+    """Return the edges (e, 2) of the channel's sides, by marker, and the nodes (n, 2) of all.
 
-    PER2 is PER1 shifted by the pitch, node by node.
+    The domain is on the left of the edges. PER2 has the nodes of PER1, shifted by the pitch.
     """
     _, xs, ys, _ = camber_line()
     ends = np.array([-AHEAD, LENGTH - AHEAD])
@@ -117,7 +123,7 @@ def _channel(sizing: Sizing) -> tuple[dict[str, IntArray], FloatArray]:
 
 
 def _spread(curve: FloatArray, sizing: Sizing) -> FloatArray:
-    """Return points on a fine curve (m, 2), as far apart as wanted there, ends included."""
+    """Return points (k, 2) on a fine curve (m, 2), with its ends, at distances by ``sizing``."""
     steps = np.hypot(*np.diff(curve, axis=0).T)
     density = 1 / sizing.at((curve[1:] + curve[:-1]) / 2)
     place = np.concatenate([[0.0], np.cumsum(steps * density)])
@@ -128,25 +134,25 @@ def _spread(curve: FloatArray, sizing: Sizing) -> FloatArray:
 
 
 def _loop(nodes: IntArray) -> IntArray:
-    """Return the edges around a closed row of nodes: (k, 2)."""
+    """Return the edges (k, 2) around a closed row of nodes (k,)."""
     return np.column_stack([nodes, np.roll(nodes, -1)])
 
 
 def front_points(
     fixed: FloatArray, edges: IntArray, sizing: Sizing, triangles: float
 ) -> FloatArray:
-    """Return points (k, 2) that fill a domain, those of its boundary left out.
+    """Return points (k, 2) that fill the inside of a domain, by an advancing front.
 
     Parameters
     ----------
     fixed : (n, 2)
-        Nodes of the boundary, as far apart as ``sizing`` wants.
+        Nodes of the boundary, at distances by ``sizing``.
     edges : (e, 2)
-        Its edges, with the domain on their left.
+        Edges of the boundary, with the domain on their left.
     sizing : Sizing
-        The edge length, over a rectangle that the domain does not leave.
+        The edge length, tabulated over a rectangle that contains the domain.
     triangles : float
-        About how many equilateral ones of that size the domain holds.
+        About how many equilateral triangles of these edge lengths fill the domain.
     """
     first, second = fixed[edges[:, 0]], fixed[edges[:, 1]]
     along = second - first
@@ -162,7 +168,7 @@ def front_points(
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _size_at(x, y, low, step, table):  # type: ignore[no-untyped-def]
-    """Return the edge length, or -1 outside the rectangle."""
+    """Return the edge length at (x, y), bilinear in the table of a `Sizing`; -1 outside of it."""
     px, py = (x - low[0]) / step[0], (y - low[1]) / step[1]
     if px < 0 or py < 0 or px > table.shape[0] - 1 or py > table.shape[1] - 1:
         return -1.0
@@ -175,7 +181,11 @@ def _size_at(x, y, low, step, table):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _is_free(x, y, reach, points, buckets):  # type: ignore[no-untyped-def]
-    """Tell whether no point is nearer than ``reach``; ``buckets`` are chains of points."""
+    """Return whether no point is nearer to (x, y) than ``reach``.
+
+    Buckets are squares of a grid: the first point of each, the next point after each point (-1: no
+    more), the grid's lowest corner, and the width of a square.
+    """
     heads, following, low, width = buckets
     i0, i1 = int((x - reach - low[0]) / width), int((x + reach - low[0]) / width)
     j0, j1 = int((y - reach - low[1]) / width), int((y + reach - low[1]) / width)
@@ -224,7 +234,7 @@ def _fill(fixed, starts, sizing, most, turns):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _add(x, y, points, count, buckets):  # type: ignore[no-untyped-def]
-    """Put a point into its bucket, and return the number of points."""
+    """Append the point (x, y) to ``points`` and to its bucket; return the new number of points."""
     heads, following, low, width = buckets
     i = min(max(int((x - low[0]) / width), 0), heads.shape[0] - 1)
     j = min(max(int((y - low[1]) / width), 0), heads.shape[1] - 1)

@@ -1,7 +1,8 @@
 """The vane of the sample ``turbine-row``, its layer of quadrilaterals, and its channel.
 
-A supersonic stator: the camber line enters axially, turns early and leaves as a nearly straight
-tail. The channel between two periodic sides follows it. Lengths are those of thesis Table 4.7.
+A supersonic stator: the camber line is axial at the leading edge, turns early and is nearly
+straight towards the trailing edge. The periodic sides of the channel follow it. Lengths are those
+of thesis Table 4.7, in its unit.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from slideviz.mesh.model import FloatArray
 
 LENGTH, HEIGHT = 0.058275, 0.097982
-"""Of the whole mesh (thesis Table 4.7)."""
+"""Extents of the whole mesh in x and y (thesis Table 4.7)."""
 AHEAD = 0.0135
 """Axial distance from the inflow to the leading edge, which is the origin."""
 CHORD = 0.0465
@@ -22,21 +23,24 @@ CHORD = 0.0465
 ANGLES_DEG = (0.0, -68.0, -57.0)
 """Direction of the camber line at the leading edge, at the trailing edge and at the outflow."""
 TURNS = (0.56, 0.9)
-"""Within which part of ``CHORD``, from the leading and from the trailing edge, it turns."""
+"""Lengths over which the camber line turns, from the leading and trailing edge on, by ``CHORD``."""
 THICKNESS = (0.06, 0.2, 1.3)
-"""a, b, c of the half thickness sqrt(u (1 - u)) (a + b (1 - u)^c) over ``CHORD``.
+"""a, b, c of the half thickness sqrt(u (1 - u)) (a + b (1 - u)^c), with lengths by ``CHORD``.
 
 The root rounds both ends: the radii are (a + b)^2 / 2 in front and a^2 / 2 behind, times CHORD.
 """
 GROWTH, RATIO = 1.2, 30.0
-"""Of the layer's heights: at most from one to the next, and at most from first to last."""
+"""Largest ratio of heights in the layer, of neighbouring quadrilaterals and of last to first."""
 TOP = 0.85
-"""Height of the layer's last quadrilaterals over their width, near that of a triangle."""
+"""Height of the layer's last quadrilaterals, divided by their width: about that of a triangle."""
 
 
 @cache
 def camber_line() -> FloatArray:
-    """Return arc length, x, y and direction in radians from inflow to outflow: (4, m)."""
+    """Return points of the camber line from inflow to outflow: (4, m).
+
+    The rows are arc length (0 at the leading edge), x, y, and direction in radians.
+    """
     ahead, behind = -1.5 * AHEAD / CHORD, 3.0
     u = np.arange(ahead, behind, 2e-4)
     u -= u[np.argmin(np.abs(u))]
@@ -51,7 +55,7 @@ def camber_line() -> FloatArray:
 
 
 def camber(x: FloatArray) -> FloatArray:
-    """Return y of the camber line and of its tangents at these x."""
+    """Return y of the camber line at ``x``, from inflow to outflow."""
     _, xs, ys, _ = camber_line()
     return np.interp(x, xs, ys)
 
@@ -63,16 +67,16 @@ def pitch() -> float:
 
 
 def _ramp(part: FloatArray) -> FloatArray:
-    """Return 0 before 0, 1 after 1, and between them a step with two smooth derivatives."""
+    """Return 0 below 0, 1 above 1, and between a step with two continuous derivatives."""
     t = np.clip(part, 0.0, 1.0)
     return t**3 * (10 - 15 * t + 6 * t**2)
 
 
 @cache
 def _profile() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return arc length (m,), points (m, 2), outer normals (m, 2) and curvature (m,).
+    """Return arc length (m,), points (m, 2), outer normals (m, 2) and curvature (m,) of the vane.
 
-    Counter-clockwise and closed, from the trailing edge over the suction side.
+    They go counter-clockwise from the trailing edge and back to it.
     """
     phi = np.linspace(-np.pi, np.pi, 40001)
     u = (1 + np.cos(phi + np.pi)) / 2
@@ -91,7 +95,10 @@ def _profile() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
 def _smooth_curve(
     points: FloatArray, arc: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return arc, points, outer normals and curvature of the spline through closed points."""
+    """Return the same as `_profile` for a closed curve of ``points`` (m, 2) at ``arc`` (m,).
+
+    Normals and curvature are those of a periodic cubic spline; the last point becomes the first.
+    """
     points[-1] = points[0]
     spline = CubicSpline(arc, points, bc_type="periodic")
     (tx, ty), (cx, cy) = spline(arc, 1).T, spline(arc, 2).T
@@ -100,10 +107,10 @@ def _smooth_curve(
 
 
 def vane_layers(around: int, layers: int) -> FloatArray:
-    """Return the nodes of vane and layer: (layers + 1, around, 2), counter-clockwise.
+    """Return the nodes of vane and layer: (layers + 1, around, 2), counter-clockwise, vane first.
 
-    The nodes stand on the vane so that those of the outermost ring are equally far apart, and
-    the heights so that the last quadrilaterals are as high as the triangles that follow.
+    Nodes are placed on the vane so that those of the outermost ring are equally far apart. The
+    last quadrilaterals are about as high as the triangles that follow (``TOP``).
     """
     arc, points, normals, curvature = _profile()
     heights = _heights(layers)
@@ -121,6 +128,6 @@ def vane_layers(around: int, layers: int) -> FloatArray:
 
 
 def _heights(layers: int) -> FloatArray:
-    """Return the heights of the layers over that of the first: (layers,)."""
+    """Return the heights (layers,) of the layers, divided by that of the first."""
     growth = min(GROWTH, RATIO ** (1 / max(layers - 1, 1)))
     return growth ** np.arange(layers)

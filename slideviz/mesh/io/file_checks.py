@@ -22,6 +22,7 @@ from slideviz.mesh.check import printable
 Inputs = Mapping[Path, str]
 """Input files, and what each is in words: ``the input mesh``."""
 _known: list[Callable[[], Inputs]] = []
+"""Functions that return input files: those of `protected` contexts that are open."""
 
 
 @contextmanager

@@ -38,6 +38,7 @@ _TICK_SECONDS = 0.05
 _BYTES_PER_SECOND = 5e6
 """Speed of reading that the progress assumes."""
 _CHUNK_BYTES = 1 << 20
+"""Most bytes that are read from the process at a time."""
 _SET_DEATH_SIGNAL = 1
 """``PR_SET_PDEATHSIG`` of Linux's ``prctl``."""
 

@@ -31,8 +31,11 @@ if TYPE_CHECKING:
 
 VTKHDF = ".vtkhdf"
 _VERSION = (2, 1)
+"""Version of the format."""
 _VOLUME = "volume"
+"""Name of the block with the cells."""
 _CHUNK_ROWS = 1 << 16
+"""Most rows in a chunk of an HDF5 dataset that grows."""
 PARTITION = 1 << 20
 """Most cells of a partition."""
 

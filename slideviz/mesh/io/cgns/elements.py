@@ -28,7 +28,9 @@ TETRA_35 PYRA_P4_29 PYRA_50 PYRA_55 PENTA_33 PENTA_66 PENTA_75 HEXA_44 HEXA_98 H
 _VTK = {"NODE": 1, "BAR_2": 3, "TRI_3": 5, "QUAD_4": 9, "TETRA_4": 10, "PYRA_5": 14, "PENTA_6": 13}
 _VTK["HEXA_8"] = 12
 _TYPES = {_NAMES.index(name): vtk for name, vtk in _VTK.items()}
+"""VTK identifier by number of the ``ElementType_t``, of the types that slideviz reads."""
 _SIZES = np.zeros(256, np.int64)
+"""Number of nodes by number of the ``ElementType_t``; 0 for those that slideviz does not read."""
 _SIZES[list(_TYPES)] = [ELEMENTS[vtk].n_nodes for vtk in _TYPES.values()]
 _MIXED = _NAMES.index("MIXED")
 

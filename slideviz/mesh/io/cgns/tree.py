@@ -25,9 +25,12 @@ if TYPE_CHECKING:
     import h5py
 
 _ADF = b"ADF Database"
+"""In the first ``_HEAD_BYTES`` of a CGNS file of the old kind."""
 _HEAD_BYTES = 32
 DATA = " data"
+"""Name of the dataset with the value of a node."""
 _LINK = " link"
+"""Name of the HDF5 link in a node that is a link."""
 
 
 @contextmanager

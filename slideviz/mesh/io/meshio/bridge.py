@@ -43,6 +43,7 @@ _FLAT = 1e-9
 """Largest range of z, as a fraction of the extent, of a mesh in the xy-plane."""
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
+"""First bytes of an HDF5 file."""
 _INCLUDE = re.compile(rb"^\*INCLUDE\b[^=\n]*=([^\n]*)", re.IGNORECASE | re.MULTILINE)
 _MOST_FILES = 100
 """Most files that are searched for names of further files: two may name each other."""

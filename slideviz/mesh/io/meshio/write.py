@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 
 _NAMES = {vtk: name for name, vtk in MESHIO_TYPES.items()}
+"""meshio's name of an element type by VTK identifier."""
 # Name of the cell data with the numbers of the boundaries, by format; else "marker".
 _TAG = {
     "gmsh": "gmsh:physical",
@@ -45,6 +46,7 @@ _EXACT = 1e-12
 """Largest error of a coordinate in a written file, as a fraction of the extent."""
 
 _TYPES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "u1": "UInt8"}
+"""VTK's name of a data type by NumPy's."""
 _BLOCK_BYTES = 3 << 18
 """A multiple of 3, so that the encoded blocks join."""
 # Order of a prism's nodes in VTU files. Until VTK 9.7 (vtk!12988) the first triangle faced outward.
@@ -188,7 +190,7 @@ def _to_meshio(mesh: Mesh, cell_data: Mapping[str, NDArray], name: str) -> meshi
 
 
 def _boundary_blocks(mesh: Mesh) -> list[tuple[int, NDArray, NDArray]]:
-    """Return for each type of boundary element: type, nodes (m, n), number of marker from 1 (m,)."""
+    """Return for each type of boundary element: type, nodes (m, n), marker's number from 1 (m,)."""
     found: dict[int, list[tuple[NDArray, NDArray]]] = {}
     for number, marker in enumerate(mesh.markers, 1):
         for vtk, (_, nodes) in marker.cells.by_type.items():

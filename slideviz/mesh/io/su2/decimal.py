@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from slideviz.mesh.caching import njit
 
 OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
+"""Options of `njit` for the loops over text."""
 
 _LEAST, _MOST = -342, 308
 """Powers of ten beyond which a number of 19 digits is zero or infinite."""
@@ -39,6 +40,8 @@ def _powers_of_five() -> NDArray[np.uint64]:
 
 _POWERS = _powers_of_five()
 _U0, _U1, _U3, U10, _U32, U48, _U63 = (np.uint64(n) for n in (0, 1, 3, 10, 32, 48, 63))
+# Bits of uint64 and of a float64: lowest 32; all; numbers with the highest byte or bit set are not
+# below these; the mantissa's limit, and the highest bit of it, which a float64 does not store.
 _LOW = np.uint64(0xFFFFFFFF)
 _ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
 _BYTE_FREE, _BIT_FREE = np.uint64(1 << 56), np.uint64(1 << 63)

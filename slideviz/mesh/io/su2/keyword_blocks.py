@@ -1,6 +1,6 @@
-"""The keyword lines of an SU2 file, and the zones they divide it into.
+"""The keyword lines of an SU2 file (``KEY= value``), and the zones they divide it into.
 
-A section is a keyword line and what follows it up to the next keyword line.
+A section is a keyword line with all lines up to the next keyword line. Lines are counted from 0.
 """
 
 from __future__ import annotations
@@ -14,17 +14,22 @@ from slideviz.mesh.io.su2.lines import KEYWORD, Lines, show
 
 _KEY = re.compile(rb"[A-Za-z_]\w*")
 _COUNT = re.compile(rb"\+?\d{1,18}")
+"""The value of a key that counts."""
 KNOWN = ("NZONE", "IZONE", "NDIME", "NELEM", "NPOIN", "NMARK", "MARKER_TAG", "MARKER_ELEMS")
+"""Keys of the sections that slideviz reads; all others are copied as they are."""
 
 
 def is_ffd(text: bytes) -> bool:
-    """Tell whether a section is one of the boxes for free-form deformation."""
+    """Return whether a section (its text or key) is of boxes for free-form deformation."""
     return text.lstrip()[:14].upper().startswith((b"FFD_", b"BSPLINE_ORDER_"))
 
 
 @dataclass(frozen=True)
 class KeywordBlock:
-    """A keyword line and the lines up to ``stop``, the next keyword line."""
+    """A section: key (in capitals) and value, its keyword line, and the next one ``stop``.
+
+    For the last section ``stop`` is the number of lines of the file.
+    """
 
     key: str
     value: bytes
@@ -34,7 +39,7 @@ class KeywordBlock:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Zone ``number`` (from 1) of ``zones`` is the lines ``begin:end``, without ``IZONE``."""
+    """The lines ``begin:end``, without ``IZONE``, of zone ``number`` (from 1) of ``zones``."""
 
     number: int
     zones: int
@@ -54,7 +59,7 @@ def find_blocks(lines: Lines) -> list[KeywordBlock]:
 
 
 def find_bounds(lines: Lines, sections: list[KeywordBlock], number: int | None) -> Bounds:
-    """Return where a zone stands.
+    """Return the lines of a zone.
 
     Parameters
     ----------
@@ -64,7 +69,7 @@ def find_bounds(lines: Lines, sections: list[KeywordBlock], number: int | None) 
     Raises
     ------
     MeshError
-        This is no SU2 mesh, there is no such zone, or the zones are not numbered well.
+        This is no SU2 mesh, there is no such zone, or the zones are not numbered 1, 2, and so on.
     """
     if not any(section.key in KNOWN for section in sections):
         raise MeshError(
@@ -87,7 +92,7 @@ def find_bounds(lines: Lines, sections: list[KeywordBlock], number: int | None) 
 
 
 def boxes_elsewhere(sections: list[KeywordBlock], bounds: Bounds) -> dict[str, int]:
-    """Return the boxes for free-form deformation that other zones have, and their zones."""
+    """Return the names of boxes for free-form deformation in other zones, and numbers of these."""
     found, zone = {}, 1
     for section in sections:
         if section.key == "IZONE":
@@ -98,7 +103,10 @@ def boxes_elsewhere(sections: list[KeywordBlock], bounds: Bounds) -> dict[str, i
 
 
 def _zone_heads(lines: Lines, sections: list[KeywordBlock]) -> dict[int, KeywordBlock]:
-    """Return the ``IZONE`` line of each zone by number; none when the file has no zones."""
+    """Return the ``IZONE`` section of each zone by number; empty if the file has no zones.
+
+    Raises MeshError if ``NZONE`` and the ``IZONE`` lines contradict each other.
+    """
     totals = [s for s in sections if s.key == "NZONE"]
     heads: dict[int, KeywordBlock] = {}
     for section in sections:
@@ -135,7 +143,7 @@ def _zone_heads(lines: Lines, sections: list[KeywordBlock]) -> dict[int, Keyword
 
 
 def misspelt(sections: list[KeywordBlock], key: str) -> str:
-    """Return which unknown keyword may be meant as this one, for a message, or nothing."""
+    """Return the words for a message that an unknown keyword may mean ``key``; "" if none may."""
     for section in sections:
         if section.key not in KNOWN and get_close_matches(section.key, [key], cutoff=0.8):
             return f"; line {section.line + 1} has {section.key}=, did you mean {key}=?"
@@ -143,12 +151,12 @@ def misspelt(sections: list[KeywordBlock], key: str) -> str:
 
 
 def count_of(lines: Lines, section: KeywordBlock) -> int:
-    """Return the number after the keyword; what follows it is not looked at.
+    """Return the number after the keyword; further words are ignored.
 
     Raises
     ------
     MeshError
-        It is no whole number, or negative.
+        The first word is no whole number, or negative.
     """
     word = (section.value.split() or [b""])[0]
     if not _COUNT.fullmatch(word):

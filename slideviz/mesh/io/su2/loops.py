@@ -1,9 +1,10 @@
 """Compiled loops over the text of SU2 files: where lines are, and the numbers on them.
 
-They do what is plain. A row with anything else on it (a sign before a node, a wrong type, a number
-that is none, or not finite) is only listed: `su2.numbers` looks at it with all of Python.
+They read plain rows only. A row with anything else (a sign before a node, a wrong type, a word that
+is no number, a number that is not finite) is *left*: only listed, for `su2.numbers` to read it in
+Python.
 
-Every text ends with a line break.
+``text`` is an array of bytes, (b,) uint8, that ends with a line break; ``at`` is an index into it.
 """
 
 from __future__ import annotations
@@ -16,24 +17,25 @@ from slideviz.mesh.io.su2.decimal import OPTIONS, U10, U48, decimal
 from slideviz.mesh.io.su2.lines import KEYWORD, ROWS, TEXT
 
 SIZES = np.zeros(257, np.int64)
-"""Number of nodes by element type; the last row is for all types that are none."""
+"""Number of nodes by element type, 0 for no type; the last entry is for all numbers above 255."""
 DIMS = np.full(257, -1)
+"""Dimension by element type, likewise; -1 for no type."""
 for _row in ELEMENTS.values():
     SIZES[_row.vtk], DIMS[_row.vtk] = _row.n_nodes, _row.dim
 
 RUN_COLUMNS = 5
-"""First byte, number of the line, what it begins with, rows of numbers, nodes if they are cells."""
+"""Columns of a table of runs: first byte, first line, kind, rows, nodes (see `Lines`)."""
 
 
 @njit(inline="always", **OPTIONS)
 def _is_blank(code):  # type: ignore[no-untyped-def]
-    """Tell whether a byte is a blank within a line."""
+    """Return whether a byte is a blank within a line."""
     return code == 32 or code == 9 or 11 <= code <= 13
 
 
 @njit(inline="always", **OPTIONS)
 def is_numeric(code):  # type: ignore[no-untyped-def]
-    """Tell whether a number may begin with this byte."""
+    """Return whether a number may begin with this byte: a digit, a sign or a point."""
     return 48 <= code <= 57 or code == 43 or code == 45 or code == 46
 
 
@@ -47,7 +49,7 @@ def _next_line(text, at):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _first_word(text, at):  # type: ignore[no-untyped-def]
-    """Return where the first word of a line begins, or where the line or its text ends."""
+    """Return where the first word, or comment, of the line from ``at`` on begins, or its end."""
     # Control characters stand before words like blanks, but not between numbers.
     while text[at] <= 32 and text[at] != 10:
         at += 1
@@ -56,7 +58,7 @@ def _first_word(text, at):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _next_word(text, at):  # type: ignore[no-untyped-def]
-    """Return where the next word begins, or the line or its text ends."""
+    """Return where the next word begins: ``at``, or behind the blanks there."""
     while _is_blank(text[at]):
         at += 1
     return at
@@ -64,7 +66,10 @@ def _next_word(text, at):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _type_of(text, at):  # type: ignore[no-untyped-def]
-    """Return the element type that a row begins with; 256 where it is none."""
+    """Return the whole number that a row begins with, an element type; 256 if it is larger.
+
+    It is 0 if there are no digits.
+    """
     at += text[at] == 43
     value = np.int64(0)
     while 48 <= text[at] <= 57:
@@ -76,20 +81,20 @@ def _type_of(text, at):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def scan_block(text, runs):  # type: ignore[no-untyped-def]
-    """Find the runs of a block of lines: a line of text, and the rows of numbers after it.
+    """Write the runs (see `Lines`) of a block of lines into ``runs``; return how many there are.
 
     Parameters
     ----------
     text : (b,) uint8
         The lines.
     runs : (l, 5) int64
-        As many rows as there are lines. Receives the runs, with bytes and lines counted from the
-        start of the block; the first may begin without text.
+        Receives the runs, columns as in ``RUN_COLUMNS``, with bytes and lines counted from the
+        start of the block; l is the number of lines. The first run may have no line of text.
 
     Returns
     -------
     n_runs, n_lines : int
-        Runs and lines found.
+        Numbers of runs and lines.
     """
     at, line, n = 0, 0, 0
     while at < len(text):
@@ -117,10 +122,7 @@ def scan_block(text, runs):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def count_types(text, counts):  # type: ignore[no-untyped-def]
-    """Count the rows of a text by the element type (257,) that they begin with.
-
-    The last is for all types that are none.
-    """
+    """Add to ``counts`` (257,) the number of rows of each element type; the last is for others."""
     at = 0
     while at < len(text):
         at = _first_word(text, at)
@@ -131,9 +133,9 @@ def count_types(text, counts):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _whole_number(text, at):  # type: ignore[no-untyped-def]
-    """Return a whole number of plain digits and where they end; -1 where there is none.
+    """Return the whole number from ``at`` on, of plain digits, and where it ends.
 
-    What follows the digits need not be looked at: no other number begins with it.
+    The number is -1 if there are no digits or more than 18.
     """
     first, value = at, np.int64(0)
     digit = np.uint64(text[at]) - U48
@@ -146,7 +148,10 @@ def _whole_number(text, at):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _nodes(text, at, size, n_points, nodes, k):  # type: ignore[no-untyped-def]
-    """Put the nodes of an element into place k, and return where they end, or -1."""
+    """Write the ``size`` nodes of an element to ``nodes[k:]``; return where they end in the text.
+
+    The result is -1 if one is not a whole number below ``n_points``, or is there twice.
+    """
     for j in range(k, k + size):
         node, at = _whole_number(text, _next_word(text, at))
         if node < 0 or node >= n_points:
@@ -160,25 +165,26 @@ def _nodes(text, at, size, n_points, nodes, k):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def cell_block(text, dim, n_points, types, nodes, odd):  # type: ignore[no-untyped-def]
-    """Read rows of elements: type, nodes, and perhaps an index that is ignored.
+    """Read the rows of elements (type, nodes, perhaps an index, ignored) into types and nodes.
 
     Parameters
     ----------
     text : (b,) uint8
-        Lines; those without numbers are passed over.
+        Whole lines; those that are no rows are skipped.
     dim, n_points : int
-        The dimension of the elements; the nodes are below this number.
+        Dimension that elements must have; number that nodes must be below.
     types : (m,) uint8
         Receives the types.
     nodes : (k,) int64
         Receives the nodes.
     odd : (m, 3) int64
-        Receives row, first byte of its line, and place of its first node, of each row left.
+        Receives for each row left: its number, the first byte of its line, and the index of its
+        first node in ``nodes``.
 
     Returns
     -------
     rows, left : int
-        The number of rows, m if the text is what it was, and of those left.
+        Number of rows (-1 if more than m; if it is not m, the file was changed), and of rows left.
     """
     at, row, k, n = 0, 0, 0, 0
     while at < len(text):
@@ -204,7 +210,7 @@ def cell_block(text, dim, n_points, types, nodes, odd):  # type: ignore[no-untyp
 
 @njit(inline="always", **OPTIONS)
 def _ends_row(text, at):  # type: ignore[no-untyped-def]
-    """Tell whether a row of whole numbers ends here, or after one more number."""
+    """Return whether a row of whole numbers ends at ``at``, or after one more number."""
     at = _next_word(text, at)
     if text[at] == 10 or text[at] == 37:
         return True
@@ -215,26 +221,27 @@ def _ends_row(text, at):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def point_block(text, first, points, extra, odd):  # type: ignore[no-untyped-def]
-    """Read rows of points: coordinates, and perhaps one or two indices.
+    """Read the rows of points (coordinates, perhaps one or two indices) into ``points``.
 
     Parameters
     ----------
     text : (b,) uint8
-        Lines; those without numbers are passed over.
+        Whole lines; those that are no rows are skipped.
     first : int
-        The number of the first row among all points.
+        Number of the first row among all points.
     points : (m, d) uint64
         Receives the bits of the coordinates.
     extra : (2,) int64
-        Of rows that are not left: receives the most numbers on one, if more than is there, and
-        the first whose last coordinate is its own number with nothing after it, if before that.
+        Updated by the rows that are not left: ``[0]`` becomes the largest count of numbers on a
+        row, ``[1]`` the smallest number of a row that has only d numbers, the last of which is
+        that number: perhaps its index, and a coordinate is missing.
     odd : (m, 2) int64
-        Receives row and first byte of its line of each row that is left.
+        Receives for each row left: its number and the first byte of its line.
 
     Returns
     -------
     rows, left : int
-        The number of rows, m if the text is what it was, and of those left.
+        Number of rows (-1 if more than m; if it is not m, the file was changed), and of rows left.
     """
     at, row, n, dim = 0, 0, 0, points.shape[1]
     bits = np.zeros(1, np.uint64)

@@ -1,4 +1,7 @@
-"""Elements and points from the rows of an SU2 file, with the place of every mistake."""
+"""Elements and points from the rows of an SU2 file; errors name the line of a mistake.
+
+`su2.loops` reads plain rows; those that it leaves are read here, or are the mistakes.
+"""
 
 from __future__ import annotations
 
@@ -17,22 +20,23 @@ from slideviz.mesh.io.su2.scan import Progress
 from slideviz.mesh.model import Cells, FloatArray, IntArray
 
 _SUPPORTED = ", ".join(str(vtk) for vtk, row in ELEMENTS.items() if row.dim > 0)
+"""The element types, for messages."""
 # VTK's quadratic and higher-order elements, and SU2's own identifiers: 100 more per degree.
 _HIGH_ORDER = (*range(21, 38), *range(60, 82))
 _LONE_SIGN = re.compile(rb"[+-](?![0-9])")
 _DIGITS = 18
-"""Whole numbers of more digits may be too large to be read."""
+"""Most digits of a whole number that surely fits into 64 bits."""
 _EXTRA_POINT_WORDS = 2
-"""After the coordinates: the index, and in partitioned files the global index."""
+"""Most numbers after the coordinates: the index, and in partitioned files the global index."""
 
 
 def parse_cells(lines: Lines, rows: Rows, dim: int, n_points: int, progress: Progress) -> Cells:
-    """Return the elements of the rows: type, nodes, and perhaps an index that is ignored.
+    """Return the elements on rows, each with type, nodes, and perhaps an index that is ignored.
 
     Parameters
     ----------
     rows : tuple of Piece
-        Where they are, one element on each row.
+        The rows, with one element each.
     dim : int
         The dimension that the elements must have.
     n_points : int
@@ -43,7 +47,7 @@ def parse_cells(lines: Lines, rows: Rows, dim: int, n_points: int, progress: Pro
     Raises
     ------
     MeshError
-        An element is not what it should be; the message has its line.
+        An element has a wrong type, dimension or nodes; the message has its line.
     """
     types = np.empty(number_of(rows), np.uint8)
     nodes = np.empty(rows[-1].node + rows[-1].nodes if rows else 0, np.int64)
@@ -67,12 +71,12 @@ def fill_cells(
     dim: int,
     n_points: int,
 ) -> None:
-    """Fill types (m,) and nodes (k,) with the elements of a piece, of which there are m.
+    """Write the m elements of a piece into ``types`` (m,) and ``nodes`` (k,).
 
     Raises
     ------
     MeshError
-        An element is not what it should be; the message has its line.
+        An element has a wrong type, dimension or nodes; the message has its line.
     """
     from slideviz.mesh.io.su2.loops import cell_block
 
@@ -88,24 +92,27 @@ def fill_cells(
 
 
 def _each(work: Callable[[Piece], None], rows: Rows, progress: Progress) -> None:
-    """Do the work for each piece, on all cores."""
+    """Call ``work`` with each piece, on all cores."""
     for piece, _ in zip(rows, in_order(work, rows), strict=True):
         progress((piece.row + piece.rows) / number_of(rows))
 
 
 def _line_at(lines: Lines, piece: Piece, text: bytes, begin: int) -> tuple[Lines, int, bytes]:
-    """Return the number, and the text without comment, of the line that begins at this byte."""
+    """Return ``lines``, and number and text without comment of the line from byte ``begin`` on.
+
+    ``text`` is the text of the piece, and ``begin`` counted in it.
+    """
     stop = text.index(b"\n", begin)
     return lines, piece.line + text.count(b"\n", 0, begin), text[begin:stop].partition(b"%")[0]
 
 
 def _element(lines: Lines, index: int, row: bytes, dim: int, n_points: int) -> tuple[int, IntArray]:
-    """Return type and nodes of a row.
+    """Return type and nodes of the element on a row; ``index`` is the number of its line.
 
     Raises
     ------
     MeshError
-        It is not what it should be.
+        It has a wrong type, dimension or nodes, or a word that is no whole number.
     """
     numbers = _numbers(lines, index, row, np.int64)
     words, vtk, n_numbers = row.split(), int(numbers[0]), len(numbers) - 1
@@ -121,7 +128,7 @@ def _element(lines: Lines, index: int, row: bytes, dim: int, n_points: int) -> t
     nodes = numbers[1 : 1 + kind.n_nodes]
     fault = first_fault(Cells.from_types([vtk], nodes), n_points)
     if fault:
-        # Those with more digits are not what was read.
+        # A word with more digits may have been read as another number: the message has the word.
         large = (word for word in words[1 : 1 + kind.n_nodes] if len(word.lstrip(b"+-0")) > _DIGITS)
         word = next(large, None)
         raise lines.error(index, fault[1] if word is None else no_node(show(word), n_points))
@@ -129,7 +136,7 @@ def _element(lines: Lines, index: int, row: bytes, dim: int, n_points: int) -> t
 
 
 def _wrong_type(lines: Lines, index: int, vtk: int, dim: int, word: str) -> MeshError:
-    """Return the error for an element of unknown type or wrong dimension."""
+    """Return the error for an element of unknown type (in the file ``word``) or wrong dimension."""
     if vtk in ELEMENTS:
         allowed = ", ".join(f"{t} ({e.name})" for t, e in ELEMENTS.items() if e.dim == dim)
         return lines.error(
@@ -166,9 +173,9 @@ def _numbers(lines: Lines, index: int, row: bytes, kind: type) -> NDArray:
 
 
 def _parse(text: bytes, kind: type) -> NDArray | None:
-    """Return the numbers in the text, or None when some word is no number.
+    """Return the numbers of a text, (w,), or None if a word is no number.
 
-    The conversion of floats is that of Python: correctly rounded.
+    Floats are rounded correctly, as by Python.
     """
     # NumPy takes a lone sign for 0, or joins it to the next word.
     if kind is np.int64 and (b"-" in text or b"+" in text) and _LONE_SIGN.search(text):
@@ -180,12 +187,12 @@ def _parse(text: bytes, kind: type) -> NDArray | None:
 
 
 def parse_points(lines: Lines, rows: Rows, dim: int, progress: Progress) -> FloatArray:
-    """Return the coordinates, (n, dim), read-only.
+    """Return the coordinates (n, dim) of the points on rows, read-only.
 
     Raises
     ------
     MeshError
-        A point is not what it should be; the message has its line.
+        A row has too few or many numbers, or one that is not finite; the message has its line.
     """
     points = np.empty((number_of(rows), dim))
     found = np.empty((len(rows), 2), np.int64)
@@ -202,17 +209,18 @@ def parse_points(lines: Lines, rows: Rows, dim: int, progress: Progress) -> Floa
 
 
 def fill_points(lines: Lines, piece: Piece, points: FloatArray) -> IntArray:
-    """Fill an array (m, d) with the coordinates of a piece, of which there are m.
+    """Write the coordinates of the m points of a piece into ``points`` (m, d).
 
     Returns
     -------
     (2,) int64
-        The most numbers on a row, and the first row that may have lost a coordinate.
+        Largest count of numbers on a row, and number of the first row that may lack a coordinate
+        (``extra`` of `loops.point_block`), the largest int64 if there is none.
 
     Raises
     ------
     MeshError
-        A point is not what it should be; the message has its line.
+        A row has too few or many numbers, or one that is not finite; the message has its line.
     """
     from slideviz.mesh.io.su2.loops import point_block
 
@@ -234,15 +242,15 @@ def fill_points(lines: Lines, piece: Piece, points: FloatArray) -> IntArray:
 
 
 def require_all_coordinates(lines: Lines, rows: Rows, dim: int, found: IntArray) -> None:
-    """Raise where a point has lost a coordinate, by what `fill_points` found in each piece (p, 2).
+    """Raise if a point lacks a coordinate, by the results (p, 2) of `fill_points` for p pieces.
 
-    Where other lines end with an index, a line that has just enough numbers and also ends with
-    its index has lost a coordinate.
+    If any row has an index after its coordinates, then a row with only ``dim`` numbers, the last
+    of which is its index, lacks a coordinate.
 
     Raises
     ------
     MeshError
-        It has; the message has its line.
+        A point lacks a coordinate; the message has its line.
     """
     lost = int(found[:, 1].min())
     if found[:, 0].max() > dim and lost < number_of(rows):
@@ -250,12 +258,12 @@ def require_all_coordinates(lines: Lines, rows: Rows, dim: int, found: IntArray)
 
 
 def _point(lines: Lines, index: int, row: bytes, dim: int) -> FloatArray:
-    """Return the numbers of a row with a point, coordinates first.
+    """Return the numbers of a row with a point, coordinates first; ``index`` is that of its line.
 
     Raises
     ------
     MeshError
-        It is not what it should be.
+        It has too few or many numbers, or a coordinate that is not finite.
     """
     numbers = _numbers(lines, index, row, np.float64)
     if not dim <= len(numbers) <= dim + _EXTRA_POINT_WORDS:
@@ -269,6 +277,7 @@ def _point(lines: Lines, index: int, row: bytes, dim: int) -> FloatArray:
 
 
 def _wrong_count(lines: Lines, index: int, count: int, dim: int) -> MeshError:
+    """Return the error for a point on line ``index`` with ``count`` numbers."""
     return lines.error(
         index,
         f"a point has {dim} coordinates (NDIME= {dim}) and perhaps an index, but "

@@ -1,4 +1,4 @@
-"""Reading SU2 meshes, and what of the file is kept for writing it again."""
+"""Reading SU2 text meshes; with the mesh is kept what is needed to write the file again."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from slideviz.mesh.io.su2.zone import find_zone
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh, Origin
 
 _SCANNED = 0.2
-"""Fraction of the time for reading that finding the lines takes."""
+"""Part of the time of reading a file, as told to the progress, that finding its lines takes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Document(Origin):
-    """An SU2 file as it was read, with the places of the coordinates in it.
+    """An SU2 file as it was read, with the places of its parts, so that it can be written again.
 
     Attributes
     ----------
     raw : Source
         The whole file.
     rows : tuple of Piece
-        Where the points are in it.
+        The rows of the points in it.
     points : (n, d) float64
         The points as read.
     cells : Cells
@@ -113,7 +113,7 @@ def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
 
 
 def _shares(sizes: list[int], progress: Progress) -> list[Progress]:
-    """Return for each part, of these sizes, a callable that turns its progress into the whole's."""
+    """Return a function for each part that turns its progress (0 to 1) into that of all parts."""
     total = max(sum(sizes), 1)
     edges = [_SCANNED + (1.0 - _SCANNED) * sum(sizes[:k]) / total for k in range(len(sizes) + 1)]
 

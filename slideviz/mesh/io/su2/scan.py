@@ -14,7 +14,9 @@ from slideviz.mesh.io.su2.lines import Lines, line_end, text_of
 from slideviz.mesh.model import IntArray
 
 BLOCK_BYTES = 1 << 20
+"""About how many bytes a block has: whole lines that are scanned together."""
 Progress = Callable[[float], object]
+"""A callback, called with the fraction done; what it raises ends the work."""
 
 
 def scan(raw: Source, progress: Progress) -> Lines:
@@ -61,7 +63,7 @@ def scan(raw: Source, progress: Progress) -> Lines:
 
 
 def _blocks(raw: Source) -> list[tuple[int, int]]:
-    """Return the bounds of blocks of whole lines."""
+    """Return first byte and end of the blocks of a file, whole lines each."""
     bounds, begin = [], 0
     while begin < raw.size:
         end = line_end(raw, min(begin + BLOCK_BYTES, raw.size) - 1)

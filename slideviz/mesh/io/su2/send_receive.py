@@ -1,9 +1,10 @@
 """The halo of an SU2 file: ``SEND_RECEIVE`` markers and the transforms of ``NPERIODIC``.
 
-The marker with ``SEND_TO= 1`` lists donors, the one with ``SEND_TO= -1`` receivers, in the same
-order; a row is ``1 node k``, k the ``PERIODIC_INDEX`` of a centre of rotation, angles and a
-translation. Files differ in direction, order and unit of these, so the undeformed coordinates of
-both decide. What does not fit is no error, for the mesh can be used all the same, but a remark.
+The marker with ``SEND_TO= 1`` lists donors, the one with ``SEND_TO= -1`` their receivers in the
+same order. A row is ``1 node k``, with k the ``PERIODIC_INDEX`` of a centre of rotation, angles and
+a translation. Files differ in direction, order and unit of these three, so of all readings the one
+is taken that fits the coordinates of donors and receivers. A misfit is a remark and no error, for
+the mesh can be used without its halo. (Periodic boundaries come from the case, not from here.)
 """
 
 from __future__ import annotations
@@ -19,10 +20,11 @@ from slideviz.mesh.io.su2.zone import SendRows, TextZone
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 HaloAndRemarks = tuple[Halo | None, tuple[str, ...]]
+"""The halo, None if there is none or it cannot be used; and remarks, a sentence each."""
 
 
 def find_halo(lines: Lines, zone: TextZone, mesh: Mesh) -> HaloAndRemarks:
-    """Return the halo that a zone's markers describe, if they do, and what is odd about it."""
+    """Return the halo that the ``SEND_RECEIVE`` markers of a zone describe, and remarks on it."""
     if not zone.sends:
         return None, ()
     sends, receives = ([s for s in zone.sends if s.domain == to] for to in (b"1", b"-1"))
@@ -38,6 +40,7 @@ def find_halo(lines: Lines, zone: TextZone, mesh: Mesh) -> HaloAndRemarks:
 
 
 def _unused(why: str) -> str:
+    """Return the remark on a halo that cannot be used."""
     return (
         f"the SEND_RECEIVE markers tie no halo to its donors ({why}); they are kept, but the nodes "
         "are treated like all others, so make the halo anew"
@@ -47,7 +50,17 @@ def _unused(why: str) -> str:
 def _tied(
     mesh: Mesh, donors: IntArray, receivers: IntArray, given: dict[int, FloatArray]
 ) -> HaloAndRemarks:
-    """Return the halo of pairs whose motion is found, and what is odd."""
+    """Return the halo of those pairs whose motion is found, and remarks.
+
+    Parameters
+    ----------
+    donors : (h,)
+        Nodes.
+    receivers : (h, 2)
+        Nodes and their ``PERIODIC_INDEX``.
+    given : dict of int to (3, 3)
+        Centre, angles and translation by ``PERIODIC_INDEX``.
+    """
     remarks: list[str] = []
     motions: list[RigidMotion] = []
     which = np.full(len(donors), -1)
@@ -69,7 +82,11 @@ def _tied(
 def _best(
     mesh: Mesh, index: int, donors: IntArray, receivers: IntArray, tries: Sequence[RigidMotion]
 ) -> tuple[RigidMotion | None, str]:
-    """Return the motion that fits donors and receivers best, and what is odd about it."""
+    """Return the motion that best moves donors (k,) to receivers (k,), and a remark ("" if none).
+
+    It is one of ``tries`` if any fits, else possibly the one fitted to the points. None if it
+    misses most receivers. ``index`` is their ``PERIODIC_INDEX``.
+    """
     before, after = mesh.points[donors], mesh.points[receivers]
     allowed = FITS * float(np.ptp(mesh.points, axis=0).max())
 
@@ -81,7 +98,7 @@ def _best(
         return int(np.count_nonzero(far > allowed)), float(far.max())
 
     fitted = fit_motion(before, after)
-    # What the file says goes before what is fitted, as long as it fits.
+    # A motion of the file is preferred to the fitted one, as long as it fits.
     motion = min(tries, key=rank, default=fitted)
     if rank(motion)[0]:
         motion = min(motion, fitted, key=rank)
@@ -103,7 +120,10 @@ def _best(
 
 
 def _table(lines: Lines, parts: Sequence[SendRows], count: int) -> IntArray | None:
-    """Return node and transform of each row, (r, 2), or None where a row is no such thing."""
+    """Return node and ``PERIODIC_INDEX`` of each row, (r, 2), or None if any row is wrong.
+
+    ``count`` is the number of nodes.
+    """
     pieces = (piece for part in parts for piece in part.rows)
     rows = [row.split()[:3] for piece in pieces for _, row in lines.numeric(piece)]
     if not rows or any(len(row) < 3 or not all(w.isdigit() for w in row) for row in rows):
@@ -113,7 +133,7 @@ def _table(lines: Lines, parts: Sequence[SendRows], count: int) -> IntArray | No
 
 
 def _transforms(lines: Lines, zone: TextZone) -> dict[int, FloatArray]:
-    """Return centre, angles and translation, (3, 3), by PERIODIC_INDEX."""
+    """Return centre, angles and translation (rows of (3, 3)) by PERIODIC_INDEX, where readable."""
     found = {}
     for section in zone.kept:
         if section.key == "PERIODIC_INDEX" and section.value.isdigit():
@@ -128,7 +148,11 @@ def _transforms(lines: Lines, zone: TextZone) -> dict[int, FloatArray]:
 
 
 def _readings(transform: FloatArray, dim: int) -> Iterator[RigidMotion]:
-    """Yield the motions that centre, angles and translation (3, 3) may mean."""
+    """Yield the 16 motions that centre, angles and translation (rows of (3, 3)) may mean.
+
+    They differ in the unit of the angles, the order of rotations, whether the translation comes
+    before or after, and the direction.
+    """
     centre, angles, shift = transform[0], transform[1], transform[2]
     for unit, order in product((1.0, np.pi / 180.0), ((2, 1, 0), (0, 1, 2))):
         rotation = np.eye(3)
@@ -142,7 +166,7 @@ def _readings(transform: FloatArray, dim: int) -> Iterator[RigidMotion]:
 
 
 def _about(axis: int, angle: float) -> FloatArray:
-    """Return the rotation (3, 3) about a Cartesian axis."""
+    """Return the rotation (3, 3) by an angle in radians about Cartesian axis 0, 1 or 2."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
     out = np.eye(3)
     out[i, i] = out[j, j] = np.cos(angle)

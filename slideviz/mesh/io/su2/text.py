@@ -1,4 +1,4 @@
-"""A zone of an SU2 text file whose parts are found, and not read."""
+"""A zone of an SU2 text file whose parts are located, but not read."""
 
 from __future__ import annotations
 
@@ -14,7 +14,17 @@ from slideviz.mesh.io.su2.zone import TextZone, find_zone
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """One zone of an SU2 text file: its lines, where its parts are, and the boxes of others."""
+    """One zone of an SU2 text file, located but not read.
+
+    Attributes
+    ----------
+    lines : Lines
+        The lines of the file.
+    zone : TextZone
+        Where the zone's parts are.
+    boxes_elsewhere : dict of str to int
+        Boxes for free-form deformation in other zones, and the numbers of these.
+    """
 
     lines: Lines
     zone: TextZone
@@ -37,17 +47,19 @@ class Text:
 
     @property
     def kept(self) -> tuple[tuple[int, int], ...]:
-        """Return first byte and end of each section that is kept as it is."""
+        """Return first byte and end of each section that slideviz does not know."""
         return self.lines.bytes_of(*((part.line, part.stop) for part in self.zone.kept))
 
     def boxes(self) -> bytes | None:
-        """Return the sections of the boxes for free-form deformation, where there are some."""
+        """Return the text of the boxes for free-form deformation, or None if there are none."""
         parts = (self.lines.raw[a:b] for a, b in self.kept)
         return b"".join(part for part in parts if is_ffd(part)) or None
 
 
 def find_text(path: Path, zone: int | None, progress: Progress = lambda _: None) -> Text:
-    """Return a zone of an SU2 text file, of which nothing but the lines is looked at.
+    """Return a zone of an SU2 text file; its parts are located and counted, but not read.
+
+    ``zone`` is counted from 1; None: the first.
 
     Raises
     ------

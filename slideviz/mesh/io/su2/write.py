@@ -1,4 +1,4 @@
-"""Writing SU2 meshes: the file that was read with other coordinates, or all of it anew.
+"""Writing SU2 text meshes: the file that was read with other coordinates, or a new one.
 
 Numbers are written with as few digits as identify the float64, so that nothing is lost.
 """
@@ -23,18 +23,19 @@ from slideviz.mesh.io.su2.zone import SEND_RECEIVE
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 
 _BLOCK_ROWS = 20_000
+"""Most elements or points in a block of text."""
 _NUMBER_BYTES = 20
-"""No index has more digits, with the blank after it."""
+"""Most bytes of an index, with the blank after it."""
 Edit = tuple[int, int, bytes]
-"""First byte and end of what is replaced in a file, and by what."""
+"""A change of a file: first byte and end of the text to replace, and the new text."""
 
 
 def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
     """Yield the SU2 file of a mesh, block by block.
 
-    A mesh that was read from an SU2 file and has the same cells and markers gives that file, in
-    which only the coordinates that changed are replaced. Any other mesh is written anew; what
-    slideviz does not know of the file it came from stands at the end of its zone.
+    For a mesh that was read from an SU2 file and has the same cells and markers it is that file, in
+    which only the coordinates that changed are replaced. Any other mesh is written anew; sections
+    of its file that slideviz does not know follow at the end of its zone.
 
     Raises
     ------
@@ -66,6 +67,7 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
 
 
 def _only_points_differ(mesh: Mesh, document: Document) -> bool:
+    """Return whether a mesh has the cells and markers, and as many points, as its file."""
     if mesh.points.shape != document.points.shape:
         return False
     if mesh.cells is not document.cells and not mesh.cells.same_as(document.cells):
@@ -77,7 +79,7 @@ def _only_points_differ(mesh: Mesh, document: Document) -> bool:
 
 
 def _patched(document: Document, points: FloatArray) -> Iterator[bytes]:
-    """Yield the file with every coordinate that changed, in any bit, and other boxes in place."""
+    """Yield the file with all coordinates replaced that differ in any bit, and with new boxes."""
 
     def text(piece: Piece) -> bytes:
         mine = slice(piece.row, piece.row + piece.rows)
@@ -91,7 +93,9 @@ def _patched(document: Document, points: FloatArray) -> Iterator[bytes]:
 def patched_blocks(
     raw: Source, rows: Rows, rows_text: Callable[[Piece], bytes], edits: Sequence[Edit]
 ) -> Iterator[bytes]:
-    """Yield a file with other texts in place of the pieces of points, and of the bytes of edits.
+    """Yield a file, block by block, with new texts for the pieces of points, and with ``edits``.
+
+    ``rows_text`` returns the new text of a piece of ``rows``.
 
     Raises
     ------
@@ -115,14 +119,16 @@ def patched_blocks(
 
 
 def box_edits(raw: Source, kept: Sequence[tuple[int, int]], end: int, ffd: bytes) -> list[Edit]:
-    """Return what puts other boxes into a file.
+    """Return the edits that replace the boxes for free-form deformation of a zone by ``ffd``.
+
+    If the zone has none, ``ffd`` is put at its end.
 
     Parameters
     ----------
     kept : sequence of (int, int)
         First byte and end of each unknown section.
     end : int
-        Where the zone ends.
+        The byte where the zone ends.
     """
     old = [(a, b) for a, b in kept if is_ffd(raw[a:b])]
     if old:
@@ -131,7 +137,7 @@ def box_edits(raw: Source, kept: Sequence[tuple[int, int]], end: int, ffd: bytes
 
 
 def _around(edits: Sequence[Edit], begin: int, end: int) -> Iterator[tuple[int, int] | bytes]:
-    """Yield blocks of a range of bytes, and the texts that stand in place of some."""
+    """Yield the parts of a range of bytes in order: blocks (first byte, end) and texts of edits."""
     for first, after, text in edits:
         if begin <= first < end:
             yield from _ranges(begin, first)
@@ -141,17 +147,22 @@ def _around(edits: Sequence[Edit], begin: int, end: int) -> Iterator[tuple[int, 
 
 
 def _ranges(begin: int, end: int) -> list[tuple[int, int]]:
-    """Return the bounds of blocks of a range of bytes."""
+    """Return first byte and end of the blocks that a range of bytes is divided into."""
     return [(i, min(i + BLOCK_BYTES, end)) for i in range(begin, end, BLOCK_BYTES)]
 
 
 def moved_rows(raw: Source, piece: Piece, before: FloatArray, now: FloatArray) -> bytes:
-    """Return some rows of points with every coordinate that changed in its place.
+    """Return the text of a piece of points with the coordinates that changed replaced.
 
     Parameters
     ----------
     before, now : (m, d) float64
-        The points of these rows.
+        The points of these rows, as read and as they are to be written.
+
+    Raises
+    ------
+    MeshError
+        The file was changed.
     """
     from slideviz.mesh.io.su2.digits import print_changed
 
@@ -176,12 +187,15 @@ def _digits(points: FloatArray) -> NDArray[np.uint8]:
 
 
 def require_text_names(mesh: str, names: Iterable[str]) -> None:
-    """Raise where a marker of a mesh would have another name if a text were read again.
+    """Raise if the name of a marker cannot be written to an SU2 text file and read again.
+
+    ``mesh`` is the name of the mesh, for the message.
 
     Raises
     ------
     MeshError
-        One would.
+        A name is empty, has a percent sign, blanks around it or control characters, or is
+        ``SEND_RECEIVE``.
     """
     for name in names:
         if not name or name != name.strip() or not name.isprintable() or "%" in name:
@@ -196,9 +210,9 @@ def require_text_names(mesh: str, names: Iterable[str]) -> None:
 
 
 CellsOf = Callable[[int, int], Cells]
-"""Returns the cells ``i`` to ``j``."""
+"""A function that returns the cells ``i`` to ``j - 1``."""
 PointsOf = Callable[[int, int], FloatArray]
-"""Returns the points ``i`` to ``j``, (j - i, d)."""
+"""A function that returns the points ``i`` to ``j - 1``, (j - i, d)."""
 
 
 def text_of_parts(
@@ -207,19 +221,23 @@ def text_of_parts(
     points: tuple[int, PointsOf],
     markers: Sequence[Marker],
 ) -> Iterator[bytes]:
-    """Yield the SU2 file of a mesh of which parts are given on demand, from several threads.
+    """Yield the SU2 file of a mesh whose parts are made by functions, called from several threads.
 
     Parameters
     ----------
+    dim : int
+        2 or 3.
     cells, points : (int, callable)
-        How many there are, and what returns some.
+        Their number, and the function that returns some of them.
+    markers : sequence of Marker
+        The boundaries.
     """
     yield from _zone(dim, cells, points)
     yield from _markers(markers, 0)
 
 
 def _zone(dim: int, cells: tuple[int, CellsOf], points: tuple[int, PointsOf]) -> Iterator[bytes]:
-    """Yield dimension, elements and points."""
+    """Yield dimension, elements and points, as `text_of_parts` gets them."""
     yield f"NDIME= {dim}\nNELEM= {cells[0]}\n".encode()
     yield from _elements(*cells, numbered=True)
     yield f"NPOIN= {points[0]}\n".encode()
@@ -236,7 +254,7 @@ def _whole_zone(mesh: Mesh) -> Iterator[bytes]:
 
 
 def _some(cells: Cells, i: int, j: int) -> Cells:
-    """Return the cells ``i`` to ``j``; their offsets are those of the whole."""
+    """Return the cells ``i`` to ``j - 1``, with offsets that begin as in ``cells``, not with 0."""
     offsets = cells.offsets[i : j + 1]
     return Cells(cells.types[i:j], offsets, cells.connectivity[offsets[0] : offsets[-1]])
 
@@ -257,6 +275,7 @@ def _point_rows(points: PointsOf, block: tuple[int, int]) -> bytes:
 
 
 def _markers(markers: Sequence[Marker], sends: int) -> Iterator[bytes]:
+    """Yield NMARK, which includes ``sends`` markers of a halo that follow, and the boundaries."""
     yield f"NMARK= {len(markers) + sends}\n".encode()
     for marker in markers:
         yield f"MARKER_TAG= {marker.name}\nMARKER_ELEMS= {len(marker.cells)}\n".encode()
@@ -280,5 +299,5 @@ def _cell_rows(cells: CellsOf, numbered: bool, block: tuple[int, int]) -> bytes:
 
 
 def _whole(text: bytes) -> bytes:
-    """Return a section that ends with its line."""
+    """Return the text of a section with a line break at its end."""
     return text if text.endswith(b"\n") else text + b"\n"

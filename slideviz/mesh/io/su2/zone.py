@@ -1,4 +1,4 @@
-"""The parts of one zone of an SU2 file, by their lines, counted and checked.
+"""Where the parts of one zone of an SU2 file are, with their counts checked.
 
 Sections that slideviz does not know (FFD boxes, periodic data, offsets) and the halo markers are
 only located, so that writing can keep them.
@@ -21,24 +21,26 @@ from slideviz.mesh.io.su2.keyword_blocks import (
 from slideviz.mesh.io.su2.lines import ROWS, Lines, Rows, number_of, show
 
 SEND_RECEIVE = "SEND_RECEIVE"
+"""Name of the markers of a halo (in `su2b.layout`, too)."""
+# Remedies in messages.
 _NAME_IT = "; name the marker"
 _COUNT_THEM = "; add it with the number of elements"
 
 
 class SectionRows:
-    """The rows of numbers, and the lines of other text, of each section of a file."""
+    """Finds the rows of sections of a file, and raises for wrong counts of them."""
 
     def __init__(self, lines: Lines) -> None:
         self.lines = lines
         self.text_lines = lines.firsts[:-1][lines.kinds != ROWS]
 
     def none(self, section: KeywordBlock) -> None:
-        """Raise when a section that should have no numbers has some.
+        """Raise if a section that should have no rows of numbers has any.
 
         Raises
         ------
         MeshError
-            It has some.
+            The section has rows.
         """
         rows = self.lines.pieces(section.line, section.stop)
         if rows:
@@ -49,17 +51,19 @@ class SectionRows:
             )
 
     def counted(self, section: KeywordBlock, what: str) -> Rows:
-        """Return the rows of numbers of a section.
+        """Return the rows of numbers of a section, as many as its keyword line says.
 
         Parameters
         ----------
+        section : KeywordBlock
+            The section.
         what : str
-            What stands on each line, for messages.
+            What is on the rows, for messages: ``points``.
 
         Raises
         ------
         MeshError
-            They are not as many as the number after the keyword says.
+            There are more or fewer rows, or other text among them.
         """
         count = count_of(self.lines, section)
         rows = self.lines.pieces(section.line, section.stop)
@@ -91,7 +95,7 @@ class SectionRows:
 
 @dataclass(frozen=True, eq=False)
 class MarkerRows:
-    """A boundary: its name, the line of the name, and the rows of its elements."""
+    """A boundary: its name, the line of its MARKER_TAG, and the rows of its elements."""
 
     name: str
     line: int
@@ -100,7 +104,7 @@ class MarkerRows:
 
 @dataclass(frozen=True, eq=False)
 class SendRows:
-    """A ``SEND_RECEIVE`` marker: its lines ``begin:end``, ``SEND_TO`` and its rows."""
+    """A ``SEND_RECEIVE`` marker: its lines ``begin:end``, value of ``SEND_TO``, and its rows."""
 
     begin: int
     end: int
@@ -110,7 +114,7 @@ class SendRows:
 
 @dataclass(frozen=True, eq=False)
 class TextZone:
-    """Where the parts of one zone stand.
+    """Where the parts of one zone are in the file.
 
     Attributes
     ----------
@@ -123,7 +127,7 @@ class TextZone:
     markers : tuple of MarkerRows
         The boundaries.
     sends : tuple of SendRows
-        The ``SEND_RECEIVE`` markers, which tie the nodes of a halo.
+        The ``SEND_RECEIVE`` markers, which list donors and receivers of a halo.
     kept : tuple of KeywordBlock
         The unknown sections.
     """
@@ -138,18 +142,19 @@ class TextZone:
 
     @property
     def ffd_at(self) -> tuple[range, ...]:
-        """Return the lines of the boxes for free-form deformation."""
+        """Return the ranges of lines of the boxes for free-form deformation."""
         boxes = (part for part in self.kept if is_ffd(part.key.encode()))
         return tuple(range(part.line, part.stop) for part in boxes)
 
 
 def find_zone(lines: Lines, sections: list[KeywordBlock], bounds: Bounds) -> TextZone:
-    """Return where the parts of a zone stand.
+    """Return where the parts of a zone are.
 
     Raises
     ------
     MeshError
-        A section is missing or stands twice, a count is wrong, or a marker has no good name.
+        A section is missing or occurs twice, a count is wrong, or the name of a marker is empty,
+        not printable or used twice.
     """
     inside = [
         section
@@ -160,7 +165,7 @@ def find_zone(lines: Lines, sections: list[KeywordBlock], bounds: Bounds) -> Tex
 
 
 class _Walk:
-    """A walk through the sections of one zone, which notes where its parts stand."""
+    """Goes through the sections of one zone, finds its parts and raises for mistakes."""
 
     def __init__(self, lines: Lines, sections: list[KeywordBlock], bounds: Bounds) -> None:
         self.lines = lines
@@ -169,7 +174,7 @@ class _Walk:
         self.rows = SectionRows(lines)
 
     def zone(self) -> TextZone:
-        """Return where the parts stand."""
+        """Return where the parts are; raise MeshError for a mistake."""
         heads = {key: self._only(key) for key in ("NDIME", "NELEM", "NPOIN", "NMARK")}
         dim = count_of(self.lines, heads["NDIME"])
         if dim not in (2, 3):
@@ -198,7 +203,7 @@ class _Walk:
         )
 
     def _only(self, key: str) -> KeywordBlock:
-        """Return the section of that key, which must stand once."""
+        """Return the section of a key; raise MeshError if there is none or a second one."""
         found = [section for section in self.sections if section.key == key]
         if not found:
             remedy = "; write NMARK= 0 if it has no boundaries" if key == "NMARK" else ""
@@ -246,7 +251,12 @@ class _Walk:
     def _marker_head(
         self, tag: KeywordBlock, at: int, sends: bool
     ) -> tuple[KeywordBlock, bytes, int]:
-        """Return the MARKER_ELEMS section of a marker, SEND_TO, and the place after them."""
+        """Return the section with the elements of a marker, its SEND_TO, and the next section.
+
+        ``tag`` is its MARKER_TAG, ``at`` the index of the section after that; ``sends`` tells
+        whether it is a SEND_RECEIVE marker. SEND_TO is empty where there is none; the next section
+        is an index. Raises MeshError if MARKER_ELEMS does not follow.
+        """
         self.rows.none(tag)
         following = self.sections[at] if at < len(self.sections) else None
         if following is None or following.key != "MARKER_ELEMS":
@@ -257,7 +267,7 @@ class _Walk:
             )
         at, domain = at + 1, b""
         if sends and at < len(self.sections) and self.sections[at].key == "SEND_TO":
-            # The elements stand after this line, which belongs to the marker.
+            # The elements follow the SEND_TO line.
             self.rows.none(following)
             head = self.sections[at]
             following = KeywordBlock(following.key, following.value, head.line, head.stop)
@@ -265,6 +275,7 @@ class _Walk:
         return following, domain, at
 
     def _name(self, section: KeywordBlock) -> str:
+        """Return the name of a marker, ``SEND_RECEIVE`` in capitals; raise if it is unusable."""
         try:
             name = section.value.decode()
         except UnicodeDecodeError:
@@ -281,7 +292,7 @@ class _Walk:
     def _check_markers(
         self, head: KeywordBlock, markers: tuple[MarkerRows, ...], sends: int
     ) -> None:
-        """Raise when names repeat or the count is wrong."""
+        """Raise MeshError if two boundaries have one name, or NMARK (``head``) is wrong."""
         seen: dict[str, int] = {}
         for marker in markers:
             if marker.name in seen:

@@ -1,7 +1,8 @@
-"""The elements of an SU2 binary mesh, block by block, with the byte of every mistake.
+"""Reading elements of an SU2 binary mesh, block by block; errors name the byte of a mistake.
 
-The type of each element, its nodes and its index are taken out of the list of all numbers with
-array operations.
+A file has a *list*, one array with type, nodes and index of each element one after the other, and
+the offset of each element in it. A *place* is the number of an element in the file, which is not
+its index if the file has another order.
 """
 
 from __future__ import annotations
@@ -17,14 +18,23 @@ from slideviz.mesh.io.su2b.layout import BinaryFile, ElementTable, ZonePlace
 from slideviz.mesh.model import IntArray
 
 BLOCK = 1 << 18
-"""Elements or points that are read at a time."""
+"""Most elements or points that are read at a time."""
 
 
 @dataclass(frozen=True, eq=False)
 class ElementBlock:
-    """Some elements as they stand in a file: types (k,), nodes one after the other, indices (k,).
+    """Consecutive elements of a file.
 
-    ``first`` is the number of the first, and ``ids`` empty where elements have no index.
+    Attributes
+    ----------
+    first : int
+        Place of the first element.
+    types : (k,) uint8
+        VTK identifiers.
+    nodes : (n,) int64
+        Nodes of all elements, one after the other.
+    ids : (k,) int64
+        Index of each element; empty where elements have none (in markers).
     """
 
     first: int
@@ -36,12 +46,12 @@ class ElementBlock:
 def element_blocks(
     source: BinaryFile, place: ZonePlace, table: ElementTable, dim: int, size: int = BLOCK
 ) -> Iterator[ElementBlock]:
-    """Yield the elements of a table, of dimension ``dim``, so many at a time.
+    """Yield the elements of a table, of dimension ``dim``, in blocks of at most ``size``.
 
     Raises
     ------
     MeshError
-        An element is not what it should be; the message has its byte.
+        As `element_block`.
     """
     for first in range(0, table.count, size):
         yield element_block(source, place, table, dim, first, size)
@@ -52,12 +62,12 @@ def element_blocks(
 def element_block(
     source: BinaryFile, place: ZonePlace, table: ElementTable, dim: int, first: int, size: int
 ) -> ElementBlock:
-    """Return the elements of a table from the ``first`` on, at most ``size``.
+    """Return at most ``size`` elements of a table, of dimension ``dim``, from place ``first`` on.
 
     Raises
     ------
     MeshError
-        An element is not what it should be; the message has its byte.
+        An element has a wrong offset, type, dimension or node; the message has the byte.
     """
     width, count = source.width, min(size, table.count - first)
     at = table.offsets + first * width
@@ -84,7 +94,7 @@ def element_block(
 
 
 def require_used(source: BinaryFile, table: ElementTable, used: int) -> None:
-    """Raise where the elements of a table use ``used`` numbers, and its list has more."""
+    """Raise MeshError if the list of a table has not as many numbers as its elements use."""
     if used != table.length:
         raise source.error(
             table.entries + used * source.width,
@@ -96,12 +106,14 @@ def require_used(source: BinaryFile, table: ElementTable, used: int) -> None:
 def elements_between(
     source: BinaryFile, place: ZonePlace, table: ElementTable, dim: int, first: int, count: int
 ) -> ElementBlock:
-    """Return ``count`` elements of a table from the place ``first`` on.
+    """Return ``count`` elements of a table, of dimension ``dim``, from place ``first`` on.
+
+    Unlike `element_block`, it compares their offsets only with each other.
 
     Raises
     ------
     MeshError
-        An element is not what it should be; the message has its byte.
+        An element has a wrong offset, type, dimension or node; the message has the byte.
     """
     at = table.offsets + first * source.width
     offsets = _whole_numbers(source.array(at, count + 1, source.conn, "the offsets"))
@@ -119,13 +131,13 @@ def elements_between(
 def element_at(
     source: BinaryFile, place: ZonePlace, table: ElementTable, at: int
 ) -> tuple[int, IntArray, int]:
-    """Return type, nodes (k,) and index of the element at a place of a table of cells."""
+    """Return type, nodes (k,) and index of the element at place ``at`` of a table of cells."""
     block = elements_between(source, place, table, place.dim, at, 1)
     return int(block.types[0]), block.nodes, int(block.ids[0])
 
 
 def _whole_numbers(values: NDArray) -> IntArray:
-    """Return counts as int64; those that are too large for it become negative."""
+    """Return unsigned counts (k,) as int64; those that are too large for it become negative."""
     return np.asarray(values.astype(np.uint64, copy=False).view(np.int64))
 
 
@@ -137,7 +149,17 @@ def _taken_apart(
     numbers: IntArray,
     offsets: IntArray,
 ) -> ElementBlock:
-    """Return the types, nodes and indices in a part of a list, ``offsets`` counted from there."""
+    """Return the elements in a part of a list; raise MeshError for a wrong type or length.
+
+    Parameters
+    ----------
+    first, begin : int
+        Place of the first element, and the byte where the part begins.
+    numbers : (n,)
+        The part of the list.
+    offsets : (k + 1,)
+        Where each element begins in ``numbers``, and the end.
+    """
     types = numbers[offsets[:-1]]
     known = (types > 0) & (types < 256)
     sizes = np.where(known, SIZES[np.where(known, types, 0)], 0)
@@ -174,7 +196,7 @@ def _taken_apart(
 def _check_nodes(
     source: BinaryFile, place: ZonePlace, block: ElementBlock, begin: int, offsets: IntArray
 ) -> None:
-    """Raise for the first node of a block that does not exist."""
+    """Raise MeshError if a block has a node that does not exist; arguments as in `_taken_apart`."""
     wrong = block.nodes.view(np.uint64) >= place.n_points
     if not wrong.any():
         return
@@ -193,7 +215,7 @@ def _check_nodes(
 def _check_dim(
     source: BinaryFile, block: ElementBlock, dim: int, begin: int, offsets: IntArray
 ) -> None:
-    """Raise for the first element of a block that has another dimension."""
+    """Raise MeshError if a block has an element whose dimension is not ``dim``."""
     wrong = DIMS[block.types] != dim
     if wrong.any():
         k = int(np.argmax(wrong))

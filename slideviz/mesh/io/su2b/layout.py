@@ -1,10 +1,10 @@
-"""Where the parts of an SU2 binary mesh (``.su2b``) stand in the file.
+"""The layout of an SU2 binary mesh (``.su2b``): at which byte of the file each part begins.
 
-Two whole numbers of 4 bytes, the width of all further counts and indices (4 or 8 bytes, in either
-byte order) and the number of zones; then for each zone its number, dimension, elements, points and
-markers. Elements are a table of offsets into a list of type, nodes and, but for markers, index.
-Every count is held against the size of the file before anything is read by it, so that a file that
-is cut off or was changed costs no memory.
+The file begins with two integers of 4 bytes: the width of all further counts and indices (4 or 8
+bytes, in either byte order) and the number of zones. Then it has for each zone number, dimension,
+elements, points and markers. Elements are an array of offsets, and a list with type, nodes and
+(not for markers) index of each. Each count is compared with the size of the file before an array is
+made by it, so that a file that is cut off or was changed costs no memory.
 """
 
 from __future__ import annotations
@@ -23,20 +23,31 @@ from slideviz.errors import MeshError
 from slideviz.mesh.check import printable
 
 NAME_BYTES = 33
+"""Bytes of the name of a marker, padded with zeros."""
 SEND_RECEIVE = "SEND_RECEIVE"
+"""Name of the markers of a halo (in `su2.zone`, too), which this format cannot have."""
 _INT = 4
+"""Bytes of the integers that are no counts: numbers of zones and markers, dimension."""
 MAGIC = {
     np.array(width, f"{order}i4").tobytes(): (width, order) for width in (4, 8) for order in "<>"
 }
-"""How a file begins: the width of its numbers and their byte order, as NumPy writes it."""
+"""Width of counts and byte order ("<" or ">"), by the first four bytes of a file."""
 
 
 @dataclass(frozen=True)
 class ElementTable:
-    """A table of elements: how many, the first byte of its offsets and of its list.
+    """Where the elements of a zone or marker are in the file.
 
-    ``length`` is the number of entries in the list; ``numbered`` tells whether each element ends
-    with its index.
+    Attributes
+    ----------
+    count : int
+        Number of elements.
+    offsets, entries : int
+        First byte of the offsets, and of the list.
+    length : int
+        How many numbers the list has.
+    numbered : bool
+        Whether each element ends with its index.
     """
 
     count: int
@@ -48,7 +59,7 @@ class ElementTable:
 
 @dataclass(frozen=True)
 class MarkerPlace:
-    """A marker: its name, the bytes of the name as they stand in the file, its elements."""
+    """A marker: its name, the ``NAME_BYTES`` bytes of the name in the file, its elements."""
 
     name: str
     raw: bytes
@@ -57,9 +68,22 @@ class MarkerPlace:
 
 @dataclass(frozen=True)
 class ZonePlace:
-    """A zone: its number, first byte, end, dimension, elements, points and markers.
+    """Where a zone is in the file.
 
-    ``points`` is the first byte of the first point.
+    Attributes
+    ----------
+    number : int
+        Number of the zone, from 1.
+    begin, end : int
+        Its first byte, and the one after its last.
+    dim : int
+        2 or 3.
+    cells : ElementTable
+        Its cells.
+    n_points, points : int
+        Number of points, and the first byte of the first.
+    markers : tuple of MarkerPlace
+        Its markers.
     """
 
     number: int
@@ -73,20 +97,25 @@ class ZonePlace:
 
 
 class BinaryFile:
-    """An open ``.su2b`` file: reads arrays, and says where a mistake is.
+    """An open ``.su2b`` file: reads arrays, from any thread, and makes errors that name the byte.
 
     Attributes
     ----------
     name : str
         The file, for messages.
     size : int
-        Its bytes.
+        Number of bytes.
     width : int
         Bytes of a count or an index, 4 or 8.
     order : "<" or ">"
         The byte order.
     zones : int
-        How many zones it says that it has.
+        Number of zones by its head.
+
+    Raises
+    ------
+    MeshError
+        The file does not begin as an SU2 binary mesh.
     """
 
     def __init__(self, path: Path, file: BinaryIO) -> None:
@@ -106,18 +135,18 @@ class BinaryFile:
             raise self.error(_INT, f"the number of zones is {self.zones}, but at least 1 is needed")
 
     def of(self, file: BinaryIO) -> BinaryFile:
-        """Return the same for another file of the same layout, whose head is not read."""
+        """Return this object for another open file of the same layout, whose head is not read."""
         other = copy(self)
         other._file, other._lock = file, Lock()
         return other
 
     @property
     def conn(self) -> np.dtype:
-        """Return the type of counts and indices."""
+        """Return the data type of counts and indices."""
         return np.dtype(f"{self.order}u{self.width}")
 
     def point(self, dim: int) -> np.dtype:
-        """Return the type of a point: coordinates ``x`` (dim,) and its index ``i``."""
+        """Return the data type of a point: coordinates ``x`` (dim,) and its index ``i``."""
         return np.dtype([("x", f"{self.order}f8", (dim,)), ("i", self.conn)])
 
     def error(self, at: int, message: str) -> MeshError:
@@ -125,12 +154,14 @@ class BinaryFile:
         return MeshError(f"{self.name}: byte {at}: {message}")
 
     def require(self, at: int, count: int, width: int, what: str) -> int:
-        """Return the byte after ``count`` things of ``width`` bytes that begin at byte ``at``.
+        """Return the byte after ``count`` items of ``width`` bytes that begin at byte ``at``.
+
+        ``what`` names the items in the message.
 
         Raises
         ------
         MeshError
-            The file ends before it.
+            The file ends before that byte.
         """
         end = at + count * width
         if end > self.size:
@@ -142,12 +173,14 @@ class BinaryFile:
         return end
 
     def array(self, at: int, count: int, dtype: DTypeLike, what: str) -> NDArray:
-        """Return ``count`` things that begin at byte ``at``, as they are in the file.
+        """Return the ``count`` items of type ``dtype`` that begin at byte ``at``.
+
+        ``what`` names the items in the message.
 
         Raises
         ------
         MeshError
-            The file ends before the last.
+            The file ends before the last item, or cannot be read.
         """
         kind = np.dtype(dtype)
         self.require(at, count, kind.itemsize, what)
@@ -162,25 +195,25 @@ class BinaryFile:
         return found
 
     def bytes(self, begin: int, end: int) -> bytes:
-        """Return the bytes from ``begin`` to ``end``."""
+        """Return the bytes ``begin`` to ``end - 1``."""
         return self.array(begin, end - begin, np.uint8, "the zones").tobytes()
 
     def whole(self, at: int, what: str) -> int:
-        """Return the whole number of four bytes at a place."""
+        """Return the integer of four bytes at byte ``at``."""
         return int(self.array(at, 1, f"{self.order}i4", what)[0])
 
     def count(self, at: int, what: str) -> int:
-        """Return the count or index at a place."""
+        """Return the count or index, of ``width`` bytes, at byte ``at``."""
         return int(self.array(at, 1, self.conn, what)[0])
 
 
 def find_zones(source: BinaryFile) -> tuple[ZonePlace, ...]:
-    """Return where the zones of a file stand.
+    """Return where the zones of a file are.
 
     Raises
     ------
     MeshError
-        A count goes beyond the file, a number cannot be right, or something follows the last zone.
+        A part goes beyond the end of the file, a number is wrong, or bytes follow the last zone.
     """
     zones: list[ZonePlace] = []
     at = 2 * _INT
@@ -197,12 +230,12 @@ def find_zones(source: BinaryFile) -> tuple[ZonePlace, ...]:
 
 
 def find_zone(source: BinaryFile, number: int | None) -> ZonePlace:
-    """Return where the zone of that number stands, the first where it is None.
+    """Return where the zone of that number (from 1) is; None: the first.
 
     Raises
     ------
     MeshError
-        There is none, or the file has a mistake.
+        There is no such zone, or as `find_zones`.
     """
     zones, chosen = find_zones(source), 1 if number is None else number
     if not 1 <= chosen <= len(zones):
@@ -214,6 +247,7 @@ def find_zone(source: BinaryFile, number: int | None) -> ZonePlace:
 
 
 def _zone(source: BinaryFile, begin: int, number: int) -> ZonePlace:
+    """Return where zone ``number`` is, which begins at byte ``begin``; raise as `find_zones`."""
     given = source.whole(begin, f"the number of zone {number}")
     if given != number:
         raise source.error(
@@ -243,6 +277,7 @@ def _zone(source: BinaryFile, begin: int, number: int) -> ZonePlace:
 
 
 def _marker(source: BinaryFile, at: int, dim: int) -> MarkerPlace:
+    """Return the marker that begins at byte ``at``; raise MeshError for a wrong name or count."""
     raw = source.array(at, NAME_BYTES, np.uint8, "the name of a marker").tobytes()
     text, end, _ = raw.partition(b"\0")
     try:
@@ -268,7 +303,10 @@ def _marker(source: BinaryFile, at: int, dim: int) -> MarkerPlace:
 def _elements(
     source: BinaryFile, at: int, what: str, fewest: int, *, numbered: bool
 ) -> ElementTable:
-    """Return where a table of elements stands, whose smallest ones have ``fewest`` numbers."""
+    """Return the table of elements that begins at byte ``at``, or raise MeshError.
+
+    ``what`` names the elements in messages, ``fewest`` is the least count of numbers of an element.
+    """
     count = source.count(at, f"the number of {what}")
     offsets = at + source.width
     entries = source.require(offsets, count + 1, source.width, f"the offsets of the {what}")

@@ -1,8 +1,10 @@
-"""A large file that is made in place over some time, and can be gone on with after a stop.
+"""Partial files: large files that are written part by part, and resumed after the program stopped.
 
-It has a hidden name beside what it is to become, or helps to make. A mesh is a copy of another one,
-which is changed part by part; until the end its first bytes are zeros, so that nothing reads it.
-Then they are put back, and it takes the place of the target in one step of the file system.
+A partial file has a hidden name in the folder of the *target*, the file that it is to replace or
+that it is needed for. A *note*, a small JSON file beside it, says which parts are done. A mesh is
+first a copy of another one, whose parts are changed one by one. Its first bytes are zeros
+meanwhile, so that no program reads it; at the end they are written, and it is renamed to the
+target.
 """
 
 from __future__ import annotations
@@ -30,20 +32,20 @@ HEAD = 8
 
 @dataclass(eq=False)
 class Partial:
-    """A file that is being made.
+    """A partial file.
 
     Attributes
     ----------
     file : BinaryIO
         Open for reading and writing.
     path : Path
-        Its name meanwhile.
+        Its hidden name.
     sums : list of int
-        The checksums of the parts that are made, of those that the caller counts.
+        Checksum of each part that is done; what a part is, the caller decides.
     mode : int or None
-        The permissions of the file that is there already.
+        Permissions of the target, None if it does not exist.
     ready : callable
-        Waits until the copy is made, and is to be called before anything is written to it.
+        Waits until the file is a complete copy; call it before the first writing.
     """
 
     file: BinaryIO
@@ -56,15 +58,15 @@ class Partial:
 
     @property
     def done(self) -> int:
-        """Return how many parts are made."""
+        """Return how many parts are done."""
         return len(self.sums)
 
     def remove(self) -> None:
-        """Remove it and its note, at the end of its use."""
+        """Remove the file and its note."""
         _removed(self.path, self._note)
 
     def note(self, sums: Iterable[int]) -> None:
-        """Keep that parts with these checksums are made, after they are on the disk."""
+        """Sync the file to the disk, then note that parts with these checksums are done."""
         os.fsync(self.file.fileno())
         self.sums = list(sums)
         fresh = self._note.with_suffix(".new")
@@ -75,7 +77,7 @@ class Partial:
 
 
 def names_of(path: Path, more: str = "") -> tuple[Path, Path]:
-    """Return what a file in the making is called, and the note of how far it is."""
+    """Return the paths of the partial file of a target, and of its note."""
     real = Path(os.path.realpath(path))
     name = f".{real.name}.partial{more}"
     return real.with_name(name), real.with_name(f"{name}.json")
@@ -85,24 +87,28 @@ def names_of(path: Path, more: str = "") -> tuple[Path, Path]:
 def partial_file(
     path: Path, size: int, about: str, *, resume: bool, more: str = ""
 ) -> Iterator[Partial]:
-    """Return a file of some size, which has zeros or what a stopped process has put there.
+    """Context with a partial file of ``size`` bytes, zeros or as a stopped process left it.
 
-    After an error nothing is left; after the end of the process it stays once a part of it is
-    noted as done, so that ``resume`` can go on with it. Else it is the caller who removes it.
+    An error in the block removes the file. If the program is stopped, the file stays once a part is
+    noted as done, so that ``resume`` can continue. Otherwise the caller removes or renames it.
 
     Parameters
     ----------
     path : Path
-        What it is to become, or for which it is made.
+        The target.
+    size : int
+        Number of bytes.
     about : str
-        What is made of what: another text begins anew.
+        A text that identifies the work: if that in the note differs, the file is made anew.
+    resume : bool
+        Whether to continue with the file of a stopped process, if there is one.
     more : str
-        What its name ends with, where several files are made for one.
+        End of its name, where a target has several partial files.
 
     Raises
     ------
     MeshError
-        It cannot be written, or another process is making it.
+        It cannot be written, or another process is writing it.
     """
     ours, note = names_of(path, more)
     try:
@@ -140,23 +146,27 @@ def partial_copy(
     replaces: Path | None,
     ranks: Alone = ALONE,
 ) -> Iterator[Partial]:
-    """Return a copy of ``source`` to be changed; it takes the place of ``path`` at the end.
+    """Context with a partial file that is a copy of ``source``, which replaces ``path`` at the end.
 
     Of a copy that a stopped process has left, all that is not ``changed`` is made equal again.
 
     Parameters
     ----------
+    path : Path
+        The target.
+    source : Path
+        The mesh to copy.
     about, resume
         As of `partial_file`.
     changed : tuple of int
         The first of the bytes that the caller changes, and the one after the last.
     ranks : Alone or Ranks
-        Those that copy.
+        The processes that copy.
 
     Raises
     ------
     MeshError
-        It cannot be written, or another process is making it.
+        It cannot be written, or another process is writing it.
     """
     require_no_input(path, MeshError, replaces)
     size = source.stat().st_size
@@ -174,7 +184,7 @@ def partial_copy(
 
 
 def finish_head(file: BinaryIO, head: bytes) -> None:
-    """Write what a mesh begins with, when all else of it is there."""
+    """Write the first bytes of a mesh, after all others, and sync the file to the disk."""
     file.seek(0)
     file.write(head)
     file.flush()
@@ -182,11 +192,12 @@ def finish_head(file: BinaryIO, head: bytes) -> None:
 
 
 def _kept_words(ours: Path) -> str:
+    """Return the words for the user on a partial file that stays."""
     return f"what is done is kept in {ours}; go on with --resume"
 
 
 def _noted(note: Path, about: str) -> list[int]:
-    """Return the checksums of the parts of the same work that a stopped process has made."""
+    """Return the checksums in a note on the same work ``about``; empty if there is no such note."""
     try:
         kept = json.loads(note.read_text())
         return [int(one) for one in kept["sums"]] if kept["about"] == about else []
@@ -195,6 +206,7 @@ def _noted(note: Path, about: str) -> list[int]:
 
 
 def _lock(file: BinaryIO, path: Path) -> None:
+    """Lock a file, or raise MeshError, which names the target, if another process has."""
     import fcntl  # POSIX only
 
     try:
@@ -208,12 +220,14 @@ def _lock(file: BinaryIO, path: Path) -> None:
 
 
 def _removed(*paths: Path) -> None:
+    """Remove files, those that exist and can be removed."""
     for path in paths:
         with suppress(OSError):
             path.unlink(missing_ok=True)
 
 
 def _umask() -> int:
+    """Return the permission bits that new files do not get."""
     now = os.umask(0)
     os.umask(now)
     return now

@@ -1,6 +1,6 @@
-"""Reading SU2 binary meshes (``.su2b``), block by block, and what is kept for writing them again.
+"""Reading SU2 binary meshes (``.su2b``), block by block.
 
-Coordinates and indices of points have a fixed stride; elements are those of `su2b.elements`.
+With the mesh is kept what is needed to write the file again. `su2b.elements` reads elements.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origi
 
 @dataclass(frozen=True, eq=False)
 class BinaryForm(Origin):
-    """How a ``.su2b`` file held a mesh, so that it can be written the same way.
+    """The form of the ``.su2b`` file that a mesh was read from, to write it the same way.
 
     Attributes
     ----------
     width : int
         Bytes of an index, 4 or 8.
     byte_order : "<" or ">"
-        As NumPy writes it.
+        Little or big endian.
     before, after : bytes
-        The file before the zone and after it: the other zones.
+        The file before and after the zone: its head and the other zones.
     order : (m,) int64 or None
-        The cell that stands at each place of the file; None where they stand in order.
+        Index of the cell at each place of the file; None where each is at its place.
     names : tuple of bytes
-        The names of the markers with what fills them up.
+        Names of the markers with the bytes that pad them.
     cells : Cells
         The cells as read.
     """
@@ -111,7 +111,7 @@ def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
 def point_blocks(
     source: BinaryFile, place: ZonePlace, size: int = BLOCK
 ) -> Iterator[tuple[int, FloatArray]]:
-    """Yield the number of a point and the coordinates (k, d) of it and those that follow.
+    """Yield the points of a zone in blocks: number of the first point, and coordinates (k, d).
 
     Raises
     ------
@@ -123,7 +123,7 @@ def point_blocks(
 
 
 def point_block(source: BinaryFile, place: ZonePlace, first: int, size: int) -> FloatArray:
-    """Return the coordinates (k, d) of the points from the ``first`` on, at most ``size``.
+    """Return the coordinates (k, d) of the points from number ``first`` on, at most ``size``.
 
     Raises
     ------
@@ -157,11 +157,13 @@ def point_block(source: BinaryFile, place: ZonePlace, first: int, size: int) -> 
 def read_elements(
     source: BinaryFile, place: ZonePlace, table: ElementTable, dim: int, tick: Callable[[int], None]
 ) -> tuple[Cells, IntArray | None]:
-    """Return the elements of a table, and which of them stands at each place of the file.
+    """Return the elements of a table in the order of their indices, and the order of the file.
 
-    That is None where they stand in the order of their indices.
+    That is the index (m,) of the element at each place, or None where each is at its place. Raises
+    MeshError as `element_block`, or if indices are not each number below m once. ``tick`` is called
+    with the number of elements of each block.
     """
-    # Too many to be copied once more.
+    # Filled block by block, so that they are in memory only once.
     types = np.empty(table.count, np.uint8)
     flat = np.empty(table.length - (1 + table.numbered) * table.count, np.int64)
     order = np.empty(table.count if table.numbered else 0, np.int64)
@@ -188,7 +190,7 @@ def read_elements(
 
 
 def _check_order(source: BinaryFile, table: ElementTable, cells: Cells, order: IntArray) -> None:
-    """Raise for the first element whose index is not below their number, or stands twice."""
+    """Raise MeshError if an index of elements, ``order`` (m,), is not below m or repeats."""
     inside = order.view(np.uint64) < len(order)
     first = np.full(len(order), len(order))
     np.minimum.at(first, order[inside], np.flatnonzero(inside))
@@ -204,14 +206,14 @@ def _check_order(source: BinaryFile, table: ElementTable, cells: Cells, order: I
 
 
 def sorted_back(cells: Cells, order: IntArray) -> Cells:
-    """Return cells that stand in another order, by their indices ``order`` (m,)."""
+    """Return cells in the order of their indices, ``order`` (m,) being the index of each."""
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
     return cells.take(place)
 
 
 def is_su2b(path: Path) -> bool:
-    """Tell whether a file begins as an SU2 binary mesh does.
+    """Return whether a file begins as an SU2 binary mesh does.
 
     Raises
     ------

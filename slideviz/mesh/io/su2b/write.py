@@ -1,9 +1,9 @@
-"""Writing SU2 binary meshes (``.su2b``), from arrays or from whatever can make blocks of them.
+"""Writing SU2 binary meshes (``.su2b``), of arrays or of functions that return parts of them.
 
-A mesh that was read from such a file gives that file again, in the same width, byte order and
-order of its elements, with other coordinates. Others are written as SU2 does: counts of 8 bytes,
-little endian, elements sorted by type. Their indices say which element is which, so that a mesh
-is read back with its cells in the order that it had.
+A mesh that was read from such a file is written as it was: with the same width, byte order and
+order of its elements. Others are written as by SU2: counts of 8 bytes, little endian, elements
+sorted by type. Each element has its index, so that a mesh is read back with its cells in the order
+that it had.
 """
 
 from __future__ import annotations
@@ -35,21 +35,25 @@ OTHER_ZONES = "its other zones"
 
 @dataclass(frozen=True, eq=False)
 class ZoneContent:
-    """What a zone of a file is written from.
+    """The content of a zone to write, with functions that return parts of its large arrays.
+
+    The functions get numbers i, j and return the k = j - i items from i on.
 
     Attributes
     ----------
     dim : int
         2 or 3.
     n_cells, n_points : int
+        Numbers of cells and points.
     cells : callable
-        The cells ``i`` to ``j`` in the order of the file: types (k,), nodes one after the other,
-        and the index of each (k,).
+        Returns cells in the order of the file: types (k,), nodes one after the other, and the
+        index of each (k,).
     types : callable
-        The types of the cells ``i`` to ``j`` (k,).
+        Returns the types (k,) of these cells.
     points : callable
-        The coordinates of the points ``i`` to ``j`` (k, d).
+        Returns coordinates (k, d).
     markers : tuple of Marker
+        The boundaries.
     """
 
     dim: int
@@ -64,7 +68,7 @@ class ZoneContent:
 def su2b_blocks(*meshes: Mesh) -> Iterator[bytes]:
     """Yield the SU2 binary file of a mesh, or of several as its zones, block by block.
 
-    A single mesh that is one zone of a ``.su2b`` file keeps the other zones.
+    For a single mesh that is one zone of a ``.su2b`` file, the other zones are written, too.
 
     Raises
     ------
@@ -90,7 +94,7 @@ def su2b_blocks(*meshes: Mesh) -> Iterator[bytes]:
 
 
 def require_binary(mesh: Mesh) -> None:
-    """Raise where an SU2 binary file cannot hold a mesh.
+    """Raise if an SU2 binary file cannot hold a mesh.
 
     Raises
     ------
@@ -103,7 +107,7 @@ def require_binary(mesh: Mesh) -> None:
 
 
 def halo_error(name: str) -> MeshError:
-    """Return the error about a mesh with a halo."""
+    """Return the error for a mesh, called ``name``, with a halo."""
     return MeshError(
         f"{name}: has a halo ({SEND_RECEIVE} markers), which an SU2 binary mesh cannot hold; write "
         "a .su2 file, or make the mesh without its halo"
@@ -111,12 +115,12 @@ def halo_error(name: str) -> MeshError:
 
 
 def require_binary_names(mesh: str, names: Iterable[str]) -> None:
-    """Raise where a boundary of a mesh has a name that cannot stand in an SU2 binary file.
+    """Raise if a name of a boundary of the mesh called ``mesh`` cannot be in an SU2 binary file.
 
     Raises
     ------
     MeshError
-        One has.
+        A name is empty, not printable, too long, or ``SEND_RECEIVE``.
     """
     for name in names:
         size = len(name.encode("utf-8", "replace"))
@@ -129,13 +133,13 @@ def require_binary_names(mesh: str, names: Iterable[str]) -> None:
 
 
 def lost_in_binary(mesh: Mesh) -> tuple[str, ...]:
-    """Return what an SU2 binary file does not keep of the file of a mesh, in words."""
+    """Return what of a mesh's file is lost if it is written as SU2 binary, in words."""
     is_binary = isinstance(mesh.origin, BinaryForm)
     return lost_of_mesh(replace(mesh, zones=1) if is_binary else mesh)
 
 
 def lost_of_mesh(mesh: Mesh) -> tuple[str, ...]:
-    """Return what the file of a mesh has beside points, cells and boundaries, in words."""
+    """Return what the file of a mesh has besides points, cells and boundaries, in words."""
     document = mesh.origin
     keys = ["FFD_NBOX"] if document.ffd else []
     has_halo = mesh.halo is not None
@@ -147,7 +151,10 @@ def lost_of_mesh(mesh: Mesh) -> tuple[str, ...]:
 
 
 def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:
-    """Return what is lost of a text of so many zones, with unknown sections of these keys."""
+    """Return what of an SU2 text is lost as binary, in words; empty if nothing is.
+
+    ``keys`` are those of sections that slideviz does not know, ``zones`` the number of zones.
+    """
     unique = dict.fromkeys(key.upper() for key in keys)
     others = ", ".join(key for key in unique if not is_ffd(key.encode()))
     lost = {
@@ -159,7 +166,7 @@ def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:
 
 
 def listed(lost: Sequence[str]) -> str:
-    """Return things in a row, in words."""
+    """Return words (at least one) as a list in a sentence: ``a, b and c``."""
     *first, last = lost
     return f"{', '.join(first)} and {last}" if first else last
 
@@ -187,13 +194,16 @@ def sentence_of_lost(
 
 
 def file_head(zones: int, form: BinaryForm | None = None) -> Iterator[bytes]:
-    """Yield what a file begins with."""
+    """Yield the head of a file, in width and byte order of ``form``, else 8 and little endian."""
     width, sign = (8, "<") if form is None else (form.width, form.byte_order)
     yield np.array([width, zones], f"{sign}i4").tobytes()
 
 
 def zone_blocks(zone: ZoneContent, number: int, form: BinaryForm | None = None) -> Iterator[bytes]:
-    """Yield one zone of a file, in the width and byte order of ``form``."""
+    """Yield one zone of a file, in the width and byte order of ``form``, else 8 and little endian.
+
+    Raises MeshError if its numbers do not fit into counts of 4 bytes.
+    """
     width, sign = (8, "<") if form is None else (form.width, form.byte_order)
     conn = np.dtype(f"{sign}u{width}")
 
@@ -225,23 +235,30 @@ def zone_blocks(zone: ZoneContent, number: int, form: BinaryForm | None = None) 
 
 
 def padded(name: bytes) -> bytes:
-    """Return the name of a marker as it stands in a file."""
+    """Return the name of a marker padded with zeros to ``NAME_BYTES``."""
     return name.ljust(NAME_BYTES, b"\0")
 
 
 def marker_table(cells: Cells, conn: np.dtype) -> bytes:
-    """Return the elements of a marker as they stand in a file, after its name."""
+    """Return the bytes of a marker's elements (count, offsets, list), which follow its name.
+
+    ``conn`` is the data type of counts and indices.
+    """
     head = np.concatenate([[len(cells), 0], np.cumsum(SIZES[cells.types] + 1)])
     return np.concatenate([head, rows_of(cells.types, cells.connectivity)]).astype(conn).tobytes()
 
 
 def _parts(count: int) -> Iterator[tuple[int, int]]:
+    """Yield begin and end of parts of at most ``BLOCK`` of ``count`` items."""
     for first in range(0, count, BLOCK):
         yield first, min(first + BLOCK, count)
 
 
 def rows_of(types: NDArray[np.uint8], nodes: IntArray, ids: IntArray | None = None) -> IntArray:
-    """Return elements as a list: type, nodes and, where there is one, index of each."""
+    """Return the list (n,) of elements in the file: type, nodes and, if given, index of each.
+
+    ``types`` and ``ids`` are (k,), ``nodes`` those of all elements one after the other.
+    """
     sizes = SIZES[types]
     more = 1 if ids is None else 2
     if len(types) and (types == types[0]).all():
@@ -264,7 +281,7 @@ def rows_of(types: NDArray[np.uint8], nodes: IntArray, ids: IntArray | None = No
 
 
 def _by_type(cells: Cells) -> IntArray | None:
-    """Return the cells in the order in which SU2 writes them, None where they are in it."""
+    """Return indices (m,) that sort cells by type as SU2 does, or None if they are sorted so."""
     rank = np.zeros(256, np.int64)
     rank[list(SORTED)] = np.arange(len(SORTED))
     ranks = rank[cells.types]
@@ -272,7 +289,7 @@ def _by_type(cells: Cells) -> IntArray | None:
 
 
 def _zone(mesh: Mesh, order: IntArray | None) -> ZoneContent:
-    """Return what the zone of a mesh is written from."""
+    """Return the content of a zone for a mesh; ``order`` has the cell at each place of the file."""
     cells = mesh.cells
 
     def part(i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
@@ -297,4 +314,5 @@ def _zone(mesh: Mesh, order: IntArray | None) -> ZoneContent:
 
 
 def _slice(array: FloatArray, i: int, j: int) -> FloatArray:
+    """Return the rows ``i`` to ``j - 1``."""
     return array[i:j]
