@@ -79,7 +79,7 @@ def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: T
     for number, text in enumerate(texts, 1):
         name = printable(source.name) + (f", zone {number}" if number > 1 else "")
         _require_binary(text, name)
-        keys = (part.key for part in text.zone.kept)
+        keys = (part.key for part in text.zone.unknown)
         lost = lost_of_text(keys, 1 if zone is None else zones)
         warn(sentence_of_lost(target, name, lost, alone=zone is not None and zones > 1))
         begin = plans[-1].size if plans else 8

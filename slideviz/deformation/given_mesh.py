@@ -38,7 +38,7 @@ from slideviz.mesh.io.su2b.write import (
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.ranks import ALONE, Alone
 from slideviz.mesh.skin import read_skin
-from slideviz.mesh.text_skin import skin_of_text, told_of
+from slideviz.mesh.text_skin import naming_text, skin_of_text
 from slideviz.mesh.threads import Tick
 from slideviz.terms import FileFormat
 
@@ -158,7 +158,7 @@ def given_mesh(
                 f"{path}: its binary copy cannot be written in {folder}: {reason_of(problem)} "
                 "(TMPDIR names another folder)"
             ) from problem
-        with told_of(plan.text, ours):
+        with naming_text(plan.text, ours):
             yield Given(ours, None, plan.text)
 
 
@@ -207,7 +207,7 @@ def given_for(
     text = _streamable(path, zone, tick)
     if not is_text:
         require_binary_names(printable(path.name), (m.name for m in text.zone.markers))
-        lost = lost_of_text((part.key for part in text.zone.kept), text.zone.bounds.zones)
+        lost = lost_of_text((part.key for part in text.zone.unknown), text.zone.bounds.zones)
         warn(sentence_of_lost(output, printable(path.name), lost))
     plan, left = planned(text, is_result=not is_text), bytes_left(output)
     state = path.stat()
@@ -261,7 +261,7 @@ def text_blocks(
     edits: Sequence[tuple[int, int, bytes]] = ()
     if ffd is not None:
         bounds = text.zone.bounds
-        edits = box_edits(raw, text.kept, text.lines.byte(bounds.end), ffd)
+        edits = box_edits(raw, text.unknown, text.lines.byte(bounds.end), ffd)
     with given.path.open("rb") as old, after.open("rb") as new:
 
         def rows(piece: Piece) -> bytes:

@@ -71,7 +71,7 @@ def _lines(mesh: Mesh) -> list[str]:
     if origin.ffd is not None:
         text = origin.ffd
     elif isinstance(origin, Document):
-        parts = (origin.raw[a:b] for a, b in origin.kept)
+        parts = (origin.raw[a:b] for a, b in origin.unknown)
         text = b"".join(part for part in parts if is_ffd(part))
     else:
         text = b""

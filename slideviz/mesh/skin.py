@@ -59,7 +59,7 @@ def read_skin(
         with ranks.sharing(_cells_near, path, zone, np.flatnonzero(used)) as do:
             tasks = range(0, place.cells.count, BLOCK)
             cells, ids = _cells_at(
-                source, place, map(_told(progress, 0.0, 0.6, len(tasks)), do(tasks))
+                source, place, map(_ticking(progress, 0.0, 0.6, len(tasks)), do(tasks))
             )
         used[cells.connectivity] = True
         numbers = np.flatnonzero(used)
@@ -71,7 +71,7 @@ def read_skin(
                 for first, a, b in zip(starts, ends[:-1], ends[1:], strict=True)
             ]
             numbers, points = _points_of(
-                source, place, numbers, map(_told(progress, 0.6, 1.0, len(parts)), do(parts))
+                source, place, numbers, map(_ticking(progress, 0.6, 1.0, len(parts)), do(parts))
             )
     return Mesh(
         points,
@@ -90,7 +90,7 @@ def read_skin(
     )
 
 
-def _told(tick: Tick, begin: float, end: float, count: int) -> Callable[[Any], Any]:
+def _ticking(tick: Tick, begin: float, end: float, count: int) -> Callable[[Any], Any]:
     """Return a function that returns its argument, and with each of ``count`` calls ticks.
 
     The fraction told to ``tick`` rises from ``begin`` to ``end``.

@@ -22,7 +22,7 @@ def skin_of_text(text: Text, path: Path, tick: Tick, ranks: Alone = ALONE) -> Me
     Names, zone and source are those of the text. Raises MeshError as `read_skin`, naming the text.
     """
     zone = text.zone
-    with told_of(text, path):
+    with naming_text(text, path):
         skin = read_skin(path, None, tick, ranks)
     return replace(
         skin,
@@ -39,7 +39,7 @@ def skin_of_text(text: Text, path: Path, tick: Tick, ranks: Alone = ALONE) -> Me
 
 
 @contextmanager
-def told_of(text: Text, path: Path) -> Iterator[None]:
+def naming_text(text: Text, path: Path) -> Iterator[None]:
     """Context in which a `MeshError` on the binary file ``path`` names the text it was made of."""
     try:
         yield

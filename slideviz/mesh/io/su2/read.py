@@ -37,7 +37,7 @@ class Document(Origin):
         The boundaries as read.
     zone : (int, int)
         First byte and end of the zone, without its ``IZONE`` line.
-    sends, kept : tuple of (int, int)
+    sends, unknown : tuple of (int, int)
         First byte and end of each ``SEND_RECEIVE`` marker, and of each unknown section.
     """
 
@@ -49,7 +49,7 @@ class Document(Origin):
     markers: tuple[Marker, ...]
     zone: tuple[int, int]
     sends: tuple[tuple[int, int], ...]
-    kept: tuple[tuple[int, int], ...]
+    unknown: tuple[tuple[int, int], ...]
 
 
 def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
@@ -94,7 +94,7 @@ def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
         markers=markers,
         zone=lines.bytes_of((found.bounds.begin, found.bounds.end))[0],
         sends=lines.bytes_of(*((part.begin, part.end) for part in found.sends)),
-        kept=lines.bytes_of(*((part.line, part.stop) for part in found.kept)),
+        unknown=lines.bytes_of(*((part.line, part.stop) for part in found.unknown)),
         ffd_at=found.ffd_at,
         ffd_elsewhere=boxes_elsewhere(sections, found.bounds),
     )

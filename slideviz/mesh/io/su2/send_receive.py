@@ -135,7 +135,7 @@ def _table(lines: Lines, parts: Sequence[SendRows], count: int) -> IntArray | No
 def _transforms(lines: Lines, zone: TextZone) -> dict[int, FloatArray]:
     """Return centre, angles and translation (rows of (3, 3)) by PERIODIC_INDEX, where readable."""
     found = {}
-    for section in zone.kept:
+    for section in zone.unknown:
         if section.key == "PERIODIC_INDEX" and section.value.isdigit():
             words = b" ".join(lines.line(k) for k in range(section.line + 1, section.stop)).split()
             try:

@@ -46,13 +46,13 @@ class Text:
         return number_of(self.zone.points)
 
     @property
-    def kept(self) -> tuple[tuple[int, int], ...]:
+    def unknown(self) -> tuple[tuple[int, int], ...]:
         """Return first byte and end of each section that slideviz does not know."""
-        return self.lines.bytes_of(*((part.line, part.stop) for part in self.zone.kept))
+        return self.lines.bytes_of(*((part.line, part.stop) for part in self.zone.unknown))
 
     def boxes(self) -> bytes | None:
         """Return the text of the boxes for free-form deformation, or None if there are none."""
-        parts = (self.lines.raw[a:b] for a, b in self.kept)
+        parts = (self.lines.raw[a:b] for a, b in self.unknown)
         return b"".join(part for part in parts if is_ffd(part)) or None
 
 

@@ -59,7 +59,7 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
     yield from (raw[a:b] for a, b in _ranges(0, begin))
     yield from _whole_zone(mesh)
     yield from _markers(mesh.markers, len(document.sends))
-    kept = (_whole(raw[a:b]) for a, b in (*document.sends, *document.kept))
+    kept = (_whole(raw[a:b]) for a, b in (*document.sends, *document.unknown))
     yield from (text for text in kept if boxes is None or not is_ffd(text))
     yield boxes or b""
     yield from (raw[a:b] for a, b in _ranges(end, raw.size))
@@ -86,7 +86,7 @@ def _patched(document: Document, points: FloatArray) -> Iterator[bytes]:
         return moved_rows(raw, piece, document.points[mine], points[mine])
 
     raw, ffd = document.raw, document.ffd
-    edits = [] if ffd is None else box_edits(raw, document.kept, document.zone[1], ffd)
+    edits = [] if ffd is None else box_edits(raw, document.unknown, document.zone[1], ffd)
     yield from patched_blocks(raw, document.rows, text, edits)
 
 
@@ -118,19 +118,19 @@ def patched_blocks(
     raw.require_same()
 
 
-def box_edits(raw: Source, kept: Sequence[tuple[int, int]], end: int, ffd: bytes) -> list[Edit]:
+def box_edits(raw: Source, unknown: Sequence[tuple[int, int]], end: int, ffd: bytes) -> list[Edit]:
     """Return the edits that replace the boxes for free-form deformation of a zone by ``ffd``.
 
     If the zone has none, ``ffd`` is put at its end.
 
     Parameters
     ----------
-    kept : sequence of (int, int)
+    unknown : sequence of (int, int)
         First byte and end of each unknown section.
     end : int
         The byte where the zone ends.
     """
-    old = [(a, b) for a, b in kept if is_ffd(raw[a:b])]
+    old = [(a, b) for a, b in unknown if is_ffd(raw[a:b])]
     if old:
         return [(a, b, b"" if at else ffd) for at, (a, b) in enumerate(old)]
     return [(end, end, ffd if raw[end - 1 : end] == b"\n" else b"\n" + ffd)]

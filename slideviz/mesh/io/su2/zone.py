@@ -128,7 +128,7 @@ class TextZone:
         The boundaries.
     sends : tuple of SendRows
         The ``SEND_RECEIVE`` markers, which list donors and receivers of a halo.
-    kept : tuple of KeywordBlock
+    unknown : tuple of KeywordBlock
         The unknown sections.
     """
 
@@ -138,12 +138,12 @@ class TextZone:
     points: Rows
     markers: tuple[MarkerRows, ...]
     sends: tuple[SendRows, ...]
-    kept: tuple[KeywordBlock, ...]
+    unknown: tuple[KeywordBlock, ...]
 
     @property
     def ffd_at(self) -> tuple[range, ...]:
         """Return the ranges of lines of the boxes for free-form deformation."""
-        boxes = (part for part in self.kept if is_ffd(part.key.encode()))
+        boxes = (part for part in self.unknown if is_ffd(part.key.encode()))
         return tuple(range(part.line, part.stop) for part in boxes)
 
 
@@ -190,7 +190,7 @@ class _Walk:
                     heads[key].line, f"{key}= 0 leaves nothing to work on; export the volume mesh"
                 )
         self.rows.none(heads["NMARK"])
-        markers, sends, kept = self._walk()
+        markers, sends, unknown = self._walk()
         self._check_markers(heads["NMARK"], markers, len(sends))
         return TextZone(
             bounds=self.bounds,
@@ -199,7 +199,7 @@ class _Walk:
             points=points,
             markers=markers,
             sends=sends,
-            kept=kept,
+            unknown=unknown,
         )
 
     def _only(self, key: str) -> KeywordBlock:
@@ -225,7 +225,7 @@ class _Walk:
         self,
     ) -> tuple[tuple[MarkerRows, ...], tuple[SendRows, ...], tuple[KeywordBlock, ...]]:
         """Return the boundaries, the SEND_RECEIVE markers and the unknown sections."""
-        markers, sends, kept = [], [], []
+        markers, sends, unknown = [], [], []
         at = 0
         while at < len(self.sections):
             section = self.sections[at]
@@ -245,8 +245,8 @@ class _Walk:
                     + (misspelt(self.sections[at - 2 : at - 1], "MARKER_TAG") or _NAME_IT),
                 )
             elif section.key not in KNOWN:
-                kept.append(section)
-        return tuple(markers), tuple(sends), tuple(kept)
+                unknown.append(section)
+        return tuple(markers), tuple(sends), tuple(unknown)
 
     def _marker_head(
         self, tag: KeywordBlock, at: int, sends: bool

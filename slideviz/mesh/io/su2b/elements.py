@@ -85,7 +85,7 @@ def element_block(
         )
     begin = table.entries + start * width
     numbers = source.array(begin, int(offsets[-1]) - start, source.conn, "the elements")
-    block = _taken_apart(source, table, first, begin, _whole_numbers(numbers), offsets - start)
+    block = _split_list(source, table, first, begin, _whole_numbers(numbers), offsets - start)
     _check_nodes(source, place, block, begin, offsets - start)
     _check_dim(source, block, dim, begin, offsets - start)
     if first + count == table.count:
@@ -122,7 +122,7 @@ def elements_between(
         raise source.error(at, "offsets of elements do not rise; the file is damaged")
     begin = table.entries + start * source.width
     found = source.array(begin, int(offsets[-1]) - start, source.conn, "the elements")
-    block = _taken_apart(source, table, first, begin, _whole_numbers(found), offsets - start)
+    block = _split_list(source, table, first, begin, _whole_numbers(found), offsets - start)
     _check_nodes(source, place, block, begin, offsets - start)
     _check_dim(source, block, dim, begin, offsets - start)
     return block
@@ -141,7 +141,7 @@ def _whole_numbers(values: NDArray) -> IntArray:
     return np.asarray(values.astype(np.uint64, copy=False).view(np.int64))
 
 
-def _taken_apart(
+def _split_list(
     source: BinaryFile,
     table: ElementTable,
     first: int,
@@ -196,7 +196,7 @@ def _taken_apart(
 def _check_nodes(
     source: BinaryFile, place: ZonePlace, block: ElementBlock, begin: int, offsets: IntArray
 ) -> None:
-    """Raise MeshError if a block has a node that does not exist; arguments as in `_taken_apart`."""
+    """Raise MeshError if a block has a node that does not exist; arguments as in `_split_list`."""
     wrong = block.nodes.view(np.uint64) >= place.n_points
     if not wrong.any():
         return

@@ -144,7 +144,7 @@ def lost_of_mesh(mesh: Mesh) -> tuple[str, ...]:
     keys = ["FFD_NBOX"] if document.ffd else []
     has_halo = mesh.halo is not None
     if isinstance(document, Document):
-        keys += [document.raw[a:b].partition(b"=")[0].strip().decode() for a, b in document.kept]
+        keys += [document.raw[a:b].partition(b"=")[0].strip().decode() for a, b in document.unknown]
         has_halo = has_halo or bool(document.sends)
     halo = (f"its halo ({SEND_RECEIVE}; its cells are as any others now)",) if has_halo else ()
     return (*halo, *lost_of_text(keys, mesh.zones))
