@@ -1,1 +1,1 @@
-"""The window: the only room that speaks Qt."""
+"""The window: the only room that imports Qt."""

@@ -71,7 +71,7 @@ class Actions:
             self.window.say(NO_DISPLACEMENT)
 
     def sync(self, now: Now) -> None:
-        """Show which actions are checked and which can be done."""
+        """Update the actions, menus and tool bar: titles, checked, enabled."""
         for name, command in COMMANDS.items():
             command.show(self.by_name[name], now)
         for name, table in self._tables.items():
@@ -86,6 +86,7 @@ class ToolBar(QToolBar):
     ----------
     colour, zone : Choice
     range : QToolButton
+        Opens the menu of the colour range.
     """
 
     def __init__(self, window: MainWindow, actions: Actions) -> None:
@@ -134,7 +135,7 @@ class ToolBar(QToolBar):
         self.zone_shown = self.addWidget(self.zone)
 
     def sync(self, now: Now) -> None:
-        """Show the session."""
+        """Show the session's quantity and zone, and enable what can be used."""
         session: Session = now.session
         mesh = session.mesh
         self.colour.setEnabled(mesh is not None)

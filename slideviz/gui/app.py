@@ -1,4 +1,4 @@
-"""The application: Qt, the window, and what happens to errors that nobody expected."""
+"""Start the application: Qt, the window, and the handling of unexpected errors."""
 
 from __future__ import annotations
 
@@ -60,7 +60,8 @@ def launch(path: Path | None = None, run: bool = False) -> int:
                     QTimer.singleShot(READ_MS, lambda: _run_when_read(window))
             code = int(app.exec())
     if window.left_behind:
-        # A library still computes in a thread that cannot be stopped: no tidying up under it.
+        # A library still computes in a thread that cannot be stopped: a normal exit would free
+        # what it uses.
         logging.shutdown()
         sys.stdout.flush()
         sys.stderr.flush()
@@ -69,9 +70,9 @@ def launch(path: Path | None = None, run: bool = False) -> int:
 
 
 def _graphics() -> QSurfaceFormat:
-    """Return what VTK draws with, for all that Qt shares with it.
+    """Return the OpenGL format that VTK needs, to be Qt's default for all widgets.
 
-    pyvistaqt asks for the same, but for Qt too late: it warns that it may not be had.
+    pyvistaqt sets the same, but after the application is made, about which Qt warns.
     """
     graphics = QSurfaceFormat.defaultFormat()
     graphics.setRenderableType(QSurfaceFormat.RenderableType.OpenGL)
@@ -85,11 +86,11 @@ def _folder(place: QStandardPaths.StandardLocation) -> Path:
 
 
 def _keep_private(*folders: Path) -> None:
-    """Let nobody else read settings, sessions and crashes, nor the samples."""
+    """Make settings and folders (sessions, crashes, samples) readable for the user only."""
     settings = Path(QSettings("slideviz", "slideviz").fileName())
     try:
         for folder in (*folders, settings.parent):
-            if folder.name == "slideviz":  # not /tmp, where there is no place of its own
+            if folder.name == "slideviz":  # not /tmp, the fallback
                 private_folder(folder)
         private_file(settings)
     except OSError as problem:
@@ -97,7 +98,7 @@ def _keep_private(*folders: Path) -> None:
 
 
 def _run_when_read(window: MainWindow) -> None:
-    """Start the run as soon as the file is read, if nothing is missing for it."""
+    """Start the run as soon as the file is read, if all its requirements are met."""
     if window.runner.busy:
         QTimer.singleShot(READ_MS, lambda: _run_when_read(window))
     elif window.run_panel.run.isEnabled():

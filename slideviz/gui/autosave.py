@@ -1,9 +1,8 @@
 """Autosave: the session is written as a case file, so that a crash costs some seconds of work.
 
-Each window has a file of its own, ``session-PID-N.cfg``, and a lock beside it that the system
-frees when the program ends, however it does. A file that nobody holds is of a session that did
-not end properly. Nothing is ever thrown away unasked: what cannot be read is renamed to
-``….broken``.
+Each window has a file of its own, ``session-PID-N.cfg``, and a lock file beside it that is free
+when the process has ended, however it did. A session file without a held lock is of a session that
+did not end properly. No file is ever deleted unasked: an unreadable one is renamed to ``….broken``.
 """
 
 from __future__ import annotations
@@ -34,9 +33,14 @@ from slideviz.session.state import Session
 from slideviz.session.store import Store
 
 HALF_WRITTEN_S = 60.0
-"""A temporary file older than this is not being written any more."""
+"""Age in seconds from which a temporary file is not being written any more."""
+
 SOURCE = "saved as: "
+"""Begin of the remark in a session's file that names the case file it belongs to."""
+
 CURRENT = "the results of the designs are of this case"
+"""The remark in a session's file that says so."""
+
 _numbers = count(1)
 log = logging.getLogger("slideviz")
 
@@ -48,9 +52,9 @@ class Autosave(QObject):
     ----------
     store : Store
     folder : Path
-        Where the files are, of all windows; made when needed.
+        The folder of all windows' session files; made when needed.
     camera : callable
-        Tells from where the mesh is looked at.
+        Returns the camera of the first view.
     designs : callable
         Returns the table of designs, and the case of its results.
     """
@@ -90,7 +94,7 @@ class Autosave(QObject):
             self._runner.start(self._write, case, table, up_to_date)
 
     def replace(self, found: LeftSession) -> None:
-        """Remove the session of an earlier start once this one, restored from it, is written."""
+        """Save this session, restored from an earlier one, then remove the earlier one's file."""
         self._replaces.append(found)
         self._written = ()
         self.save()
@@ -109,7 +113,7 @@ class Autosave(QObject):
         self._changed(self.store.session, self.store.session)
 
     def _changed(self, _old: Session, new: Session) -> None:
-        # Not put off by the next change: somebody who never rests is saved as well.
+        # The timer is not restarted by each change: also saved during constant changes.
         if new.mesh is not None and self._key(new) != self._written and not self._timer.isActive():
             self._timer.start()
 
@@ -142,24 +146,24 @@ class Autosave(QObject):
         self.look()
 
     def _failed(self, error: Exception) -> None:
-        # Tried again with the next change; the log shows the same line once.
+        # Tried again at the next change.
         log.warning("the session could not be kept for a restart: %s", error)
 
 
 @dataclass(frozen=True, eq=False)
 class LeftSession:
-    """The session of a program that did not end properly.
+    """A session found in the file of a program that did not end properly.
 
     Attributes
     ----------
     path : Path
-        Its file.
+        The session's file.
     case : Case
-        What is in it.
+        The case in the file.
     source : Path or None
-        The case file that it was opened from or saved to.
+        The case file that the session was opened from or saved to.
     lock : QLockFile
-        Held, so that no other window offers it too.
+        Held by this window, so that no other window offers the session too.
     """
 
     path: Path
@@ -169,7 +173,7 @@ class LeftSession:
 
     @property
     def when(self) -> datetime:
-        """Return when the session was written."""
+        """Return the time at which the session was written."""
         return datetime.fromtimestamp(self.path.stat().st_mtime)
 
     def designs(self) -> tuple[DesignTable, bool]:
@@ -186,15 +190,16 @@ class LeftSession:
         return read_results(file), f"% {CURRENT}" in self.path.read_text(encoding="utf-8")
 
     def remove(self) -> None:
-        """Remove the files of the session."""
+        """Remove the session's files, and release its lock."""
         _unlink(self.path)
         self.lock.unlock()
 
 
 def find_sessions(folder: Path) -> tuple[list[LeftSession], list[str]]:
-    """Return the sessions that no window holds, newest first, and sentences about unreadable ones.
+    """Return the sessions whose lock is free, newest first, and a sentence per unreadable file.
 
-    Those that cannot be read are renamed to ``….broken``, with a sentence each.
+    The lock of each session returned is held. Unreadable and half-written files are renamed to
+    ``….broken``.
     """
     found, problems = [], []
     for path in sorted(folder.glob("session-*.cfg"), key=_modified, reverse=True):
@@ -230,7 +235,7 @@ def _unlink(path: Path) -> None:
 
 def _lock(path: Path) -> QLockFile:
     lock = QLockFile(str(path.with_suffix(".lock")))
-    # A lock is free when its program is gone, not when it is old.
+    # A lock never expires by its age, only with its process.
     lock.setStaleLockTime(0)
     return lock
 
@@ -243,7 +248,7 @@ def _modified(path: Path) -> float:
 
 
 def _source(path: Path) -> Path | None:
-    """Return the case file that the remark in a session names."""
+    """Return the case file named by the remark in a session's file, or None."""
     for line in path.read_text(encoding="utf-8").splitlines():
         _, found, name = line.partition(f"% {SOURCE}")
         if found:
@@ -252,7 +257,7 @@ def _source(path: Path) -> Path | None:
 
 
 def _put_aside(path: Path, why: str) -> str:
-    """Rename a file that cannot be used, and return what to say."""
+    """Rename an unusable file to ``….broken``; return a sentence about it for the user."""
     kept = path.with_name(f"{path.name.lstrip('.')}.broken")
     number = count(2)
     while kept.exists():

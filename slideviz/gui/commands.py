@@ -1,7 +1,8 @@
-"""Every action and toggle of the window, once: menus, tool bar, help and panels read it here.
+"""The table of all commands of the window, read by menus, tool bar, help and panels.
 
-`MENUS` has them as the menu bar shows them, `COMMANDS` by name. A toggle of the view is a row of
-`slideviz.terms.SHOWN`, a shape of sections one of `slideviz.case.section_shapes.SECTION_SHAPES`.
+`MENUS` has them in the order of the menu bar, `COMMANDS` by name. The toggles of the view are made
+from `slideviz.terms.SHOWN`, those that add a section from
+`slideviz.case.section_shapes.SECTION_SHAPES`.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ KEY = QKeySequence.StandardKey
 
 
 def _again(window: MainWindow, step: Callable[[], None], words: str, done: str) -> None:
-    """Undo or redo, and say in the status bar what that was."""
+    """Call ``step`` (undo or redo), and show in the status bar which change that was."""
     step()
     if words:
         window.say(f"{done}: {words}")
@@ -59,7 +60,7 @@ def _switch(name: Shown, window: MainWindow) -> None:
 
 def _add_section(kind: str, window: MainWindow) -> None:
     window.docks_.bring_to_front("sections")
-    panel: Any = window.docks_.panels["sections"]  # a panel, which commands do not know
+    panel: Any = window.docks_.panels["sections"]  # this module cannot import the panels
     panel.add[kind].click()
 
 
@@ -198,7 +199,7 @@ _SIDES = Menu("look_from", "Look &from", "Look at the mesh from a side.", (
     _side("iso", "0", "Iso"),
 ))
 
-# Where there is nothing to play, Space belongs to the button that has the focus.
+# Without steps the commands are disabled, and Space presses the focused button.
 STEPS = Menu("steps", "&Steps", "Show another step of the deformation.", (
     Command("step_first", "Undeformed mesh", "Show the mesh before it is deformed.",
             lambda window: window.player.go(0), ("Home",), enabled=stepped,

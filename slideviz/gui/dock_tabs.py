@@ -1,4 +1,4 @@
-"""The tabs of docks: a double click takes a dock out, a right click has its menu."""
+"""The tabs of docks: a double click makes a dock a window, a right click opens its menu."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -14,20 +14,21 @@ from slideviz.gui.responsiveness.timers import later
 
 TIP = "Double click: a window of its own. Drag it away to put the panel elsewhere."
 _DOWN = 24
-"""Pixels below its tab where a panel appears that is taken out."""
+"""Distance in pixels, left and down, at which a dock appears that is made a window of its own."""
 
 
 class DockTabs(QObject):
-    """The tab bars that Qt makes for docks, on which a double click takes a dock out.
+    """Watches the tab bars that Qt makes for docks: double click, right click, and title bars.
 
-    A right click asks what to do with it. A panel that a tab names has no title bar.
+    A double click makes a dock a window of its own; a right click opens its menu. A dock whose
+    name is on a tab has no title bar.
 
     Parameters
     ----------
     window : QMainWindow
     docks : iterable of QDockWidget
     bare : set of QDockWidget
-        Those that have no title bar where they are alone, either.
+        The docks that have no title bar even without a tab.
     """
 
     def __init__(
@@ -47,12 +48,12 @@ class DockTabs(QObject):
         self._timer.start()
 
     def bars(self) -> list[QTabBar]:
-        """Return the present tab bars of docks."""
+        """Return the tab bars that docks have at present."""
         direct = Qt.FindChildOption.FindDirectChildrenOnly
         return [bar for bar in self.window.findChildren(QTabBar, options=direct) if bar.count()]
 
     def watch(self) -> None:
-        """Watch every tab bar, and give the docks without one their titles."""
+        """Install the event filter on every tab bar; show a title bar on docks without a tab."""
         for dock in self._docks.values():
             tabbed = bool(self.window.tabifiedDockWidgets(dock))
             self._set_title(dock, dock.isFloating() or not (tabbed or dock in self._bare))
@@ -63,7 +64,7 @@ class DockTabs(QObject):
                 bar.setTabToolTip(index, TIP)
 
     def _set_title(self, dock: QDockWidget, titled: bool) -> None:
-        # What stands in the place of a title bar hides it.
+        # An empty widget in place of the title bar hides it.
         if (dock.titleBarWidget() is None) != titled:
             dock.setTitleBarWidget(None if titled else QWidget())  # type: ignore[arg-type]
 
@@ -86,7 +87,7 @@ class DockTabs(QObject):
         return self._docks.get(bar.tabText(bar.tabAt(where)))
 
     def menu_of(self, dock: QDockWidget) -> QMenu:
-        """Return the menu of a dock: take it out, close it."""
+        """Return the menu of a dock: make it a window of its own, close it."""
         menu = QMenu(self.window)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.addAction("Own window", lambda: self.take_out(dock))
@@ -97,7 +98,7 @@ class DockTabs(QObject):
         """Make a dock a window of its own, near its old place, of the same size."""
         size, at = dock.size(), dock.mapToGlobal(QPoint(-_DOWN, _DOWN))
         for other in self.window.tabifiedDockWidgets(dock):
-            # Behind another tab it may be as small as it was long ago.
+            # A dock behind another tab keeps an old size.
             size = size.expandedTo(other.size())
         dock.setFloating(True)
         dock.resize(size)

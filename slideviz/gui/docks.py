@@ -29,31 +29,37 @@ Side = Qt.DockWidgetArea
 LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
 BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
 LEFT_WIDTH, RIGHT_WIDTH = 356, 316
-"""Pixels that the panels at the sides need at least, on a screen that has room for them."""
+"""Least width in pixels of the docks on each side, on a screen at least `ROOMY` wide."""
+
 NARROWEST = {LEFT: 300, RIGHT: 264}
-"""Pixels that they may shrink to on a smaller screen, in proportion."""
+"""Least width in pixels of the docks on each side, on a narrow screen."""
+
 ROOMY = 1280
-"""Pixels of the width of a screen with room."""
+"""Width of a screen in pixels below which the least widths shrink in proportion."""
+
 FRAME = 40
-"""Pixels of the height of a screen that a window leaves to its own title bar."""
+"""Height in pixels of a screen that is left for the window's title bar."""
+
 FIRST = {LEFT: "boundaries", RIGHT: "histogram"}
+"""The dock whose width is set for each side before the window is shown."""
+
 SIDE = 0.22
-"""Part of the window's width that the panels of a side take, until somebody chooses otherwise."""
+"""Initial width of each side's docks, relative to the window's."""
 
 
 def room_for(window: QWidget) -> QRect:
-    """Return the part of the screen where a window is seen whole, with the bar of its title."""
+    """Return the part of the screen that a window may fill so that its title bar is visible too."""
     room = window.screen().availableGeometry()
-    # A window that fills the screen has its title on it.
+    # A maximized window has its title bar within this.
     return room if window.isMaximized() or window.isFullScreen() else room.adjusted(0, 0, 0, -FRAME)
 
 
 @dataclass(frozen=True)
 class DockRow:
-    """A dock: name, title, place, and the function that makes its panel.
+    """A row of the table of docks: name, title, area, and the function that makes its panel.
 
-    ``after`` names the dock that it shares a place with, as a tab. One that is ``named`` by what is
-    in it has no title bar, as those have none that a tab names: the height is needed.
+    ``after`` names the dock that it is tabbed with. ``named``: it has no title bar, as its content
+    says what it is. ``shown``: it is visible at first.
     """
 
     name: str
@@ -85,7 +91,7 @@ DOCKS: tuple[DockRow, ...] = (
     DockRow("designs", "Designs", BOTTOM, DesignsPanel, shown=False),
     DockRow("log", "Log", BOTTOM, lambda _: LogPanel(), shown=False),
 )
-"""Every dock; the panels get the window and take from it what they need."""
+"""Every dock; ``make`` is called with the window."""
 
 
 class Docks(QObject):
@@ -122,21 +128,21 @@ class Docks(QObject):
         dock.setObjectName(row.title.lower())
         panel = row.make(self.window)
         dock.setWidget(panel)
-        # A window once made small must not leave names and fields cut off for ever.
+        # A window made small and large again must not leave names and fields cut off.
         if row.area != BOTTOM:
             dock.setMinimumWidth(self.least[row.area])
-        # What is typed must not end in a field that is hidden behind another tab.
+        # Keys must not go to a field in a dock that is hidden behind another tab.
         dock.visibilityChanged.connect(lambda shown: None if shown else _leave(dock))
         self.by_name[row.name] = dock
         self.panels[row.name] = panel
 
     def panel(self, kind: type[Panel]) -> Panel:
-        """Return the panel of a kind."""
+        """Return the panel of a class."""
         return next(panel for panel in self.panels.values() if isinstance(panel, kind))
 
     def save(self, settings: QSettings) -> None:
-        """Write down where the window and every dock are."""
-        # The next window begins with its panels, and with a frame.
+        """Save the geometry of the window and the layout of the docks in the settings."""
+        # Docks hidden together and full screen are not kept for the next start.
         self.show_hidden()
         window = self.window
         window.setWindowState(window.windowState() & ~Qt.WindowState.WindowFullScreen)
@@ -144,10 +150,7 @@ class Docks(QObject):
         settings.setValue("state", window.saveState())
 
     def restore(self, settings: QSettings) -> None:
-        """Put the window and every dock where they were, or else where they belong at first.
-
-        Not one dock after the other: Qt would leave tab bars over the panels that belong to none.
-        """
+        """Restore the window's geometry and the docks' layout; the initial one if none is saved."""
         window, state, geometry = self.window, settings.value("state"), settings.value("geometry")
         if geometry is not None:
             window.restoreGeometry(geometry)
@@ -158,12 +161,12 @@ class Docks(QObject):
         for row in DOCKS:
             dock = self.by_name[row.name]
             if window.dockWidgetArea(dock) == Side.NoDockWidgetArea and not dock.isFloating():
-                window.addDockWidget(row.area, dock)  # a version of that time had none
-        # When the docks have their places.
+                window.addDockWidget(row.area, dock)  # a dock that an older version did not have
+        # After Qt has laid the docks out.
         QTimer.singleShot(0, self, self.follow)
 
     def _fit_screen(self) -> None:
-        """Make the window no larger than the screen, and keep all of it there."""
+        """Shrink and move the window so that all of it is on the screen."""
         window, room = self.window, room_for(self.window)
         window.resize(window.size().boundedTo(room.size()))
         corner = window.pos()
@@ -173,7 +176,7 @@ class Docks(QObject):
             window.move(x, y)
 
     def restore_layout(self) -> None:
-        """Put every dock where it belongs at first, with the room it needs."""
+        """Put every dock back to its initial place and size."""
         self._arrange()
         self._share_room()
 
@@ -182,7 +185,7 @@ class Docks(QObject):
         for row in DOCKS:
             dock = self.by_name[row.name]
             dock.setFloating(False)
-            # Without this, Qt leaves tab bars that belong to nothing over the panels.
+            # Without this, Qt leaves orphaned tab bars over the panels.
             window.removeDockWidget(dock)
         for row in DOCKS:
             if row.after:
@@ -205,19 +208,19 @@ class Docks(QObject):
             window.resizeDocks(right, [410, 290][: len(right)], Qt.Orientation.Vertical)
 
     def _shares(self) -> dict[Side, int]:
-        """Return the width that each side has as long as nobody has moved it."""
+        """Return the width in pixels that each side has unless the user has changed it."""
         part = round(SIDE * self.window.width())
         return {side: max(part, least) for side, least in self.least.items()}
 
     def _share_width(self) -> None:
-        """Give both sides their part of the window's width."""
+        """Set the width of both sides to their part of the window's width."""
         self._widths = self._shares()
-        # Before the window is shown, nothing is seen yet.
+        # Before the window is shown, no dock is in front.
         docks = [self._seen(side) or self.by_name[FIRST[side]] for side in self._widths]
         self.window.resizeDocks(docks, list(self._widths.values()), Qt.Orientation.Horizontal)
 
     def _seen(self, side: Side) -> QDockWidget | None:
-        """Return a dock at that side which is in front: one behind a tab keeps an old width."""
+        """Return a dock of a side that is in front, or None; one behind a tab has an old width."""
         for dock in self.by_name.values():
             here = self.window.dockWidgetArea(dock) == side and not dock.isFloating()
             if here and _is_in_front(dock):
@@ -225,12 +228,12 @@ class Docks(QObject):
         return None
 
     def follow(self) -> None:
-        """Let the sides follow the width of the window again, where nobody has moved them."""
+        """Let the sides follow the window's width from now on, if they have their usual width."""
         shares = self._shares()
         self._widths = shares if self._as_wide_as(shares) else {}
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:  # noqa: N802
-        """Let the sides follow the width of the window, where nobody has moved them."""
+        """Set the sides' widths when the window is resized, unless the user has changed them."""
         resized = event.type() == QEvent.Type.Resize
         if resized and self._widths and self._as_wide_as(self._widths):
             QTimer.singleShot(0, self, self._share_width)
@@ -241,7 +244,7 @@ class Docks(QObject):
         return all(dock is None or abs(dock.width() - widths[s]) < 4 for s, dock in seen.items())
 
     def toggle_all(self) -> None:
-        """Hide every dock, or show again those that were hidden together."""
+        """Hide all docks; if none is visible, show those again that were hidden together."""
         if any(dock.isVisible() for dock in self.by_name.values()):
             self._hidden = self.window.saveState()
             for dock in self.by_name.values():
@@ -250,36 +253,35 @@ class Docks(QObject):
             self.show_hidden()
 
     def show_hidden(self) -> None:
-        """Show again the docks that were hidden together."""
+        """Show the docks again that `toggle_all` has hidden, unless one is visible already."""
         state, self._hidden = self._hidden, None
         if state is not None and not any(dock.isVisible() for dock in self.by_name.values()):
             self.window.restoreState(state)
 
     def toggle(self, name: str) -> None:
-        """Bring a dock to the front, or hide it if it is there."""
+        """Hide a dock if it is in front; otherwise bring it to the front."""
         if _is_in_front(self.by_name[name]):
             self.by_name[name].hide()
         else:
             self.bring_to_front(name)
 
     def bring_to_front(self, name: str) -> None:
-        """Bring a dock to the front."""
+        """Show a dock in front and give it the keyboard focus, unless one of its fields has it."""
         dock = self.by_name[name]
         dock.show()
         dock.raise_()
-        # A field in it that is being typed in must not be left.
         at = self.window.focusWidget()
         if at is None or not dock.isAncestorOf(at):
             dock.widget().setFocus()
 
 
 def _is_in_front(dock: QDockWidget) -> bool:
-    """Tell whether a dock is seen: neither hidden nor behind a tab."""
+    """Return whether a dock is visible and not behind another tab."""
     return dock.isVisible() and not dock.visibleRegion().isEmpty()
 
 
 def _leave(dock: QDockWidget) -> None:
-    """Take the keyboard from a dock that is not seen."""
+    """Take the keyboard focus away from a field in a dock."""
     field = QApplication.focusWidget()
     if field is not None and dock.isAncestorOf(field):
         field.clearFocus()

@@ -1,4 +1,4 @@
-"""Opening and saving of files, with the questions before."""
+"""Opening and saving of files, with the questions to the user before."""
 
 from __future__ import annotations
 
@@ -28,10 +28,16 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("slideviz")
 RECENT = 10
+"""Number of recent files that are remembered."""
 
 
 class Files(QObject):
-    """The files of a window: recent ones, opening, saving."""
+    """Opens and saves the files of a window, and remembers recent ones.
+
+    Closing the window with unsaved work: `MainWindow.closeEvent` calls `ask_about_unsaved`, which
+    takes the text and what can be saved from `slideviz.session.unsaved.Unsaved`, and the answer
+    from `slideviz.gui.widgets.questions.ask_unsaved`. Opening another file asks the same way.
+    """
 
     def __init__(self, window: MainWindow, settings: QSettings) -> None:
         from slideviz.samples.table import SAMPLES
@@ -49,7 +55,7 @@ class Files(QObject):
     # Open ------------------------------------------------------------------------------
 
     def recent(self) -> list[Path]:
-        """Return the files used last, newest first."""
+        """Return the files used last, the latest first."""
         listed = self.settings.value("recent", []) or []
         assert isinstance(listed, str | list)
         return [Path(text) for text in ([listed] if isinstance(listed, str) else listed)]
@@ -61,9 +67,10 @@ class Files(QObject):
         self.settings.setValue("folder", str(path.parent))
 
     def folder(self) -> Path:
-        """Return the folder in which file dialogs start: that of the last file, or of the program.
+        """Return the folder in which file dialogs start: that of the last file, if it exists.
 
-        From a desktop that is no place of the user's.
+        Else the working directory; the home folder if that is the root or not writable, as when
+        started from a desktop.
         """
         path = Path(str(self.settings.value("folder", "")))
         if self.settings.value("folder", "") and path.is_dir():
@@ -77,7 +84,7 @@ class Files(QObject):
             self.open_path(path)
 
     def open_path(self, path: Path, zone: int | None = None) -> None:
-        """Open a mesh or case in the background, once unsaved work is saved or may be lost."""
+        """Ask about unsaved work, then start the job that opens a mesh or case."""
         if self.ask_about_unsaved(lambda: self.open_path(path, zone)):
             path = Path(path).absolute()
             self.window.running.start_job(
@@ -85,7 +92,7 @@ class Files(QObject):
             )
 
     def open_zone(self, zone: int) -> None:
-        """Open another zone of the file that is open."""
+        """Open another zone of the open file."""
         session = self.window.store.session
         if session.mesh is None or session.path is None or zone == session.mesh.zone:
             return
@@ -101,7 +108,10 @@ class Files(QObject):
             self.open_sample(found[0], size=found[1])
 
     def open_sample(self, name: str, run: bool = False, size: int | None = None) -> None:
-        """Write a sample case into a folder of this program and open it; ``run`` deforms it."""
+        """Start the job that writes a sample case to `sample_folder` and opens it.
+
+        ``run``: deform it then; ``size``: see `ask_and_open_sample`, by default the usual one.
+        """
         if not self.ask_about_unsaved(lambda: self.open_sample(name, run, size)):
             return
         self.window.running.start_job(
@@ -140,10 +150,10 @@ class Files(QObject):
         Parameters
         ----------
         again : callable
-            Is called when a mesh was saved, in the background, so that the answer may be another
-            one.
+            Called after the mesh was saved, which is done by a job: False is returned then, and
+            ``again`` repeats what was asked about.
         before : str
-            What the changes would be lost by, in words.
+            What the user wants to do that would lose the changes, in words.
         """
         window, designs = self.window, self.window.docks_.panel(DesignsPanel)
         unsaved = self._unsaved()
@@ -153,7 +163,7 @@ class Files(QObject):
         answer = questions.ask_unsaved(
             window, unsaved.question(before), can_save, lambda: self._unsaved().question(before)
         )
-        # What else there is was in the question, too: it is not asked about again.
+        # The question named everything unsaved: nothing is asked about again.
         wanted = can_save if answer == "all" else [answer]
         savers = {"case": self.save_case, "table": designs.save_table}
         if not all(save() for name, save in savers.items() if name in wanted):
@@ -169,7 +179,7 @@ class Files(QObject):
         return Unsaved.of(window.store.session, window.runner.busy, designs)
 
     def _go_on(self, again: Callable[[], object]) -> None:
-        """Do what was asked about, without asking once more."""
+        """Call ``again`` with `ask_about_unsaved` returning True."""
         self._answered = True
         try:
             again()
@@ -179,13 +189,13 @@ class Files(QObject):
     # Save ------------------------------------------------------------------------------
 
     def stem(self) -> str:
-        """Return the stem of the names that file dialogs offer."""
+        """Return the stem of the file names that dialogs offer: that of the case or mesh."""
         session = self.window.store.session
         path = session.case.source or session.path
         return path.stem if path is not None else "mesh"
 
     def save_mesh(self, last: bool = False, then: Callable[[], object] | None = None) -> None:
-        """Ask for a name and write the mesh of the step that is shown, or of the last.
+        """Ask for a file name and start the job that writes the mesh of the shown (or last) step.
 
         ``then`` is called when it is written.
         """
@@ -216,7 +226,10 @@ class Files(QObject):
         )
 
     def ask_output(self) -> Path | None:
-        """Ask where the deformed mesh goes of one that stays in its file, which no run changes."""
+        """Ask for the file of the deformed mesh, needed if the mesh stays in its file; or None.
+
+        The mesh's own file is refused, as a run reads it while it writes.
+        """
         session = self.window.store.session
         assert session.mesh is not None
         default = session.case.mesh_out or self.folder() / f"{self.stem()}_deformed.su2b"
@@ -243,7 +256,7 @@ class Files(QObject):
             QTimer.singleShot(0, self.after_save)
 
     def save_case(self) -> bool:
-        """Ask for a name and write the case; return whether it was written."""
+        """Ask for a file name and write the case; return whether it was written."""
         session = self.window.store.session
         if session.mesh is None:
             return False
@@ -276,9 +289,9 @@ class Files(QObject):
         return True
 
     def _take_along(self, path: Path) -> bool:
-        """Copy the files of a sample beside its case: where it is opened, it is not to be kept.
+        """Copy the files of a sample, which are in a cache, beside the case that is being saved.
 
-        Return whether the case can be saved.
+        Return False if the user declines to replace a file, or a copy fails.
         """
         moved = files_beside(self.window.store.session.case, path, sample_folder())
         there = [target for target in moved.values() if target.exists()]
@@ -297,6 +310,6 @@ class Files(QObject):
 
 
 def sample_folder() -> Path:
-    """Return the folder into which sample cases are written to be opened."""
+    """Return the folder in the user's cache into which sample cases are written."""
     places = QStandardPaths.standardLocations(QStandardPaths.StandardLocation.CacheLocation)
     return Path(places[0] if places else tempfile.gettempdir()) / "slideviz-samples"

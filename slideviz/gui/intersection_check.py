@@ -1,4 +1,4 @@
-"""The intersection check: a job beside the window, soon after motions or roles have changed."""
+"""The intersection check: a job in a thread, started after motions or roles have changed."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ log = logging.getLogger("slideviz")
 
 
 class IntersectionCheck(QObject):
-    """The job that keeps ``Session.intersection`` up to date; an answer stays until the next."""
+    """Keeps ``Session.intersection`` up to date by a job; a result stays until the next one."""
 
     def __init__(self, store: Store, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.store = store
-        # A thread of its own: a run must not wait for it, nor it for a run.
+        # A runner of its own: neither a run nor the check waits for the other.
         self._runner = JobRunner(self)
         self._runner.finished.connect(self._found)
         self._runner.cancelled.connect(self._again)
@@ -34,7 +34,7 @@ class IntersectionCheck(QObject):
 
     @property
     def busy(self) -> bool:
-        """Tell whether a check runs or is about to."""
+        """Return whether a check is running or scheduled."""
         return self._runner.busy or self._timer.isActive()
 
     def close(self) -> None:

@@ -26,16 +26,16 @@ log = logging.getLogger("slideviz")
 
 
 class SessionRecovery(QObject):
-    """The sessions of earlier starts, and the banner that offers them.
+    """Finds the sessions of earlier starts that did not end properly, and offers to restore them.
 
     Parameters
     ----------
     window : MainWindow
-        Where a session is opened.
+        Opens a session.
     banner : Banner
-        Where they are offered: one of its own, which no other message takes away.
+        Offers the sessions; a banner of its own, so that no other message replaces the offer.
     autosave : Autosave
-        Goes on with what is restored.
+        Saves the restored session from then on.
     """
 
     def __init__(self, window: MainWindow, banner: Banner, autosave: Autosave) -> None:
@@ -44,12 +44,12 @@ class SessionRecovery(QObject):
         self.banner = banner
         self.autosave = autosave
         self.waiting: list[LeftSession] = []
-        # Held while this window lasts: what was not wanted now is offered at the next start.
+        # Their locks are held while this window is open: they are offered at the next start.
         self._later: list[LeftSession] = []
         self._trace = ""
 
     def look(self, crashes: Path | None = None) -> None:
-        """Find sessions to recover, and traces of crashes in a folder; offer the first session."""
+        """Find the sessions to restore, and traces of crashes in a folder; offer the first one."""
         self.waiting, problems = find_sessions(self.autosave.path.parent)
         for path in old_crashes(crashes) if crashes is not None else ():
             log.warning("slideviz crashed; where it was is in %s", path)
@@ -75,7 +75,7 @@ class SessionRecovery(QObject):
         self.banner.ask(text, answers, self._trace, later=self._put_off)
 
     def answer(self, restore: bool) -> None:
-        """Open the offered session, or remove it; then offer the next."""
+        """Start restoring the offered session, or remove its file; then offer the next."""
         found = self.waiting[0]
         if not restore:
             self.waiting.pop(0).remove()
@@ -113,5 +113,5 @@ class SessionRecovery(QObject):
 
 
 def _time_text(when: datetime) -> str:
-    """Return a time as people say it: the day only when it is not today."""
+    """Return a time as text, with the date only if it is not today."""
     return f"{when:%H:%M}" if when.date() == datetime.now().date() else f"{when:%Y-%m-%d %H:%M}"

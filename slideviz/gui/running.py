@@ -1,4 +1,4 @@
-"""The jobs of a window: one after the other, each with one end, and messages about them."""
+"""The jobs of a window: one at a time, with messages about their progress and end."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ log = logging.getLogger("slideviz")
 
 
 class Running(QObject):
-    """The jobs of a window: their start, their reports and their ends.
+    """Starts the jobs and runs of a window, and passes their steps and ends to the session.
 
     Signals
     -------
     began(str), doing(Doing), ended()
-        A job started, with its name; is so far; ended, however it did.
+        A job has started, with its name; reports progress; has ended, in whatever way.
     cancelling()
         The running job was asked to stop.
     said(str)
-        Something for the status bar.
+        A message for the status bar.
     worst_wanted()
-        The worst cell is to be seen.
+        The user wants to see the worst cell.
     """
 
     began = Signal(str)
@@ -81,7 +81,10 @@ class Running(QObject):
         function: Callable[..., Any],
         *values: object,
     ) -> None:
-        """Start a job beside the window; one that still runs is cancelled first."""
+        """Start a job, shown as ``text``; ``finish`` is called with its result.
+
+        If a job is running, it is cancelled first, and the new one starts when it has ended.
+        """
         if self.runner.busy:
             self._next = partial(self.start_job, text, finish, function, *values)
             self.cancel()
@@ -92,14 +95,17 @@ class Running(QObject):
         self.said.emit(text)
 
     def start_run(self, output: Path | None = None) -> None:
-        """Deform the mesh with the settings there are; one in its file into another, ``output``."""
+        """Start a run of the session's case, if nothing is missing for it.
+
+        ``output`` is the file of the deformed mesh, needed if the mesh stays in its file.
+        """
         if not self.runner.busy and not changes.run_requirements(self.store.session):
             self._start_run(self.store.session.case, output=output)
 
     def show_design(self, case: Case, name: str) -> bool:
-        """Show the run of a design; it is deformed first, unless that was done already.
+        """Show the run of a design, started first unless there is one already.
 
-        Another design that is deformed meanwhile is given up; False where another job runs.
+        The run of another design is cancelled. Return False if a job of another kind is running.
         """
         for run in self.store.session.runs:
             if run.name == name and run.case == case and run.end == "done":
@@ -168,7 +174,7 @@ class Running(QObject):
 
     @staticmethod
     def _log_remarks(run: Run) -> list[str]:
-        """Write what a run remarks into the log; return what it warns of."""
+        """Write the notes and warnings of a run to the log; return its warnings."""
         for note in notes_of(run):
             log.info("%s", note)
         warnings = list(warnings_of(run))
@@ -178,7 +184,7 @@ class Running(QObject):
 
     def _failed(self, error: Exception) -> None:
         if self._deforms and isinstance(error, SlidevizError):
-            # What is said of the case, not of a file with one.
+            # The message names keys of a case file: say it in the words of the window.
             error = type(error)(in_window_words(str(error)))
         self.banner.tell_error(error)
         log.error("%s", error)
@@ -217,14 +223,14 @@ class Running(QObject):
         self._about = None
 
     def _hide_other(self, _: Session, new: Session) -> None:
-        """Hide what the banner says of a run that is no longer shown."""
+        """Hide the banner if it is about a run that is no longer shown."""
         if self._about not in (None, new.shown):
             self._about = None
             self.banner.hide()
 
 
 def _steps_text(frame: StepFrame) -> str:
-    """Return how many steps an automatic run took, and what else it tried; else nothing."""
+    """Return the number of steps of an automatic run, and those it tried; else an empty text."""
     if frame.step is None or not frame.step.tried:
         return ""
     count = frame.step.total

@@ -1,4 +1,4 @@
-"""The reading of sections of a mesh that stays in its file: a job beside the window."""
+"""Read the cells of sections of a mesh that stays in its file, by a job in a thread."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from slideviz.session.store import Store
 log = logging.getLogger("slideviz")
 
 READING = "Reading the cells of the section"
-"""What news of it begin with."""
+"""Begin of the job's progress messages."""
 
 
 class SectionReader(QObject):
-    """The job that reads the cells that sections cut; a section that is dragged is read anew.
+    """Reads the cells that shown sections cut, by a job; cancels it if its section has changed.
 
     Signals
     -------
     found()
-        The cells of a section are there.
+        The cells of a section have been read.
     said(str)
-        Something for the status bar.
+        A message for the status bar.
     """
 
     found = Signal()
@@ -41,7 +41,7 @@ class SectionReader(QObject):
     def __init__(self, store: Store, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.store = store
-        # A thread of its own: a section need not wait for a run.
+        # A runner of its own: a section need not wait for a run.
         self._runner = JobRunner(self)
         self._timer = later(self, self._look)
         self._runner.finished.connect(self._read)
@@ -54,7 +54,7 @@ class SectionReader(QObject):
 
     @property
     def busy(self) -> bool:
-        """Tell whether something is read or about to be."""
+        """Return whether a section is being read, or reading is scheduled."""
         return self._runner.busy or self._timer.isActive()
 
     def close(self) -> None:
@@ -67,7 +67,7 @@ class SectionReader(QObject):
             self._timer.start()
 
     def _wanted(self) -> list[tuple[StepFrame, Section]]:
-        """Return the sections whose cells are still to be read, the first one first."""
+        """Return the sections whose cells are still to be read, each with the frame it cuts."""
         return [
             (view.frame, plain(section))
             for view in shown_views(self.store.session)
@@ -81,7 +81,7 @@ class SectionReader(QObject):
     def _look(self) -> None:
         wanted = self._wanted() if self.store.session.in_file else []
         if self._runner.busy:
-            # What is read now may be wanted no more: a plane is dragged on.
+            # The section being read may be dragged on, and its cells no longer wanted.
             if self._now not in [(frame.mesh, section) for frame, section in wanted]:
                 self._runner.cancel()
             return

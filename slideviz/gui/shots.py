@@ -1,7 +1,7 @@
-"""The pictures in ``screenshots/``: the window in typical states, drawn by ``slideviz shots``.
+"""Make the pictures in ``screenshots/``: the window in typical states, by ``slideviz shots``.
 
-The screen is photographed, not the window drawn once more into a picture: Qt then paints tab bars
-that nobody sees.
+They are grabbed from the screen: a window rendered into a picture by Qt would have tab bars that
+are not visible.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 SIZE = (1280, 800)
 APART, MANY, EXACT = 192, 40, 24
-"""Colours of the palette of a picture: far from each other; of large areas; the most frequent."""
+"""Numbers of colours in a picture's palette: mutually distant; of large areas; most frequent."""
 
 
 def shots(folder: Path) -> list[Path]:
-    """Draw all pictures, and the film, into a folder and return them.
+    """Write all pictures, and the film, into a folder, and return their paths.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def shots(folder: Path) -> list[Path]:
 
 @contextmanager
 def display() -> Iterator[None]:
-    """Offer a screen: one that nobody else draws on, or the present one where there is no Xvfb.
+    """Provide a display within the context: an Xvfb of its own; without Xvfb the present one.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def display() -> Iterator[None]:
 
 @contextmanager
 def open_window(place: Path) -> Iterator[MainWindow]:
-    """Offer a window of the usual size that knows nothing of the user's settings."""
+    """Provide a window of `SIZE`, with settings of its own in a folder instead of the user's."""
     from qtpy.QtCore import QSettings
     from qtpy.QtWidgets import QApplication
 
@@ -115,7 +115,7 @@ def open_window(place: Path) -> Iterator[MainWindow]:
 
 
 def photograph(window: MainWindow, path: Path) -> Path:
-    """Write a picture of the screen at the place of the window, and return the path.
+    """Write a picture of the part of the screen where the window is, and return its path.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def photograph(window: MainWindow, path: Path) -> Path:
 
 
 def shrink(path: Path) -> None:
-    """Reduce a PNG picture to a palette: a third of the size, and no difference is seen."""
+    """Reduce a PNG picture to a palette of 256 colours: a third of its size, hardly visible."""
     import numpy as np
     from PIL import Image
     from scipy.spatial import KDTree
@@ -148,7 +148,7 @@ def shrink(path: Path) -> None:
     counted = sorted(drawn.getcolors(drawn.width * drawn.height) or [], reverse=True)
     exact = np.ravel([colour for _, colour in counted[:EXACT]]).tolist()
     palette = apart[: 3 * APART] + many[: 3 * MANY] + exact
-    # Pillow's own search for the nearest colour is coarse: it takes 250 for 255.
+    # Pillow's own search for the nearest colour is coarse: it maps 255 to 250.
     tree = KDTree(np.reshape(palette, (-1, 3)))
     colours, where = np.unique(np.asarray(drawn).reshape(-1, 3), axis=0, return_inverse=True)
     nearest = np.asarray(tree.query(colours)[1], np.uint8)[where.ravel()]

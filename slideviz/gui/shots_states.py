@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 
 
 PATIENCE = 300.0
-"""Seconds."""
+"""Longest time to wait for the window, in seconds."""
 
 
 def wait(until: Callable[[], bool]) -> None:
-    """Process events until a condition holds.
+    """Process events until ``until()`` is true.
 
     Raises
     ------
     SlidevizError
-        It does not hold within some minutes.
+        It is not true within `PATIENCE`.
     """
     from qtpy.QtWidgets import QApplication
 
@@ -42,13 +42,15 @@ def wait(until: Callable[[], bool]) -> None:
 
 
 def settle(window: MainWindow) -> None:
-    """Wait for the end of a job, and half a second more for late drawings."""
+    """Wait until no job runs, and half a second more for delayed drawings."""
     wait(lambda: not window.runner.busy)
     end = time.monotonic() + 0.5
     wait(lambda: time.monotonic() > end)
 
 
 STATOR_CELLS = 40_000
+"""Approximate number of cells of the sample ``stator``."""
+
 TURNED: tuple[Motion, ...] = (
     Rotate("BLADE", 15.0, (0.275, 0.0, 0.0525), (1.0, 0.0, 0.0)),
     Rotate("BLADE", 2.5, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
@@ -56,26 +58,29 @@ TURNED: tuple[Motion, ...] = (
 """The blade is staggered by 15 degrees, and moved around the machine by 2.5 of its 8.8 degrees."""
 
 FAR: tuple[Motion, ...] = (Rotate("airfoil", -14.0), Translate("airfoil", (0.0, 0.2)))
-"""Of the sample ``passage``, more than its own case has."""
+"""Motions for the sample ``passage``, larger than those of its own case."""
 
 NEAR_HUB = 0.2512
-"""Radius of the cut in thesis Figure 6.20."""
+"""Radius of the cut in thesis Figure 6.20, in metres."""
 
 SLIDING = {"sliding": "ds", "periodic": "moving"}
 OUTER = ("SHROUD", "PER1", "PER2", "INFLOW", "OUTFLOW")
-"""What stands between the eye and the blade."""
+"""The stator's boundaries between the camera and the blade."""
 
 
 @dataclass(frozen=True)
 class ShotState:
-    """A state of the window: name of its picture, and function that brings it about."""
+    """A state of the window to be pictured: the picture's name, and the function that sets it up.
+
+    ``bring`` is called with the window and a folder for its files.
+    """
 
     name: str
     bring: Callable[[MainWindow, Path], None]
 
 
 def _stator(place: Path) -> Path:
-    """Return the case of the stator, with motions that can be read instead of a table."""
+    """Return the stator's case, written once; its motions are `TURNED`, not a displacement file."""
     folder = place / "stator"
     if not folder.exists():
         write_sample("stator", folder, STATOR_CELLS)
@@ -90,14 +95,14 @@ def _open(window: MainWindow, path: Path) -> None:
 
 
 def _run(window: MainWindow, **changed: Any) -> None:
-    """Deform with other settings."""
+    """Change settings of the case, run it, and wait for its end."""
     window.store.change(changes.set_case, **changed)
     window.start_run()
     settle(window)
 
 
 def _look(window: MainWindow, azimuth: float, elevation: float) -> None:
-    """Turn the camera about the mesh, from where it stands, by degrees."""
+    """Turn the camera about the mesh by angles in degrees, and fit the mesh."""
     camera = window.scene.plotter.camera
     camera.Azimuth(azimuth)
     camera.Elevation(elevation)
@@ -107,7 +112,7 @@ def _look(window: MainWindow, azimuth: float, elevation: float) -> None:
 
 
 def roles(window: MainWindow, place: Path) -> None:
-    """Bring up a blade passage whose roles are guesses, and a menu that gives another one."""
+    """Show the stator with guessed roles, and the menu that changes the role of a boundary."""
     from qtpy.QtCore import QPoint
 
     from slideviz.gui.panels.boundaries import boundary_menu
@@ -128,7 +133,7 @@ def roles(window: MainWindow, place: Path) -> None:
 
 
 def quality(window: MainWindow, place: Path) -> None:
-    """Bring up the stator after a run, with neighbouring passages."""
+    """Show the stator after a run, with neighbouring passages."""
     _open(window, _stator(place))
     _run(window, **SLIDING)
     window.store.change(changes.show, OUTER, False)
@@ -137,7 +142,7 @@ def quality(window: MainWindow, place: Path) -> None:
 
 
 def section(window: MainWindow, place: Path) -> None:
-    """Bring up a cylinder at mid-span, unrolled below the 3D view."""
+    """Show a cylindrical section at mid-span, unrolled below the 3D view."""
     _open(window, _stator(place))
     _run(window, **SLIDING)
     window.docks_.bring_to_front("sections")
@@ -151,7 +156,7 @@ def section(window: MainWindow, place: Path) -> None:
 
 
 def beside(window: MainWindow, place: Path) -> None:
-    """Bring up two methods side by side, on a cut near the hub."""
+    """Show two methods side by side, on a cylindrical section near the hub."""
     _open(window, _stator(place))
     _run(window, sliding="none", periodic="none")
     _run(window, **SLIDING)
@@ -166,7 +171,7 @@ def beside(window: MainWindow, place: Path) -> None:
 
 
 def dark(window: MainWindow, place: Path) -> None:
-    """Bring up a 2D run and its worst cells, in dark colours."""
+    """Show a run of the 2D passage and its curves, in the dark theme."""
     window.set_theme("dark")
     write_sample("passage", place / "passage", 48)
     case = Case.read(place / "passage" / "passage.cfg")
@@ -187,7 +192,7 @@ STATES = (
 
 
 def film_of_passage(path: Path) -> Path:
-    """Write a film of the passage that the dark picture shows, and return its path."""
+    """Write a film of the 2D passage, as in the dark picture, and return its path."""
     from slideviz.deformation.solver import deform
     from slideviz.export.film import film
     from slideviz.export.reel import Reel

@@ -29,17 +29,30 @@ from slideviz.gui.widgets.icons import icon, logo
 from slideviz.gui.widgets.labels import ElidedLabel, rich_label, wrapped
 
 WIDEST = 860
-"""Pixels: longer lines would be hard to read."""
+"""Largest width of the page in pixels: longer lines would be hard to read."""
+
 RECENT = 5
+"""Number of recent files that are listed."""
+
 COLUMNS = 4
+"""Most cards of samples in a row."""
+
 NARROWEST = 126
-"""Pixels that a card needs for its name."""
+"""Least width of a card in pixels, for its name."""
 TRIED = "passage"
 """The sample that is deformed by one click."""
 
 
 class StartPage(QScrollArea):
-    """The start page: buttons to try and to open, recent files, sample cases."""
+    """The start page: buttons to try a sample and to open a file, recent files, sample cases.
+
+    Signals
+    -------
+    try_wanted(str), sample_wanted(str)
+        The user wants to open and deform a sample; only to open it.
+    file_wanted(Path)
+        The user wants to open a recent file.
+    """
 
     try_wanted = Signal(str)
     file_wanted = Signal(object)
@@ -121,7 +134,7 @@ class StartPage(QScrollArea):
         return self._cards
 
     def _place_cards(self) -> None:
-        """Make the cards as large as there is room for: all are seen without scrolling."""
+        """Size the cards and set their columns by the page's width, so that no row is cut off."""
         whole = min(self.viewport().width() - 48, WIDEST)
         columns = max(1, min(COLUMNS, whole // NARROWEST))
         width = min(max(whole // columns - 20, SIZE[0] // 2), SIZE[0])
@@ -140,7 +153,7 @@ class StartPage(QScrollArea):
     # Recent files ----------------------------------------------------------------------
 
     def show_recent(self, paths: list[Path]) -> None:
-        """List the files used last, with folder and time; those that are gone are grey."""
+        """List the files used last, with folder and time; missing files are disabled."""
         while self._recent.count():
             widget = self._recent.takeAt(0).widget()
             if widget is not None:
@@ -170,7 +183,7 @@ class StartPage(QScrollArea):
 
 
 class Card(QToolButton):
-    """The button of a sample; the Enter key presses it, too."""
+    """The button of a sample, which the Enter key presses too."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
@@ -180,7 +193,7 @@ class Card(QToolButton):
 
 
 class RecentButton(QPushButton):
-    """A file in the list: its name, its folder, and when it was changed."""
+    """The button of a recent file, with its name, its folder, and when it was changed."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()
@@ -207,7 +220,7 @@ class RecentButton(QPushButton):
 
 
 def when_changed(path: Path, now: datetime | None = None) -> str:
-    """Return when a file was changed, in words; empty when it is not there."""
+    """Return when a file was changed, as text such as ``today 14:05``; empty if it is missing."""
     try:
         then = datetime.fromtimestamp(path.stat().st_mtime)
     except OSError:

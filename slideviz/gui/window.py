@@ -60,16 +60,16 @@ log = logging.getLogger("slideviz")
 
 
 class MainWindow(Services):
-    """The window of slideviz.
+    """The main window of slideviz.
 
     Parameters
     ----------
     settings : QSettings, optional
-        Where recent files, theme and layout are kept.
+        Keeps recent files, theme and layout; by default those of the user.
     multi_samples : int
-        Anti-aliasing of the view; 0 is the fastest.
+        Samples per pixel for antialiasing in the views; 0 for none, which is the fastest.
     kept : Path, optional
-        The folder where the session is kept in case the program ends badly; nowhere without it.
+        The folder for autosaved sessions; without it nothing is autosaved.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class MainWindow(Services):
         self.setMinimumSize(QSize(900, 620).boundedTo(room))
         self.resize(QSize(1280, 800).boundedTo(room))
         self.setAcceptDrops(True)
-        # Before there are widgets, each of which a style sheet that comes later would polish anew.
+        # Before there are widgets: a later style sheet would polish each of them again.
         scheme = self._choose_theme(str(self.settings.value("theme", "system")))
         self.store = Store()
         self.banner = Banner()
@@ -126,7 +126,7 @@ class MainWindow(Services):
         centre, stack = QWidget(), QWidget()
         grid = QGridLayout(stack)
         grid.setContentsMargins(0, 0, 0, 0)
-        # The start page lies over the view: a view that is never shown has no size.
+        # The start page covers the view, which must be shown to have a size.
         self.viewing = Viewing(self.store, multi_samples, stack)
         self.section_views = SectionViews(self.viewing, multi_samples, stack)
         self.start = StartPage(self.files.samples, stack)
@@ -194,7 +194,7 @@ class MainWindow(Services):
         running.doing.connect(panel.show_doing)
         running.cancelling.connect(panel.show_cancelling)
         running.ended.connect(lambda: panel.set_busy(""))
-        # The mesh may have moved out of the view.
+        # The deformed mesh may be out of view.
         running.ended.connect(self.viewing.refit)
         for change in (running.began, running.ended):
             change.connect(lambda *_: self.sync_actions())
@@ -206,7 +206,7 @@ class MainWindow(Services):
         self.start.try_wanted.connect(self.files.try_sample)
 
     def toggle_full_screen(self) -> None:
-        """Fill the screen with the window, or end that."""
+        """Switch full screen on or off."""
         self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
 
     def _keep_session(self, folder: Path | None) -> None:
@@ -227,7 +227,7 @@ class MainWindow(Services):
     # The session -----------------------------------------------------------------------
 
     def sync_actions(self) -> None:
-        """Bring menus, tool bar, title and mesh text up to date."""
+        """Update menus, tool bar, window title, and the facts of the mesh in the status bar."""
         session = self.store.session
         self.actions_.sync(
             Now(
@@ -247,7 +247,7 @@ class MainWindow(Services):
             self.mesh_text.setToolTip(about)
 
     def show_opened(self, opened: jobs.Opened) -> None:
-        """Show a mesh that was just opened."""
+        """Show a mesh or case that was just opened, in place of the present one."""
         session = opened.session
         if not opened.kept:
             session = changes.fresh_view(session, self.store.session.view)
@@ -270,29 +270,29 @@ class MainWindow(Services):
     # Jobs ------------------------------------------------------------------------------
 
     def start_run(self) -> None:
-        """Deform the mesh with the settings there are."""
+        """Start a run; if the mesh stays in its file, ask for the deformed mesh's file first."""
         session = self.store.session
         if not session.in_file or self.runner.busy or changes.run_requirements(session):
             self.running.start_run()
             return
-        # The deformed mesh is made in a file, as it would not be in memory.
+        # The deformed mesh would not fit into memory either.
         output = self.files.ask_output()
         if output is not None:
             self.running.start_run(output)
 
     def say(self, text: str) -> None:
-        """Show a short message in the status bar; an empty one takes it away."""
+        """Show a short message in the status bar for 8 s; an empty text clears it."""
         self.statusBar().showMessage(text, 8000)
 
     def _say_reading(self, text: str) -> None:
-        """Show how far a section was read; an empty text takes that away, and nothing else."""
+        """Show the progress of reading a section; an empty text clears only such a message."""
         if text or self.statusBar().currentMessage().startswith(READING):
             self.say(text)
 
     # The view --------------------------------------------------------------------------
 
     def lead_to(self, missing: Requirement) -> None:
-        """Bring the panel to the front in which a requirement is met, and its field."""
+        """Bring the panel to the front where a missing requirement is met, and focus the field."""
         if missing.place == "open":
             self.files.ask_and_open()
             return
@@ -306,7 +306,7 @@ class MainWindow(Services):
         self.docks_.panel(WorstPanel).show_worst()
 
     def set_theme(self, name: str) -> None:
-        """Change to the light or dark theme, or to that of the desktop."""
+        """Change to a theme: ``light``, ``dark``, or ``system`` for that of the desktop."""
         self._take_scheme(self._choose_theme(name))
 
     def _choose_theme(self, name: str) -> ColorScheme:
@@ -317,7 +317,7 @@ class MainWindow(Services):
     def _take_scheme(self, scheme: ColorScheme) -> None:
         redraw_icons(self)
         self.sync_actions()
-        # Words about inverted cells have the theme's red.
+        # Texts about inverted cells have the theme's red.
         self.player.sync(self.store.session)
         for panel in self.findChildren(Panel):
             panel.take_theme(scheme)
@@ -334,10 +334,11 @@ class MainWindow(Services):
         paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
         if paths:
             event.acceptProposedAction()
-            # After the drop is over: a question now would hold the other program.
+            # After the drop: a modal question now would block the program it came from.
             QTimer.singleShot(0, lambda: self.files.open_path(paths[0]))
 
     def closeEvent(self, event: QCloseEvent) -> None:
+        # What counts as unsaved, and the question: `Files.ask_about_unsaved`.
         if not self._closed:
             if self.files.saving:
                 self.say("The window closes when the mesh is saved")
@@ -350,7 +351,7 @@ class MainWindow(Services):
             self._closed = True
             self.docks_.save(self.settings)
             self.hide()
-            # First the work, then the view: a job may still hand over a step.
+            # The jobs before the views: a job may still add a step, which is drawn.
             self.player.stop()
             self.exports.end()
             self.docks_.panel(DesignsPanel).runner.close()

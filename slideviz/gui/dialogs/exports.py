@@ -1,4 +1,4 @@
-"""Exports: pictures, films, tables of quality, meshes of all steps."""
+"""The exports of the window: pictures, films, tables of quality, meshes of all steps."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from slideviz.session.state import Session
 
 log = logging.getLogger("slideviz")
 COPIED_WIDTH = 1600
-"""Pixels that a picture on the clipboard is wide at least."""
+"""Least width of a picture on the clipboard, in pixels."""
 
 
 class Exports(QObject):
-    """The exports of a window, each with the questions that it asks."""
+    """The exports of a window: each method asks for options and file name, then writes."""
 
     def __init__(self, window: Services) -> None:
         super().__init__(window)
@@ -47,7 +47,7 @@ class Exports(QObject):
     # Pictures --------------------------------------------------------------------------
 
     def picture(self) -> None:
-        """Ask for the options of a picture, then for a name, and write the picture."""
+        """Ask for the options of a picture, then for a file name, and write the picture."""
         if self._session.mesh is None:
             return
         view, settings = self.window.viewing, self.window.settings
@@ -81,7 +81,7 @@ class Exports(QObject):
         self._written(path)
 
     def copy_picture(self) -> None:
-        """Put a picture of the view on the clipboard, with a white background."""
+        """Copy a picture of the view to the clipboard, with a white background."""
         if self._session.mesh is None:
             return
         view = self.window.viewing
@@ -103,7 +103,10 @@ class Exports(QObject):
     # Films -----------------------------------------------------------------------------
 
     def make_film(self) -> None:
-        """Open the dialog that makes a film of the steps while the window goes on."""
+        """Open the dialog that makes a film of the steps; if it is open, bring it to the front.
+
+        It is not modal: the window can be used while the film is made.
+        """
         if self.film is not None:
             self.film.raise_()
             self.film.activateWindow()
@@ -136,14 +139,14 @@ class Exports(QObject):
             self.film = None
 
     def end(self) -> None:
-        """Stop the film that is being made: its mesh is closed."""
+        """Close the film dialog, which stops its film; called when another mesh is opened."""
         if self.film is not None:
             self.film.reject()
 
     # Tables and meshes -----------------------------------------------------------------
 
     def quality(self) -> None:
-        """Ask for a name and write the quality of every cell of the step that is shown."""
+        """Ask for a file name and write the quality of every cell of the shown step as CSV."""
         frame, files = self._session.frame, self.window.files
         if frame is None or self.window.runner.busy:
             return
@@ -155,7 +158,7 @@ class Exports(QObject):
             )
 
     def steps(self) -> None:
-        """Ask for a name and write the mesh of every step, with a number behind the name."""
+        """Ask for a file name and write the mesh of every step: numbered files, or one .vtkhdf."""
         session, files = self._session, self.window.files
         run, mesh = session.run_shown, session.mesh
         if run is None or mesh is None or not run.frames or self.window.runner.busy:
@@ -194,7 +197,7 @@ class Exports(QObject):
 
 
 def picture_filters(session: Session) -> str:
-    """Return the formats that a picture of a session can be saved in."""
+    """Return the formats a picture of a session can be saved in, as filters of a file dialog."""
     mesh = session.mesh
     if mesh is None or mesh.dim != 2 or len(mesh.cells) > MOST_CELLS:
         return questions.PICTURE_FILTERS
@@ -202,7 +205,7 @@ def picture_filters(session: Session) -> str:
 
 
 def new_folder(parent: Path, name: str) -> Path:
-    """Return a new folder of a name; a number is added where it exists."""
+    """Return the path of a folder that does not exist yet: ``name``, or ``name_2`` and so on."""
     path, number = parent / name, 1
     while path.exists():
         number += 1

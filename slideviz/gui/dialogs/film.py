@@ -23,20 +23,21 @@ PREVIEW = (360, 225)
 
 
 class FilmDialog(QDialog):
-    """The dialog that makes a film, a piece in each turn of the event loop.
+    """The dialog that makes a film, one image per turn of the event loop, so that nothing freezes.
 
     Parameters
     ----------
     parent : QWidget
     renderer : OffscreenRenderer
-        Knows the session, whose steps are filmed whatever the window shows meanwhile.
+        Draws the steps of its session, whatever the window shows meanwhile.
     ask : callable
-        Returns the file for a kind of `slideviz.gui.dialogs.film_form.KINDS`, or None.
+        Asks the user for the file, given a kind of `slideviz.gui.dialogs.film_form.KINDS`; returns
+        None if there is none.
 
     Signals
     -------
     made(Path), failed(Exception), stopped()
-        How a film ended.
+        A film was written; failed; was stopped by the user.
     """
 
     made = Signal(object)
@@ -99,7 +100,7 @@ class FilmDialog(QDialog):
             self._previewing.start(self._drawing())
 
     def _drawing(self) -> Generator[object, Any, None]:
-        """Draw the first and the last image, from one place, in pieces."""
+        """Yield pieces of the work that draws both previews, with one camera."""
         options = self.form.picture_options.within(drawn_for(self.renderer, PREVIEW))
         yield from posing(self.renderer, options)
         for label, frame in zip(self.previews, (0, self.form.frames - 1), strict=True):
@@ -110,7 +111,7 @@ class FilmDialog(QDialog):
 
     @property
     def filming(self) -> bool:
-        """Tell whether a film is being made."""
+        """Return whether a film is being made."""
         return self._runner.busy
 
     def _start(self) -> None:
@@ -138,7 +139,7 @@ class FilmDialog(QDialog):
         self.failed.emit(error)
 
     def cancel(self) -> None:
-        """Stop filming, if it goes on; no file is left."""
+        """Stop the film, if one is being made; no file is left."""
         if self.filming:
             self._runner.stop()
             self._end()
@@ -156,7 +157,7 @@ class FilmDialog(QDialog):
         self.form.setEnabled(not filming)
 
     def done(self, result: int) -> None:
-        """Close; a film that goes on is stopped."""
+        """Close the dialog and stop a film that is being made."""
         self.cancel()
         self._soon.stop()
         self._previewing.stop()

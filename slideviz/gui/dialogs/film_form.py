@@ -34,12 +34,12 @@ class FilmForm(QWidget):
     Parameters
     ----------
     renderer : OffscreenRenderer
-        Knows the session whose steps are filmed.
+        Holds the session whose steps are filmed.
 
     Signals
     -------
     changed()
-        Something was chosen or typed.
+        An option has changed.
     """
 
     changed = Signal()
@@ -93,7 +93,7 @@ class FilmForm(QWidget):
         self.between = number_box(
             0,
             100,
-            # Few steps jump; images in between make about three seconds of them.
+            # With few steps, a film of about three seconds needs images in between.
             0 if self.frames > 15 else round(3 * FPS / self.frames) - 1,
             self._changed,
             tip="Images between two steps, with the nodes on straight lines from one to the next.",
@@ -103,13 +103,13 @@ class FilmForm(QWidget):
 
     @property
     def reel(self) -> Reel:
-        """Return size, speed and images in between."""
+        """Return size, frame rate, duration of the last image, and images between steps."""
         size = self.width_px.value(), self.height_px.value()
         return Reel(size, self.fps.value(), self.hold.value(), self.between.value())
 
     @property
     def picture_options(self) -> PictureOptions:
-        """Return the picture options of its images."""
+        """Return the options of the film's images."""
         size = self.width_px.value(), self.height_px.value()
         view = self.renderer.session.view
         return PictureOptions(
@@ -149,7 +149,7 @@ class FilmForm(QWidget):
         """Return why no film can be made with these options; empty if one can."""
         kind = self.kind.currentData()
         try:
-            # Any name in a folder that is there; the real one is asked for later.
+            # A placeholder: the real file name is asked for later.
             check_film(Path(f"film{kind}").absolute(), self.reel, overwrite=True)
         except SlidevizError as error:
             return str(error)
@@ -157,7 +157,7 @@ class FilmForm(QWidget):
 
     @property
     def words(self) -> str:
-        """Return in words how many images the film has, and how long it is."""
+        """Return a sentence with the film's number of images and its duration."""
         return length_words(self.reel, self.frames, self.kind.currentData())
 
     def _changed(self, _: object = None) -> None:
@@ -165,7 +165,10 @@ class FilmForm(QWidget):
 
 
 def length_words(reel: Reel, frames: int, kind: str) -> str:
-    """Return in words how many images a film has, and how long it is."""
+    """Return a sentence with a film's number of images and its duration.
+
+    ``frames`` is the number of steps with the undeformed mesh; ``kind`` a key of `KINDS`.
+    """
     count = reel.count(frames)
     steps = f"{frames - 1} step{'s' if frames > 2 else ''}"
     between = f", {reel.between} image{'s' if reel.between > 1 else ''} between two"

@@ -29,6 +29,8 @@ from slideviz.gui.widgets.labels import fixed_font
 from slideviz.gui.widgets.services import Services
 
 LOG_LINES = 40
+"""Number of the log's last lines in a bug report."""
+
 CLOSE = QDialogButtonBox.StandardButton.Close
 MOUSE = (
     ("Drag", "turn a 3D mesh, move a 2D one"),
@@ -48,7 +50,7 @@ MOUSE = (
 
 
 class Help(QObject):
-    """The help of a window."""
+    """What the Help menu does: shortcuts, case keys, about, and details for a bug report."""
 
     def __init__(self, window: Services) -> None:
         super().__init__(window)
@@ -56,21 +58,21 @@ class Help(QObject):
         self._shown: dict[str, QDialog] = {}
 
     def shortcuts(self) -> None:
-        """Show all keys and what the mouse does."""
+        """Show the dialog of keyboard shortcuts and mouse actions."""
         self._show("shortcuts", lambda: ShortcutsDialog(self.window))
 
     def case_keys(self) -> None:
-        """Show the keys of a case file."""
+        """Show the dialog with the keys of a case file."""
         from slideviz.case.cfg import describe_keys
 
         self._show("keys", lambda: TextDialog(self.window, "Case keys", describe_keys()))
 
     def about(self) -> None:
-        """Show version and licence."""
+        """Show the dialog with version, libraries and licence."""
         self._show("about", lambda: AboutDialog(self.window))
 
     def copy_details(self) -> None:
-        """Copy versions, graphics, mesh and messages for a bug report."""
+        """Copy the details for a bug report to the clipboard (see `details`)."""
         QApplication.clipboard().setText(details(self.window))
         self.window.say("Copied; paste it into the report and say what you did")
 
@@ -84,7 +86,7 @@ class Help(QObject):
 
 
 class ShortcutsDialog(QDialog):
-    """The dialog with the keys of all actions, by menu, and the mouse; a field finds some."""
+    """The dialog with the shortcuts of all commands, by menu, and of the mouse, with a filter."""
 
     def __init__(self, window: Services) -> None:
         super().__init__(window)
@@ -131,7 +133,7 @@ class ShortcutsDialog(QDialog):
 
 
 class TextDialog(QDialog):
-    """A dialog with a long text, in which words can be found."""
+    """A dialog with a long text and a field to search it."""
 
     def __init__(self, parent: QWidget, title: str, text: str) -> None:
         super().__init__(parent)
@@ -159,7 +161,7 @@ class TextDialog(QDialog):
         self.next()
 
     def next(self) -> None:
-        """Go to the next place that has the words; after the last one to the first."""
+        """Select the next match of the searched words; after the last one, the first."""
         wanted = self.search.text()
         if wanted and not self.text.find(wanted, QTextDocument.FindFlag(0)):
             self.text.moveCursor(QTextCursor.MoveOperation.Start)
@@ -194,7 +196,7 @@ class AboutDialog(QDialog):
 
 
 def _search_field(words: str) -> QLineEdit:
-    """Return a field for words to find, with a button that clears it."""
+    """Return a search field with a placeholder text and a button that clears it."""
     field = QLineEdit()
     field.setPlaceholderText(words)
     field.setClearButtonEnabled(True)
@@ -202,8 +204,8 @@ def _search_field(words: str) -> QLineEdit:
 
 
 def shortcut_rows(window: Services) -> list[tuple[str, list[tuple[str, str, str]]]]:
-    """Return the commands with keys, by menu: title, keys and tip of each."""
-    # Without what would be undone just now.
+    """Return per menu its title, and title, first key and tip of each command that has a key."""
+    # A plain `Now`: no title such as “Undo role”.
     now, native = Now(window.store.session), QKeySequence.SequenceFormat.NativeText
     rows = {
         menu.title: [
@@ -221,7 +223,7 @@ def _plain(title: str) -> str:
 
 
 def details(window: Services) -> str:
-    """Return the text for a bug report: versions, graphics, mesh, settings, the last messages."""
+    """Return a text for a bug report: versions, OpenGL, mesh, settings, last log messages."""
     session = window.store.session
     lines = [versions(), _graphics(window)]
     mesh = session.mesh
@@ -242,7 +244,7 @@ def details(window: Services) -> str:
 
 
 def _graphics(window: Services) -> str:
-    """Return who draws, as OpenGL tells it."""
+    """Return OpenGL's vendor, renderer and version, as lines."""
     said = window.viewing.view.render_window.ReportCapabilities().splitlines()
     kept = [" ".join(line.split()) for line in said if line.startswith("OpenGL")]
     return "\n".join(kept[:3]) or "OpenGL: not known yet"

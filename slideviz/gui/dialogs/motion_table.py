@@ -1,4 +1,4 @@
-"""The dialog in which a table of displacements is typed or pasted."""
+"""The dialog in which a table of nodal displacements is typed or pasted."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ ABOUT = (
 
 
 class TableDialog(QDialog):
-    """The dialog for a table of displacements; below it stands its effect, or its mistake.
+    """The dialog for a table of displacements; a text below it shows its effect or its error.
 
     Parameters
     ----------
     parent : QWidget or None
     rows : TableRows
-        What it may list.
+        The nodes it may list; checks the text.
     text : str
-        The table to begin with.
+        The initial table.
     """
 
     def __init__(self, parent: QWidget | None, rows: TableRows, text: str = "") -> None:
@@ -65,17 +65,17 @@ class TableDialog(QDialog):
 
     @property
     def text(self) -> str:
-        """Return the table."""
+        """Return the text of the table."""
         return self.edit.toPlainText()
 
     def _fill(self) -> None:
         self.edit.selectAll()
-        # Inserted, so that it can be undone.
+        # Unlike `setPlainText`, this can be undone.
         self.edit.insertPlainText(self.rows.fill(self.text))
         self.check()
 
     def check(self) -> None:
-        """Show the effect of the table, or its mistake."""
+        """Show the effect of the table, or its error, and enable the save button accordingly."""
         self._soon.stop()
         try:
             said, wrong = self.rows.check(self.text), False
@@ -86,24 +86,24 @@ class TableDialog(QDialog):
         self.save.setEnabled(not wrong)
 
     def accept(self) -> None:
-        """Close, if the table is right."""
+        """Close the dialog if the table is valid."""
         self.check()
         if self.save.isEnabled():
             super().accept()
 
 
 def ask_table(parent: QWidget, rows: TableRows, path: Path, default: Path) -> Path | None:
-    """Return the displacement file that a table was saved in, or None.
+    """Open the dialog of a table; return the file it was saved to, or None if it was not saved.
 
     Parameters
     ----------
     parent : QWidget
     rows : TableRows
-        What the table may list.
+        The nodes the table may list; checks the text.
     path : Path
-        The file that it begins with, if there is one.
+        The displacement file to edit, if it exists.
     default : Path
-        What a new file is called.
+        The name that is offered for a new file.
 
     Raises
     ------

@@ -51,6 +51,8 @@ from slideviz.gui.widgets.pixmaps import (
 from slideviz.terms import SHOWN
 
 PREVIEW = (470, 330)
+"""Largest width and height of the preview, in pixels."""
+
 SIZES = {
     "view": "as the view",
     "1600x1000": "1600 × 1000, for a report",
@@ -60,10 +62,14 @@ SIZES = {
     "other": "other",
 }
 TEXT = {0.8: "small", 1.0: "normal", 1.4: "large"}
+"""Sizes of letters relative to the normal one."""
+
 PAPER = (16.0, 10.0, 300.0)
-"""Width and height in cm, pixels per inch: the text width of a page."""
+"""Initial width and height on paper in cm, as wide as a page's text; pixels per inch."""
+
 PAPER_POINTS = 8.5
-"""Normal letters on paper; journals ask for 8 at least."""
+"""Size of normal letters on paper in points; journals ask for 8 at least."""
+
 OPTIONS = {
     "legend": ("Legend or colour bar", "What the colours mean, at the right."),
     "edges": (SHOWN["edges"].name, SHOWN["edges"].tip),
@@ -82,11 +88,11 @@ class PictureDialog(QDialog):
     ----------
     parent : QWidget
     renderer : OffscreenRenderer
-        Draws it.
+        Draws the picture.
     view_size : (int, int)
-        Pixels of the view.
+        Width and height of the view in pixels.
     kept : str
-        What `choices` returned the last time.
+        The `choices` of the last time; empty for none.
     """
 
     def __init__(
@@ -170,7 +176,7 @@ class PictureDialog(QDialog):
 
     @property
     def picture_options(self) -> PictureOptions:
-        """Return the options of the picture."""
+        """Return the options of the picture as chosen in the dialog."""
         picked: dict[str, Any] = {name: box.isChecked() for name, box in self.options.items()}
         background, text = self.background.currentData(), float(self.text.currentData())
         if self.size_choice.currentData() != "paper":
@@ -185,18 +191,18 @@ class PictureDialog(QDialog):
 
     @property
     def choices(self) -> str:
-        """Return the options as a text, to be offered the next time."""
+        """Return the chosen options as JSON, to be the initial ones of the next dialog."""
         kept = asdict(self.picture_options)
         numbers = (self.width_cm.value(), self.height_cm.value(), self.dpi.value())
         kept.update(
             preset=self.size_choice.currentData(), text=self.text.currentData(), paper=numbers
         )
-        # Whether the mesh fills the picture depends on how it is looked at.
+        # These two depend on the present view.
         del kept["fill"], kept["both"]
         return json.dumps(kept)
 
     def _take(self, kept: str) -> None:
-        """Show what was chosen the last time, or what makes a good picture."""
+        """Fill the fields from the `choices` of the last time; from defaults if there are none."""
         usual = replace(PictureOptions(), fill=self.renderer.fills)
         known = asdict(usual)
         try:
@@ -253,13 +259,13 @@ class PictureDialog(QDialog):
         self._runner.start(self._drawing())
 
     def _drawing(self) -> Generator[object, Any, None]:
-        """Draw the preview in pieces: of a large mesh, all at once would take a second."""
+        """Yield pieces of the work that draws the preview: of a large mesh it takes a second."""
         options = self.picture_options.within(drawn_for(self.renderer, PREVIEW))
         pixels = yield from self.renderer.picturing(options)
         self.preview.setPixmap(framed(fitted(to_image(pixels), PREVIEW)))
 
     def _copy(self) -> None:
-        if self._runner.busy:  # a preview in pieces: nothing else may be drawn meanwhile
+        if self._runner.busy:  # the renderer draws one picture at a time: stop the preview
             self._runner.stop()
             self._timer.start()
         with wait_cursor():
@@ -267,19 +273,19 @@ class PictureDialog(QDialog):
         self.words.setText("Copied to the clipboard.")
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Draw the first preview; nothing is drawn that nobody sees."""
+        """Draw the first preview, now that the dialog is visible."""
         super().showEvent(event)
         self._changed()
 
     def done(self, result: int) -> None:
-        """Close; nothing is drawn any more."""
+        """Close the dialog and stop drawing."""
         self._timer.stop()
         self._runner.stop()
         super().done(result)
 
 
 def _kinds(renderer: OffscreenRenderer) -> str:
-    """Return which kinds of files there can be, and why not others."""
+    """Return a sentence about the file formats that are possible, and why others are not."""
     mesh = renderer.session.mesh
     if mesh is None or mesh.dim != 2:
         return "Saved as PNG; the view of a 3D mesh consists of pixels."

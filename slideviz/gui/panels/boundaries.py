@@ -30,15 +30,17 @@ from slideviz.session.store import Store
 from slideviz.terms import ROLES, labels
 
 NAME, COUNT, ROLE = 0, 1, 2
+"""The columns of the table."""
 
 
 class BoundariesTable(QTableWidget):
-    """The table of the boundaries, which the tab key leaves, with a menu for selected rows.
+    """The table of the boundaries; the tab key leaves it instead of going through the cells.
 
     Signals
     -------
     menu_wanted(int, QPoint), role_wanted(int)
-        The menu of a row, at a place of the screen; its roles.
+        The user asks for the menu of a row, at a position on the screen; for the list of its
+        roles (F2, Return, Alt+Down).
     """
 
     menu_wanted = Signal(int, QPoint)
@@ -49,7 +51,7 @@ class BoundariesTable(QTableWidget):
         self.setTabKeyNavigation(False)
 
     def chosen_row(self) -> int:
-        """Return the row for a key: the current one, or the first that is selected."""
+        """Return the row a key acts on: the current row if selected, else the first selected."""
         rows = sorted({index.row() for index in self.selectionModel().selectedRows()})
         return rows[0] if rows and self.currentRow() not in rows else self.currentRow()
 
@@ -74,7 +76,7 @@ class BoundariesTable(QTableWidget):
 
 
 class BoundariesPanel(Panel):
-    """The roles of the boundaries; several can be changed at once."""
+    """The panel of the boundaries' visibility and roles; selected rows are changed together."""
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
@@ -125,7 +127,7 @@ class BoundariesPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
-        """Show the session; the only place that fills the table."""
+        """Fill the table from the session, and show how many roles are guesses."""
         names = session.mesh.marker_names if session.mesh else ()
         with QSignalBlocker(self.table):
             if names != self._names or len(self._choices) != len(names):
@@ -205,7 +207,7 @@ class BoundariesPanel(Panel):
             if name in wanted:
                 index = self.table.model().index(row, 0)
                 if not model.selectedRows():
-                    # Keys go on from here.
+                    # The arrow keys start from the current row.
                     model.setCurrentIndex(index, QItemSelectionModel.SelectionFlag.NoUpdate)
                 model.select(index, flags)
                 self.table.scrollTo(index)
@@ -239,7 +241,7 @@ class BoundariesPanel(Panel):
 
 
 def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMenu:
-    """Return the menu of some boundaries: role, visibility."""
+    """Return a new menu for the named boundaries: role, visibility. The 3D view shows it too."""
     menu = QMenu(parent)
     menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     menu.setToolTipsVisible(True)
@@ -267,5 +269,5 @@ def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMen
 
 
 def _later(store: Store, function: Callable[..., Session], *values: object) -> Callable[..., None]:
-    """Return a slot that makes this change, whatever Qt tells it."""
+    """Return a slot that makes a change of the session and ignores the signal's arguments."""
     return lambda *_: store.change(function, *values)

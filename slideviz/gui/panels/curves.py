@@ -45,7 +45,7 @@ WHAT = {"minimum": "minimum", "mean": "mean"}
 
 
 class CurveCanvas(PlotCanvas):
-    """A plot that hands over the value of the horizontal axis at a click."""
+    """A plot that calls ``picked`` with the value of the horizontal axis where it is clicked."""
 
     def __init__(self, drawing: Callable[[], Draw]) -> None:
         super().__init__(drawing)
@@ -59,7 +59,7 @@ class CurveCanvas(PlotCanvas):
 
 
 class CurvesPanel(Panel):
-    """One plot of three, of the shown run and of the others."""
+    """The panel with one of three plots: quality by step, convergence, quality along the span."""
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
@@ -101,7 +101,7 @@ class CurvesPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
-        """Show the session."""
+        """Plot the selected curves of the session, or show why there are none."""
         if session.mesh is not self._mesh:
             self._mesh = session.mesh
             self.coordinate.clear()
@@ -123,7 +123,7 @@ class CurvesPanel(Panel):
             self.area.plot()
 
     def _missing(self, session: Session, kind: str) -> str:
-        """Return why there is no such plot, or an empty text."""
+        """Return why the session has no plot of a kind; an empty text if it has one."""
         if session.mesh is None:
             return "Open a mesh first: here are the curves of its runs."
         if kind == "span" and session.in_file:
@@ -144,7 +144,7 @@ class CurvesPanel(Panel):
     # Drawing ---------------------------------------------------------------------------
 
     def drawing(self) -> Draw:
-        """Return the function that draws the selected plot."""
+        """Return a function that draws the selected plot into a figure."""
         session, kind = self.store.session, self.kind.currentData()
         if self._missing(session, kind):
             return lambda _figure, _style: None
@@ -160,7 +160,7 @@ class CurvesPanel(Panel):
     # What the user does ----------------------------------------------------------------
 
     def _other_plot(self) -> None:
-        """Show the plot that was chosen; not the one before meanwhile, of other axes."""
+        """Draw the newly selected plot; wipe the old one first, as its axes are other ones."""
         self.canvas.wipe()
         self.sync(self.store.session)
 
@@ -175,13 +175,13 @@ class CurvesPanel(Panel):
 
 
 def _concerned(old: Session, new: Session) -> bool:
-    """Tell whether a change is one of what the curves are of."""
+    """Return whether the curves differ between two sessions: by frame, runs or the case's axis."""
     same = old.frame is new.frame and old.runs is new.runs and old.shown == new.shown
     return not same or old.case.axis != new.case.axis or old.case.origin != new.case.origin
 
 
 def close_limits(values: Iterable[FloatArray]) -> tuple[float, float]:
-    """Return the ends of an axis around qualities: round numbers, with room for the markers."""
+    """Return the limits of an axis that fits the values: round numbers, and 4 % of margin."""
     good = np.concatenate(list(values))
     low, high = rounded_out(float(np.nanmin(good)), float(np.nanmax(good)))
     room = 0.04 * (high - low)
@@ -189,7 +189,10 @@ def close_limits(values: Iterable[FloatArray]) -> tuple[float, float]:
 
 
 def draw_steps(session: Session, whole: bool, figure: Figure, style: Style) -> None:
-    """Draw minimum and mean quality of each run against the step."""
+    """Draw minimum and mean quality of each run against the step, with a line at the shown step.
+
+    ``whole``: the axis shows all qualities from 0 to 1 rather than those of the curves.
+    """
     axes, runs = figure.add_subplot(), curves.step_runs(session)
     quality_by_step(axes, runs, style)
     if not whole:
@@ -201,7 +204,7 @@ def draw_steps(session: Session, whole: bool, figure: Figure, style: Style) -> N
 
 
 def draw_greedy(session: Session, figure: Figure, style: Style) -> None:
-    """Draw the error of the shown step against control nodes."""
+    """Draw the greedy selection of the shown step: its error against control nodes."""
     axes, run = figure.add_subplot(), curves.greedy_run(session)
     assert run is not None
     convergence(axes, [run], style=style)
@@ -216,7 +219,10 @@ def draw_span(
     figure: Figure,
     style: Style,
 ) -> None:
-    """Draw the lowest or mean quality along a coordinate, or words that say why there is none."""
+    """Draw the lowest or mean quality along a coordinate; if ``find`` fails, draw its error text.
+
+    ``find`` returns the profiles to draw.
+    """
     axes = figure.add_subplot()
     try:
         found = find()

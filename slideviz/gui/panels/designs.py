@@ -1,4 +1,4 @@
-"""The panel of designs: a table of them, run beside the window, and curves of their quality."""
+"""The panel of designs: a table of them, a job that runs them, and a plot of their quality."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -37,16 +37,16 @@ class DesignsPanel(Panel):
     ----------
     table : DesignTable
     case, mesh
-        Of the results there are: a change of the session does not change them.
+        The case and the mesh that the results were computed with; the session may have others.
     shown : int or None
-        The design whose mesh was asked for last.
+        The number, from 1, of the design that the user last asked to see.
     written : DesignTable or None
-        The table that was saved last.
+        The table as it was saved last.
 
     Signals
     -------
-    changed
-        The table or its results are others.
+    changed()
+        The table or its results have changed.
     """
 
     changed = Signal()
@@ -117,7 +117,7 @@ class DesignsPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
-        """Follow the session: another mesh has other designs, another case other numbers."""
+        """Offer the columns of the session's case; clear the table if the mesh is another."""
         now = (session.mesh, session.case)
         if now[0] is self._drawn[0] and now[1] is self._drawn[1]:
             return
@@ -133,11 +133,11 @@ class DesignsPanel(Panel):
         self._sync()
 
     def _left(self) -> DesignTable:
-        """Return the table with the results that a run now would not change."""
+        """Return the table with only those results that are valid for the present case."""
         return self.table.left(self.case, self.store.session.case)
 
     def put(self, table: DesignTable) -> None:
-        """Show another table; the design that is shown is none of it if it has other values."""
+        """Show another table; forget the shown design if its values differ there."""
         at = slice((self.shown or 1) - 1, self.shown)
         if table.columns != self.table.columns or table.rows[at] != self.table.rows[at]:
             self.shown = None
@@ -176,11 +176,11 @@ class DesignsPanel(Panel):
 
     @property
     def unsaved(self) -> str:
-        """Return what would be lost with this panel, in a sentence, or nothing."""
+        """Return a sentence about results that closing would lose; empty if there are none."""
         return self.table.unsaved(self.runner.busy, self.written)
 
     def _try(self, change: Callable[[], DesignTable]) -> None:
-        """Change the table, or say why that cannot be."""
+        """Show the table that ``change`` returns, or the error that it raises."""
         self.services.banner.withdraw(self._mistakes)
         self._mistakes = ""
         try:
@@ -223,7 +223,7 @@ class DesignsPanel(Panel):
             self._try(lambda: self._replacing(read_table(self.store.session.case, path)))
 
     def _replacing(self, table: DesignTable) -> DesignTable:
-        """Return another table with the results there are; this one where results would be lost."""
+        """Return another table, with the results it shares; this one if results would be lost."""
         table = table.keeping(self.table)
         return table if self._may_become(table) else self.table
 
@@ -257,7 +257,7 @@ class DesignsPanel(Panel):
         return True
 
     def show_design(self, number: int) -> None:
-        """Show the mesh of a design in the window; it is deformed once more for that."""
+        """Show the mesh of a design, numbered from 1, in the window: deform it as a run there."""
         session, row = self.store.session, self.table.results.get(number)
         other = session.mesh is not (self.mesh or session.mesh)
         if session.mesh is None or session.in_file or other:
@@ -275,7 +275,7 @@ class DesignsPanel(Panel):
         if not self.services.running.show_design(design.case, f"design {number}"):
             self._say("Another job runs in the window; wait for it, or cancel it.", wrong=True)
             return
-        self.services.viewing.refit()  # where its run is there already, nothing ends
+        self.services.viewing.refit()  # no job ends if the design was shown before
         self.shown = number
         self._say(f"Design {number} is shown.")
         self._sync()

@@ -1,4 +1,4 @@
-"""The job that runs a table of designs, and how often its results are shown."""
+"""The job that runs a table of designs, with its results handed over in batches."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from slideviz.session.jobs_designs import run_designs
 
 
 class DesignsJob(QObject):
-    """The job of a panel of designs.
+    """The job that runs the designs of a table in a thread.
 
     Parameters
     ----------
     ended : callable
-        Called with a sentence, empty where all went well, and whether that is an error.
+        Called with a sentence, empty if all designs were run, and whether it is an error.
 
     Signals
     -------
     came(list of Row)
-        Results since the last time: not for each, as the whole window is painted for it.
+        Results since the last emission: not one by one, as each repaints the whole window.
     said(str, float)
-        How far it is, in words and from 0 to 1.
+        The progress, in words and from 0 to 1.
     """
 
     came = Signal(list)
@@ -64,7 +64,7 @@ class DesignsJob(QObject):
             self._soon.start()
 
     def _take(self) -> None:
-        """Hand over the results that came since the last time."""
+        """Emit the results since the last emission, and the progress."""
         self._soon.stop()
         rows, self._arrived = self._arrived, []
         if rows:

@@ -1,4 +1,4 @@
-"""The table of designs for Qt: values that can be edited, and the results beside them."""
+"""The Qt model of a table of designs: editable values, and the results beside them."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -23,7 +23,7 @@ RESULTS = {
     "max_error": ("error", ".1e"),
     "seconds": ("s", ".2f"),
 }
-"""The results that are shown: head and form."""
+"""The results that are shown, by the field of `DesignRow`: column title and number format."""
 
 
 class DesignsModel(QAbstractTableModel):
@@ -45,7 +45,7 @@ class DesignsModel(QAbstractTableModel):
         self.editable = True
 
     def show(self, table: DesignTable) -> None:
-        """Show another table, or other results of the same."""
+        """Show a table; if only its results changed, selection and scroll position stay."""
         same = table.columns == self.table.columns and table.rows == self.table.rows
         if not same:
             self.beginResetModel()

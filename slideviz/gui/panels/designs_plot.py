@@ -31,7 +31,7 @@ FAILED = "No design has a result yet: those that were run failed."
 
 
 class DesignCanvas(PlotCanvas):
-    """A plot that hands over the design whose point was clicked."""
+    """A plot that calls ``picked`` with a click's position, in the figure's pixels from below."""
 
     def __init__(self, drawing: Callable[[], Draw]) -> None:
         super().__init__(drawing)
@@ -47,7 +47,7 @@ class DesignCanvas(PlotCanvas):
 
 
 class DesignPlot(QWidget):
-    """The plot of the results, and the fields that say which result, and against what.
+    """The plot of a result of the designs against a varied number, with choices of both.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class DesignPlot(QWidget):
             self.area.say(FAILED if table.results else EMPTY)
 
     def drawing(self) -> Draw:
-        """Return the function that draws the plot."""
+        """Return a function that draws the plot into a figure; one that draws nothing if empty."""
         column, what = self.across.currentData(), self.what.currentData()
         if column is None or not self._table.count_done():
             return lambda _figure, _style: None
@@ -121,6 +121,6 @@ class DesignPlot(QWidget):
 def _draw(
     table: DesignTable, column: str, what: str, shown: int | None, figure: Figure, style: Style
 ) -> None:
-    """Draw the results of a table against a column."""
+    """Draw the result ``what`` of the designs against a column, with a ring at design ``shown``."""
     curves, failed = design_curves(table, column, what), failed_designs(table, column)
     against_designs(figure.add_subplot(), curves, column, what, shown, style, failed=failed)

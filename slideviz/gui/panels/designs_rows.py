@@ -1,4 +1,4 @@
-"""The rows of a table of designs, and the fields that fill it."""
+"""The view of a table of designs, and the fields by which designs are added."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ RANGE = "-8 to 0 in 9, or 1, 2, 5"
 
 
 class DesignRows(QWidget):
-    """The rows, and above them what varies, its values, and the button that adds them.
+    """The table of designs, and above it the fields for the number that varies and its values.
 
     Parameters
     ----------
     add : callable
-        What the button does.
+        Called when the user clicks “Add” or presses Return.
     """
 
     def __init__(self, add: Do) -> None:
@@ -74,7 +74,7 @@ class DesignRows(QWidget):
         return view
 
     def show_columns(self, case: Case, mesh: Mesh | None) -> None:
-        """Offer what can vary in a case of a mesh, of another mesh the first number of a motion."""
+        """Offer the numbers of a case that can vary; keep the choice unless the mesh is another."""
         chosen = self.column.currentData() if mesh is self._mesh else None
         if mesh is not self._mesh:
             self.values.clear()
@@ -86,7 +86,7 @@ class DesignRows(QWidget):
         self.column.show_value(chosen)
 
     def show_table(self, table: DesignTable, editable: bool) -> None:
-        """Show a table, or where it has no rows what they are good for."""
+        """Show a table; if it has no rows, show a hint instead."""
         if table is not self.model.table:
             self.model.show(table)
         self.model.editable = editable
@@ -94,5 +94,5 @@ class DesignRows(QWidget):
 
     @property
     def selected(self) -> set[int]:
-        """Return the places of the selected rows."""
+        """Return the indices of the selected rows, from 0."""
         return {index.row() for index in self.view.selectionModel().selectedRows()}

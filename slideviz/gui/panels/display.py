@@ -39,13 +39,14 @@ NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbour
 
 
 MOST_PASSAGES = 9
-"""Neighbours on each side that can be chosen where a row has no end."""
+"""Most neighbouring passages on each side for translational periodicity, which is endless."""
+
 
 ONLY = "Draw only the cells whose value is within these two numbers."
 
 
 class PassagesBox(NumberBox):
-    """The number of neighbouring passages, in words; the last value is all of a wheel."""
+    """A spin box for the number of neighbouring passages; its maximum means the whole wheel."""
 
     letters = "al"  # of "all"
 
@@ -56,7 +57,7 @@ class PassagesBox(NumberBox):
         self.set_around(None)
 
     def set_around(self, around: int | None) -> None:
-        """Set the number of passages of the whole wheel; None for a row without an end."""
+        """Set the number of passages in the whole wheel; None for translational periodicity."""
         self.around = around
         self.setRange(0, MOST_PASSAGES if around is None else max(around // 2, 1))
 
@@ -83,7 +84,7 @@ class PassagesBox(NumberBox):
 
 
 class Span(QWidget):
-    """Two numbers, the first below the second."""
+    """Two number fields for a range; the low number must stay below the high one."""
 
     def __init__(self, name: str, changed: Callable[[tuple[float, float]], object]) -> None:
         super().__init__()
@@ -98,14 +99,14 @@ class Span(QWidget):
         self.setLayout(parts)
 
     def _must(self, good: bool, value: float, sign: str) -> str:
-        """Return why a number may not be at its end; empty where it may."""
+        """Return, unless ``good``, why a number must be less (``<``) or greater than the other."""
         if good:
             return ""
         than, other = ("less", self.high) if sign == "<" else ("greater", self.low)
         return f"{number_text(value)} must be {than} than {number_text(other.value)}"
 
     def show_values(self, values: tuple[float, float]) -> None:
-        """Show two numbers; nothing is emitted."""
+        """Show two numbers; no signal is emitted."""
         for field, value in zip((self.low, self.high), values, strict=True):
             if value != field.value:
                 field.show_value(value)
@@ -117,7 +118,7 @@ class Span(QWidget):
 
 
 def map_icon(name: str) -> QIcon:
-    """Return a picture of a colour map, from low to high."""
+    """Return an icon of a colour map, from low to high."""
     from matplotlib import colormaps
 
     row = (np.asarray(colormaps[name](np.linspace(0.0, 1.0, 64))) * 255).astype(np.uint8)
@@ -127,7 +128,7 @@ def map_icon(name: str) -> QIcon:
 
 
 class DisplayPanel(Panel):
-    """Colours, threshold, points, passages and toggles of the view."""
+    """The panel of the view's colours, threshold, points, passages and toggles."""
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
@@ -171,7 +172,7 @@ class DisplayPanel(Panel):
         )
         self.form.addRow("Points", self.points)
         self.passages = PassagesBox()
-        # Arrows as large as those of the fields above it.
+        # As high as the fields above it, so that the arrows are.
         self.passages.setMinimumHeight(self.points.sizeHint().height())
         self.passages.valueChanged.connect(self._passages)
         self.passages_label = QLabel("Neighbours")
@@ -200,7 +201,7 @@ class DisplayPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
-        """Show the session; nothing is done while only steps or selection change."""
+        """Fill the panel from the session; skipped if nothing shown here has changed."""
         case, view = session.case, session.view
         periodic = case.markers_with("periodic"), case.periodic_type, case.axis, case.origin
         runs = session.runs if view.colour_by == "displacement" else ()
@@ -271,6 +272,6 @@ class DisplayPanel(Panel):
 
 
 def _worse_half(session: Session) -> tuple[float, float]:
-    """Return the lower half of the colours: of qualities, what one looks for."""
+    """Return the lower half of the colour range: the first threshold, as low quality is worse."""
     low, high = session.colour_range
     return low, low + 0.5 * (high - low)

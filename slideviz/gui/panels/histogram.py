@@ -32,7 +32,8 @@ from slideviz.session.state import IN_FILE, Session, StepFrame
 from slideviz.session.store import Store
 
 END_PX = 6
-"""A press so near to an end of the range moves that end."""
+"""Distance in pixels up to which a press moves an end of the range."""
+
 
 BRUSH = "Drag over values to show only the cells that have them; click to end it."
 
@@ -40,14 +41,14 @@ Range = tuple[float, float]
 
 
 class BrushCanvas(PlotCanvas):
-    """A plot on which the mouse paints a range of values.
+    """A histogram on which the mouse selects a range of values.
 
     Signals
     -------
     brushed(object)
-        The range (low, high) that the mouse holds, or None for a click beside it.
+        The selected range (low, high); None for a click or double click, which ends it.
     dragging(bool)
-        The button is down, or up again.
+        True when the mouse button is pressed, False when it is released.
     """
 
     brushed = Signal(object)
@@ -63,15 +64,15 @@ class BrushCanvas(PlotCanvas):
         self.locked = False
 
     def value_at(self, x_px: float) -> float:
-        """Return the value under a position of the mouse, within the axis."""
+        """Return the value at a horizontal position in the widget, clipped to the axis."""
         return float(np.clip(self.to_value(x_px), *self.figure.axes[0].get_xlim()))
 
     def pixel_of(self, value: float) -> float:
-        """Return the horizontal pixel of a value in the widget, within the axis."""
+        """Return the horizontal pixel in the widget of a value, clipped to the axis."""
         return self.to_pixel(float(np.clip(value, *self.figure.axes[0].get_xlim())))
 
     def show_band(self, band: Range | None) -> None:
-        """Show a range."""
+        """Show a range of values as selected; None for no range."""
         if band != self.band:
             self.band = band
             self.update()
@@ -177,7 +178,7 @@ class HistogramPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
-        """Show the session."""
+        """Plot the histogram of the session's step, with the threshold as selected range."""
         self.whole.setText("from 0" if session.view.colour_by == "displacement" else "0–1")
         for widget in (self.numbers, self.log, self.whole, self.save):
             widget.setVisible(session.frame is not None)
@@ -209,7 +210,7 @@ class HistogramPanel(Panel):
         bad = found.inverted
         low = "highest" if what == "displacement" else "min"
         mean = found.mean if what == "size-skew" else plain.mean()
-        # Of a node: the values of cells are means of theirs.
+        # The largest displacement of a node: values of cells are means over their nodes.
         far = what == "displacement"
         least = found.min if what == "size-skew" else plain.min()
         ends = session.frame.furthest(session.mesh) if far else least
@@ -230,14 +231,14 @@ class HistogramPanel(Panel):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
-        # Behind another tab there were no words.
+        # While the panel was behind another tab, the text was not updated.
         if self._described is None and self.store.session.frame is not None:
             QTimer.singleShot(0, self, lambda: self._sync_words(self.store.session))
 
     # Drawing ---------------------------------------------------------------------------
 
     def drawing(self) -> Draw:
-        """Return the function that draws the histogram of the shown step."""
+        """Return a function that draws the histogram of the shown step into a figure."""
         log, whole = self.log.isChecked(), self.whole.isChecked()
         return partial(draw_histogram, self._counts, self.store.session, log=log, whole=whole)
 
@@ -247,7 +248,8 @@ class HistogramPanel(Panel):
         if band is None:
             self.clear_range()
             return
-        # Left of the values only inverted cells are; from there on they belong to it.
+        # The bar of the inverted cells is left of the first value: a range that lies there
+        # selects them only, and one that begins there begins at 0.
         (low, high), left = band, first_value(self.canvas.figure.axes[0])
         self._wanted = ONLY_INVERTED if high < left else (0.0 if low < left else low, high)
         if not self._soon.isActive():
@@ -276,7 +278,7 @@ class HistogramPanel(Panel):
 
 
 def _concerned(old: Session, new: Session) -> bool:
-    """Tell whether a change is one of what the histogram is of."""
+    """Return whether the histogram differs between two sessions."""
     names = ("colour_by", "colour_map", "threshold", "beside")
     same = (
         old.frame is new.frame,

@@ -1,4 +1,4 @@
-"""Forms made from the table of keys of the case file: a row for each key that is shown there."""
+"""Forms made from the table of case file keys: a row for each key that belongs to the form."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from slideviz.gui.widgets.vector_field import VectorField, a_direction
 
 
 def number_field(kind: Kind) -> NumberField:
-    """Return a field for numbers that a kind of value allows."""
+    """Return a number field that accepts only numbers valid for a kind of value."""
     return NumberField(0.0, lambda value: kind.problem(number_text(value)))
 
 
@@ -47,7 +47,8 @@ FIELDS: dict[Entry, tuple[Callable[[Kind], Field], str]] = {
     "axis": (lambda _: VectorField((0.0, 0.0, 1.0), a_direction), "changed"),
     "point": (lambda _: VectorField(), "changed"),
 }
-"""How to make the field for a kind of value, and the signal by which it tells a new one."""
+"""For each entry of a kind of value: the function that makes its field, and the name of the
+field's signal that carries a new value."""
 
 
 class KeyForm(QFormLayout):
@@ -56,14 +57,14 @@ class KeyForm(QFormLayout):
     Parameters
     ----------
     place : "main" or "more"
-        Which of the keys.
+        The form whose keys are shown: that of the method panel, or “More settings” there.
     own : mapping
-        Fields by the name of the key, for those which somebody else makes, connects and fills.
+        Fields that the caller makes, connects and fills, by the name of their key.
 
     Signals
     -------
     changed(object, object)
-        The row of the table of keys, and the new value.
+        The `Key` whose value changed, and the new value.
     """
 
     changed = Signal(object, object)
@@ -93,13 +94,14 @@ class KeyForm(QFormLayout):
 
     @property
     def words(self) -> str:
-        """Return a sentence that lists the settings."""
+        """Return the labels of the form's settings, as a sentence."""
         return ", ".join(key.label.rstrip(" ×") for key, _ in self._rows).capitalize() + "."
 
     def sync(self, case: Case, spare: Case, reasons: Mapping[str, str]) -> None:
-        """Fill the fields from a case; where a setting is None there, from ``spare``.
+        """Fill the fields from ``case``, or from ``spare`` where a setting of ``case`` is None.
 
-        ``reasons`` has more reasons, by the field, for which it is not available.
+        ``reasons`` says, by the name of a field, why it is not available, in addition to what the
+        key itself says.
         """
         for key, field in self._rows:
             if key.name not in self._own:
@@ -112,8 +114,8 @@ class KeyForm(QFormLayout):
 
 
 def _set_tip(field: Field, text: str) -> None:
-    """Explain a field and its parts."""
+    """Set the tooltip of a field and of its parts."""
     if hasattr(field, "set_tip"):
         field.set_tip(text)
-    if not isinstance(field, NumberField):  # that one may have more urgent things to say
+    if not isinstance(field, NumberField):  # its tooltip may show why its text is invalid
         field.setToolTip(wrapped(text))

@@ -1,4 +1,4 @@
-"""The log panel: messages with times, also the warnings of libraries."""
+"""The log panel: log messages with their times, including the warnings of libraries."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from qtpy.QtWidgets import QPlainTextEdit
 from slideviz.gui.widgets.labels import fixed_font
 
 LOGGERS = ("slideviz", "py.warnings")
-"""Whose lines are shown: ours, those of Qt and VTK below it, and Python's warnings."""
+"""The loggers shown: slideviz, with those of Qt and VTK below it, and Python's warnings."""
 
 
 class _Bridge(QObject):
@@ -19,7 +19,7 @@ class _Bridge(QObject):
 
 
 class LogHandler(logging.Handler):
-    """A log handler that hands lines of any thread to the window's thread."""
+    """A log handler that passes lines logged in any thread to the GUI thread, by a signal."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -29,15 +29,15 @@ class LogHandler(logging.Handler):
         self.setFormatter(logging.Formatter("%(asctime)s  %(levelname)-7s %(message)s", "%H:%M:%S"))
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Emit the line of a log record."""
+        """Emit the line of a log record; a message repeated in a row is only counted."""
         line = self.format(record)
-        # What a library says for every picture it draws would hide everything else.
+        # A library's warning at every drawing would push all else out of the panel.
         what, self._last = self._last, (record.levelno, record.getMessage())
         if what == self._last:
             self._repeats += 1
             return
         repeats, self._repeats = self._repeats, 0
-        # The window may be gone when the thread that logs is not yet.
+        # A thread may still log when the window, and the signal's object with it, is gone.
         with contextlib.suppress(RuntimeError):
             if repeats:
                 self.bridge.wrote.emit(f"          … {repeats} times more")
@@ -54,7 +54,7 @@ class LogPanel(QPlainTextEdit):
         self.setFont(fixed_font())
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.WidgetWidth)
         self.handler = LogHandler()
-        # In a turn of its own: what Qt complains of in the middle of something comes here too.
+        # Queued: Qt's own warnings arrive here, which it may log in the middle of a paint event.
         self.handler.bridge.wrote.connect(self.appendPlainText, Qt.ConnectionType.QueuedConnection)
         logger = logging.getLogger("slideviz")
         for name in LOGGERS:
@@ -63,6 +63,6 @@ class LogPanel(QPlainTextEdit):
             logger.setLevel(logging.INFO)
 
     def detach(self) -> None:
-        """Stop listening to the log."""
+        """Remove the panel's handler from the loggers."""
         for name in LOGGERS:
             logging.getLogger(name).removeHandler(self.handler)

@@ -38,16 +38,16 @@ from slideviz.session.store import Store
 from slideviz.terms import LEVEL_CRITERIA, DataReduction, labels
 
 LEVEL_ENDS = {"size": KEYS["LVL_SIZE"], "tol": KEYS["LVL_TOL_CRIT"]}
-"""The key that says where a level ends, by the criterion."""
+"""The key that says at what size or tolerance a level ends, by the level criterion."""
 
 
 class MoreSettings(QWidget):
-    """The settings below “More settings”, a button that opens and closes their form.
+    """The button “More settings”, and the form that it opens and closes.
 
     Signals
     -------
     changed(object, object)
-        The row of the table of keys, and the new value.
+        The `Key` whose value changed, and the new value.
     """
 
     changed = Signal(object, object)
@@ -87,7 +87,7 @@ class MoreSettings(QWidget):
         self.body.setVisible(shown)
 
     def sync(self, case: Case, spare: Case) -> None:
-        """Show the settings of a case, and those that it lacks of a spare case."""
+        """Fill the form from ``case``, or from ``spare`` where ``case`` has no data reduction."""
         given = case.reduction or spare.reduction
         self._criterion = given.criterion
         self.levels.show_value(given.criterion if given.multilevel else "none")
@@ -96,9 +96,9 @@ class MoreSettings(QWidget):
 
 
 class MethodPanel(Panel):
-    """The settings of the case: a field for each key that has one.
+    """The panel of the case's settings: a field for each key that is shown there.
 
-    Each field is found by the name that it has in the case, as ``panel.sliding``.
+    Each field is also an attribute, by the name of its setting in the case: ``panel.sliding``.
     """
 
     def __init__(self, store: Store) -> None:
@@ -121,7 +121,7 @@ class MethodPanel(Panel):
         self.watch = FieldWatch(self, store, "method")
 
     def _complete_form(self) -> None:
-        """Say in the form what belongs to its fields."""
+        """Add hints to the form: the period found below ``origin``, one beside ``tolerance``."""
         form, fields = self.form, self.form.fields
         row, _ = _position(form, fields["origin"])
         form.insertRow(row + 1, "", self.found)
@@ -135,25 +135,25 @@ class MethodPanel(Panel):
         self.form.changed.connect(self._set)
         self.more.changed.connect(self._set)
         self.more.button.toggled.connect(
-            # When its form has been laid out.
+            # In the next turn of the event loop the form is laid out.
             lambda on: on and QTimer.singleShot(0, self, self._show_more)
         )
 
     def _show_more(self) -> None:
-        """Scroll to the settings that have opened below the others."""
+        """Scroll to “More settings” after they were opened."""
         self.area.widget().adjustSize()
         bar = self.area.verticalScrollBar()
         bar.setValue(min(self.more.y(), bar.maximum()))
 
     def lead_to(self, _missing: Requirement) -> None:
-        """Put the cursor into the field for a requirement."""
+        """Put the cursor into the first invalid field, or into that for sliding."""
         if not self.watch.focus():
             self.form.fields["sliding"].setFocus()
 
     # Widgets to state ------------------------------------------------------------------
 
     def _set(self, key: Key, value: object) -> None:
-        """Change the case by the value of a key, and by what the window means with it."""
+        """Change the case by the new value of a key; data reduction is handled by this panel."""
         own: dict[str, Callable[[Case, Any], Case]] = {
             "DATA_REDUCTION": self._reduce,
             "DATA_RED_TOLERANCE": self._tolerate,
@@ -166,7 +166,7 @@ class MethodPanel(Panel):
             self.store.change(changes.set_case, **changed)
 
     def _reduce(self, case: Case, wanted: DataReduction) -> Case:
-        # What was set before it was switched off comes back with it.
+        # The settings from before it was switched off come back; else those for this mesh.
         mesh = self.store.session.mesh
         first = self._reduction or AUTO
         if wanted == "YES" and first == AUTO and mesh is not None:
@@ -180,7 +180,7 @@ class MethodPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
-        """Show the session."""
+        """Fill the panel from the session's case."""
         if session.mesh is not self._mesh:
             self._mesh, self._reduction = session.mesh, None
             # Once for each mesh: it takes 10 ms where there are 250,000 cells.
@@ -202,12 +202,12 @@ class MethodPanel(Panel):
         self._sync_hints(session)
 
     def _in_length(self, given: Reduction) -> Reduction:
-        """Return data reduction with its tolerance as a length of six digits."""
+        """Return data reduction with its tolerance as a length, to six significant digits."""
         absolute = given.relative * self._extent if given.relative else given.tolerance
         return replace(given, tolerance=float(f"{absolute:.6g}"))
 
     def _sync_hints(self, session: Session) -> None:
-        """Say what is found, guessed and not available."""
+        """Show the hints: the tolerance relative to the extent, idle settings, the period found."""
         case, extent = session.case, self._extent
         tolerance = self.form.fields["tolerance"]
         assert isinstance(tolerance, NumberField)

@@ -35,9 +35,9 @@ class MotionEditor(MotionForm):
     Signals
     -------
     changed(Motion)
-        Another motion instead.
+        The motion as edited, in place of the one that was shown.
     table_wanted()
-        The rows of its displacement file are to be typed.
+        The user wants to edit the rows of the motion's displacement file.
     """
 
     changed = Signal(object)
@@ -68,7 +68,7 @@ class MotionEditor(MotionForm):
         self.table.clicked.connect(lambda _: self.table_wanted.emit())
 
     def show_motion(self, motion: Motion | None, targets: tuple[Target, ...], dim: int) -> None:
-        """Show a motion whose target is one of those given, or nothing."""
+        """Show a motion, offering ``targets`` and ``dim`` components; None hides the editor."""
         self._motion, self._dim = motion, dim
         self.setVisible(motion is not None)
         if motion is None:
@@ -83,7 +83,7 @@ class MotionEditor(MotionForm):
         self.show_rows(shown)
 
     def _show_numbers(self, motion: Motion, dim: int) -> set[str]:
-        """Show what a motion does, and return the rows for it."""
+        """Fill the fields with a motion's numbers, and return the names of their rows."""
         if isinstance(motion, Translate):
             self.vector.show_value(motion.vector)
             return {"vector"}
@@ -111,7 +111,7 @@ class MotionEditor(MotionForm):
         return {"path"}
 
     def _show_place(self, motion: Rotate | Scale | Radial, dim: int) -> set[str]:
-        """Show what a motion leaves in place, and return the rows for it."""
+        """Fill the fields for a motion's fixed point and axis; return the names of their rows."""
         offered = ["point"] if isinstance(motion, Radial) else ["centroid", "point"]
         if self._machine is not None and not isinstance(motion, Scale):
             offered.insert(-1, "axis")
@@ -136,7 +136,10 @@ class MotionEditor(MotionForm):
         return ({"point"} if what == "point" else set()) | ({"axis"} if turns else set())
 
     def _radial(self, motion: Motion) -> tuple[float, float, float] | None:
-        """Return the radial direction through the centroid of what turns, if there is one."""
+        """Return the radial direction through the centroid of a rotation's target.
+
+        None if the motion is no rotation, or the mesh is 2D or does not repeat about an axis.
+        """
         if self._machine is None or self._dim == 2 or not isinstance(motion, Rotate):
             return None
         return radial(self._machine, self._centroid(motion.marker))
@@ -150,7 +153,7 @@ class MotionEditor(MotionForm):
         return f"{ABOUT[what]} ({direction_words(axis)})"
 
     def _is_machine(self, motion: Rotate | Scale | Radial) -> bool:
-        """Tell whether a motion is about the machine's axis."""
+        """Return whether a motion is about the machine's axis."""
         if self._machine is None or isinstance(motion, Scale):
             return False
         axis, origin = self._machine
@@ -162,7 +165,7 @@ class MotionEditor(MotionForm):
             self._targets = targets
             self.marker.clear()
             for place, target in enumerate(targets):
-                # By its number: Qt would make a list of several names.
+                # The item's data is an index: Qt would turn a tuple of names into a list.
                 self.marker.addItem(target_words(target), place)
         self.marker.show_value(targets.index(motion.marker))
 
@@ -197,15 +200,15 @@ class MotionEditor(MotionForm):
         elif what == "centroid" and radially and self._machine is not None:
             self.axis.show_value(self._machine[0])
         self._tell()
-        # What is about the axis already is the same motion: only the fields differ.
+        # The motion may be the same, but other fields belong to this choice.
         self.show_motion(self._motion, self._targets, self._dim)
 
     def show_another(self) -> None:
-        """Forget the choice of a point: another motion is shown from now on."""
+        """Reset the choice of “a point” instead of the axis, before another motion is shown."""
         self._as_point = False
 
     def focus(self) -> None:
-        """Put the cursor into the first field."""
+        """Put the cursor into the first number field of the shown motion, and select its text."""
         first = {
             Translate: self.vector.fields[0],
             Rotate: self.angle,
@@ -219,22 +222,23 @@ class MotionEditor(MotionForm):
             first.selectAll()
 
     def set_centroid(self, centroid: Callable[[Target], tuple[float, ...]]) -> None:
-        """Set the function that returns the centroid of a target, where a point starts."""
+        """Set the function that returns a target's centroid, offered as the first fixed point."""
         self._centroid = centroid
 
     def set_extent(self, extent: float) -> None:
-        """Set the size of the mesh, beside which rounding errors are shown as 0."""
+        """Set the size of the mesh; coordinates that are rounding errors beside it show as 0."""
         self.point.set_scale(extent)
 
     def set_machine(self, machine: Axis | None) -> None:
-        """Set the axis about which the mesh repeats; None where it does not."""
+        """Set the axis about which the mesh repeats; None if it does not."""
         self._machine = machine
 
     def set_boxes(self, names: tuple[str, ...]) -> None:
-        """Set the boxes for free-form deformation that there are."""
+        """Set the names of the boxes for free-form deformation that can be chosen."""
         self._boxes = names
 
     def _tell(self) -> None:
+        """Emit the motion that the fields describe, if it differs from the shown one."""
         marker, kind = self._targets[self.marker.currentData()], type(self._motion)
         x, y, z = self.axis.value if self._dim == 3 else Z
         if self.axis.problem:
@@ -259,7 +263,7 @@ class MotionEditor(MotionForm):
             self.changed.emit(motion)
 
     def _ffd(self, marker: Target, before: Ffd) -> Ffd:
-        """Return the motion of a control point that the fields describe; in 2D, k stays."""
+        """Return the free-form deformation that the fields describe; in 2D, index k stays."""
         at = before.index if self.index.problem else (*self.index.value, before.index[2])[:3]
         i, j, k = (int(value) for value in at)
         dx, dy, dz = (*self.vector.value, 0.0)[:3]

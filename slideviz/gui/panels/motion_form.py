@@ -1,4 +1,4 @@
-"""The form of a motion: a row for each number that some kind of motion has."""
+"""The form of a motion: rows for the numbers of all kinds of motion."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ABOUT = {
 
 
 class MotionForm(QWidget):
-    """The fields of a motion, in a form whose rows can be hidden."""
+    """The fields for all kinds of motion, in a form of which only some rows are shown."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -98,7 +98,7 @@ class MotionForm(QWidget):
         ):
             self._rows[name] = widget
             self.form.addRow(QLabel(title), widget)
-        # As wide whatever is shown: else the fields would jump from one motion to the next.
+        # One width for all labels, so that the fields do not jump from motion to motion.
         labels = [self.form.labelForField(widget) for widget in self._rows.values()]
         widest = max(label.sizeHint().width() for label in labels)
         for label in labels:
@@ -107,13 +107,13 @@ class MotionForm(QWidget):
             choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     def show_rows(self, names: set[str]) -> None:
-        """Show some rows of the form only."""
+        """Show the rows with these names, and hide the others."""
         for name, widget in self._rows.items():
             self.form.setRowVisible(widget, name in names)
 
 
 def _above_minus_100(value: float) -> str:
-    """Return why a radius cannot change by so many percent."""
+    """Return why a radius cannot change by this many percent; empty if it can."""
     return "" if value > -100.0 else "-100 % or less would fold the boundary"
 
 
@@ -128,7 +128,7 @@ KINDS: dict[type, str] = {
 
 
 def control_point(values: Sequence[float]) -> str:
-    """Return why numbers are no control point of a box."""
+    """Return why numbers are no index of a control point; empty if they are."""
     whole = all(value == int(value) and value >= -1 for value in values)
     return "" if whole else "needed are whole numbers from 0, or -1 for all"
 
@@ -140,10 +140,10 @@ def new_motion(
     machine: Axis | None = None,
     boxes: Sequence[str] = (),
 ) -> Motion:
-    """Return a motion of a kind that does not move anything yet.
+    """Return a motion of a kind with zero displacement, to be edited.
 
-    Where the mesh repeats about an axis, what turns or is pushed does so about that axis; control
-    points are those of the first of ``boxes``.
+    Rotations and radial motions are about ``machine``, the axis about which the mesh repeats, if
+    there is one; a free-form deformation moves a control point of the first of ``boxes``.
     """
     axis, origin = machine or ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
     if kind is Translate:

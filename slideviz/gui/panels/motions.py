@@ -41,11 +41,11 @@ from slideviz.session.state import Session
 from slideviz.session.store import Store
 
 HEIGHT, LEAST_HEIGHT = 300, 210
-"""Pixels that the panel would like, and that its longest form needs."""
+"""Preferred height of the panel, and its least height, which the longest form needs; pixels."""
 
 
 class MotionPanel(Panel):
-    """The list of the motions, and the editor of the selected one."""
+    """The panel of the case's motions: their list, and the editor of the selected one."""
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
@@ -82,7 +82,7 @@ class MotionPanel(Panel):
         return in_row(self.add, None, *self._make_actions(), spacing=2)
 
     def _make_actions(self) -> Iterator[QToolButton]:
-        """Make what the menu of the list offers, and yield buttons of what has an icon."""
+        """Make the actions of the list's menu, and yield a button for each that has an icon."""
         self.actions_: dict[str, QAction] = {}
         for name, text, keys, function, image, tip in (
             ("duplicate", "Duplicate", "Ctrl+D", self._duplicate, "", ""),
@@ -105,7 +105,7 @@ class MotionPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
-        """Show the session."""
+        """Fill list and editor from the motions of the session's case."""
         motions, moving = session.case.motions, session.case.markers_with("moving")
         if session.mesh is not self._mesh:
             self._take_mesh(session.mesh)
@@ -130,13 +130,13 @@ class MotionPanel(Panel):
         self._sync_buttons(session, moving)
 
     def _take_mesh(self, mesh: Mesh | None) -> None:
-        """Note what motions need to know of another mesh; that takes a while."""
+        """Store another mesh and its extent (slow for a large mesh) and pass both to the editor."""
         self._mesh, self._extent = mesh, mesh.extent if mesh is not None else 0.0
         self.editor.set_centroid(self._centroid)
         self.editor.set_extent(self._extent)
 
     def _centroid(self, target: Target) -> tuple[float, ...]:
-        """Return the centroid of what a motion moves."""
+        """Return the centroid of a target: the boundaries it names, or all moving ones."""
         moving = self.store.session.case.markers_with("moving")
         assert self._mesh is not None
         return centroid(self._mesh, named(target) or moving)
@@ -183,7 +183,7 @@ class MotionPanel(Panel):
         self._add_for(new_target(self.store.session), kind)
 
     def _add_for(self, target: Target, kind: type) -> None:
-        """Add a motion that does nothing yet, and let its numbers be typed."""
+        """Add a motion with zero displacement, and put the cursor into its first field."""
         session = self.store.session
         motion = new_motion(
             kind, target, session.mesh.dim, machine_axis(session), box_names(session)
@@ -192,7 +192,7 @@ class MotionPanel(Panel):
         self.editor.focus()
 
     def lead_to(self, missing: Requirement) -> None:
-        """Put the cursor into the field for a requirement; a boundary without a motion gets one."""
+        """Put the cursor where a missing requirement is met; add a motion if one is missing."""
         motions = self.store.session.case.motions
         if self.watch.focus():
             return
@@ -203,7 +203,7 @@ class MotionPanel(Panel):
             self.editor.focus()
 
     def _insert(self, motion: Motion) -> None:
-        """Add a motion below the chosen one, and choose it."""
+        """Add a motion below the selected one, and select it."""
         row = self.list.currentRow() + 1
         self.store.change(changes.add_motion, motion, row)
         self.list.setCurrentRow(row)
@@ -212,7 +212,7 @@ class MotionPanel(Panel):
         self._insert(self.store.session.case.motions[self.list.currentRow()])
 
     def _copy(self) -> None:
-        """Copy the motion as a case file has it."""
+        """Copy the selected motion to the clipboard, written as in a case file."""
         motion = self.store.session.case.motions[self.list.currentRow()]
         try:
             QApplication.clipboard().setText(write_motions((motion,)))
@@ -220,7 +220,7 @@ class MotionPanel(Panel):
             main_window(self).banner.tell_error(error)
 
     def _paste(self) -> None:
-        """Add the motions that were copied, here or from a case file, below the chosen one."""
+        """Add the motions in the clipboard, as written in a case file, below the selected one."""
         session = self.store.session
         moving = session.case.markers_with("moving")
         try:
@@ -249,7 +249,8 @@ class MotionPanel(Panel):
         if path is None:
             return
         if path == motion.path:
-            # The same file with other rows: only another motion makes everybody read it again.
+            # The file has other rows now, but the motion is equal: change it and back, so that
+            # whoever caches the file's content reads it again.
             self.store.change(changes.replace_motion, row, FromFile(Path(), motion.marker))
         self.store.change(changes.replace_motion, row, FromFile(path, motion.marker))
 
@@ -279,7 +280,7 @@ class MotionPanel(Panel):
         self.list.setCurrentRow(row + by)
 
     def sizeHint(self) -> QSize:
-        # Whatever the form shows: else the panel above would jump with every motion.
+        # Independent of the shown form, so that the panel above does not jump.
         return QSize(super().sizeHint().width(), HEIGHT)
 
     def minimumSizeHint(self) -> QSize:

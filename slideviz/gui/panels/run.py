@@ -31,16 +31,16 @@ from slideviz.session.store import Store
 
 LONG = 100
 SETTINGS, NOTES = "settings", "notes"
-"""What the links stand for: to take the settings of the run shown, and to tell its notes."""
+"""Targets of links in the text: take the settings of the shown run, show its notes."""
 
 
 class RunPanel(Panel):
-    """Buttons to run and cancel, progress, and the requirements of a run, with links to panels.
+    """The panel to run and cancel, with a line of text: progress, result or what is missing.
 
     Signals
     -------
     place_wanted(Requirement)
-        The link to where what is missing is put right.
+        The user clicked on a missing requirement, and wants to be led to where it is met.
     """
 
     place_wanted = Signal(object)
@@ -81,8 +81,8 @@ class RunPanel(Panel):
         return button
 
     def sync(self, session: Session) -> None:
-        """Show that a run can start, or the first requirement that is not met."""
-        # Some checks look at the mesh: not again while only the view changes.
+        """Show the shown run's end, that a run can start, or the first missing requirement."""
+        # Some checks go through the mesh: they are not repeated if only the view changed.
         key = (session.mesh, session.case, session.intersection, session.invalid)
         if key != self._key:
             self._key = key
@@ -113,7 +113,7 @@ class RunPanel(Panel):
         self._tell_run(session)
 
     def _tell_run(self, session: Session) -> None:
-        """Tell how the run that is shown ended, or that the panels say something else."""
+        """Show how the shown run ended, or that the panels have other settings than it."""
         run, bad = session.run_shown, ""
         if run is None:
             self._tell_ready("Ready.", session)
@@ -135,7 +135,7 @@ class RunPanel(Panel):
         set_style(self.text, "bad", bool(bad))
 
     def _tell_ready(self, text: str, session: Session) -> None:
-        """Tell that a run can start, what it costs, and what is to be expected of it."""
+        """Show ``text`` (or a warning that cells will fold), and the cost of the run."""
         folding = _short(session.folding)
         text = html.escape(" ".join(filter(None, (folding or text, self._cost))))
         self.text.setText(f"<a href='motion'>{text}</a>" if folding else text)
@@ -154,13 +154,13 @@ class RunPanel(Panel):
             self.place_wanted.emit((*self._missing, asked)[0])
 
     def take_theme(self, _scheme: ColorScheme) -> None:
-        """Show the text in the colours of another theme: those of a link are kept otherwise."""
+        """Set the text again: a label's links keep the colours of the old theme otherwise."""
         text = self.text.text()
         self.text.clear()
         self.text.setText(text)
 
     def set_busy(self, what: str) -> None:
-        """Show the name of the running job, or with an empty text that none runs."""
+        """Show the name of the running job; an empty text means that none runs."""
         self._busy = what
         self.cancel.setEnabled(True)
         self.bar.setRange(0, 1000)
@@ -188,5 +188,5 @@ class RunPanel(Panel):
 
 
 def _short(text: str) -> str:
-    """Return a text that fits beside the button: a long one without its remedy, a tooltip's."""
+    """Return a text short enough to stand beside the button: a long one only up to its ``;``."""
     return text if len(text) <= LONG else text.partition("; ")[0].removesuffix(".") + "."

@@ -23,7 +23,7 @@ EMPTY = "Nothing was computed yet. Each run will be listed here with its setting
 
 
 class RunsPanel(Panel):
-    """The list of the runs; a click shows one, with Ctrl beside the one that is shown."""
+    """The panel with the list of the runs: a click shows a run, Ctrl+click shows it beside."""
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
@@ -56,7 +56,7 @@ class RunsPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
-        """Show the session; the rows are touched only when a run or the choice differs."""
+        """Fill the list from the session; skipped if no run and no choice of runs changed."""
         key = (session.runs, session.shown, session.view.beside)
         if key == self._drawn:
             return
@@ -118,7 +118,7 @@ class RunsPanel(Panel):
             self.store.change(changes.show_run, item.data(RUN, NUMBER))
 
     def _double_clicked(self) -> None:
-        """Show the run beside the one that was shown before, or end the comparison with it."""
+        """Show the run beside the one shown before the double click, or end that comparison."""
         number, seen = self.tree.number, self.tree.seen_before
         if number is None:
             return

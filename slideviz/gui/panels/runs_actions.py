@@ -25,13 +25,13 @@ TABLE_FILTERS = "Table (*.csv)"
 
 
 class RunActions:
-    """The actions of the runs panel, for the selected run or one that is given.
+    """The actions of the runs panel, for the selected run or the run with a given number.
 
     Attributes
     ----------
     buttons : dict of str to QToolButton
     row : QHBoxLayout
-        Where they are.
+        The layout of the buttons.
     """
 
     def __init__(self, panel: QWidget, tree: RunTree, store: Store) -> None:
@@ -59,7 +59,7 @@ class RunActions:
         return tool_button(tip, image="beside", text="Compare", menu=menu)
 
     def sync(self, session: Session) -> None:
-        """Show which actions can be done."""
+        """Enable the buttons of the actions that the shown run allows."""
         run = session.run_shown
         self.buttons["compare"].setEnabled(run is not None and run.last is not None)
         for command in filter(None, RUN_COMMANDS):
@@ -72,7 +72,7 @@ class RunActions:
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         run = session.run(number)
         assert run is not None
-        # A click with the right button chooses no row: which one is meant, the menu says.
+        # A right click selects no row: the menu's first line names its run.
         menu.addAction(f"Run {number}: {run_words(run)}").setEnabled(False)
         menu.addSeparator()
         beside = session.view.beside == number
@@ -98,7 +98,7 @@ class RunActions:
         return lambda: command.do(self, number)
 
     def show_beside(self, number: int) -> None:
-        """Show a run beside the shown one, or end that."""
+        """Show a run beside the shown one; if it is there already, end the comparison."""
         session = self.store.session
         if number != session.shown:
             ends = session.view.beside == number
@@ -122,12 +122,12 @@ class RunActions:
         self._window.say(f"Run {number} removed (Ctrl+Z brings it back)")
 
     def copy_table(self, _number: int | None = None) -> None:
-        """Put the table into the clipboard, for a spreadsheet."""
+        """Copy the table of all runs to the clipboard, with tabs, for a spreadsheet."""
         QApplication.clipboard().setText(table_text(self.store.session.runs, "\t"))
         self._window.say("Copied the table of runs")
 
     def export_table(self, _number: int | None = None) -> None:
-        """Ask for a name and write the table."""
+        """Ask for a file name and write the table of all runs as CSV."""
         session = self.store.session
         folder = session.path.parent if session.path is not None else Path.home()
         stem = session.path.stem if session.path is not None else "mesh"
@@ -155,5 +155,7 @@ RUN_COMMANDS: tuple[Command | None, ...] = (
             RunActions.export_table, image="table"),
 )
 # fmt: on
-"""What the buttons and the menu of a row offer: done, given `RunActions` and maybe the number of
-a run, to that or to the chosen one; enabled by a `Run`."""
+"""The buttons' commands, which the menu of a row has too (None: a separator in the menu).
+
+``do`` is called with the `RunActions`, and from the menu with the number of its run; ``enabled``
+is called with a `Run`."""

@@ -1,4 +1,4 @@
-"""The list of the runs: numbers in columns, and a line of words below them."""
+"""The list of the runs: a row has two lines, numbers in columns and words below them."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -24,10 +24,15 @@ from slideviz.gui.widgets.labels import ModelIndex, wrapped
 from slideviz.session.state import Session
 
 RUN, MIN, MEAN, INVERTED = range(4)
+"""The columns of the list."""
+
 NUMBER = Qt.ItemDataRole.UserRole
 WORDS, NAME = NUMBER + 1, NUMBER + 2
-"""What a row keeps beside its texts: the number of its run, the line below, and its own name."""
+"""Item data roles of column `RUN`: the run's number, the row's second line, the run's own name."""
+
 PAD = 4
+"""Space around the text of a row, in pixels."""
+
 TIPS = (
     "Number, and name (F2) or method; below it what sets it apart. Ctrl+click shows it beside.",
     "Lowest quality of a cell after the last step; the best of the runs with one motion is bold.",
@@ -37,12 +42,12 @@ TIPS = (
 
 
 class _FirstLine(QStyledItemDelegate):
-    """Draws a cell in the upper half of its row: the lower half is one line for all columns.
+    """The delegate that draws an item in the upper half of its row, and edits a run's name.
 
     Signals
     -------
     renamed(int, str)
-        A run got another name, by its number.
+        The number of a run, and its new name.
     """
 
     renamed = Signal(int, str)
@@ -82,7 +87,7 @@ class _FirstLine(QStyledItemDelegate):
 
     def setEditorData(self, editor: QWidget, index: ModelIndex) -> None:
         assert isinstance(editor, QLineEdit)
-        # The row changes while its run goes on; what is being typed stays.
+        # Qt calls this again when the row changes, as its run goes on: keep what is being typed.
         if not editor.isModified():
             editor.setText(index.data(NAME))
 
@@ -98,7 +103,7 @@ class _FirstLine(QStyledItemDelegate):
 
 
 def text_colour(option: QStyleOptionViewItem, plain: QPalette.ColorRole) -> QColor:
-    """Return the colour of letters in a row, selected or not."""
+    """Return the text colour of a row: ``plain`` of the palette, or that of a selected row."""
     chosen = bool(option.state & QStyle.StateFlag.State_Selected)
     active = bool(option.state & QStyle.StateFlag.State_Active)
     group = QPalette.ColorGroup.Active if active else QPalette.ColorGroup.Inactive
@@ -114,14 +119,14 @@ class Seen(NamedTuple):
 
 
 class RunTree(QTreeWidget):
-    """A row for each run: numbers in columns, and below them a line over the whole width.
+    """The list of runs: per row numbers in columns, and below them a line over the whole width.
 
     Signals
     -------
     beside_wanted(int)
-        A run was clicked with Ctrl, by its number.
+        The number of a run that was clicked with Ctrl.
     renamed(int, str)
-        A run got another name, by its number.
+        The number of a run, and its new name.
     """
 
     beside_wanted = Signal(int)
@@ -159,7 +164,7 @@ class RunTree(QTreeWidget):
 
     @property
     def number(self) -> int | None:
-        """Return the number of the run whose row is selected."""
+        """Return the number of the run whose row is selected, or None."""
         item = self.currentItem()
         return None if item is None else item.data(RUN, NUMBER)
 
@@ -187,14 +192,14 @@ class RunTree(QTreeWidget):
                 self.beside_wanted.emit(item.data(RUN, NUMBER))
             event.accept()
             return
-        # A double click begins with a click, which shows the run: what was shown before it is
-        # what the run is to be compared with.
+        # A double click begins with a click, which shows the run: keep what was shown before,
+        # as a double click compares the run with that.
         now = self.session()
         self.seen_before = Seen(now.shown, now.view.frame, now.view.beside)
         super().mousePressEvent(event)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        # A drag with Ctrl or the right button chooses nothing.
+        # A drag with Ctrl or the right button selects no row.
         if event.buttons() == Qt.MouseButton.LeftButton and not event.modifiers():
             super().mouseMoveEvent(event)
 
@@ -208,7 +213,7 @@ class RunTree(QTreeWidget):
 
     def dataChanged(self, first: ModelIndex, last: ModelIndex, roles: Sequence[int] = ()) -> None:
         super().dataChanged(first, last, roles)
-        # The line below spans all columns; Qt draws only the one that has changed.
+        # The second line spans all columns, but Qt repaints only the changed column.
         self.viewport().update()
 
     def drawRow(self, painter: QPainter, option: QStyleOptionViewItem, index: ModelIndex) -> None:

@@ -20,17 +20,24 @@ from slideviz.sections.model import Section, Triple
 from slideviz.session import section_start
 
 STEPS = 1000
-"""Places of the slider."""
+"""Positions of the slider."""
 
 FREE = "free"
 AXES: dict[str, Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 class SectionEditor(QWidget):
-    """The editor of a section, which emits each valid change.
+    """The editor of a section, which emits the section after each valid change.
 
-    What the slider is dragged through is emitted once per turn of the event loop, so that drawing
-    never falls behind the mouse.
+    While the slider is dragged, at most one section is emitted per turn of the event loop, so that
+    drawing never falls behind the mouse.
+
+    Signals
+    -------
+    changed(Section)
+        The section as edited.
+    dragging(bool)
+        The slider was pressed (True) or released (False).
     """
 
     changed = Signal(object)
@@ -43,7 +50,8 @@ class SectionEditor(QWidget):
         self._mesh: Mesh | None = None
         self._span = (0.0, 1.0)
         self._span_of: tuple[object, ...] = ()
-        # The fields stay while numbers are typed into them, also those of an axis.
+        # Whether the fields of a free direction are shown; they stay while a direction is typed,
+        # even along x, y or z.
         self._free = self._typing = False
         self._place: int | None = None
         self._make_fields()
@@ -91,7 +99,7 @@ class SectionEditor(QWidget):
     def show_section(
         self, section: Section | None, mesh: Mesh | None, place: int | None = None
     ) -> None:
-        """Show a section of a mesh, or nothing; ``place`` is its row in the list."""
+        """Show a section of a mesh; ``place`` is its row in the list. None hides the editor."""
         other = (place, _way(section)) != (self._place, _way(self._section))
         self._section, self._place = section, place
         self.setVisible(section is not None and mesh is not None)
@@ -100,10 +108,10 @@ class SectionEditor(QWidget):
         if mesh is not self._mesh:
             self._mesh, self._points = mesh, section_start.cell_points(mesh)
         terms, flat = section.shape.terms, mesh.dim == 2
-        # The axis of a circle cannot be another.
+        # A circle's axis is always z.
         fixed = flat and bool(terms.point)
         word = _axis_of(section)
-        # Undone or turned by the handle, it is shown as what it is now.
+        # A direction changed elsewhere (undo, handle) is shown as x, y or z again if it is.
         if other and not self._typing:
             self._free = False
         self._free = self._free or word == FREE
@@ -130,14 +138,14 @@ class SectionEditor(QWidget):
         self._sync_place(section)
 
     def _sync_axes(self, flat: bool) -> None:
-        """Offer the axes there are."""
+        """Enable the choice of z, unless the mesh is 2D."""
         at = self.axis.findData("z")
         model = self.axis.model()
         assert isinstance(model, QStandardItemModel)
         model.item(at).setEnabled(not flat)
 
     def _sync_place(self, section: Section) -> None:
-        """Show position or size; the range is looked for again only where it may differ."""
+        """Show position or size; the slider's range is found again only if it may have changed."""
         centre = section.origin if section.shape.terms.point else ()
         key = (self._mesh, section.kind, section.direction, centre)
         if key != self._span_of:
@@ -146,7 +154,7 @@ class SectionEditor(QWidget):
         value, (low, high) = section.shape.position(section), self._span
         self.number.show_value(float(f"{value:.6g}"))
         if self.slider.isSliderDown() or self._soon.isActive():
-            return  # the mouse knows better
+            return  # the user is moving the slider
         share = (value - low) / (high - low) if high > low else 0.0
         with QSignalBlocker(self.slider):
             self.slider.setValue(round(float(np.clip(share, 0.0, 1.0)) * STEPS))
@@ -208,7 +216,7 @@ class SectionEditor(QWidget):
         if self._section is None:
             return
         low, high = self._span
-        # A cylinder has no radius 0, and a plane in the outermost nodes cuts nothing.
+        # A radius of 0 is not allowed, and a plane through the outermost nodes cuts nothing.
         share = np.clip(self.slider.value() / STEPS, 1e-4, 1.0 - 1e-4)
         value = low + float(share) * (high - low)
         self._offer(self._section.shape.at_position(self._section, value))
@@ -219,7 +227,7 @@ def _way(section: Section | None) -> tuple[object, ...]:
 
 
 def _axis_of(section: Section) -> str:
-    """Return x, y or z where the direction is that axis, else ``FREE``."""
+    """Return ``x``, ``y`` or ``z`` if the section's direction is along that axis, else `FREE`."""
     unit = np.asarray(section.direction) / np.linalg.norm(section.direction)
     for word, axis in AXES.items():
         along = float(unit @ np.asarray(axis))

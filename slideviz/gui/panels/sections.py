@@ -44,28 +44,32 @@ HINTS = {
     2: f"Lay a {names(2)} through the mesh to see the cells on it, and their quality along it.",
 }
 BUTTONS_IN_ROW = 3
+"""Most buttons that add a section in one row."""
+
 UNSEEN = "Tick the section in the list to show it."
+"""Tip of the tools of a section that is not shown."""
+
 SIZES = {
     "8.5 cm wide, a column…": Paper.of_cm(8.5, 6.4),
     "17 cm wide, a page…": Paper.of_cm(17.0, 10.6),
     "25 cm wide, a slide…": Paper.of_cm(25.0, 14.0),
     "1600 pixels wide, for the screen…": Paper((1600, 1000)),
 }
-"""Sizes of pictures, with the words of the menu; the height is the most."""
+"""Sizes of pictures by their words in the menu; the heights are limits."""
 
 
 class SectionsPanel(Panel):
-    """The list of the sections, and the editor of the selected one.
+    """The panel of the sections: their list, and the editor of the selected one.
 
     Parameters
     ----------
     section_views : SectionViews
-        The handle and the flat view of that section.
+        The handles and the flat views of the selected section.
 
     Signals
     -------
     picture_wanted(Paper)
-        A picture of that section is to be written.
+        The user wants a picture of the selected section, on this paper.
     """
 
     picture_wanted = Signal(object)
@@ -97,7 +101,7 @@ class SectionsPanel(Panel):
         elide_items(self.list)
         self.list.itemChanged.connect(self._checked)
         self.list.currentRowChanged.connect(self._row_chosen)
-        # For the list alone: elsewhere the key means something else.
+        # For the list alone: elsewhere Delete does something else.
         delete = QShortcut(QKeySequence(QKeySequence.StandardKey.Delete), self.list)
         delete.setContext(Qt.ShortcutContext.WidgetShortcut)
         delete.activated.connect(self._remove)
@@ -181,7 +185,7 @@ class SectionsPanel(Panel):
                 if (item.text(), item.toolTip()) != (text, tip):
                     item.setText(text)
                     item.setToolTip(tip)
-                # A new row has no box at all, which reads as one without its tick.
+                # A new item has no check state, which `checkState` returns as unchecked.
                 if item.data(Qt.ItemDataRole.CheckStateRole) is None or item.checkState() != state:
                     item.setCheckState(state)
             index = session.view.section_index
@@ -249,21 +253,21 @@ class SectionsPanel(Panel):
 
 
 def _concerned(old: Session, new: Session) -> bool:
-    """Tell whether a change is one of the mesh or the sections."""
+    """Return whether the mesh or the sections differ between two sessions."""
     names = ("sections", "section_index", "handle")
     same = (getattr(old.view, name) == getattr(new.view, name) for name in names)
     return old.mesh is not new.mesh or not all(same)
 
 
 def sections_panel(window: Services) -> SectionsPanel:
-    """Return the sections panel of a window."""
+    """Return a new sections panel, connected with a window."""
     panel = SectionsPanel(window.section_views)
     panel.picture_wanted.connect(lambda paper: save_picture(window, paper))
     return panel
 
 
 def save_picture(window: Services, paper: Paper) -> None:
-    """Ask for a name and write a picture of the selected section, as it is shown."""
+    """Ask for a file name and start the job that writes a picture of the selected section."""
     session, section = window.store.session, window.store.session.view.section
     if section is None or session.frame is None or window.runner.busy:
         return

@@ -43,7 +43,7 @@ class WorstPanel(Panel):
     ----------
     store : Store
     fly_to, fly_back : callable
-        Look at a cell; look from where one looked before.
+        Move the camera to a cell; move it back to where it was.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class WorstPanel(Panel):
         self._marked: int | None = None
         self._told: tuple[object, ...] = ()
         self.model = WorstModel()
-        # Its signals hold this panel: with a parent they end with it.
+        # The model's signals keep the panel alive: as its child, the model is deleted with it.
         self.model.setParent(self)
         self.table = self._make_table()
         self.words = words_label()
@@ -101,12 +101,12 @@ class WorstPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def take_theme(self, _scheme: ColorScheme) -> None:
-        """Tell of the marked cell in the colours of another theme."""
+        """Write the facts of the marked cell again, in the colours of another theme."""
         self._told = ()
         self._sync_mark(self.store.session)
 
     def sync(self, session: Session) -> None:
-        """Show the session; while steps are played, the list is filled when there is time."""
+        """Show the worst cells of the session's step; during play, at most every `REST_MS`."""
         there = session.frame is not None
         self.stack.setCurrentWidget(self.table if there else self.words)
         for widget in (self.back, self.export):
@@ -147,7 +147,7 @@ class WorstPanel(Panel):
         self.model.show(worst, axis_of(session))
 
     def _sync_mark(self, session: Session) -> None:
-        """Make the marked cell the current row, and tell of it."""
+        """Make the marked cell the current row, and show its facts."""
         cell = session.view.marked_cell
         row = self.model.row_of(cell)
         current = self.table.currentIndex()
@@ -164,7 +164,7 @@ class WorstPanel(Panel):
         if cell is not None:
             key = session.frame, cell, axis_of(session)
             if key != self._told:
-                # The nearest boundary of a large mesh takes a while.
+                # Finding the nearest boundary of a large mesh takes a while.
                 self._told = key
                 self.info.setText(info_text(session, cell))
                 self.info.setToolTip(info_text(session, cell, every=True))
@@ -172,7 +172,7 @@ class WorstPanel(Panel):
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         session = self.store.session
-        # Behind another tab nothing was listed.
+        # While the panel was behind another tab, the list was not filled.
         if session.frame is not None and self._key(session) != self._seen:
             QTimer.singleShot(0, self, lambda: self.sync(self.store.session))
 
@@ -197,12 +197,12 @@ class WorstPanel(Panel):
             self._go(index.row())
 
     def unmark(self) -> None:
-        """Take the mark away."""
+        """Remove the mark from the marked cell."""
         if self.store.session.view.marked_cell is not None:
             self.store.change(changes.mark_cell, None)
 
     def copy_rows(self) -> None:
-        """Copy the selected rows, or all, to the clipboard, with a line of names."""
+        """Copy the selected rows (all, if none is) to the clipboard, below the column names."""
         if self.model.worst is None:
             return
         chosen = sorted(index.row() for index in self.table.selectionModel().selectedRows())
@@ -226,9 +226,9 @@ class WorstPanel(Panel):
 
 
 def info_text(session: Session, cell: int, every: bool = False) -> str:
-    """Return the facts of a cell of the shown step, as rich text of few lines.
+    """Return the facts of a cell of the shown step, as rich text of a few lines.
 
-    ``every`` tells every corner.
+    ``every``: list the Jacobian at every corner, not only their range.
     """
     assert session.frame is not None
     info = cell_info(session.frame, cell)

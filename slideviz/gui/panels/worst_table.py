@@ -1,4 +1,4 @@
-"""The table of the worst cells: model, order of the rows, keys."""
+"""The table of the worst cells: its model, which can be sorted, and its view."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -20,17 +20,23 @@ from slideviz.session.locate import Around, coordinates, decimals
 SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
 COLUMNS = ("Cell", "Quality", "Worst\nstep")
 CELL, QUALITY, SINCE = range(3)
-"""The first columns; the coordinates follow, and the type where there are several."""
+"""The first columns; then come the coordinates, and the cell type if there are several."""
+
 LAST = "Type"
+"""Title of the last column, if the cells have several types."""
+
 ARROW, GAP = 20, "\N{NO-BREAK SPACE}"
-"""Pixels of the sign of the order in a header, and what is between it and the words."""
+"""Width of the sort arrow in a header, in pixels, and the space between title and arrow."""
+
 _RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
 _LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
 _MIDDLE = int(Qt.AlignmentFlag.AlignCenter)
 FEWEST, MOST = 4, 5
-"""Digits of a quality."""
+"""Least and most decimals shown of a quality."""
+
 MOST_MORE = 4
-"""Digits that coordinates have at most where the usual ones do not tell cells apart."""
+"""Most decimals added to coordinates if the usual ones do not tell cells apart."""
+
 TIPS = {
     CELL: "Number of the cell, from 0 as in an SU2 file",
     QUALITY: "Quality of the step that is shown",
@@ -39,7 +45,7 @@ TIPS = {
 
 
 def digits_apart(values: FloatArray) -> int:
-    """Return the digits behind the point by which most of some values (n,) differ."""
+    """Return the number of decimals, `FEWEST` to `MOST`, that tell most of values (n,) apart."""
     different = len(np.unique(values.round(MOST)))
     for digits in range(FEWEST, MOST):
         if not len(values) or len(np.unique(values.round(digits))) > 0.5 * different:
@@ -60,7 +66,18 @@ def digits_more(places: FloatArray, digits: Sequence[int]) -> int:
 
 
 class WorstModel(QAbstractTableModel):
-    """The model of the worst cells: rows in any order."""
+    """The Qt model of the worst cells.
+
+    Attributes
+    ----------
+    worst : WorstCells or None
+    names : tuple of str
+        Titles of the columns of coordinates.
+    places : (n, d) float64
+        The coordinates, in mesh units or degrees.
+    order : (n,) int64
+        The index in ``worst`` of the cell in each row.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -75,7 +92,7 @@ class WorstModel(QAbstractTableModel):
         self._by, self._down = QUALITY, False
 
     def show(self, worst: WorstCells | None, around: Around | None = None) -> None:
-        """Show other worst cells, with coordinates about an axis if one is given."""
+        """Show other worst cells, in cylindrical coordinates about an axis if one is given."""
         self.beginResetModel()
         self.worst = worst
         if worst is not None:
@@ -92,11 +109,11 @@ class WorstModel(QAbstractTableModel):
         self.endResetModel()
 
     def cell(self, row: int) -> int:
-        """Return the cell of a row."""
+        """Return the index in the mesh of the cell in a row."""
         return int(self.worst.cells[self.order[row]])
 
     def row_of(self, cell: int | None) -> int:
-        """Return the row of a cell, or -1."""
+        """Return the row of a cell of the mesh; -1 if it is not in the table."""
         if self.worst is None or cell is None:
             return -1
         found = np.flatnonzero(self.worst.cells[self.order] == cell)
@@ -130,7 +147,7 @@ class WorstModel(QAbstractTableModel):
             return self._alignment(section)
         if role != Qt.ItemDataRole.DisplayRole:
             return None
-        # Qt draws the sign of the order right behind the letters.
+        # Qt draws the sort arrow right behind the last letter.
         return self.headers[section] + (GAP if section == QUALITY == self._by else "")
 
     def data(self, index: ModelIndex, role: int = Qt.ItemDataRole.DisplayRole) -> object:
@@ -156,7 +173,7 @@ class WorstModel(QAbstractTableModel):
         if axis == len(self.names):
             return SHORT.get(worst.kinds[at], worst.kinds[at])
         value, digits = float(self.places[at, axis]), self._decimals[axis]
-        # Without a sign before zeros.
+        # The sum turns -0 into 0; a column of tiny numbers is shown in scientific notation.
         if digits - self._more < 8:
             return f"{round(value, digits) + 0.0:.{digits}f}"
         return f"{value:.{3 + self._more}g}"
@@ -168,7 +185,7 @@ class WorstModel(QAbstractTableModel):
         self.endResetModel()
 
     def _arrange(self) -> None:
-        """Order the rows; equal ones stay in the order of their quality."""
+        """Sort the rows by the selected column; equal ones stay in the order of their quality."""
         if self.worst is None:
             self.order = np.empty(0, np.int64)
             return
@@ -186,9 +203,13 @@ class WorstModel(QAbstractTableModel):
 
 
 class WorstTable(QTableView):
-    """The table of the worst cells, which emits the row to which the keys have gone.
+    """The view of the worst cells.
 
-    The current row itself would tell too much: the focus alone makes the first one current.
+    Signals
+    -------
+    gone_to(int)
+        The row to which a key moved, or on which Return was pressed. Qt's own signal of the
+        current row is emitted too often: the focus alone makes the first row current.
     """
 
     gone_to = Signal(int)
@@ -223,7 +244,7 @@ class WorstTable(QTableView):
         self.setSortingEnabled(True)
 
     def _share(self) -> None:
-        """Give every column what its numbers need; while it is the same one, never less again."""
+        """Measure the width that each column's texts need; it never shrinks for the same columns."""
         model = self.model()
         assert isinstance(model, WorstModel)
         if not model.rowCount():
@@ -236,16 +257,16 @@ class WorstTable(QTableView):
         for column, words in enumerate(self._shared):
             texts = [model.index(row, column).data() for row in rows]
             room = max(metrics.horizontalAdvance(text) for text in (*texts, *words.split()))
-            # What Qt would take is more than there is.
+            # Qt's own size hint is wider than the panel has room for.
             room += 8 + (ARROW if column == QUALITY else 0)
             self._needed.append(max(room, before[column]))
         if self._needed != before:
             self._spread()
 
     def _spread(self) -> None:
-        """Give every column its part of the width, unless somebody has chosen others."""
+        """Spread the spare width over the columns, unless the user has resized one."""
         now = [self.columnWidth(column) for column in range(len(self._needed))]
-        # The last one takes what is left.
+        # The last column stretches: its width says nothing about the user.
         if not self._needed or (self._given and now[:-1] != self._given[:-1]):
             return
         spare = max(self.viewport().width() - sum(self._needed), 0) // len(self._needed)

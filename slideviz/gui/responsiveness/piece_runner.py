@@ -1,4 +1,4 @@
-"""Jobs in pieces: those that draw in turns of the event loop, the others beside the window."""
+"""Run a generator's work in pieces: in the event loop if it draws, else in a thread."""
 
 from __future__ import annotations
 
@@ -16,16 +16,18 @@ from slideviz.session.pieces import Beside
 
 
 class PieceRunner(QObject):
-    """The runner of a generator of `slideviz.session.pieces`, a piece in each turn.
+    """Advances a generator (see `slideviz.session.pieces`) by one piece per turn of the event loop.
+
+    A piece that it yields as a `Beside` is run in a thread first, and its result sent back.
 
     Signals
     -------
     came(object)
-        Something that the generator yielded, neither None nor a `Beside`.
+        A value that the generator yielded, if neither None nor a `Beside`.
     done(object)
-        What it returned. Nothing is emitted of one that was stopped.
+        The generator's return value. Nothing is emitted for one that was stopped.
     failed(Exception)
-        What it raised.
+        The error that it raised.
     """
 
     came = Signal(object)
@@ -46,17 +48,17 @@ class PieceRunner(QObject):
 
     @property
     def busy(self) -> bool:
-        """Tell whether a generator is being run."""
+        """Return whether a generator is being run."""
         return self._pieces is not None
 
     def start(self, pieces: Generator[object, Any, Any]) -> None:
-        """Run a generator, instead of the one before."""
+        """Run a generator; stop the one before, if it still runs."""
         self.stop()
         self._pieces = pieces
         self._timer.start()
 
     def stop(self) -> None:
-        """Close the generator, which cleans up."""
+        """Stop and close the generator, which can then clean up in its ``finally``."""
         self._timer.stop()
         if self._runner.busy:
             self._runner.close()
@@ -74,7 +76,7 @@ class PieceRunner(QObject):
             self._pieces = None
             self.done.emit(end.value)
         except Exception as error:
-            # Whatever it is: a generator that raised would look like one that is done.
+            # Any error: otherwise the signal `failed` would never come.
             self._pieces = None
             self.failed.emit(error)
         else:
@@ -87,7 +89,7 @@ class PieceRunner(QObject):
 
 
 def raise_again(error: Exception) -> None:
-    """Raise the error of a generator that nobody waits for, to be shown as any other fault."""
+    """Raise an error: a slot for `failed` that passes it to the window's handler of exceptions."""
     raise error
 
 

@@ -12,12 +12,12 @@ from slideviz.gui.responsiveness.timers import later
 
 
 class RepaintCoalescer(QObject):
-    """The coalescer of repaints: a view and the widgets around it are painted together, soon.
+    """Delays repaints so that a view and the widgets around it are painted together, soon.
 
-    After a scene has changed, Qt answers clicks and timers first; then the view is drawn. Labels
-    around the view change at the same time, and Qt would paint each of them at once. Beside a view
-    that OpenGL draws, every such paint sends the whole window to the screen, 10 to 20 ms each
-    time; so they wait for the view.
+    After a change of the scene, Qt handles pending clicks and timers first; then the view is
+    drawn. Labels around it change at the same time, and Qt would paint each at once. In a window
+    with an OpenGL view, every such paint composes the whole window (10 to 20 ms without a graphics
+    card), so the window's update requests are held back until the view is painted.
     """
 
     def __init__(self, view: QWidget) -> None:
@@ -38,7 +38,7 @@ class RepaintCoalescer(QObject):
             self._timer.start()
 
     def end(self) -> None:
-        """Stop; the window is painted as any other."""
+        """Stop delaying repaints of the window."""
         self._timer.stop()
         self._let_go()
 
@@ -54,6 +54,6 @@ class RepaintCoalescer(QObject):
     def eventFilter(self, _window: QObject, event: QEvent) -> bool:
         if event.type() != QEvent.Type.UpdateRequest or not self._timer.isActive():
             return False
-        # Asked for again in a millisecond: Qt takes it for done, and asks for none meanwhile.
+        # The event is filtered out and posted again by `_let_go`: Qt takes it for handled.
         self._held = True
         return True

@@ -1,88 +1,106 @@
-"""Every number that keeps the window answering: setting, value, reason.
+"""The constants that keep the window responsive, each with its reason.
 
-Nowhere else in ``gui/`` is there a thread, a priority, garbage, or a time to wait; a test holds the
-rest against that. Besides: `slideviz.session.pieces.PART_CELLS` (faces drawn in one piece), and
-`slideviz.rbf` compiles its loops with ``nogil`` and does small work in one thread.
+Nowhere else in ``gui/`` are threads, priorities, garbage collection or waiting times set; a test
+checks that. Related: `slideviz.session.pieces.PART_CELLS` (cells drawn in one piece), and
+`slideviz.rbf`, which compiles its loops with ``nogil`` and does small work in one thread.
 """
 
 # Interpreter, threads and garbage ----------------------------------------------------------
 
 SWITCH_S = 0.00005
-"""How long a thread may keep the interpreter to itself when another wants it.
+"""How long a thread may keep the interpreter (GIL) when another one waits for it, in seconds.
 
-A picture asks for the interpreter a hundred times: at Python's 5 ms each, or even at one, that
-would be seen while another thread draws a plot.
+Drawing a frame takes the interpreter a hundred times: at Python's default of 5 ms each, or even at
+1 ms, the view would stutter while another thread draws a plot.
 """
 NICENESS = 5
-"""How far a job stands back behind the window where both want the processor.
+"""How much the nice value of a job's thread is above that of the GUI thread.
 
-Not further: while it keeps the interpreter, the window waits for it, and where other programs are
-busy, too, it would hardly go on.
+Not more: the window waits for a job that holds the interpreter, and beside other busy programs the
+job would hardly advance.
 """
 NUMPY_THREADS = 1
-"""Of NumPy's BLAS, where SciPy, which solves the large systems, has one of its own.
+"""Number of threads of NumPy's BLAS, if SciPy, which solves the large systems, has its own.
 
-The window multiplies, too, and on a busy machine the threads of BLAS wait for each other: 0.14 s
-instead of 3 ms for the points of a large mesh.
+The GUI thread multiplies matrices, too; on a busy machine the threads of BLAS wait for each other:
+0.14 s instead of 3 ms for the points of a large mesh.
 """
 GARBAGE_MS = 200
-"""Between two looks for garbage, at least: a look stops the window for some ms."""
+"""Least time between two garbage collections: one blocks the window for some ms."""
+
 GARBAGE_OBJECTS = 2000
-"""Objects made since the last look that are worth another one."""
+"""Least number of objects made since the last garbage collection for another one."""
+
 GARBAGE_REST_TIMES = 20
-"""The next look is not before so many times as long as one took: it takes 5 % at most."""
+"""Least time between two garbage collections, relative to the last one's duration: 5 % at most."""
+
 WARM_UP_MS = 300
-"""Before the numerics are compiled: the window is drawn first, which that slows down a little."""
+"""Delay from showing the window to compiling the numerics, which would slow down its drawing."""
+
 CLOSING_S = 1.0
-"""How long a window that closes waits for its job; a library may keep its thread for minutes."""
+"""How long a closing window waits for its job's thread, which a library may keep for minutes."""
 
 # Painting ----------------------------------------------------------------------------------
 
 REPAINT_MS = 1
-"""Until a changed view is painted.
+"""Delay from a change to the view's repaint.
 
-Not 0: that would wait for every other timer that is due, one that plays for example.
+Not 0: the repaint would wait for all other timers that are due, such as the player's.
 """
+
 TURN_MS = 1
-"""Between two pieces of work; not 0, so that other timers and clicks come between them."""
+"""Delay between two pieces of work; not 0, so that other timers and clicks are handled between."""
+
 TICK_MS = 33
-"""Shortest time between two steps that are played: 30 pictures in a second look smooth.
+"""Shortest interval of the player's timer: 30 frames per second look smooth.
 
-Where drawing takes longer, too, steps are left out.
+If drawing takes longer, steps are skipped.
 """
-SLOW_FRAME_S = 0.04
-"""A picture that takes longer is drawn with fewer facets while the mouse moves the camera.
 
-Two such in a row, and what Qt does with them, are felt."""
+SLOW_FRAME_S = 0.04
+"""Drawing time of a frame above which boundaries are drawn coarse while the mouse moves something.
+
+Two frames of that time in a row are felt as a delay."""
+
 STILL_MS = 250
-"""A camera that the mouse has not moved for so long is at rest, and everything is drawn again."""
+"""Time without a mouse movement after which the boundaries are drawn in full detail again."""
+
 NEWS_S = 0.1
-"""Between two news of a job, at least: each time the whole window goes to the screen again."""
+"""Least time between two progress reports of a job, as each one repaints the whole window."""
+
 COUNTING_MS = 300
-"""Between two counts of an error that comes again and again, for the same reason."""
+"""Delay from a repeated error to showing its count, as each one repaints the whole window."""
 
 # Plots and tables --------------------------------------------------------------------------
 
 REST_MS = 200
-"""Between two drawings of a plot or table while steps are played, at least."""
+"""Least time between two drawings of a plot or table while steps are played."""
+
 REST_TIMES, MOST_REST = 4.0, 4
-"""A plot rests so many times as long as its drawing took, but not more than so many ``REST_MS``."""
+"""Pause of a plot relative to the time its drawing took; and its limit, in units of `REST_MS`."""
+
 LOOK_MS = 8
-"""How often it is looked whether a plot is there: unseen at half a picture's time."""
+"""Interval at which a finished plot is polled for: half the time of a screen's frame."""
 
 # After what the user does ------------------------------------------------------------------
 
 SELECTING_MS = 120
-"""Cells are selected in a histogram while the mouse moves, but not with each of its pixels."""
+"""Delay from a drag in the histogram to selecting the cells: not once per mouse event."""
+
 PREVIEW_MS = 120
-"""The preview of a picture or film waits for the end of what is typed."""
+"""Delay from the last change of an option to drawing the preview of a picture or film."""
+
 TABLE_MS = 150
-"""A table of motions is checked so long after the last key: a long one takes a while."""
+"""Delay from the last key to checking a table of displacements, which takes a while if long."""
+
 ROWS_MS = 250
-"""Results of designs are shown so long after the first of them came, all together."""
+"""Delay from the first new result of a design to showing all results that came until then."""
+
 INTERSECTION_MS = 200
-"""Boundaries are checked for intersections so long after the last change: it takes a job."""
+"""Delay from the last change of the case to the job that checks boundaries for intersections."""
+
 AUTOSAVE_MS = 5000
-"""The session is written so long after the first change that is not in the file yet."""
+"""Delay from the first unsaved change to writing the session."""
+
 READ_MS = 100
-"""How often a run that waits for its file looks whether that is read."""
+"""Interval at which a run that was asked for at the start checks whether its file is read."""

@@ -1,4 +1,4 @@
-"""Threads beside the window, all of lower priority, and garbage collection."""
+"""Threads of lower priority than the GUI thread, and garbage collection in the GUI thread."""
 
 from __future__ import annotations
 
@@ -27,9 +27,12 @@ from slideviz.gui.responsiveness.settings import (
 
 
 def ready_numerics() -> None:
-    """Import the numerics before there is another thread, and give their threads low priority."""
-    # Here, once: two threads that import Numba at the same time (the warm-up and a run) find it
-    # half-made.
+    """Import the numerics before any thread is started, and lower their threads' priority.
+
+    NumPy's BLAS gets `NUMPY_THREADS` if SciPy has a BLAS of its own.
+    """
+    # Once, here: if two threads (the warm-up and a run) import Numba at the same time, one finds
+    # it partly initialized.
     import_module("slideviz.deformation.solver")
     hold_libraries_back()
     blas = ThreadpoolController().select(user_api="blas").lib_controllers
@@ -40,12 +43,12 @@ def ready_numerics() -> None:
 
 
 def be_quick() -> GarbageCollector:
-    """Set Python up for a window that answers while other threads compute.
+    """Set Python's thread switching and garbage collection up for a responsive window.
 
     Returns
     -------
     GarbageCollector
-        Looks for garbage from now on; it belongs to the application.
+        Collects garbage from now on; a child of the application.
     """
     # The modules live as long as the window, and need not be searched for garbage.
     gc.collect()
@@ -57,9 +60,10 @@ def be_quick() -> GarbageCollector:
 
 
 def start_thread(work: Callable[[], object], name: str, daemon: bool = True) -> Thread:
-    """Return a started thread of lower priority than the window, as are those that it starts.
+    """Start a thread of lower priority than the GUI thread, and return it.
 
-    A daemon: the program must be able to end while a library keeps its thread.
+    Threads that it starts inherit the priority. It is a daemon by default, so that the program can
+    end while a library keeps the thread.
     """
 
     def run() -> None:
@@ -74,14 +78,14 @@ def start_thread(work: Callable[[], object], name: str, daemon: bool = True) -> 
 def stand_back(thread: int | None = None) -> None:
     """Lower the priority of a thread (default: this one), and of those that it starts.
 
-    Without a graphics card the picture is drawn by the same processor that computes.
+    Without a graphics card, the GUI thread draws on the processors that compute. Only on Linux.
 
     Parameters
     ----------
     thread : int, optional
-        Its number in the system.
+        Its native id (see `threading.get_native_id`).
     """
-    if sys.platform == "linux":  # only there it is for one thread, not for the whole program
+    if sys.platform == "linux":  # elsewhere a priority is that of the whole process
         thread = get_native_id() if thread is None else thread
         with contextlib.suppress(OSError):
             before = os.getpriority(os.PRIO_PROCESS, thread)
@@ -89,10 +93,10 @@ def stand_back(thread: int | None = None) -> None:
 
 
 def hold_libraries_back() -> None:
-    """Lower the priority of the threads of libraries, BLAS for example.
+    """Lower the priority of the threads that libraries such as BLAS have started. Called once.
 
-    They are as many as there are processors, begin when the library is imported, and bear the name
-    of the program, unlike those of Qt and of the graphics. Called once.
+    They are recognized by their name: unlike threads of Qt and of the graphics driver, they have
+    that of the main thread.
     """
     tasks = Path("/proc/self/task")
     if not tasks.is_dir():
@@ -107,11 +111,10 @@ def hold_libraries_back() -> None:
 
 
 class GarbageCollector(QObject):
-    """The collector of garbage in the window's thread, in place of Python's in any thread.
+    """Collects garbage in the GUI thread, instead of Python's automatic collection in any thread.
 
-    That thread keeps the interpreter to itself meanwhile: one that computes, and stands back
-    behind the window, for up to 90 ms. Besides, what belongs to Qt and VTK may end in the window's
-    thread only.
+    A collection holds the interpreter: in a computing thread of low priority for up to 90 ms.
+    Besides, objects of Qt and VTK may be deleted in the GUI thread only.
     """
 
     def __init__(self, parent: QObject | None = None) -> None:
@@ -131,12 +134,12 @@ class GarbageCollector(QObject):
         gc.enable()
 
     def look(self) -> None:
-        """Collect garbage, if much was made since the last time."""
+        """Collect garbage, if `GARBAGE_OBJECTS` were made since the last time."""
         if gc.get_count()[0] < GARBAGE_OBJECTS:
             return
         began = time.perf_counter()
-        # All of it: what survives is little where the modules are left out (`gc.freeze`), and the
-        # longer garbage waits, the longer it takes.
+        # All generations: few objects survive, as the modules are left out (`gc.freeze`), and the
+        # more garbage there is, the longer a collection takes.
         gc.collect()
         took_ms = 1000.0 * (time.perf_counter() - began)
         self._timer.setInterval(max(GARBAGE_MS, round(GARBAGE_REST_TIMES * took_ms)))

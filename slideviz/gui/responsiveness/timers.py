@@ -1,4 +1,4 @@
-"""Timers that call once for many events in quick succession."""
+"""Single-shot timers that merge many events in quick succession into one call."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from qtpy.QtCore import QObject, QTimer
 
 
 def later(parent: QObject | None, call: Callable[[], object], wait_ms: int = 0) -> QTimer:
-    """Return a timer that calls once, ``wait_ms`` after it was last started.
+    """Return a single-shot timer that calls ``call``, ``wait_ms`` after it was last started.
 
-    At 0 ms that is the next turn of the event loop: once for all that happens in this one.
+    At 0 ms it calls in the next turn of the event loop, once for all starts in this one.
     """
     timer = QTimer(parent)
     timer.setSingleShot(True)

@@ -1,4 +1,4 @@
-"""Compilation of numerics and graphics beside the window, for which the first run need not wait."""
+"""Warm-up after the start: shaders compiled below the start page, numerics in a thread."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ from slideviz.session import jit_warmup
 
 
 def prepare_drawing(view: Any, stage: Stage) -> None:
-    """Draw a face in every way that meshes are drawn, unseen below the start page.
+    """Draw a face with each combination of lighting and scalars, unseen below the start page.
 
-    What the graphics compile for that takes a tenth of a second each time, which would be felt
-    later.
+    OpenGL compiles shaders for each, which takes a tenth of a second and would be felt later.
     """
     face = pv.Plane(i_resolution=1, j_resolution=1)
     face.cell_data[VALUES] = [0.5]
@@ -43,12 +42,13 @@ def prepare_drawing(view: Any, stage: Stage) -> None:
 
 
 class WarmupThread(QObject):
-    """The thread of `slideviz.session.jit_warmup.warm_up`, for which no exit waits.
+    """The daemon thread that runs `slideviz.session.jit_warmup.warm_up` once.
 
     Signals
     -------
     compiling(bool)
-        True when compilation began, false when all of it is done; neither when nothing had to be.
+        True when the first compilation begins, False when all are done; not emitted if everything
+        was compiled before.
     """
 
     compiling = Signal(bool)
@@ -70,14 +70,14 @@ class WarmupThread(QObject):
         self.blockSignals(True)
 
     def _run(self) -> None:
-        # Numba's threads begin here, and stay as far back as this one.
+        # Numba's threads are started here, and inherit this thread's low priority.
         try:
             jit_warmup.warm_up(self._begun, self._stop.is_set)
-        except RuntimeError:  # a program that ends gives its threads no more work
+        except RuntimeError:  # the interpreter shuts down, and no thread pool takes work
             if not self._stop.is_set():
                 raise
             return
-        # What was imported stays: to look through all of it for garbage takes 100 ms each time.
+        # The imported modules stay: scanning them would take 100 ms per garbage collection.
         gc.freeze()
         if self._compiles:
             self._tell(False)

@@ -1,8 +1,8 @@
-"""Long jobs beside the window: one thread, one job at a time, one end for each.
+"""Run long jobs in a thread, one at a time, each ending with exactly one signal.
 
-The sender of the signals lives in the window's thread, so that every slot runs there; the job
-itself runs in a thread and never touches Qt or VTK. What is reported meanwhile goes through a
-mailbox: of `Doing` only the newest is delivered, everything else in full.
+The object with the signals lives in the GUI thread, so that every slot runs there; the job itself
+runs in its thread and never uses Qt or VTK. Its reports go through a mailbox: of `Doing` only the
+newest is delivered, everything else in full.
 """
 
 from __future__ import annotations
@@ -26,16 +26,19 @@ log = logging.getLogger("slideviz")
 
 
 class JobRunner(QObject):
-    """The runner of jobs, ``function(*values, report, stopped)``, beside the window.
+    """Runs jobs, ``function(*values, report, stopped)``, in a thread, one at a time.
+
+    A job calls ``report(item)`` for its signals, and ``stopped()``, which is True after `cancel`.
 
     Signals
     -------
     doing(Doing)
-        The newest news.
+        The newest progress that the job reported.
     kept(list)
-        Everything else that was reported since the last time, in order.
+        All other items reported since the last emission, in order.
     finished(object), cancelled(), failed(Exception)
-        Exactly one of them ends each job, after all that it reported was delivered.
+        The job returned a value; raised `Cancelled`; raised another error. Exactly one is emitted
+        per job, after all its reports.
     """
 
     doing = Signal(object)
@@ -61,11 +64,11 @@ class JobRunner(QObject):
 
     @property
     def alive(self) -> bool:
-        """Tell whether the thread of a job is alive, also when the job was closed."""
+        """Return whether the thread of the last job is alive, even after `close`."""
         return self._thread is not None and self._thread.is_alive()
 
     def start(self, function: Callable[..., Any], *values: Any) -> None:
-        """Start a job; none may be running."""
+        """Start a job in a new thread; none may be running."""
         assert not self.busy, "a job is running"
         self.busy = True
         self._stop = Event()
@@ -73,11 +76,11 @@ class JobRunner(QObject):
         self._thread = start_thread(work, "slideviz")
 
     def cancel(self) -> None:
-        """Ask the job to end, within a second, with ``cancelled``."""
+        """Ask the job to stop, which it does within a second, with ``cancelled``."""
         self._stop.set()
 
     def close(self) -> bool:
-        """End the job without a signal; return whether its thread has ended."""
+        """Stop the job without a signal, wait `CLOSING_S`; return whether its thread has ended."""
         self._stop.set()
         self._closed = True
         self.blockSignals(True)
@@ -91,7 +94,7 @@ class JobRunner(QObject):
         except Cancelled:
             end = ("cancelled", None)
         except Exception as error:
-            # Whatever it is, the window must hear of it: a thread swallows it otherwise.
+            # Any error: it is passed on to the GUI thread.
             end = ("failed", error)
         with self._lock:
             self._end = end
@@ -106,7 +109,7 @@ class JobRunner(QObject):
             self._call()
 
     def _call(self) -> None:
-        # The window may be gone when its job is not yet.
+        # The window may be deleted before its job has ended.
         with contextlib.suppress(RuntimeError):
             if not self._woken and not self._closed:
                 self._woken = True

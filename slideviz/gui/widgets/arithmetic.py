@@ -1,4 +1,4 @@
-"""Numbers as people type them into a field: with a decimal comma, or as a sum or product."""
+"""Parse numbers as people type them into a field: with a decimal comma, or as an expression."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
 
 
 def typed_number(text: str) -> float:
-    """Return the number that a text is, as ``2.5``, ``2,5`` or ``360/7 + 1``.
+    """Return the value of a text such as ``2.5``, ``2,5`` or ``360/7 + 1``.
 
     Raises
     ------
     ValueError
-        It is none.
+        The text is not a number or an expression of ``+ - * / ( )``.
     """
     plain = text.strip().replace(",", ".")
     try:
@@ -41,7 +41,7 @@ def typed_number(text: str) -> float:
 
 
 def _value(node: ast.expr) -> float:
-    """Return the value of a part of what was typed."""
+    """Return the value of a node of the parsed expression; raise ValueError for other nodes."""
     if isinstance(node, ast.Constant):
         return float(node.value)  # type: ignore[arg-type]  # only digits came here
     if isinstance(node, ast.UnaryOp) and type(node.op) in _SIGNS:

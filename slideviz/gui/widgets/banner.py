@@ -1,4 +1,7 @@
-"""The banner above the view: a message or a question that stays until it is closed."""
+"""The banner above the view: a message or a question that stays until it is closed.
+
+Its colours are in the style sheet of `slideviz.gui.widgets.theme` (``QFrame#banner``).
+"""
 
 from __future__ import annotations
 
@@ -30,13 +33,16 @@ from slideviz.gui.widgets.faults import details_of
 from slideviz.gui.widgets.labels import rich_label
 
 MOST_LINES = 4
-"""Of a message; the rest is behind “Details”."""
+"""Most lines of a message in the banner; all of them are behind “Details”."""
+
 Answers = Mapping[str, Callable[[], object]]
+"""The functions that buttons call, by the buttons' texts."""
+
 NO_ANSWERS: Answers = MappingProxyType({})
 
 
 class DetailsDialog(QDialog):
-    """The full text of an error, to be copied."""
+    """The dialog with the full text of a message, which can be copied."""
 
     def __init__(self, parent: QWidget, text: str) -> None:
         super().__init__(parent)
@@ -57,7 +63,7 @@ class Banner(QFrame):
     Signals
     -------
     shown(str)
-        The message.
+        The text of a message, when it is shown.
     """
 
     shown = Signal(str)
@@ -86,9 +92,9 @@ class Banner(QFrame):
     def tell(
         self, text: str, full: str = "", calm: bool = True, answers: Answers = NO_ANSWERS
     ) -> None:
-        """Show a message, with a longer text behind “Details”; calm ones are no error.
+        """Show a message, with ``full`` behind “Details”, and a button for each of ``answers``.
 
-        ``answers`` has what there are buttons for, by their words.
+        ``calm``: in the colours of a note, otherwise of an alarm.
         """
         self._offer(answers)
         set_style(self, "calm", calm)
@@ -113,7 +119,7 @@ class Banner(QFrame):
             self.tell(text, details_of(error), calm=False)
 
     def withdraw(self, text: str) -> None:
-        """Hide a message that no longer holds, if it is still the one that is shown."""
+        """Hide the banner if it still shows this message."""
         if text and text == self._text:
             self.hide()
 
@@ -124,7 +130,10 @@ class Banner(QFrame):
         full: str = "",
         later: Callable[[], object] | None = None,
     ) -> None:
-        """Show a question with a button for each answer; ``later`` when it is closed instead."""
+        """Show a question, with a button for each of ``answers``, which calls its function.
+
+        ``later`` is called if the user closes the question instead.
+        """
         self._later = later
         self.tell(text, full, answers=answers)
 
@@ -147,7 +156,7 @@ class Banner(QFrame):
             later()
 
     def count(self, times: int) -> None:
-        """Show how often the error of the message has come."""
+        """Show behind the message how often its error has occurred."""
         self.text.setText(f"{self._brief} <i>({times:,} times)</i>")
 
     def _show_details(self) -> None:

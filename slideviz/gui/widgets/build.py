@@ -33,7 +33,7 @@ from slideviz.gui.widgets.icons import set_icon
 from slideviz.gui.widgets.labels import wrapped
 
 Part = QWidget | QLayout | int | None
-"""What stands in a row or column: None takes the room that is left, a number is pixels of air."""
+"""An item of a row or column; None is a stretch, a number a space in pixels."""
 Do = Callable[..., object] | SignalInstance
 Box = TypeVar("Box", bound=QBoxLayout)
 
@@ -41,7 +41,7 @@ Box = TypeVar("Box", bound=QBoxLayout)
 
 
 def in_row(*parts: Part, wide: Sequence[Part] = (), spacing: int = -1) -> QHBoxLayout:
-    """Return a layout of parts side by side, of which those in ``wide`` take the room."""
+    """Return a horizontal layout of parts, of which those in ``wide`` share the spare width."""
     return _filled(QHBoxLayout(), parts, wide, spacing)
 
 
@@ -52,7 +52,10 @@ def in_column(
     on: QWidget | None = None,
     margins: tuple[int, int, int, int] = (0, 0, 0, 0),
 ) -> QVBoxLayout:
-    """Return a layout of parts below each other, as that of a widget where one is given."""
+    """Return a vertical layout of parts, of which those in ``wide`` share the spare height.
+
+    It becomes the layout of the widget ``on``, if given, with ``margins`` in pixels.
+    """
     layout = QVBoxLayout()
     if on is not None:
         on.setLayout(layout)
@@ -77,7 +80,7 @@ def _filled(layout: Box, parts: Sequence[Part], wide: Sequence[Part], spacing: i
 
 
 def boxed(layout: QLayout) -> QWidget:
-    """Return a widget that has a layout, without a margin."""
+    """Return a new widget with a layout, without margins."""
     widget = QWidget()
     layout.setContentsMargins(0, 0, 0, 0)
     widget.setLayout(layout)
@@ -85,13 +88,16 @@ def boxed(layout: QLayout) -> QWidget:
 
 
 def grow_fields(form: QFormLayout, spacing: int = 4) -> None:
-    """Let the fields of a form take its width, at a vertical distance in pixels."""
+    """Make the fields of a form as wide as it is, with a vertical spacing in pixels."""
     form.setVerticalSpacing(spacing)
     form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
 
 
 class PanelScroll(QScrollArea):
-    """The scroll area that fills a panel; a field that the tab key comes to is shown whole."""
+    """The scroll area that fills a panel; a field reached by the tab key is scrolled into view.
+
+    ``widget()`` is the empty widget for the panel's content.
+    """
 
     def __init__(self, panel: QWidget) -> None:
         super().__init__()
@@ -106,7 +112,7 @@ class PanelScroll(QScrollArea):
         inside = self.widget()
         field = inside.focusWidget() if inside is not None else None
         if moved and inside is not None and field is not None:
-            # Qt shows only where its cursor is.
+            # Qt itself scrolls only the text cursor into view.
             place = QRect(field.mapTo(inside, QPoint(0, 0)), field.size())
             for y in (place.bottom(), place.top()):
                 self.ensureVisible(place.left(), y, 0, 6)
@@ -117,7 +123,7 @@ class PanelScroll(QScrollArea):
 
 
 def push_button(text: str, tip: str, do: Do, name: str = "") -> QPushButton:
-    """Return a button with words."""
+    """Return a push button with a text that calls ``do`` when clicked; ``name``: object name."""
     button = QPushButton(text)
     button.setObjectName(name)
     button.setToolTip(wrapped(tip))
@@ -134,7 +140,7 @@ def tool_button(
     menu: QMenu | None = None,
     name: str = "",
 ) -> QToolButton:
-    """Return a button with an icon, words or both, which does something or opens a menu."""
+    """Return a tool button with an icon, a text or both, which calls ``do`` or opens a menu."""
     button = QToolButton()
     button.setObjectName(name)
     button.setToolTip(wrapped(tip))
@@ -154,7 +160,7 @@ def tool_button(
 
 
 def check_box(text: str, tip: str, toggled: Do | None = None, name: str = "") -> QCheckBox:
-    """Return a box to tick."""
+    """Return a check box."""
     box = QCheckBox(text)
     box.setObjectName(name)
     box.setToolTip(wrapped(tip))
@@ -166,7 +172,7 @@ def check_box(text: str, tip: str, toggled: Do | None = None, name: str = "") ->
 def number_box(
     low: int, high: int, value: int, changed: Do | None = None, *, unit: str = "", tip: str = ""
 ) -> QSpinBox:
-    """Return a field for a whole number in a range, with its unit behind it."""
+    """Return a spin box for a whole number from ``low`` to ``high``, with its unit as suffix."""
     box = QSpinBox()
     box.setRange(low, high)
     return _completed(box, value, changed, unit, tip)
@@ -181,7 +187,7 @@ def decimal_box(
     unit: str = "",
     tip: str = "",
 ) -> QDoubleSpinBox:
-    """Return a field for a number with one decimal in a range, with its unit behind it."""
+    """Return a spin box for a number with one decimal, from ``low`` to ``high``, with its unit."""
     box = QDoubleSpinBox()
     box.setRange(low, high)
     box.setDecimals(1)
@@ -211,7 +217,7 @@ def dialog_buttons(dialog: QDialog, *kinds: QDialogButtonBox.StandardButton) -> 
 
 
 def hint_label(text: str = "", align: Qt.AlignmentFlag | None = None) -> QLabel:
-    """Return a label for a hint, in soft letters and as many lines as it needs."""
+    """Return a label for a hint: word-wrapped, in the theme's soft colour."""
     label = QLabel(text)
     label.setWordWrap(True)
     label.setProperty("hint", True)
@@ -221,7 +227,7 @@ def hint_label(text: str = "", align: Qt.AlignmentFlag | None = None) -> QLabel:
 
 
 def set_style(widget: QWidget, name: str, value: bool) -> None:
-    """Set a property of a widget by which the style sheet draws it, as ``bad``."""
+    """Set a property of a widget that the style sheet selects by, such as ``bad``; restyle it."""
     if widget.property(name) != value:
         widget.setProperty(name, value)
         widget.style().unpolish(widget)
@@ -229,11 +235,10 @@ def set_style(widget: QWidget, name: str, value: bool) -> None:
 
 
 class QuietBar(QProgressBar):
-    """A progress bar that waits for the next turn of the event loop to be painted.
+    """A progress bar that is repainted in the next turn of the event loop, not at each `setValue`.
 
-    Qt's own paints itself at once, with each value. Around a view drawn by OpenGL the whole window
-    goes to the screen for that, 10 to 20 ms each time where no graphics card does it; with
-    everything else that has changed it does so anyway.
+    Qt's own repaints itself at once. In a window with an OpenGL view, each repaint composes the
+    whole window, which takes 10 to 20 ms without a graphics card.
     """
 
     def setValue(self, value: int) -> None:

@@ -1,6 +1,6 @@
 """The small pictures of the sample cases: mesh lines about a moving body, drawn as SVG.
 
-They are drawn from formulas like the samples themselves, for light and dark alike, in no time.
+They are drawn from formulas, like the samples themselves, so that they fit both themes.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from qtpy.QtSvg import QSvgRenderer
 from slideviz.terms import ROLES
 
 SIZE = (152, 96)
-"""Pixels of a picture, at normal resolution."""
+"""Width and height of a picture in pixels, at a device pixel ratio of 1."""
 BODY, WALL, REPEAT = (ROLES[role].colour for role in ("moving", "sliding", "periodic"))
 Map = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
-"""From the unit square to the picture."""
+"""A map from coordinates (u, v) in the unit square, (n,) each, to pixels (x, y) of a picture."""
 
 
 def card(name: str, line: str) -> QPixmap:
-    """Return the picture of a sample, its mesh lines in a colour."""
+    """Return the picture of a sample by its name, with mesh lines in the colour ``line``."""
     svg = (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {SIZE[0]} {SIZE[1]}">'
         f"{_drawing(name).replace('{line}', line)}</svg>"
@@ -45,12 +45,13 @@ def _drawing(name: str) -> str:
 
 
 def _path(x: np.ndarray, y: np.ndarray, style: str) -> str:
+    """Return the SVG of a polyline through pixels x and y, (n,) each."""
     points = "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(x, y, strict=True))
     return f'<path d="M{points}" stroke-linejoin="round" stroke-linecap="round" {style}/>'
 
 
 def _lines(to: Map, columns: int, rows: int) -> str:
-    """Return the mesh lines of a mapped square."""
+    """Return the SVG of the lines of a structured mesh of a mapped square."""
     along, style = np.linspace(0, 1, 25), 'fill="none" stroke="{line}" stroke-width="0.6"'
     found = [_path(*to(np.full(25, u), along), style) for u in np.linspace(0, 1, columns + 1)]
     return "".join(
@@ -59,7 +60,7 @@ def _lines(to: Map, columns: int, rows: int) -> str:
 
 
 def _grid(to: Map, columns: int, rows: int, walls: bool = True) -> str:
-    """Return a mapped mesh with its boundaries: repeating above and below, sliding at the ends."""
+    """Return the SVG of a mapped mesh: v = 0 and 1 are periodic, u = 0 and 1 sliding boundaries."""
     along = np.linspace(0, 1, 33)
     zero, one = np.zeros(33), np.ones(33)
     edges = [(along, zero, REPEAT), (along, one, REPEAT), (zero, along, WALL), (one, along, WALL)]
@@ -79,7 +80,7 @@ def _square(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _turned(to: Map, width: float, height: float, degrees: float) -> str:
-    """Return a block in the middle, turned."""
+    """Return the SVG of a turned rectangle in the middle; width and height in the unit square."""
     turn = np.radians(degrees)
     x = np.array([-1, 1, 1, -1, -1]) * width / 2
     y = np.array([-1, -1, 1, 1, -1]) * height / 2
@@ -93,7 +94,10 @@ def _sector(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _solid(front: Map, depth: tuple[float, float], body: str, top: int = 1) -> str:
-    """Return a mapped square with depth: its front, one side above and one to the right."""
+    """Return the SVG of a solid: a mapped front, and its upper and right sides at a depth (x, y).
+
+    ``top``: the front's upper edge is at v = 0 if 1, at v = 1 if 0.
+    """
     dx, dy = depth
 
     def above(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -117,14 +121,14 @@ def _sector_front(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _channel(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Map to a passage that follows a cambered blade, its sides through the blade's ends."""
+    """Map to a blade passage that bends with its cambered blade."""
     arch = np.sin(np.pi * np.clip((u - 0.1) / 0.85, 0, 1)) ** 2
     bend = 14 * arch - 34 * np.clip(u - 0.3, 0, 1) ** 1.2
     return 6 + 140 * u, 14 + 50 * v - bend
 
 
 def _blade(to: Map, start: float, end: float, thickness: float) -> str:
-    """Return a blade along the middle of a passage."""
+    """Return the SVG of a blade along v = 0.5, from u = start to end; thickness in pixels."""
     part = np.linspace(0, 1, 30)
     half = thickness * (1.6 * np.sqrt(part) - 0.9 * part - 0.7 * part**3)
     u = start + (end - start) * part
@@ -138,7 +142,7 @@ def _cascade(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _row() -> str:
-    """Return three vanes of a row, the middle one with its mesh."""
+    """Return the SVG of three vanes of a row, the middle one with its mesh."""
 
     def shifted(by: float) -> Map:
         return lambda u, v: (_cascade(u, v)[0], _cascade(u, v)[1] + by)
@@ -156,7 +160,7 @@ def _annulus(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _stator() -> str:
-    """Return blades between hub and casing, the middle one in colour."""
+    """Return the SVG of three blades between hub and casing, the outer two faint."""
     along = np.linspace(0, 1, 25)
     walls = [
         _path(*_annulus(along, np.full(25, v)), f'fill="none" stroke="{WALL}" stroke-width="1.8"')

@@ -1,4 +1,4 @@
-"""Drop-downs of values with words."""
+"""A drop-down list of values, each shown by a text."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -15,16 +15,16 @@ from slideviz.gui.widgets.labels import wrapped
 
 Value = TypeVar("Value")
 MARGIN = 4
-"""Pixels that the style leaves free beside the text."""
+"""Space that the style leaves beside the text, in pixels."""
 
 
 class Choice(QComboBox):
-    """A drop-down of values with words; the wheel scrolls the panel instead of changing it.
+    """A drop-down list of values, each shown by a text; the wheel does not change the value.
 
     Signals
     -------
     chosen(object)
-        The value that the user has chosen.
+        The value that the user has chosen; not emitted by `show_value`.
     """
 
     chosen = Signal(object)
@@ -39,31 +39,31 @@ class Choice(QComboBox):
         self.activated.connect(lambda _: self.chosen.emit(self.currentData()))
 
     def show_value(self, value: object) -> None:
-        """Show a value; `chosen` is not emitted."""
+        """Select the entry of a value, if there is one; `chosen` is not emitted."""
         index = self.findData(value)
         if index >= 0 and index != self.currentIndex():
             self.setCurrentIndex(index)
 
     def explain(self, tips: Mapping[str, str]) -> None:
-        """Give entries tooltips, by their values."""
+        """Set the tooltips of entries, by their values."""
         for value, tip in tips.items():
             self.setItemData(self.findData(value), wrapped(tip), Qt.ItemDataRole.ToolTipRole)
 
     def showPopup(self) -> None:
-        # A list narrower than its words would cut them, and they are nowhere else in full.
+        # Make the list as wide as its longest text: the closed box may be narrower.
         frame = self.style().pixelMetric(QStyle.PixelMetric.PM_ScrollBarExtent) + 2 * MARGIN
         self.view().setMinimumWidth(self.view().sizeHintForColumn(0) + frame)
-        # Escape leaves the list at the entry below the mouse; it would open there next time.
+        # After Escape, Qt would open the list at the entry that was under the mouse.
         self.view().setCurrentIndex(self.model().index(self.currentIndex(), self.modelColumn()))
         super().showPopup()
 
     @property
     def shown(self) -> str:
-        """Return the text for which there is room."""
+        """Return the text as painted: cut with an ellipsis if it is too long."""
         return self._option().currentText
 
     def _option(self) -> QStyleOptionComboBox:
-        """Return what the style paints: a text that is too long ends with an ellipsis."""
+        """Return the style option to paint, its text cut with an ellipsis if it is too long."""
         option = QStyleOptionComboBox()
         self.initStyleOption(option)
         part, kind = QStyle.SubControl.SC_ComboBoxEditField, QStyle.ComplexControl.CC_ComboBox

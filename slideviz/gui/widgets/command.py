@@ -1,4 +1,4 @@
-"""Records of actions, toggles and menus, and the conditions under which an action can be done."""
+"""Records of commands and menus, and the conditions under which a command is enabled."""
 
 from __future__ import annotations
 
@@ -27,30 +27,31 @@ def always(_: Any) -> bool:
 
 @dataclass(frozen=True)
 class Command:
-    """A command: function, words, keys, icon, and when it can be done.
+    """A command of the window (an action or a toggle): function, texts, keys, icon, conditions.
 
     Attributes
     ----------
     name : str
     title : str
-        In a menu, with the letter marked that chooses it there.
+        Its text in a menu, with ``&`` before its mnemonic.
     tip : str
         What it does, in a sentence.
     do : callable
-        Does it, given the window.
+        Called with the window to do it.
     keys : tuple of str or standard keys
     image : str
         The name of its icon.
     enabled, checked : callable
-        Whether it can be done and, of a toggle, whether it is on, given the `Now` of the window.
+        Return whether it is enabled and, of a toggle, whether it is on, given the window's `Now`.
     title_now : callable, optional
-        Its title where that changes; an empty one takes it out of the menu.
+        Returns its present title, given the `Now`; an empty one hides it in the menu.
     tip_now : callable, optional
-        What its tooltip says instead, if anything; where it cannot be done, why.
+        Returns a tooltip to be shown instead of ``tip``, or an empty text; for a disabled command,
+        why it is disabled.
     button_tip, button_key : str
-        What the tooltip of its button in a panel says, and the key of that.
+        Tooltip and shortcut of its button in a panel.
     short : str
-        Its word on the tool bar, if it has no icon.
+        Its text on the tool bar, if it has no icon.
     """
 
     name: str
@@ -72,7 +73,7 @@ class Command:
         return (self.title_now(now) if self.title_now else "") or self.title
 
     def action(self, window: Services) -> QAction:
-        """Return an action for the command, which `show` keeps up to date."""
+        """Return a new action of a window for the command; `show` brings it up to date."""
         act = QAction(self.title, window)
         act.setObjectName(self.name)
         act.setShortcuts([QKeySequence(keys) for keys in self.keys])
@@ -91,7 +92,7 @@ class Command:
         act.setToolTip(wrapped(f"{tip} ({keys})" if keys else tip))
 
     def show(self, act: QAction, now: Now) -> None:
-        """Show in its action whether the command can be done now, and under which title."""
+        """Update the command's action: enabled, checked, title and tooltip."""
         able = self.enabled(now)
         if self.title_now is not None:
             title = self.title_now(now)
@@ -108,17 +109,17 @@ class Command:
 
 @dataclass(frozen=True)
 class Menu:
-    """A menu: its commands, lines and submenus.
+    """A menu: its commands, submenus and separators (None).
 
     Attributes
     ----------
     fill : callable, optional
-        Puts in what no table knows, given the window and the menu: once, above the entries, or,
-        where there are none, each time that it opens.
+        Adds entries that are not known beforehand, given the window and the menu: once, above
+        ``entries``; or, if there are no ``entries``, each time the menu opens.
     one_of : bool
-        Whether one of its commands is on at a time.
+        Whether its toggles exclude each other.
     tooltips : bool
-        Whether it shows tooltips: they say why something cannot be done.
+        Whether it shows tooltips, which say why a command is disabled.
     """
 
     name: str
@@ -141,17 +142,18 @@ class Menu:
 
 @dataclass(frozen=True)
 class Now:
-    """The state of the window by which commands can be done or not.
+    """The state of the window on which the commands' conditions depend.
 
     Attributes
     ----------
     busy : bool
         Whether a job runs.
     ready : bool
-        Whether a run could start if none did.
+        Whether all requirements of a run are met.
     undo, redo : str
-        What would be undone or done again, in words.
+        The change that would be undone or redone, in words; empty if there is none.
     theme : str
+        The chosen theme: one of `slideviz.gui.widgets.theme.THEMES`.
     """
 
     session: Session
@@ -163,62 +165,65 @@ class Now:
 
 
 def opened(now: Now) -> bool:
-    """Tell whether a mesh is open."""
+    """Return whether a mesh is open."""
     return now.session.mesh is not None
 
 
 def flat(now: Now) -> bool:
-    """Tell whether a mesh of two dimensions is open."""
+    """Return whether a 2D mesh is open."""
     return now.session.mesh is not None and now.session.mesh.dim == 2
 
 
 def solid(now: Now) -> bool:
-    """Tell whether a mesh of three dimensions is open."""
+    """Return whether a 3D mesh is open."""
     return opened(now) and not flat(now)
 
 
 def bounded(now: Now) -> bool:
-    """Tell whether there are boundaries that are selected, or move."""
+    """Return whether there are selected or moving boundaries."""
     return opened(now) and bool(meant(now.session))
 
 
 def meant(session: Session) -> tuple[str, ...]:
-    """Return the selected boundaries, or else those that move."""
+    """Return the boundaries a command acts on: the selected ones, or else those that move."""
     return session.view.selected or session.case.markers_with("moving")
 
 
 def boxed(now: Now) -> bool:
-    """Tell whether there are boxes for free-form deformation, or they are to be drawn."""
+    """Return whether there are boxes for free-form deformation, or their toggle is on."""
     return opened(now) and ("ffd" in now.session.view.drawn or bool(box_names(now.session)))
 
 
 def valued(now: Now) -> bool:
-    """Tell whether cells are coloured by a value."""
+    """Return whether cells are coloured by a value."""
     return opened(now) and now.session.view.colour_by != "role"
 
 
 def stepped(now: Now) -> bool:
-    """Tell whether there are steps."""
+    """Return whether the shown run has steps."""
     return len(now.session.frames) > 1
 
 
 def idle(now: Now) -> bool:
-    """Tell whether a mesh is open and no job runs."""
+    """Return whether a mesh is open and no job runs."""
     return opened(now) and not now.busy
 
 
 def stepped_and_idle(now: Now) -> bool:
-    """Tell whether there are steps and no job runs."""
+    """Return whether the shown run has steps and no job runs."""
     return stepped(now) and idle(now)
 
 
 def whole(able: Callable[[Now], bool]) -> Callable[[Now], bool]:
-    """Return a condition that holds only where all cells are in memory, too."""
+    """Return a condition that holds if ``able`` does and all cells are in memory."""
     return lambda now: able(now) and not now.session.in_file
 
 
 def why_not(able: Callable[[Now], bool], why: str) -> Callable[[Now], str]:
-    """Return a function that returns why a command cannot be done, or an empty text."""
+    """Return a ``tip_now``: it returns why a command is disabled, empty if ``able`` holds.
+
+    The reason is ``why``, unless the mesh stays in its file or a job runs.
+    """
     wait = "Wait for the end of what runs, or cancel it."
 
     def words(now: Now) -> str:

@@ -28,7 +28,8 @@ from slideviz.mesh.io.cleanup import is_alive
 from slideviz.mesh.io.private import private_file, private_folder
 
 REST_S = 5.0
-"""An error that was shown is shown again when it has not come for so long."""
+"""Seconds without an error after which the same error is shown anew rather than counted."""
+
 PACKAGES = (
     "slideviz",
     "numpy",
@@ -50,22 +51,22 @@ log = logging.getLogger("slideviz")
 
 
 class Notice(Protocol):
-    """A widget that shows an error, and how often it came."""
+    """A widget that shows an error, and how often it occurred."""
 
     def tell_error(self, error: BaseException) -> None:
         """Show an error."""
 
     def count(self, times: int) -> None:
-        """Show how often the error came."""
+        """Show how often the error occurred."""
 
 
 class Faults(QObject):
-    """The errors of a window: each is shown once in its banner, with how often it came.
+    """Receives the unexpected errors of a window: shows each once in its banner, then counts it.
 
     Attributes
     ----------
     count : int
-        How many there were.
+        The number of all errors so far.
     """
 
     _came = Signal(object)
@@ -101,7 +102,7 @@ class Faults(QObject):
             self._shown = key
             self._banner.tell_error(error)
         elif key == self._shown and not self._timer.isActive():
-            # Not at once: an error while something is painted would go round and round.
+            # Later: an error in a paint event would cause a repaint, and thus itself.
             self._timer.start()
 
     def _count_again(self) -> None:
@@ -109,14 +110,17 @@ class Faults(QObject):
 
 
 def _place(error: BaseException) -> tuple[object, ...]:
-    """Return what two errors have in common that are the same: kind, and where it was raised."""
+    """Return what identifies an error: its type, and file and line that raised it.
+
+    Without a trace: its type and its text.
+    """
     trace = traceback.extract_tb(error.__traceback__)
     last = (trace[-1].filename, trace[-1].lineno) if trace else (str(error),)
     return (type(error).__name__, *last)
 
 
 def details_of(error: BaseException) -> str:
-    """Return the details of an error for its developers: trace, versions, platform."""
+    """Return the details of an error for a bug report: trace, versions, platform."""
     trace = "".join(traceback.format_exception(error))
     return f"{trace}\n{versions()}\n"
 
@@ -132,7 +136,10 @@ def versions() -> str:
 
 @contextlib.contextmanager
 def caught(faults: Faults) -> Iterator[None]:
-    """Show every uncaught error; warnings of Qt, VTK and Python go to the log."""
+    """Pass uncaught errors of all threads to ``faults`` within the context.
+
+    Messages of Qt, VTK and Python's warnings go to the log.
+    """
     with ExitStack() as stack:
         stack.callback(setattr, sys, "excepthook", sys.excepthook)
         stack.callback(setattr, threading, "excepthook", threading.excepthook)
@@ -191,7 +198,10 @@ def _vtk_heard() -> Iterator[None]:
 
 @contextlib.contextmanager
 def crash_log(folder: Path) -> Iterator[None]:
-    """Write where every thread was to ``crash-PID.log`` in a folder, should the program crash."""
+    """Write the traces of all threads to ``crash-PID.log`` in a folder if the process crashes.
+
+    The file is removed when the context ends.
+    """
     path = folder / f"crash-{os.getpid()}.log"
     try:
         private_folder(folder)
@@ -211,9 +221,9 @@ def crash_log(folder: Path) -> Iterator[None]:
 
 
 def old_crashes(folder: Path) -> list[Path]:
-    """Return the traces of programs that crashed since this was last asked, newest last.
+    """Return the files of crashes since the last call, newest last, renamed ``crash-DATE-PID.txt``.
 
-    They are renamed to ``crash-DATE.txt``; empty ones, of programs that were killed, go.
+    Empty files, of processes that were killed, are removed.
     """
     found = []
     for path in sorted(folder.glob("crash-*.log"), key=lambda path: path.stat().st_mtime):

@@ -1,4 +1,4 @@
-"""Invalid fields of a panel are noted in the session, so that no run starts meanwhile."""
+"""Record the invalid fields of a panel in the session, which keeps a run from starting."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from slideviz.session.store import Store
 
 
 class FieldWatch(QObject):
-    """The invalid fields of a panel, kept up to date in ``Session.invalid``."""
+    """Watches the number fields of a panel and writes the invalid ones to ``Session.invalid``."""
 
     def __init__(self, panel: QWidget, store: Store, place: PanelPlace) -> None:
         super().__init__(panel)
@@ -23,11 +23,11 @@ class FieldWatch(QObject):
         ]
         for field in self._fields:
             field.marked.connect(self.look)
-        # Another motion or method may hide a field or switch it off.
+        # Another motion or method may hide or disable a field.
         store.listen(lambda *_: self.look())
 
     def look(self) -> None:
-        """Note the invalid fields in the session."""
+        """Write the faults of the visible, enabled fields to the session."""
         faults = tuple(
             f"{_title(field, self.panel)}: {field.fault}."
             for field in self._fields
@@ -45,8 +45,10 @@ class FieldWatch(QObject):
 
 
 def _title(field: QWidget, panel: QWidget) -> str:
-    """Return what a form calls a field, or the row that it is in, with its own name there."""
-    # Numbers that are not valid together are the row's fault.
+    """Return the name of a field: the label of its form's row, with its own name in the row.
+
+    The own name is left out if the row's numbers are only invalid together.
+    """
     own = field.accessibleName() if getattr(field, "problem", "") else ""
     part: QWidget | None = field
     while part is not None and part is not panel:

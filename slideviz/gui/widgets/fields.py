@@ -1,4 +1,4 @@
-"""Input fields for numbers that are checked as they are typed, and for what is on or off."""
+"""Input fields for numbers, checked as they are typed, and for settings that are on or off."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -24,20 +24,20 @@ from slideviz.gui.widgets.services import main_window
 
 
 def number_text(value: float) -> str:
-    """Return a number as text, without losing a digit."""
+    """Return a number as the shortest text that reads back as the same number."""
     text = repr(float(value))
     return text.removesuffix(".0")
 
 
 SHORT = 8
-"""A number with so many signs is shown with every digit."""
+"""Length of a text up to which a number is shown with all its digits."""
 
 NOTHING = 1e-10
-"""Part of a length below which another is what is left of zero by rounding."""
+"""Ratio of a number to a scale below which it counts as a rounding error of zero."""
 
 
 def short_text(value: float, scale: float = 0.0) -> str:
-    """Return a number as text of six digits, or all if they are few; 0 if tiny beside ``scale``."""
+    """Return a number as text: ``0`` if tiny beside ``scale``, all digits if few, else six."""
     if abs(value) < NOTHING * abs(scale) or value == 0:
         return "0"
     exact = number_text(value)
@@ -45,7 +45,10 @@ def short_text(value: float, scale: float = 0.0) -> str:
 
 
 def is_stray(event: QEvent, letters: str = "eE") -> bool:
-    """Tell whether a key is a letter that no number has: it belongs to the window's shortcuts."""
+    """Return whether an event is a key press of a letter not in ``letters``, without Ctrl or Alt.
+
+    A number field leaves it to the window's shortcuts.
+    """
     kinds = (QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress)
     if not isinstance(event, QKeyEvent) or event.type() not in kinds:
         return False
@@ -54,16 +57,32 @@ def is_stray(event: QEvent, letters: str = "eE") -> bool:
 
 
 class NumberField(QLineEdit):
-    """A field for a number, or a sum or product of some, whose value stands there when it is left.
+    """A field for a number, typed as such or as an expression, which its value then replaces.
 
-    An invalid one is marked at once, with the reason as tooltip.
+    It shows six digits, and all of them while it is edited. An invalid text is marked at once. If
+    the text is invalid when the field is left, the number from before the editing comes back (not
+    a valid beginning of what was typed), and the status bar says so.
 
-    ``allowed`` returns an empty text, or why a value may not be. Six digits are shown, every one
-    while it is edited; the value keeps them all. What is not valid when the field is left goes
-    back to the number before it was edited, not to a valid beginning of what was typed, and the
-    status bar says so. ``fault``
-    is the reason for which it is marked, ``together`` one that it has from others beside it;
-    ``marked`` tells that the reason has changed.
+    Parameters
+    ----------
+    value : float
+    allowed : callable, optional
+        Returns why a value is not allowed; empty if it is.
+    tip : str
+
+    Attributes
+    ----------
+    fault : str
+        Why the field is marked as invalid; empty if it is not.
+    together : str
+        Why it is invalid together with the fields beside it, set by these.
+
+    Signals
+    -------
+    changed(float)
+        The new number after each valid edit.
+    marked()
+        ``fault`` has changed.
     """
 
     changed = Signal(float)
@@ -96,7 +115,7 @@ class NumberField(QLineEdit):
 
     @property
     def problem(self) -> str:
-        """Return why the text is not valid, or an empty text."""
+        """Return why the text is invalid; empty if it is valid."""
         if self.text() in (number_text(self._value), short_text(self._value, self._scale)):
             return self._allowed(self._value)
         if not self.text().strip():
@@ -115,14 +134,14 @@ class NumberField(QLineEdit):
         self.mark()
 
     def set_scale(self, scale: float) -> None:
-        """Set the length beside which the smallest numbers are shown as 0."""
+        """Set the length beside which rounding errors are shown as 0 (see `short_text`)."""
         if scale != self._scale:
             self._scale = scale
             if not (self.hasFocus() or self.isModified()):
                 self._write()
 
     def show_value(self, value: float) -> None:
-        """Show a number; nothing is emitted, and a text that means the same stays."""
+        """Set the number; nothing is emitted, and a text of the same value stays."""
         if value == self._value and (self.hasFocus() or self.isModified() or not self.problem):
             return
         if not (self.hasFocus() and self.isModified()):
@@ -132,7 +151,7 @@ class NumberField(QLineEdit):
         self.mark()
 
     def _write(self) -> None:
-        """Write the value, the first digits in sight."""
+        """Set the text to the value, all digits while it is edited, the first digits in view."""
         exact = self.hasFocus() and not self.isReadOnly()
         text = number_text(self._value) if exact else short_text(self._value, self._scale)
         if text != self.text():
@@ -153,14 +172,14 @@ class NumberField(QLineEdit):
         super().focusInEvent(event)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        # Qt takes a word, and a point ends one: half of a decimal number would be replaced.
+        # Qt selects a word, which ends at a decimal point: only half of a number.
         if event.button() == Qt.MouseButton.LeftButton:
             self.selectAll()
             self._whole = True
             self._twice_ms = event.timestamp()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        # Who clicks three times wants all of it, too.
+        # A triple click selects the whole number, too.
         soon = event.timestamp() - self._twice_ms < QApplication.doubleClickInterval()
         if event.button() == Qt.MouseButton.LeftButton and soon:
             self.selectAll()
@@ -169,7 +188,7 @@ class NumberField(QLineEdit):
         super().mousePressEvent(event)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if not self._whole:  # a hand that trembles in a double click selects less again
+        if not self._whole:  # a small movement in a double click must not change the selection
             super().mouseMoveEvent(event)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
@@ -185,7 +204,7 @@ class NumberField(QLineEdit):
     def _edited(self) -> None:
         if not self.problem:
             self._value = typed_number(self.text())
-            # First the number, then that it is valid: who hears of that would show the one before.
+            # Before `mark`: who listens to ``marked`` shows the value, and needs the new one.
             self.changed.emit(self._value)
         self.mark()
 
@@ -204,7 +223,7 @@ class NumberField(QLineEdit):
         self.mark()
 
     def mark(self) -> None:
-        """Mark the field while its number is invalid, with the reason as tooltip."""
+        """Mark the field as invalid, with the reason as tooltip, or as valid again."""
         problem = self.problem or self.together
         self.setToolTip(wrapped(problem or self._tip))
         set_style(self, "bad", bool(problem))
@@ -214,10 +233,10 @@ class NumberField(QLineEdit):
 
 
 class NumberBox(QSpinBox):
-    """A field for a whole number with arrows; without digits it is marked as a `NumberField` is.
+    """A spin box for a whole number; without digits it is marked as invalid, as `NumberField` is.
 
-    The wheel scrolls the panel instead of changing it. Of ``letters``, its words may have some. The
-    first letter of the word that stands for the lowest value (``automatic``) chooses that.
+    The wheel does not change it. Typing the first letter of the text for the lowest value (such as
+    ``automatic``) selects that value. ``letters`` are the other letters its texts may contain.
     """
 
     marked = Signal()
@@ -226,7 +245,7 @@ class NumberBox(QSpinBox):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.fault = ""
-        # It writes without telling that its text has changed.
+        # No single signal covers each change of the text, by the user or by the program.
         for change in (self.lineEdit().textChanged, self.editingFinished, self.valueChanged):
             change.connect(lambda *_: self._look())
 
@@ -247,7 +266,7 @@ class NumberBox(QSpinBox):
         event.ignore()
 
     def show_value(self, value: int) -> None:
-        """Show a number; nothing is emitted."""
+        """Set the number; nothing is emitted."""
         if self.value() != value:
             with QSignalBlocker(self):
                 self.setValue(value)
@@ -261,7 +280,7 @@ class NumberBox(QSpinBox):
 
 
 class Switch(QCheckBox):
-    """A box for a setting that is on or off."""
+    """A check box for a setting, with the methods that a `KeyForm` needs."""
 
     def show_value(self, on: bool) -> None:
         """Show whether the setting is on."""
@@ -269,5 +288,5 @@ class Switch(QCheckBox):
 
 
 def not_zero(value: float) -> str:
-    """Return why a number may not be zero."""
+    """Return why a factor may not be zero; empty for other values."""
     return "" if value else "0 would flatten the boundary"

@@ -97,18 +97,18 @@ def _faded(pixmap: QPixmap) -> QPixmap:
 
 
 def icon(name: str, colour: str = "") -> QIcon:
-    """Return an icon of that name in a colour; without one in that of the theme."""
+    """Return the icon of a name in `STROKES`, in a colour; by default in the theme's."""
     return _drawn(name, colour or icon_colour())
 
 
 def set_icon(button: QAbstractButton | QAction, name: str) -> None:
-    """Give a button or action an icon; `redraw_icons` redraws it in another theme."""
+    """Set the icon of a button or action; `redraw_icons` draws it again in another theme."""
     button.setProperty("icon_name", name)
     button.setIcon(icon(name))
 
 
 def redraw_icons(window: QWidget) -> None:
-    """Redraw the icons of buttons and actions in the colour of the theme."""
+    """Draw the icons set by `set_icon` in a window again, in the colour of the present theme."""
     drawn: list[QAbstractButton | QAction] = [
         *window.findChildren(QAbstractButton),
         *window.findChildren(QAction),
@@ -132,7 +132,7 @@ def _drawn(name: str, colour: str) -> QIcon:
 
 @lru_cache(maxsize=16)
 def role_icon(role: Role) -> QIcon:
-    """Return the icon of a role: a white sign on its colour, so that shape tells it too."""
+    """Return the icon of a role: a white sign, different for each role, on the role's colour."""
     body = _ROLE_STROKES[role].format(c="#ffffff")
     sign = _SVG.format(c="#ffffff", w=2.4, body=body)
     inner = sign[sign.index("<g") : -len("</svg>")]

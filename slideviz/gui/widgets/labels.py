@@ -1,4 +1,4 @@
-"""Labels, tooltips and lists: text as it is written, in lines that can be read, or cut short."""
+"""Labels, tooltips and lists with plain text: wrapped, or cut with an ellipsis."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -30,14 +30,14 @@ def rich_label(text: str) -> QLabel:
 
 
 def fixed_font() -> QFont:
-    """Return the font whose letters are all as wide, for tables and messages."""
+    """Return the system's monospaced font."""
     return QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
 
 
 def plain_labels(widget: QWidget) -> None:
-    """Let the labels in a widget show text as it is written, but for those made for rich text.
+    """Set the labels in a widget to plain text, except those made for rich text.
 
-    Qt guesses else: a boundary named ``<img src=...>`` would be a picture.
+    By default Qt guesses: a boundary named ``<img src=...>`` would be shown as a picture.
     """
     for label in widget.findChildren(QLabel):
         if label.textFormat() == Qt.TextFormat.AutoText:
@@ -45,14 +45,14 @@ def plain_labels(widget: QWidget) -> None:
 
 
 LETTERS = 60
-"""In a line of a tooltip."""
+"""Average number of letters in a line of a tooltip."""
 
 
 def wrapped(text: str) -> str:
-    """Return a tooltip in lines of about 60 letters; Qt shows plain text on one line.
+    """Return a tooltip's text, wrapped at about `LETTERS` letters by means of rich text.
 
-    Short lines stay as they are. What looks like rich text is the name of a boundary or file, and
-    is shown as it is written.
+    A text of short lines is returned as it is. Markup in the text, which may be the name of a
+    boundary or file, is escaped.
     """
     short = all(len(line) <= LETTERS + 10 for line in text.splitlines())
     if short and not Qt.mightBeRichText(text):  # type: ignore[attr-defined]  # not in PySide's stubs
@@ -63,17 +63,17 @@ def wrapped(text: str) -> str:
 
 
 ModelIndex: TypeAlias = QModelIndex | QPersistentModelIndex
-"""A place in a list, as Qt hands it to who draws it."""
+"""An index into an item model, as Qt passes it to a delegate."""
 
 
 class ElidedLabel(QLabel):
-    """A label of any width, whose text ends with an ellipsis where there is no room for all of it.
+    """A label whose text is cut with an ellipsis where it is too long; its width is free.
 
     Parameters
     ----------
     text : str
     mode : Qt.TextElideMode
-        Where the ellipsis stands.
+        Where the ellipsis is.
     """
 
     def __init__(
@@ -83,12 +83,12 @@ class ElidedLabel(QLabel):
         self._mode = mode
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        # A long text may not make what it stands in wider.
+        # A long text must not make its container wider.
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     @property
     def shown(self) -> str:
-        """Return the text for which there is room."""
+        """Return the text as painted: cut with an ellipsis if it is too long."""
         room = self.contentsRect().width()
         return self.fontMetrics().elidedText(self.text(), self._mode, room)
 
@@ -106,12 +106,12 @@ class ElidedLabel(QLabel):
 
 
 class WideLabel(QScrollArea):
-    """A label over the whole width, as high as its text up to some lines; the others are scrolled.
+    """A word-wrapped label as wide as its container, which scrolls a text of too many lines.
 
     Parameters
     ----------
     lines : int
-        That are seen at once.
+        Most lines that are visible at once.
     """
 
     def __init__(self, lines: int) -> None:
@@ -129,7 +129,7 @@ class WideLabel(QScrollArea):
         self.setWidget(self.label)
 
     def say(self, text: str) -> None:
-        """Show a text from its beginning, or hide where there is none."""
+        """Show a text from its beginning; hide the label if it is empty."""
         self.label.setText(text)
         self.setVisible(bool(text))
         self.verticalScrollBar().setValue(0)
@@ -145,14 +145,14 @@ class WideLabel(QScrollArea):
 
 
 class _Narrow(QStyledItemDelegate):
-    """Asks for no width, so that the text of an item ends where the list does."""
+    """A delegate whose size hint has no width, so that items are as wide as the list."""
 
     def sizeHint(self, option: QStyleOptionViewItem, index: ModelIndex) -> QSize:
         return QSize(0, super().sizeHint(option, index).height())
 
 
 def elide_items(items: QAbstractItemView) -> None:
-    """Let the items of a list end with an ellipsis, instead of scrolling sideways."""
+    """Make the items of a list end with an ellipsis instead of scrolling sideways."""
     items.setItemDelegate(_Narrow(items))
     items.setTextElideMode(Qt.TextElideMode.ElideRight)
     items.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)

@@ -1,4 +1,4 @@
-"""The base of all panels."""
+"""The base class of the panels."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from slideviz.session.store import Store
 
 
 class Panel(QWidget):
-    """A widget of a dock that shows the session and changes it.
+    """The base of the widgets in the docks, which show the session and change it.
 
-    Its `sync` is the only code that fills its widgets; `follow`, when they are made, calls it.
+    A subclass makes its widgets, then calls `follow`; only its `sync` fills them.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Panel(QWidget):
         self.store = store
 
     def follow(self, concerns: Callable[[Session, Session], bool] = lambda *_: True) -> None:
-        """Show the session now, and after each change for which ``concerns(old, new)`` holds."""
+        """Call `sync` now, and after each change for which ``concerns(old, new)`` is true."""
 
         def changed(old: Session, new: Session) -> None:
             if concerns(old, new):
@@ -38,13 +38,13 @@ class Panel(QWidget):
         self.sync(self.store.session)
 
     def sync(self, session: Session) -> None:
-        """Show the session."""
+        """Fill the widgets from the session."""
         raise NotImplementedError
 
     def take_theme(self, scheme: ColorScheme) -> None:
-        """Draw plots, and what palette and icons do not reach, in the colours of another theme."""
+        """Draw plots again in another theme's colours; subclasses: all else without a palette."""
         for canvas in self.findChildren(PlotCanvas):
             canvas.set_scheme(scheme)
 
     def lead_to(self, missing: Requirement) -> None:
-        """Put the cursor into the field for a requirement of a run."""
+        """Put the cursor into the field by which a missing requirement of a run is met."""

@@ -1,4 +1,4 @@
-"""Images of Qt for previews and the clipboard."""
+"""Qt images for previews and the clipboard."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from qtpy.QtWidgets import QApplication, QLabel
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 
 LARGE = 50_000
-"""Cells of a mesh whose preview is drawn as large as it is shown."""
+"""Number of cells above which a preview is drawn at the size it is shown, not twice as large."""
 
 
 def to_image(pixels: np.ndarray) -> QImage:
-    """Return the image of pixels (height, width, 3 or 4), with memory of its own."""
+    """Return an image of pixels (height, width, 3 or 4) uint8, copied."""
     height, width, depth = pixels.shape
     kind = QImage.Format.Format_RGBA8888 if depth == 4 else QImage.Format.Format_RGB888
     return QImage(pixels.tobytes(), width, height, depth * width, kind).copy()
 
 
 def drawn_for(renderer: OffscreenRenderer, box: tuple[int, int]) -> tuple[int, int]:
-    """Return the size at which a preview is drawn: twice the box, for lines are a pixel wide.
+    """Return the size in pixels at which a preview is drawn, given its box.
 
-    Not of a large mesh, which takes its time.
+    It is twice the box, as lines are at least a pixel wide; of a large mesh, which is slow to
+    draw, the box itself.
     """
     mesh = renderer.session.mesh
     times = 1 if mesh is not None and len(mesh.cells) > LARGE else 2
@@ -34,13 +35,13 @@ def drawn_for(renderer: OffscreenRenderer, box: tuple[int, int]) -> tuple[int, i
 
 
 def fitted(image: QImage, box: tuple[int, int]) -> QImage:
-    """Return an image as large as it can be in a box."""
+    """Return an image scaled to fit into a box (width, height), its aspect ratio kept."""
     keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
     return image.scaled(QSize(*box), keep, smooth)
 
 
 def framed(image: QImage) -> QPixmap:
-    """Return an image with a thin frame; what is transparent is seen as a chequerboard."""
+    """Return a pixmap of an image in a thin frame, its transparent parts on a chequerboard."""
     out = QPixmap(image.width() + 2, image.height() + 2)
     out.fill(QColor("#ffffff"))
     painter = QPainter(out)
@@ -56,7 +57,7 @@ def framed(image: QImage) -> QPixmap:
 
 
 def preview_label(name: str, box: tuple[int, int]) -> QLabel:
-    """Return a label for a framed picture that fits into a box of pixels."""
+    """Return a label of fixed size for a framed picture in a box (width, height) of pixels."""
     label = QLabel()
     label.setFixedSize(box[0] + 2, box[1] + 2)
     label.setAlignment(Qt.AlignmentFlag.AlignCenter)
@@ -66,7 +67,7 @@ def preview_label(name: str, box: tuple[int, int]) -> QLabel:
 
 @contextmanager
 def wait_cursor() -> Iterator[None]:
-    """Show the wait cursor while a drawing takes a second or two."""
+    """Show the wait cursor within the context."""
     QApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
     try:
         yield

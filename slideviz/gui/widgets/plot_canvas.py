@@ -1,4 +1,4 @@
-"""A plot in a panel: drawn when it is seen, in the colours of the theme, saved as a figure."""
+"""A plot in a panel: drawn in a thread when it is visible; and files of plots."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -32,22 +32,23 @@ PLOT_FILTERS = "PNG picture (*.png);;SVG drawing (*.svg);;PDF drawing (*.pdf)"
 
 
 class PlotCanvas(QWidget):
-    """A plot that is drawn beside the window, shown by its newest image.
+    """A widget with a plot that is drawn in a thread; it shows the newest image of it.
 
     Parameters
     ----------
     drawing : callable
-        Returns what fills a figure with what there is now, at a call without widgets.
+        Returns a function that fills a figure with the present data. It is called in the GUI
+        thread; the function it returns is called in another one, and must not use widgets.
 
     Attributes
     ----------
     figure : Figure
-        What is shown; its axes tell what is where.
+        The figure that is shown; its axes convert between data and pixels.
 
     Signals
     -------
     drawn()
-        There is another image.
+        Another image is shown.
     """
 
     drawn = Signal()
@@ -63,7 +64,8 @@ class PlotCanvas(QWidget):
         self._coming: Future[Picture] | None = None
         self._before: Future[Picture] | None = None
         self._timer = later(self, self.fill)
-        # Asked for rather than signalled: the thread need not know of a widget that may be gone.
+        # The image is polled, not signalled: the thread must not refer to a widget that may be
+        # deleted.
         self._look_after = QTimer(self)
         self._look_after.setInterval(LOOK_MS)
         self._look_after.timeout.connect(self._take)
@@ -83,29 +85,29 @@ class PlotCanvas(QWidget):
 
     @property
     def busy(self) -> bool:
-        """Tell whether another image is on its way."""
+        """Return whether an image is being drawn or about to be."""
         return self._coming is not None or self._timer.isActive()
 
     # Drawing ---------------------------------------------------------------------------
 
     def ask(self) -> None:
-        """Schedule a drawing; a hidden plot waits until it is seen."""
+        """Schedule a drawing; a hidden plot is drawn when it is shown."""
         self._stale = True
         if is_seen(self) and not self.busy:
             since = (time.monotonic() - self._last) * 1000.0
             self._timer.start(max(0, round(self._rest_ms() - since)))
 
     def wipe(self) -> None:
-        """Show nothing until the next drawing is there: the present one is of another plot."""
+        """Show “Drawing…” instead of the image until the next one, as it is of another plot."""
         self.wiped, self._before = True, self._coming
         self.update()
 
     def _rest_ms(self) -> float:
-        """Return the time between two drawings: the view needs the processors, too."""
+        """Return the least time between two drawings, in ms: longer, the longer one takes."""
         return min(max(REST_MS, REST_TIMES * 1000.0 * self._picture.seconds), MOST_REST * REST_MS)
 
     def fill(self) -> None:
-        """Start a drawing, or note that another one is needed after the present one."""
+        """Start a drawing; if one is going on, another will be started after it."""
         self._stale = self._coming is not None
         if self._stale:
             return
@@ -116,14 +118,14 @@ class PlotCanvas(QWidget):
         self._look_after.start()
 
     def _take(self) -> None:
-        """Show the image that was asked for, if it is there."""
+        """Show the image being drawn, if it is done."""
         if self._coming is None or not self._coming.done():
             return
         coming, self._coming = self._coming, None
         self._look_after.stop()
         self._last = time.monotonic()
         self._picture = coming.result()
-        # One that was asked for before it was wiped is still the other plot.
+        # An image that was begun before `wipe` is of the other plot.
         self.wiped = self.wiped and coming is self._before
         self.update()
         self.drawn.emit()
@@ -139,17 +141,17 @@ class PlotCanvas(QWidget):
 
     @property
     def _scale(self) -> tuple[float, float]:
-        """Return pixels of the image for one of the widget: a new size is drawn a little later."""
+        """Return the image's pixels per pixel of the widget, which may have been resized since."""
         high, wide = self._picture.pixels.shape[:2]
         return wide / max(self.width(), 1), high / max(self.height(), 1)
 
     def to_value(self, x_px: float) -> float:
-        """Return the value of the horizontal axis at a position of the mouse."""
+        """Return the value of the horizontal axis at a horizontal position in the widget."""
         place = x_px * self._scale[0], 0.0
         return float(self.figure.axes[0].transData.inverted().transform(place)[0])
 
     def to_pixel(self, value: float) -> float:
-        """Return the pixel of the widget at which the horizontal axis has a value."""
+        """Return the horizontal pixel in the widget of a value of the horizontal axis."""
         place = self.figure.axes[0].transData.transform((value, 1.0))
         return float(place[0] / self._scale[0])
 
@@ -162,7 +164,7 @@ class PlotCanvas(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._last = 0.0  # what is shown meanwhile is stretched
+        self._last = 0.0  # without delay: the present image is shown stretched
         self.ask()
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -185,7 +187,7 @@ class PlotCanvas(QWidget):
 
 
 class PlotArea(QStackedWidget):
-    """A plot, or words that say why there is none."""
+    """A plot, or a text that says why there is none."""
 
     def __init__(self, canvas: PlotCanvas) -> None:
         super().__init__()
@@ -197,39 +199,39 @@ class PlotArea(QStackedWidget):
 
     @property
     def empty(self) -> bool:
-        """Tell whether words are shown."""
+        """Return whether a text is shown instead of the plot."""
         return self.currentWidget() is self.words
 
     def say(self, text: str) -> None:
-        """Show words instead of the plot."""
+        """Show a text instead of the plot."""
         self.words.setText(text)
         self.setCurrentWidget(self.words)
 
     def plot(self) -> None:
-        """Show the plot as it is now."""
+        """Show the plot, and draw it anew."""
         self.setCurrentWidget(self.canvas)
         self.canvas.ask()
 
 
 def is_seen(widget: QWidget) -> bool:
-    """Tell whether any of a widget is seen; a dock behind another tab counts as visible."""
+    """Return whether any part of a widget is on screen: Qt calls a dock behind a tab visible."""
     return widget.isVisible() and not widget.visibleRegion().isEmpty()
 
 
 def words_label() -> QLabel:
-    """Return a label for the words of a panel that has nothing to show."""
+    """Return a centred label for the text of a panel that has nothing else to show."""
     label = hint_label(align=Qt.AlignmentFlag.AlignCenter)
     label.setMargin(12)
     return label
 
 
 def write_plot(path: Path, draw_on: Draw) -> None:
-    """Write a plot as a figure for paper: PNG, SVG or PDF by the ending of the name.
+    """Write a plot as a figure for paper: PNG, SVG or PDF by the file's suffix.
 
     Raises
     ------
     SlidevizError
-        Another ending, or the file cannot be written.
+        The suffix is another one, or the file cannot be written.
     """
     kind = path.suffix.lower().lstrip(".")
     if kind not in ("png", "svg", "pdf"):
@@ -244,7 +246,10 @@ def write_plot(path: Path, draw_on: Draw) -> None:
 def ask_and_write(
     parent: QWidget, title: str, default: Path, filters: str, write: Callable[[Path], None]
 ) -> None:
-    """Ask for a name and write a file; the window, if there is one, shows success or error."""
+    """Ask for a file name and call ``write`` with it; the window shows success or error.
+
+    Without a window around ``parent``, errors are raised.
+    """
     path = questions.ask_save(parent, title, default, filters)
     if path is None:
         return
@@ -262,6 +267,6 @@ def ask_and_write(
 
 
 def ask_and_write_plot(parent: QWidget, title: str, name: str, draw_on: Draw) -> None:
-    """Ask for a file and write a plot to it, which is called ``name`` at first."""
+    """Ask for a file, by default ``name`` as PNG, and write a plot to it."""
     default = folder_of(parent) / f"{name}.png"
     ask_and_write(parent, title, default, PLOT_FILTERS, lambda path: write_plot(path, draw_on))

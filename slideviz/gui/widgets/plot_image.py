@@ -1,4 +1,4 @@
-"""Images of plots, drawn beside the window: matplotlib takes 60 to 300 ms for one."""
+"""Images of plots, drawn in a thread: matplotlib takes 60 to 300 ms for one."""
 
 from __future__ import annotations
 
@@ -17,18 +17,19 @@ from slideviz.gui.responsiveness.threads import start_thread
 from slideviz.plots.style import Style
 
 DPI = 100
-"""Of a screen whose pixels are not scaled."""
+"""Resolution of a figure on a screen with a device pixel ratio of 1."""
+
 
 THREAD = "slideviz-plot"
 _ONE = Lock()  # matplotlib is not made for several threads
 
 Draw = Callable[[Figure, Style], None]
-"""Fills a figure; it holds no widget, for it is called, and forgotten, in another thread."""
+"""A function that fills a figure in a style; it is called in another thread: without widgets."""
 
 
 @dataclass(frozen=True)
 class PlotFormat:
-    """The size and style of a plot: pixels, pixels per unit of Qt, style."""
+    """The size of a plot in pixels, its device pixel ratio, and its style."""
 
     width: int
     height: int
@@ -38,7 +39,10 @@ class PlotFormat:
 
 @dataclass(frozen=True)
 class AxesPlace:
-    """The place of the axes (left, bottom, width, height), valid while ``key`` is the same."""
+    """The bounds of the axes in the figure, valid while ``key`` is the same.
+
+    ``bounds`` are left, bottom, width, height, relative to the figure.
+    """
 
     key: tuple[object, ...] = ()
     bounds: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
@@ -46,7 +50,7 @@ class AxesPlace:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A drawn figure; nobody draws it again, so that any thread may ask it.
+    """A drawn figure; it is never drawn again, so any thread may read it.
 
     Attributes
     ----------
@@ -55,7 +59,7 @@ class Picture:
         Red, green, blue, opacity.
     place : AxesPlace
     seconds : float
-        How long it took.
+        How long it took to draw.
     """
 
     figure: Figure = field(default_factory=Figure)
@@ -65,7 +69,7 @@ class Picture:
 
 
 def picture(draw_on: Draw, paper: PlotFormat, place: AxesPlace) -> Picture:
-    """Return a plot, its axes at the place of the one before if they need no other."""
+    """Return a drawn plot; the axes keep their place from the plot before, if it still fits."""
     began = time.monotonic()
     dpi = DPI * paper.ratio
     figure = Figure((paper.width / dpi, paper.height / dpi), dpi=dpi)
@@ -79,9 +83,9 @@ def picture(draw_on: Draw, paper: PlotFormat, place: AxesPlace) -> Picture:
 
 
 def _arrange(figure: Figure, place: AxesPlace) -> AxesPlace:
-    """Place the axes where they were, if nothing that takes room has another size.
+    """Place the axes as before if all texts around them have the same size; return their place.
 
-    To find their place anew takes as long as to draw all of it.
+    Otherwise matplotlib's layout engine places them, which takes as long as drawing the plot.
     """
     if not figure.axes:
         return place
@@ -100,7 +104,7 @@ def _arrange(figure: Figure, place: AxesPlace) -> AxesPlace:
 
 
 def _beside(axes: Axes) -> list[str]:
-    """Return the texts of a legend that stands beside the axes, and takes room from them."""
+    """Return the texts of a legend beside the axes, which makes them narrower; else none."""
     legend = axes.get_legend()
     if legend is None or legend.get_bbox_to_anchor().width > 0:
         return []
@@ -108,7 +112,7 @@ def _beside(axes: Axes) -> list[str]:
 
 
 def draw_in_thread(draw_on: Draw, paper: PlotFormat, place: AxesPlace) -> Future[Picture]:
-    """Return the future of a plot that is drawn in a thread."""
+    """Return the future picture of a plot, drawn in a thread of its own."""
     coming: Future[Picture] = Future()
 
     def work() -> None:
@@ -116,9 +120,9 @@ def draw_in_thread(draw_on: Draw, paper: PlotFormat, place: AxesPlace) -> Future
             with _ONE:
                 coming.set_result(picture(draw_on, paper, place))
         except Exception as error:
-            # Whatever it is, the window must hear of it: a thread swallows it otherwise.
+            # Any error: the future passes it on to the GUI thread.
             coming.set_exception(error)
 
-    # Ended with each plot: a thread that waits for the next would keep what it drew.
+    # One thread per plot: one that waited for the next plot would keep the last one's data alive.
     start_thread(work, THREAD, daemon=False)
     return coming

@@ -27,12 +27,12 @@ CASE_FILTERS = "Case (*.cfg)"
 
 
 def mesh_filters(mesh: Mesh) -> str:
-    """Return the formats a mesh can be saved in, for a file dialog."""
+    """Return the formats a mesh can be saved in, as filters of a file dialog."""
     return ";;".join(f"{row.name} (*{end})" for end, row in formats_for(mesh).items())
 
 
 def ask_open(parent: QWidget, folder: Path) -> Path | None:
-    """Return the file to open, or None."""
+    """Return the mesh or case that the user wants to open, or None."""
     import meshio
 
     every = " ".join("*" + suffix for suffix in sorted(meshio.extension_to_filetypes))
@@ -43,27 +43,27 @@ def ask_open(parent: QWidget, folder: Path) -> Path | None:
 
 
 def ask_table(parent: QWidget, folder: Path) -> Path | None:
-    """Return the table of designs to open, or None."""
+    """Return the table of designs that the user wants to open, or None."""
     filters = "Tables (*.csv *.txt *.tsv);;All files (*)"
     name, _ = QFileDialog.getOpenFileName(parent, "Open a table of designs", str(folder), filters)
     return Path(name) if name else None
 
 
 def ask_save(parent: QWidget, title: str, default: Path, filters: str) -> Path | None:
-    """Return the file to write, with an ending, or None. It asks before one is replaced."""
+    """Return the file to write, with a suffix, or None; the dialog asks before replacing a file."""
     return _save_name(parent, title, default, filters, QFileDialog.Option(0))
 
 
 def ask_numbered(parent: QWidget, title: str, default: Path, filters: str) -> Path | None:
-    """Return the name of files that each get a number, with an ending, or None."""
-    # Of that name itself there is no file.
+    """Return the name, with a suffix, of a series of files that each get a number, or None."""
+    # A file of just that name is not replaced: no question.
     return _save_name(parent, title, default, filters, QFileDialog.Option.DontConfirmOverwrite)
 
 
 def _save_name(
     parent: QWidget, title: str, default: Path, filters: str, option: QFileDialog.Option
 ) -> Path | None:
-    """Return the name for a file, with the ending of the chosen filter where it has none."""
+    """Return the chosen name, with the suffix of the chosen filter if it has none; or None."""
     call = QFileDialog.getSaveFileName
     name, chosen = call(parent, title, str(default), filters, options=option)
     if not name:
@@ -81,12 +81,16 @@ def ask_unsaved(
     can_save: Sequence[str] = ("case",),
     now: Callable[[], str] | None = None,
 ) -> str:
-    """Return ``case``, ``mesh``, ``table`` or ``all`` to save, ``discard`` or ``cancel``.
+    """Ask what to do with unsaved changes when they would be lost.
+
+    Return ``case``, ``mesh``, ``table`` or ``all`` to save that, ``discard`` or ``cancel``. Called
+    by `slideviz.gui.files.Files.ask_about_unsaved`, which has the text from
+    `slideviz.session.unsaved`.
 
     Parameters
     ----------
     what : str
-        The question; what follows after a line break is said in smaller letters.
+        The question; the text after a line break is shown in smaller letters.
     can_save : sequence of {"case", "mesh", "table"}
         What can be saved now.
     now : callable, optional
@@ -109,14 +113,14 @@ def ask_unsaved(
     offered = [*can_save, "all"] if several else list(can_save)
     role = QMessageBox.ButtonRole
     buttons = {
-        # Of what a click has brought, the word is enough; a table is not in sight.
+        # “Save” is enough for a single case or mesh; the table may be in a hidden dock.
         name: box.addButton(
             words[name] if several or name == "table" else "&Save…", role.AcceptRole
         )
         for name in offered
     }
     buttons["discard"] = box.addButton("&Don’t save", role.DestructiveRole)
-    # Not &Cancel: Alt+C is the case.
+    # Not &Cancel: Alt+C saves the case.
     buttons["cancel"] = box.addButton("C&ancel", role.RejectRole)
     box.setEscapeButton(buttons["cancel"])
     box.setDefaultButton(next(iter(buttons.values())) if can_save else buttons["cancel"])
@@ -126,7 +130,7 @@ def ask_unsaved(
 
 
 def ask_folder(parent: QWidget, title: str, default: Path) -> Path | None:
-    """Return a folder that exists, or None."""
+    """Return an existing folder, or None."""
     name = QFileDialog.getExistingDirectory(parent, title, str(default))
     return Path(name) if name else None
 
@@ -134,7 +138,10 @@ def ask_folder(parent: QWidget, title: str, default: Path) -> Path | None:
 def ask_sample(
     parent: QWidget, samples: Mapping[str, str], sizes: Mapping[str, int]
 ) -> tuple[str, int] | None:
-    """Return the name of a sample and its size, or None; ``sizes`` are those offered at first."""
+    """Return the name and size of the sample to open, or None.
+
+    ``samples`` has a description, ``sizes`` the size that is offered first, by name.
+    """
     dialog, name = QDialog(parent), Choice({name: name for name in samples})
     dialog.setWindowTitle("Open a sample")
     size, about = NumberBox(), hint_label()
@@ -160,7 +167,7 @@ def ask_sample(
 
 
 def ask_paper(parent: QWidget, width: float, height: float) -> tuple[float, float] | None:
-    """Return how wide and at most how high a picture is on paper, in cm, or None."""
+    """Return the width and largest height of a picture on paper, in cm, or None."""
     dialog = QDialog(parent)
     dialog.setWindowTitle("Size of the picture")
     form = QFormLayout(dialog)
@@ -190,7 +197,7 @@ def ask_overwrite_input(parent: QWidget, path: Path) -> bool:
 
 
 def _agreed(parent: QWidget, icon: QMessageBox.Icon, title: str, text: str) -> bool:
-    """Return whether a question is answered with yes; names in it are shown as they are."""
+    """Return whether the user answers a question with yes; its text is plain text."""
     yes, no = QMessageBox.StandardButton.Yes, QMessageBox.StandardButton.Cancel
     box = QMessageBox(icon, title, text, yes | no, parent)
     box.setTextFormat(Qt.TextFormat.PlainText)

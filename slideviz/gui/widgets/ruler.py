@@ -14,11 +14,12 @@ from slideviz.plots.ticks import ticks
 
 
 class Ruler(QWidget):
-    """The ruler of one axis; upright at the left, or lying below.
+    """The ruler of one axis of a flat view.
 
     Parameters
     ----------
     upright : bool
+        True: vertical, left of the view; False: horizontal, below it.
     """
 
     def __init__(self, upright: bool) -> None:
@@ -31,19 +32,19 @@ class Ruler(QWidget):
             self.setFixedHeight(34)
 
     def show_range(self, low: float, high: float, name: str) -> None:
-        """Show the numbers between the ends of the axis, and its name."""
+        """Set the ends of the axis and its name."""
         if (low, high, name) != (self.low, self.high, self.name):
             self.low, self.high, self.name = low, high, name
             self.update()
 
     def ticks(self) -> list[float]:
-        """Return the numbers on the ruler, rising."""
+        """Return the values of the ticks, ascending."""
         length = self.height() if self.upright else self.width()
         room, least = (34, 15) if self.upright else (70, 50)
         most = max(length // room, 2)
         found = nice_ticks(self.low, self.high, most)
         for more in range(most + 1, most + 6):
-            # One number says nothing of the scale: closer ones, where they do not touch.
+            # One tick does not show the scale: try closer ones, if their numbers do not touch.
             if len(found) > 1:
                 break
             closer = nice_ticks(self.low, self.high, more)
@@ -77,7 +78,7 @@ class Ruler(QWidget):
         else:
             x = wide * share
             painter.drawLine(round(x), 0, round(x), 3)
-            # At the ends, where half a number would be cut off, it stands beside its tick.
+            # Near an end the number is shifted, so that it is not cut off.
             half = painter.fontMetrics().horizontalAdvance(text) / 2.0 + 1.0
             middle = min(max(x, half), wide - half)
             box = QRectF(middle - 35, 3, 70, 15)
@@ -94,20 +95,20 @@ class Ruler(QWidget):
 
 
 def nice_ticks(low: float, high: float, most: int) -> list[float]:
-    """Return round numbers in a range, rising, at most so many and one more."""
+    """Return ascending round numbers in a range, at most ``most`` + 1; none if it is invalid."""
     if not (math.isfinite(low) and math.isfinite(high) and high > low):
         return []
     return ticks(low, high, most).tolist()
 
 
 def tick_text(value: float, step: float) -> str:
-    """Return a number with as many digits as its distance from the next needs."""
+    """Return a tick's number with as many decimals as the distance of the ticks needs."""
     if abs(value) < 1e-9 * step:
         return "0"
     size = max(abs(value), step)
     if not 1e-4 <= size < 1e5:
         return f"{value:.4g}"
     digits = max(0, -math.floor(math.log10(step) + 1e-9))
-    # A step of 0.25 has a digit more than 0.1.
+    # A step of 0.25 needs one decimal more than 0.1.
     exact = abs(round(step, digits) - step) < 1e-6 * step
     return f"{value:.{digits + (not exact)}f}"

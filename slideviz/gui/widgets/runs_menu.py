@@ -1,4 +1,4 @@
-"""Menus of runs: to show one in a view, and to compare the shown one."""
+"""Menus of runs: which one a view shows, and which one the shown run is compared with."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from slideviz.session.store import Store
 
 
 def fill_pane(menu: QMenu, store: Store, pane: int) -> None:
-    """Fill the menu of one of two views: the undeformed mesh and the runs."""
+    """Fill the menu of view 0 or 1 of a comparison: the undeformed mesh and the runs."""
     _fill(menu, store, panes(store.session)[pane], lambda n: store.change(show_in, pane, n))
 
 
 def fill_compare(menu: QMenu, store: Store) -> None:
-    """Fill the menu that compares the shown run, and ends the comparison."""
+    """Fill the menu with what the shown run can be compared with, and the end of comparison."""
     beside, shown = store.session.view.beside, store.session.shown
     _fill(menu, store, beside, lambda n: store.change(changes.show_beside, n), leave=shown)
     menu.addSeparator()

@@ -1,4 +1,4 @@
-"""The services of the window that panels and dialogs use, without knowing the window."""
+"""The interface of the window for panels and dialogs, which do not import the window."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ class Services(QMainWindow):
     Attributes
     ----------
     store : Store
-        What is open and shown; everything is changed through it.
+        Holds the session; all changes of it go through the store.
     settings : QSettings
-        What is kept from one start to the next.
+        The settings kept from one start to the next.
     banner : Banner
-        Tells what went wrong.
+        Shows errors and messages above the view.
     running : Running
         Starts jobs and runs.
     runner : JobRunner
-        Tells whether one runs.
+        Runs the job; ``busy`` while there is one.
     files : Files
-        Where file dialogs start, and what the files that they offer begin with.
+        Opens and saves; knows the folder and the stem of file names that dialogs offer.
     viewing, section_views
-        The views of the mesh, and of the section that is laid flat.
+        The 3D views; the handles and flat views of the selected section.
     docks_ : Docks
-        The panels.
+        The docks with the panels.
     """
 
     store: Store
@@ -54,18 +54,18 @@ class Services(QMainWindow):
     docks_: Docks
 
     def say(self, text: str) -> None:
-        """Show a short message in the status bar; an empty one takes it away."""
+        """Show a short message in the status bar; an empty text clears it."""
         raise NotImplementedError
 
 
 def main_window(widget: QWidget | None) -> Services | None:
-    """Return slideviz's window around a widget, also where its dock floats."""
+    """Return the main window that a widget belongs to, even in a floating dock; else None."""
     while widget is not None and not isinstance(widget, Services):
         widget = widget.parentWidget()
     return widget
 
 
 def folder_of(widget: QWidget) -> Path:
-    """Return the folder in which file dialogs start."""
+    """Return the folder in which file dialogs start; the home folder without a window."""
     window = main_window(widget)
     return window.files.folder() if window is not None else Path.home()

@@ -1,4 +1,4 @@
-"""The light and the dark theme: colours of widgets, icons and words, in Qt's Fusion style."""
+"""The light and the dark theme: colours of widgets, icons and texts, in Qt's Fusion style."""
 
 from __future__ import annotations
 
@@ -30,7 +30,9 @@ _PALETTE = {
     "disabled": ("#7f8994", "#7d8894"),
     "Light": ("", "#4d5763"),
 }
-"""Colours of Qt's palette in the light and the dark theme, by role; empty: Qt's own."""
+"""Colours of Qt's palette, by role, in the light and the dark theme; empty: Qt's own.
+
+``disabled`` is the text colour of all disabled widgets."""
 
 _STYLE = {
     "title": ("#e4e9ee", "#30363e"),
@@ -47,7 +49,11 @@ _STYLE = {
     "noted": ("#8fb3dc", "#4f76a3"),
     "frame": ("#87919c", "#818c98"),
 }
-"""The other colours of the style sheet, likewise."""
+"""The other colours of the style sheet `_SHEET`, in the light and the dark theme.
+
+``bad`` is for invalid fields, warning labels and the alarm banner's border; ``banner`` is that
+banner's background; ``note`` and ``noted`` are background and border of the calm banner; ``soft``
+is for hints; ``frame`` for outlines of fields, menus and tooltips."""
 
 _SHEET = """
 QDockWidget {{ font-weight: 600; titlebar-close-icon: url("{signs}/close_{name}.svg");
@@ -100,14 +106,14 @@ FRAMED = (
     "QTableView",
     "QListView",
 )
-"""Widgets whose frames or boxes must stand out from what is around them."""
+"""Classes of widgets whose frame or box is drawn in the colour ``frame``."""
 
 _OUTLINE = 140
-"""Fusion draws outlines in the colour of windows, darker by so many percent."""
+"""Percentage for `QColor.lighter`, as Fusion draws outlines in the window colour, darkened."""
 
 
 def resolved(theme: str) -> str:
-    """Return ``light`` or ``dark`` for a theme; ``system`` asks the desktop."""
+    """Return ``light`` or ``dark`` for one of `THEMES`; ``system``: what the desktop uses."""
     if theme in ("light", "dark"):
         return theme
     scheme = _app().styleHints().colorScheme()
@@ -121,7 +127,7 @@ def _app() -> QApplication:
 
 
 def apply(theme: str) -> ColorScheme:
-    """Give the application a theme, and return the color scheme of the view."""
+    """Set style, palette and style sheet of the application; return the view's color scheme."""
     name = resolved(theme)
     dark = name == "dark"
     colours = {role: pair[dark] for role, pair in (_PALETTE | _STYLE).items()}
@@ -135,7 +141,7 @@ def apply(theme: str) -> ColorScheme:
     app = _app()
     app.setStyle("Fusion")
     app.setPalette(palette)
-    # Tool tips keep a palette of their own, which no change of the application's reaches.
+    # Tooltips have a palette of their own.
     QToolTip.setPalette(palette)
     framed = QPalette(palette)
     outline = QColor(colours["frame"]).lighter(_OUTLINE)
@@ -148,15 +154,15 @@ def apply(theme: str) -> ColorScheme:
 
 
 def is_dark() -> bool:
-    """Tell whether the theme that is shown is dark."""
+    """Return whether the present theme is dark."""
     return QApplication.palette().color(QPalette.ColorRole.Window).lightness() < 128
 
 
 def icon_colour() -> str:
-    """Return the colour of icons in the theme that is shown."""
+    """Return the colour of icons in the present theme."""
     return "#dfe5ec" if is_dark() else "#3b4652"
 
 
 def alarm() -> str:
-    """Return the colour of words about inverted cells, readable in the theme that is shown."""
+    """Return the colour of texts about inverted cells in the present theme."""
     return _STYLE["bad"][is_dark()]

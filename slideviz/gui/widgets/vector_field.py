@@ -13,11 +13,11 @@ from slideviz.gui.widgets.fields import NumberField
 
 
 class VectorField(QWidget):
-    """A field for two or three numbers in a row.
+    """A row of fields for two or three numbers.
 
-    ``allowed`` returns an empty text, or why the numbers together may not be; they are marked
-    then, and ``changed`` is not emitted. When the last of them is left, they go back to what they
-    were.
+    ``allowed`` returns why the numbers are not valid together, or an empty text. While they are
+    not, they are marked and ``changed`` is not emitted; when the row loses the focus, the last
+    valid numbers come back.
     """
 
     changed = Signal(tuple)
@@ -36,7 +36,7 @@ class VectorField(QWidget):
         for label, field in zip(self._labels, self.fields, strict=True):
             field.setAccessibleName(label.text())
             field.changed.connect(lambda _: self._tell())
-            # When it is known where the focus goes.
+            # In the next turn of the event loop, when it is known where the focus went.
             field.editingFinished.connect(lambda: QTimer.singleShot(0, self, self._tidy))
         pairs = chain(*zip(self._labels, self.fields, strict=True))
         line = in_row(*pairs, wide=self.fields, spacing=4)
@@ -55,7 +55,7 @@ class VectorField(QWidget):
 
     @property
     def problem(self) -> str:
-        """Return why the numbers together are not valid, or an empty text."""
+        """Return why the numbers are not valid together; empty if they are."""
         return self._allowed(self.value)
 
     def _tell(self) -> None:
@@ -74,19 +74,19 @@ class VectorField(QWidget):
             field.mark()
 
     def set_count(self, count: int) -> None:
-        """Show the first ``count`` numbers only."""
+        """Show only the first ``count`` numbers."""
         self.count = count
         for index, (label, field) in enumerate(zip(self._labels, self.fields, strict=True)):
             label.setVisible(index < count)
             field.setVisible(index < count)
 
     def set_scale(self, scale: float) -> None:
-        """Set the length beside which the smallest numbers are shown as 0."""
+        """Set the length beside which rounding errors are shown as 0."""
         self._scale = scale
         self._compare()
 
     def show_value(self, values: Sequence[float]) -> None:
-        """Show numbers; nothing is emitted, and invalid ones that are being typed stay."""
+        """Set the numbers; nothing is emitted, and invalid numbers being typed stay."""
         if not (self.problem and tuple(values) == self._good):
             self._write(values)
 
@@ -98,7 +98,7 @@ class VectorField(QWidget):
         self._mark()
 
     def _compare(self) -> None:
-        """Show as 0 what is left of it by rounding beside the other numbers."""
+        """Make each field show 0 for a rounding error, compared with the largest number."""
         scale = max(self._scale, *(abs(field.value) for field in self.fields))
         for field in self.fields:
             field.set_scale(scale)
@@ -111,5 +111,5 @@ class VectorField(QWidget):
 
 
 def a_direction(values: Sequence[float]) -> str:
-    """Return why numbers are no direction."""
+    """Return why numbers are no direction (all are 0); empty if they are one."""
     return "" if any(values) else "an axis needs a direction: not all may be 0"
