@@ -14,15 +14,18 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted, padded
 
 VALUES = "values"
+"""Name of the cell data by which shapes are coloured."""
+
 CELL, POINT = "vtkOriginalCellIds", "vtkOriginalPointIds"
-"""Names under which VTK's surfaces keep where cells and points come from."""
+"""Names of cell and point data with the indices of cells and nodes in the mesh."""
+
 LIFT = 1e-4
-"""Lines of a 2D mesh are drawn this part of its extent above the cells."""
+"""Height at which lines of a 2D mesh are drawn above its cells, relative to its extent."""
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnBoundary:
-    """A boundary in the scene: its surface, its geometry and its actors.
+    """A boundary in the scene: its surface, data set and actor.
 
     Attributes
     ----------
@@ -39,14 +42,17 @@ class DrawnBoundary:
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """The lines that highlight a boundary, and their actor."""
+    """The lines that highlight a selected boundary: their data set and actor."""
 
     shape: Any
     actor: Any
 
 
 def surface_shape(surface: Surface, points: FloatArray, lift: float = 0.0) -> Any:
-    """Return a boundary as PolyData at the mesh's points (n, d); lines if the mesh is 2D."""
+    """Return a boundary as PolyData, at points (n, d) of all nodes; lines if the mesh is 2D.
+
+    ``lift`` raises a 2D mesh's boundary above z = 0.
+    """
     at = lifted(points[surface.nodes], lift)
     flat = facet_connectivity(surface.facets)
     if surface.facets.shape[1] == 2:
@@ -58,17 +64,20 @@ def surface_shape(surface: Surface, points: FloatArray, lift: float = 0.0) -> An
 
 
 def rim_shape(surface: Surface, points: FloatArray, lift: float = 0.0) -> Any:
-    """Return the lines that highlight a boundary: the boundary in 2D, its border in 3D."""
+    """Return the lines that highlight a boundary as PolyData: itself in 2D, its border in 3D.
+
+    Parameters are those of `surface_shape`; a closed surface has edges of its facets instead.
+    """
     at = lifted(points[surface.nodes], lift)
     lines = surface.facets if surface.facets.shape[1] == 2 else surface.rim
     if not len(lines):
-        # A closed surface, a blade for example, has no border: its own edges show it.
+        # A closed surface, such as a blade, has no border.
         lines = np.concatenate([surface.facets[:, [0, 1]], surface.facets[:, [1, 2]]])
     return pv.PolyData(at, lines=facet_connectivity(lines))
 
 
 def cell_shape(mesh: Mesh) -> Any:
-    """Return all cells of a 2D mesh as PolyData, in the order of the cells."""
+    """Return all cells of a 2D mesh as PolyData, in the mesh's order."""
     cells = mesh.cells
     flat = np.insert(cells.connectivity, cells.offsets[:-1], np.diff(cells.offsets))
     shape = pv.PolyData(padded(mesh.points), faces=flat)
@@ -77,7 +86,7 @@ def cell_shape(mesh: Mesh) -> Any:
 
 
 def set_order(shape: Any, mesh: Mesh, order: IntArray) -> None:
-    """Give the data set of the cells of a 2D mesh its cells in another order, (m,)."""
+    """Put the cells of a 2D mesh into its data set in another order, indices (m,)."""
     sizes = np.diff(mesh.cells.offsets)[order]
     offsets = np.concatenate(([0], np.cumsum(sizes)))
     starts = np.repeat(mesh.cells.offsets[order] - offsets[:-1], sizes)
@@ -86,10 +95,10 @@ def set_order(shape: Any, mesh: Mesh, order: IntArray) -> None:
 
 
 def part_shape(mesh: Mesh, cells: IntArray) -> Any:
-    """Return some cells (k,) of a mesh as PolyData: the cells in 2D, their outside in 3D.
+    """Return the cells with indices (k,) as PolyData: themselves in 2D, their outer faces in 3D.
 
-    Its cell data ``CELL`` are the owners of the polygons, numbers in the mesh; its point data
-    ``POINT`` the nodes.
+    Its cell data `CELL` are the indices in the mesh of the cells that the polygons belong to, its
+    point data `POINT` those of the nodes.
     """
     offsets, corners, nodes = _corners_of(mesh, cells)
     points = lifted(mesh.points[nodes], 0.0)
@@ -110,7 +119,10 @@ def part_shape(mesh: Mesh, cells: IntArray) -> Any:
 
 
 def _corners_of(mesh: Mesh, cells: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Return offsets (k + 1,) and corners of some cells in new numbers of nodes, and the nodes."""
+    """Return offsets (k + 1,) and connectivity of cells (k,) with renumbered nodes, and the nodes.
+
+    The nodes are ascending indices in the mesh, by their new number.
+    """
     every = mesh.cells
     sizes = every.offsets[cells + 1] - every.offsets[cells]
     offsets = np.concatenate(([0], np.cumsum(sizes)))
@@ -122,15 +134,15 @@ def _corners_of(mesh: Mesh, cells: IntArray) -> tuple[IntArray, IntArray, IntArr
 
 
 def place(shape: Any, points: FloatArray, lift: float = 0.0) -> None:
-    """Move the points of a shape, in place."""
+    """Move the points of a data set to points (n, d), raised by ``lift``, in place."""
     shape.points[:] = lifted(points, lift)
     shape.GetPoints().Modified()
 
 
 def lookup_table() -> Any:
-    """Return the colours of 0 to 1, with those of the ends beyond, and that of inverted cells."""
+    """Return a table of colours for 0 to 1, clamped; inverted cells have the colour of NaN."""
     table = pv.LookupTable(COLOUR_MAP, n_values=256, scalar_range=(0.0, 1.0))
-    # Not what is below the range: a valid cell may be below one that was chosen.
+    # Not the colour below the range, where valid cells may be too, if the user chose the range.
     table.nan_color = INVERTED_COLOUR
     return table
 
@@ -138,7 +150,7 @@ def lookup_table() -> Any:
 _LINE = (
     "float emix = clamp(0.5 + 0.5*lineWidth - min( min( edist[0], edist[1]), edist[2]), 0.0, 1.0);"
 )
-"""How VTK's shader says how much of a pixel the edges of its triangle cover."""
+"""The line of VTK's shader that computes how much of a pixel its triangle's edges cover."""
 _FADING = """vec3 sines = abs(vec3(
     edgeEqn[1].x * edgeEqn[2].y - edgeEqn[1].y * edgeEqn[2].x,
     edgeEqn[2].x * edgeEqn[0].y - edgeEqn[2].y * edgeEqn[0].x,
@@ -148,24 +160,26 @@ _FADING = """vec3 sines = abs(vec3(
   vec3 cover = clamp(0.5 + 0.5*lineWidth - vec3(edist[0], edist[1], edist[2]), 0.0, 1.0);
   cover *= smoothstep(1.5 * lineWidth, 5.0 * lineWidth, across);
   float emix = max(max(cover.x, cover.y), cover.z);"""
-"""The same, each line by itself, and none where the triangle reaches less than 1.5 widths of a
-line from it: lines one beside the other would be a dark area, or dashes without multisampling.
+"""The replacement of `_LINE`: an edge fades where the triangle's height above it is small.
 
-By the law of sines that height is a sum: of the distances to the three sides, each times the sine
-of the angle opposite of it.
+It is drawn in full from a height of 5 line widths on, and not below 1.5: dense lines would look
+like a dark area, or like dashes without multisampling. The height above a side follows from the
+law of sines: the sum of a pixel's distances to the three sides, each times the sine of the angle
+opposite that side, divided by the sine of the angle opposite the side in question.
 """
 
 _MIX = "ambientColor = mix( ambientColor, edgeColor, emix * edgeOpacity);"
-"""How VTK's shader puts them over the colour of the face."""
+"""The line of VTK's shader that blends the edges over the colour of the face."""
 _STRONGER = """vec3 luma = vec3(0.30, 0.59, 0.11);
   float gap = abs(dot(ambientColor + diffuseColor / max(1.0 - emix * edgeOpacity, 0.01), luma)
     - dot(edgeColor, luma));
   float strong = mix(min(2.1 * edgeOpacity, 1.0), edgeOpacity, smoothstep(0.1, 0.5, gap));
   ambientColor = mix(ambientColor, edgeColor, emix * strong);
   diffuseColor *= (1.0 - emix * strong) / max(1.0 - emix * edgeOpacity, 0.01);"""
-"""The same, less seen through where the face is nearly as dark as the line.
+"""The replacement of `_MIX`: edges are more opaque where the face is nearly as dark as they are.
 
-It is always the same colour: lines that turn from dark to light look like a jump of the values.
+Their colour is the same everywhere: a change from dark to light lines would look like a jump of
+the values.
 """
 
 _DEPTH = "//VTK::Depth::Impl"
@@ -173,10 +187,11 @@ _BEHIND = _DEPTH + "\n  gl_FragDepth = 1.0;"
 
 
 def draw_fine_edges(actor: Any) -> None:
-    """Let an actor's edges fade where its cells are hardly larger than lines.
+    """Make an actor's edges fade where its cells are hardly larger than the lines.
 
-    A VTK with other shaders draws its own edges. Actors that share a mapper must share the
-    ``ShaderProperty``, too: the one that is drawn first decides for all of them.
+    It replaces lines of VTK's shader; a VTK whose shader has other lines draws its usual edges.
+    Actors that share a mapper must share the ``ShaderProperty`` too: that of the actor drawn first
+    is used for all of them.
     """
     shader = actor.GetShaderProperty()
     shader.AddFragmentShaderReplacement(_LINE, False, _FADING, False)
@@ -184,15 +199,15 @@ def draw_fine_edges(actor: Any) -> None:
 
 
 def see_through(actor: Any, opacity: float) -> None:
-    """Set the opacity of an actor; below 1 all that is opaque is drawn in front of the actor.
+    """Set the opacity of an actor; below 1 it is drawn behind all opaque actors.
 
-    Glass in front of a cut would tint it, and its colours would no longer be those of the bar.
+    In front of a cut it would tint the colours, which would no longer be those of the colour bar.
     """
     actor.GetProperty().SetOpacity(opacity)
     glass = opacity < 1.0
     if bool(actor.GetForceOpaque()) == glass:
         return
-    # Drawn with what is opaque, and as far away as can be: only the background is mixed in.
+    # Drawn in the opaque pass at the greatest depth: it is blended with the background only.
     actor.SetForceOpaque(glass)
     shader = actor.GetShaderProperty()
     if glass:

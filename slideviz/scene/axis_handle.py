@@ -1,4 +1,8 @@
-"""The handle of a section about an axis: the patch where the mouse takes it, and the drag."""
+"""The geometry of the handle of a section about an axis: its frame, and the size after a drag.
+
+The handle's widget is `slideviz.gui.viewport.round_handle.RoundHandle`; handles of 2D sections are
+in `slideviz.sections.handles`.
+"""
 
 from __future__ import annotations
 
@@ -12,30 +16,38 @@ from slideviz.sections.model import Section
 from slideviz.session.section_cuts import Cuts
 
 Seen = Callable[[FloatArray], FloatArray]
-"""Returns where points (n, 3) are seen, (n, 2) in pixels."""
+"""A function that returns the display coordinates (n, 2), in pixels, of points (n, 3)."""
 
 _ROOM = 0.015
-"""The frame is so much larger than what it is around, as a part of its diagonal."""
+"""Margin between a patch and the frame around it, relative to the patch's diagonal."""
+
 _CHORD = np.radians(1.0)
+"""Angle between the points of an arc, in radians."""
+
 _STEEP = 0.3
-"""Whoever looks along a radius sees it shortened to less than this: the mouse cannot follow it."""
+"""Foreshortening of the size's direction below which the mouse cannot drag along it."""
+
 _LEAST = 1e-3
-"""No size is less than this part of the one at the start, nor so near to the largest there is."""
+"""Least size after a drag, relative to that before; and distance from the largest size there is,
+relative to the latter."""
 
 
 def patch_in(section: Section, mesh: Mesh, cuts: Cuts) -> Patch:
-    """Return the part of a section inside a mesh, or the part nearest to the mesh."""
+    """Return the patch of a section that cuts a mesh, or the patch nearest to the mesh."""
     return patch_of(section, points_near(section, mesh, cuts))
 
 
 def points_near(section: Section, mesh: Mesh, cuts: Cuts) -> FloatArray:
-    """Return the points (n, 3) of a section's cut, or the mesh's where nothing is cut."""
+    """Return the points (n, 3) of a section's cut; the mesh's nodes if it cuts no cell."""
     cut = cuts.of(mesh, section)
     return cut.points if len(cut) else mesh.points[cuts.cutter(mesh).used]
 
 
 def frame_of(section: Section, patch: Patch) -> list[FloatArray]:
-    """Return lines (k, 3) around a patch: arcs at both ends of the axis, and what joins them."""
+    """Return polylines (k, 3) around a patch: arcs at both ends along the axis, and two sides.
+
+    A patch all around the axis has no sides.
+    """
     shape = axis_shape(section)
     girth = shape.girth(section, (patch.along[0] + patch.along[1]) / 2.0)
     size = (patch.angles[1] - patch.angles[0]) * girth, patch.along[1] - patch.along[0]
@@ -54,17 +66,30 @@ def frame_of(section: Section, patch: Patch) -> list[FloatArray]:
 def drag(
     seen: Seen, section: Section, place: PlaceOnSection, size: float
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Return the pixel of a place on a section, and how far the mouse goes for a unit of size.
+    """Return the pixel of a place on a section, and how it moves with the section's size.
+
+    Parameters
+    ----------
+    seen : callable
+        Returns display coordinates.
+    section : Section
+    place : (float, float)
+        Angle in radians, and position along the axis.
+    size : float
+        The size at which the derivative is taken.
 
     Returns
     -------
-    at, way : (2,) float64
-        In pixels. Who looks along the way that it goes pulls upwards for a larger one.
+    at : (2,) float64
+        The place's pixel.
+    way : (2,) float64
+        Derivative of the pixel by the size. If ``steep``, it points upwards, as a replacement.
     steep : bool
-        Whether that is so.
+        Whether the size's direction is nearly along the line of sight, so that the place would
+        hardly move on the screen.
     """
     shape, lever = axis_shape(section), axis_shape(section).lever(section, place[1])
-    # Outwards, around and along the section: of three, one is seen in full length or nearly.
+    # Outwards, around and along the section: one of the three is hardly foreshortened.
     ways = shape.ways(section.sized(size), place[0])
     (here,) = shape.surface(section, np.array([place]), size)
     step = 1e-3 * section.size * lever
@@ -78,17 +103,18 @@ def drag(
 def dragged_size(
     seen: Seen, section: Section, place: PlaceOnSection, *, start: FloatArray, now: FloatArray
 ) -> float:
-    """Return the size of a section after a drag of one of its places.
+    """Return the size of a section after one of its places was dragged.
 
     Parameters
     ----------
     seen : callable
+        Returns display coordinates.
     section : Section
-        As it was at the start.
+        The section when the drag began.
     place : (float, float)
-        What the mouse holds.
+        The dragged place: angle in radians, and position along the axis.
     start, now : (2,) float64
-        From where to where the mouse went, in pixels.
+        Where the drag began, and where the mouse is now, in pixels.
     """
     size, ends = (
         section.size,
@@ -98,7 +124,7 @@ def dragged_size(
     target = at + now - start
     if steep:
         return float(np.clip(size + float((now - start)[1] / slope[1]), *ends))
-    # In perspective, what is nearer moves further: a few steps to where the mouse is.
+    # Newton's method: in perspective, the pixel is not linear in the size.
     for _ in range(4):
         at, slope, steep = drag(seen, section, place, size)
         if steep:

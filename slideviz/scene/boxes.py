@@ -21,17 +21,17 @@ from slideviz.terms import ROLES
 
 BASE, MOVED, BEHIND, LABELS = "boxes:undeformed", "boxes:moved", "boxes:behind", "boxes:-labels"
 ENDS = (0, 0, 0), (-1, 0, 0), (0, -1, 0), (0, 0, -1)
-"""The first control point of a box, and those at the ends of its edges from there."""
+"""Indices of a box's first control point, and of those at the ends of its edges in i, j and k."""
+
 FAINT, CLEAR = 0.3, 0.75
-"""Opacity of what the mesh is in front of: of boxes, and of what moves of them."""
+"""Opacity of parts that the mesh hides: of undeformed boxes, and of their moved parts."""
 
 
 class BoxLayer(Layer):
-    """The control points of all boxes, and those that motions move where they come to be.
+    """The lattices of control points of all boxes, undeformed and as moved by the motions.
 
-    What is inside the mesh, or behind it, is seen faintly, and clearly what moves of it. Beside the
-    first corner of a box is its name, and at the ends of its edges from there are i, j and k, as
-    far as there is room.
+    Parts that the mesh hides are drawn faintly, moved ones clearly. The name of a box is beside its
+    first control point, and i, j and k are at the other ends of the edges from there.
     """
 
     def __init__(self, stage: Stage) -> None:
@@ -39,7 +39,7 @@ class BoxLayer(Layer):
         self._key: tuple[object, ...] = ()
 
     def clear(self) -> None:
-        """Forget the mesh."""
+        """Forget the mesh; the scene removes its actors."""
         self._key = ()
 
     def update(self, _old: Session | None, new: Session) -> None:
@@ -84,7 +84,7 @@ class BoxLayer(Layer):
             self._label(boxes, mesh.dim, lift)
 
     def _add(self, shape: Any, name: str, colour: str) -> Any:
-        """Return the actor of lines and points."""
+        """Return a new actor of a lattice's lines and points."""
         actor = self.stage.add(shape, name, lighting=False, pickable=False)
         scale = self.stage.pixel_scale
         actor.prop.color = colour
@@ -110,7 +110,7 @@ class BoxLayer(Layer):
             render=False,
             pickable=False,
         )
-        # The letters belong to what sorts them, before the mapper.
+        # The text property belongs to the filter that precedes the mapper.
         letters = labels.mapper.GetInputConnection(0, 0).GetProducer().GetTextProperty()
         set_letters(letters, self.stage.scheme, 13 * self.stage.font_scale)
 
@@ -120,9 +120,9 @@ def _ffd_motions(case: Case) -> tuple[Ffd, ...]:
 
 
 def lattices(case: Case, mesh: Mesh) -> tuple[dict[str, Box], dict[str, Box]]:
-    """Return the boxes, and as they come to be those that motions move, by name.
+    """Return the undeformed boxes, and the deformed ones of those that motions move, by name.
 
-    Of a box with a mistake, which the panel of motions tells, there are none.
+    None of both if a box is not valid, which is reported elsewhere.
     """
     try:
         boxes = boxes_for(case, mesh)
@@ -137,14 +137,17 @@ def lattices(case: Case, mesh: Mesh) -> tuple[dict[str, Box], dict[str, Box]]:
 
 
 def lattice_shape(boxes: list[tuple[FloatArray, np.ndarray]], dim: int, lift: float) -> Any:
-    """Return control points and the lines from them to their neighbours as PolyData.
-
-    In 2D, where a box is one cell thick, they are in the plane, raised by ``lift``.
+    """Return control points and the lines between neighbouring ones as PolyData.
 
     Parameters
     ----------
-    boxes : list of (I, J, K, 3) float64 and (I, J, K) bool
-        The control points of each, and which of them are drawn.
+    boxes : list of ((I, J, K, 3) float64, (I, J, K) bool)
+        The control points of each box, and which of them are drawn; lines have one of these at
+        least.
+    dim : int
+        In 2D only the layer k = 0 is drawn.
+    lift : float
+        Height above z = 0 in 2D.
     """
     points, lines, wanted, start = [], [], [], 0
     for box, drawn in boxes:

@@ -1,4 +1,4 @@
-"""The camera of a scene: sides to look from, fitting, zooming; parallel or in perspective."""
+"""The camera of a scene: look from a side, fit, zoom; parallel or perspective projection."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from slideviz.scene.pick import to_display
 from slideviz.scene.stage import Stage
 
 FILL = 0.92
-"""How much of the free height or width a mesh takes."""
+"""Part of the free height or width that a fitted mesh takes."""
 
 DETAIL = 0.5
-"""Who sees less than this part of the height that would show everything looks at a detail."""
+"""Height of the view, relative to that which shows everything, below which it shows a detail."""
 
 SLACK = 0.25
-"""The box around a mesh may be outside the view by this much of it, with the mesh inside."""
+"""How far a bounding box may be outside the view, relative to its size, to count as seen."""
 
 SIDES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
     "+x": ((1, 0, 0), (0, 0, 1)),
@@ -30,23 +30,23 @@ SIDES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] 
     "-z": ((0, 0, -1), (0, 1, 0)),
     "iso": ((1, -1, 0.8), (0, 0, 1)),
 }
-"""Direction from the mesh to the camera, and what is up."""
+"""For each side: the direction from the mesh to the camera, and the up vector."""
 
 
 class Camera:
-    """The camera of a stage: aimed, fitted and zoomed.
+    """Places the VTK camera of a stage: fits, aims, zooms, and says what it sees.
 
     Parameters
     ----------
     stage : Stage
     shapes : callable
-        Returns the data sets that should be seen.
+        Returns the data sets that a fitted camera shows.
 
     Attributes
     ----------
     beside : Camera or None
-        That of a view beside this one, which looks from the same place: what fills the view is
-        all that both show.
+        The linked camera of the view beside this one, in the same position; both are fitted to
+        the data sets of both.
     """
 
     def __init__(self, stage: Stage, shapes: Callable[[], list[Any]]) -> None:
@@ -66,7 +66,10 @@ class Camera:
         self.fit()
 
     def turn(self, towards: FloatArray, up: FloatArray, parallel: bool) -> None:
-        """Show all that is drawn from a direction (3,), from the mesh to the camera."""
+        """Turn the camera to a direction (3,), from the mesh to it, with an up vector (3,).
+
+        It looks at the middle of everything drawn; `fit` sets distance and scale.
+        """
         bounds = np.array(self.stage.plotter.bounds).reshape(3, 2)
         centre = bounds.mean(axis=1)
         camera = self._camera
@@ -77,9 +80,9 @@ class Camera:
         camera.parallel_projection = parallel
 
     def fit(self, clouds: Iterable[FloatArray] = ()) -> None:
-        """Make all that is drawn fill the view, from the present side, beside the legend's strip.
+        """Fit everything drawn to the view beside the legend's strip; the direction stays.
 
-        ``clouds`` are more points (n, 3) to be seen: where the same things are at other steps.
+        ``clouds`` are further arrays of points (n, 3) to be seen, such as those of other steps.
         """
         self.shift()
         found = self._whole(clouds)
@@ -90,7 +93,7 @@ class Camera:
         self._fitted = self.place
 
     def fit_part(self, clouds: Sequence[FloatArray]) -> None:
-        """Make some points (n, 3) fill the view, from the present side."""
+        """Fit the given points, arrays (n, 3), to the view; the direction stays."""
         self.shift()
         whole = self._whole()
         if whole is None or not clouds:
@@ -99,20 +102,26 @@ class Camera:
         self.aim(centre, max(half, 1e-9 * whole[1]), 2.0 * whole[2])
 
     def _whole(self, clouds: Iterable[FloatArray] = ()) -> tuple[Any, float, float] | None:
-        """Return the middle (3,) of all there is, half the height that shows it, and its extent."""
+        """Return centre (3,), half view height and diagonal of all that is drawn; None if nothing.
+
+        ``clouds`` are further arrays of points (n, 3).
+        """
         shapes = [shape for camera in self._cameras() for shape in camera._shapes()]
         if not shapes:
             return None
         return self._around(chain((np.asarray(shape.points) for shape in shapes), clouds))
 
     def _cameras(self) -> list[Camera]:
-        """Return this camera and the one beside it."""
+        """Return this camera and the one beside it, if there is one."""
         return [self] if self.beside is None else [self, self.beside]
 
     def _around(self, clouds: Iterable[FloatArray]) -> tuple[Any, float, float]:
-        """Return the middle (3,) of points, half the height that shows them, and their extent."""
+        """Return centre (3,), half the view height that shows them, and diagonal of points (n, 3).
+
+        The box around the points is along the camera's axes.
+        """
         axes = self._axes()
-        # Not all points at once: of large meshes, a copy of them takes longer than all else.
+        # Not concatenated: for large meshes a copy would take most of the time.
         along = (axes @ points.T for points in clouds)
         ends = np.array([(one.min(axis=1), one.max(axis=1)) for one in along])
         low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
@@ -121,31 +130,31 @@ class Camera:
         return axes.T @ ((low + high) / 2.0), half, float(np.linalg.norm(extent))
 
     def _half(self, extent: Any) -> float:
-        """Return half the height that shows an extent (3,) in a view of this size."""
+        """Return half the view height, in mesh units, that shows an extent (3,) along the axes."""
         width, height = self.stage.plotter.window_size
         free = max(width - self.stage.strip(), 1.0)
         return max(extent[1] / height, extent[0] / free, 1e-300) * height / 2.0 / FILL
 
     def sees_detail(self) -> bool:
-        """Tell whether somebody zoomed in: the view has much less than all that is drawn."""
+        """Return whether the view is zoomed in: its height is below `DETAIL` of the fitted one."""
         found = self._whole()
         return found is not None and self._camera.parallel_scale < DETAIL * found[1]
 
     @property
     def fitted(self) -> bool:
-        """Tell whether the camera is where `fit` put it."""
+        """Return whether the camera has not moved since `fit`."""
         return self._fitted == self.place
 
     def aim(self, centre: Any, half: float, depth: float = 0.0) -> None:
-        """Aim at a point, with ``half`` the height of the view above and below the point.
+        """Move the camera to look at a point with a given height of view; the direction stays.
 
         Parameters
         ----------
         centre : (3,)
         half : float
-            In the length unit.
+            Half the height of the view at the point, in the mesh's length unit.
         depth : float
-            Extent of what is seen along the line of sight.
+            Extent along the line of sight of what should be seen, which keeps the camera outside.
         """
         camera = self._camera
         direction = self._axes()[2]
@@ -158,19 +167,22 @@ class Camera:
         self.stage.plotter.renderer.ResetCameraClippingRange()
 
     def _axes(self) -> Any:
-        """Return right, up and forward, (3, 3), as unit vectors."""
+        """Return the camera's right, up and forward unit vectors as rows (3, 3)."""
         camera = self._camera
         right = np.cross(camera.direction, np.array(camera.up))
         up = np.cross(right, camera.direction)
         return np.array([right / np.linalg.norm(right), up / np.linalg.norm(up), camera.direction])
 
     def shift(self) -> None:
-        """Shift the picture beside the strip of the legend; the camera keeps its centre."""
+        """Shift the picture to the left of the legend's strip; the focal point stays."""
         width = self.stage.plotter.window_size[0]
         self._camera.SetWindowCenter(self.stage.strip() / max(width, 1), 0.0)
 
     def zoom_at(self, x: float, y: float, factor: float) -> None:
-        """Enlarge by ``factor``; in parallel projection pixel (x, y) keeps what it shows."""
+        """Zoom by ``factor``; in parallel projection, pixel (x, y) keeps showing the same point.
+
+        Pixels are counted from the lower left corner.
+        """
         camera, renderer = self._camera, self.stage.plotter.renderer
         if not camera.parallel_projection:
             camera.Dolly(factor)
@@ -189,7 +201,7 @@ class Camera:
         renderer.ResetCameraClippingRange()
 
     def take(self, other: Camera) -> None:
-        """Copy another camera's position and projection; the legend keeps its strip here."""
+        """Copy another camera's position and projection, but not its shift beside a legend."""
         camera, theirs = self._camera, other._camera
         camera.position, camera.focal_point = theirs.position, theirs.focal_point
         camera.up, camera.view_angle = theirs.up, theirs.view_angle
@@ -199,41 +211,41 @@ class Camera:
         self.stage.plotter.renderer.ResetCameraClippingRange()
 
     def show_width_of(self, other: Camera) -> None:
-        """Show as much of the width as another camera does, in a view that may be less wide."""
+        """Zoom out so that a relatively narrower view shows the width that another camera shows."""
         free = [self._ratio(stage) for stage in (self.stage, other.stage)]
         if self._camera.parallel_projection and free[0] < free[1]:
             self._camera.parallel_scale *= free[1] / free[0]
 
     @staticmethod
     def _ratio(stage: Stage) -> float:
-        """Return the width of a view without the legend's strip by its height."""
+        """Return a view's width, without the legend's strip, divided by its height."""
         width, height = stage.plotter.window_size
         return float(max(width - stage.strip(), 1.0) / max(height, 1))
 
     def sees_all(self, slack: float = SLACK) -> bool:
-        """Tell whether the boxes around all data sets to be seen are within the view.
+        """Return whether the bounding boxes of all data sets are within the view.
 
-        They may be outside by ``slack``, a part of its size.
+        They may be outside by ``slack``, relative to the view's size.
         """
         seen = np.concatenate([*self._boxes(), np.empty((0, 2))])
         size = np.array(self.stage.plotter.window_size)
         return bool((seen >= -slack * size).all() and (seen <= (1 + slack) * size).all())
 
     def loses_all(self) -> bool:
-        """Tell whether the boxes around all data sets to be seen are outside the view."""
+        """Return whether the bounding boxes of all data sets are outside the view."""
         size = np.array(self.stage.plotter.window_size)
         boxes = self._boxes()
         outside = ((box.max(axis=0) < 0).any() or (box.min(axis=0) > size).any() for box in boxes)
         return bool(boxes) and all(outside)
 
     def _boxes(self) -> list[FloatArray]:
-        """Return where the corners (8, 2) of the box around each data set are, in pixels."""
+        """Return the corners (8, 2) of each data set's bounding box, in pixels."""
         boxes = (np.array(shape.bounds).reshape(3, 2) for shape in self._shapes())
         corners = (np.stack(np.meshgrid(*box), -1).reshape(-1, 3) for box in boxes)
         return [to_display(self.stage.plotter, one) for one in corners]
 
     def loses_some(self) -> bool:
-        """Tell whether a node to be seen is outside the view, or below the legend."""
+        """Return whether a point of a data set is outside the view, or behind the legend."""
         width, height = self.stage.plotter.window_size
         free = np.array([width - self.stage.strip(), height])
         for shape in self._shapes():
@@ -243,7 +255,7 @@ class Camera:
         return False
 
     def looks_like(self, other: Camera) -> bool:
-        """Tell whether another camera has the same position and projection."""
+        """Return whether another camera has the same position and projection."""
         camera, theirs = self._camera, other._camera
         return (
             self.place == other.place
@@ -253,18 +265,21 @@ class Camera:
 
     @property
     def place(self) -> tuple[float, ...]:
-        """Return position, focal point, up, and half the height of the view: ten numbers."""
+        """Return ten numbers: position, focal point, up vector, and parallel scale.
+
+        The scale is half the height of the view, in the mesh's length unit.
+        """
         camera = self._camera
         numbers = (*camera.position, *camera.focal_point, *camera.up, camera.parallel_scale)
         return tuple(float(number) for number in numbers)
 
     @property
     def view(self) -> tuple[float, ...]:
-        """Return `place`, and the width of the view without the legend's strip by its height."""
+        """Return the ten numbers of `place`, and the view's free width divided by its height."""
         return (*self.place, self._ratio(self.stage))
 
     def go(self, place: tuple[float, ...]) -> None:
-        """Put the camera where `place` was read, or where `view` was: all its width is seen."""
+        """Restore a `place` or a `view`; of a `view` all the width is seen, if need be smaller."""
         camera = self._camera
         camera.position, camera.focal_point, camera.up = place[:3], place[3:6], place[6:9]
         camera.parallel_scale = place[9]

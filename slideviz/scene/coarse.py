@@ -1,4 +1,4 @@
-"""Coarse boundaries in the scene, drawn while the camera moves and all facets take too long."""
+"""Coarse boundaries, drawn while the mouse moves something and full detail takes too long."""
 
 from __future__ import annotations
 
@@ -15,21 +15,22 @@ from slideviz.session.state import Session
 
 
 class CoarseLayer(Layer):
-    """The coarse boundaries, in place of the others while it is `on`.
+    """The coarse boundaries, drawn in place of those in full detail while ``on``.
 
     Parameters
     ----------
     stage : Stage
     boundaries : BoundaryLayer
-        Draws them with all facets, and says how they look.
+        Draws the boundaries in full detail; their properties are copied.
     sections : SectionLayer
-        Draws sections, which have no edges meanwhile.
+        Draws sections, whose edges are switched off meanwhile.
 
     Attributes
     ----------
     surfaces : mapping of str to Surface
-        By name; set before a mesh is opened, none for small meshes.
+        The coarse boundaries by name, set before a mesh is opened; empty for small meshes.
     on : bool
+        Whether they are drawn.
     """
 
     def __init__(self, stage: Stage, boundaries: BoundaryLayer, sections: SectionLayer) -> None:
@@ -40,7 +41,7 @@ class CoarseLayer(Layer):
         self.clear()
 
     def clear(self) -> None:
-        """Forget the mesh."""
+        """Forget the mesh; the scene removes its actors."""
         self.on = False
         self.drawn: dict[str, DrawnBoundary] = {}
         self._made_of: tuple[object, ...] = ()
@@ -48,13 +49,13 @@ class CoarseLayer(Layer):
         self._edged: list[Any] = []
 
     def update(self, _old: Session | None, new: Session) -> None:
-        """Draw another state of the session, in place of what the boundaries have just drawn."""
+        """Draw another state of the session, after the boundaries in full detail were updated."""
         self._session = new
         if self.on:
             self._draw()
 
     def switch(self, on: bool) -> bool:
-        """Draw the coarse boundaries, or the others again; tell whether that was a change."""
+        """Switch to coarse boundaries, or back; return whether anything has changed."""
         if on == self.on or (on and not self.surfaces):
             return False
         self.on = on

@@ -19,20 +19,20 @@ if TYPE_CHECKING:
     from slideviz.scene.stage import Stage
 
 OPACITY = 0.82
-"""How much of a mesh a plate covers."""
+"""Opacity of a plate, which covers the mesh."""
 
 Rect = tuple[float, float, float, float]
 """Left, bottom, right and top, in pixels from the lower left corner of the view."""
 
 
 class Plate:
-    """A rectangle in the background's colours between the legend and the mesh behind.
+    """A half-transparent rectangle in the background's colours, between legend and mesh.
 
     Parameters
     ----------
     plotter : pyvista.BasePlotter
     name : str
-        Of the actor. What is drawn after it lies above it.
+        The name of the actor. 2D actors added later are drawn over it.
     scheme : ColorScheme
     """
 
@@ -47,12 +47,12 @@ class Plate:
         mapper.SetScalarModeToUsePointData()
         actor.SetMapper(mapper)
         actor.SetPickable(False)
-        # Kept here: what only VTK holds may come back without its Python part.
+        # A reference in Python: VTK alone would keep only the C++ object.
         self.actor = actor
         plotter.add_actor(actor, name=name, reset_camera=False, render=False, pickable=False)
 
     def place(self, rect: Rect) -> None:
-        """Cover a rectangle of the view as it is now."""
+        """Set the rectangle that the plate covers, and its colours, for the view's present size."""
         left, bottom, right, top = rect
         high = max(self.plotter.window_size[1], 1)
         corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
@@ -62,7 +62,7 @@ class Plate:
         self._shape.set_active_scalars("colour", preference="point")
 
     def colour_at(self, height: float) -> tuple[int, ...]:
-        """Return red, green, blue and opacity at a part of the view's height."""
+        """Return red, green, blue and opacity (0 to 255) at a height from 0 to 1 of the view."""
         below, above = (
             np.array(pv.Color(name).int_rgb, float)
             for name in (self._scheme.background, self._scheme.background_top)
@@ -72,30 +72,30 @@ class Plate:
 
 
 STRIP = 104
-"""Pixels at the right edge that are kept free of the mesh, at normal letter size."""
+"""Width in pixels of the strip at the right that is free of the mesh, at normal letter size."""
 
 _VTK_FONT_FILE = 4
 _AIR = 12.0
-"""Pixels around the colour bar and its letters."""
+"""Margin in pixels between the colour bar and the edge of its plate."""
 _BAR, _LONG = 20.0, 11
-"""Pixels that the colour bar is wide; letters of a title that needs all of the strip."""
+"""Width of the colour bar in pixels; number of letters from which a title needs the whole strip."""
 _LABEL, _GAP, _HEAD = 14.0, 4.0, 30.0
-"""Pixels that a number beside the colour bar is high, those between both, and its title's."""
+"""Height of a number beside the bar, distance between both, height of the title, in pixels."""
 _BOTTOM, _NAN, _INDENT = 0.16, 13.0, 4.0
-"""The lower end of the bar, a part of the view; pixels of the field of inverted cells there, and
-those before its word."""
+"""Lower end of the bar relative to the view's height; height in pixels of the field of inverted
+cells there; distance in pixels from the field to its text."""
 
 
 @lru_cache(maxsize=1)
 def _font_file() -> str:
-    """Return a font with Greek letters and signs, which VTK's own font lacks."""
+    """Return the path of a font with Greek letters and signs, which VTK's own font lacks."""
     import matplotlib as mpl
 
     return str(Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf")
 
 
 def set_letters(text: Any, scheme: ColorScheme, size: float) -> None:
-    """Give a vtkTextProperty the font, the color scheme's colour, and a size in pixels."""
+    """Set font, the color scheme's text colour, and a size in points of a vtkTextProperty."""
     text.SetFontFamily(_VTK_FONT_FILE)
     text.SetFontFile(_font_file())
     text.SetFontSize(round(size))
@@ -106,23 +106,27 @@ def set_letters(text: Any, scheme: ColorScheme, size: float) -> None:
 
 
 ROLE, NODES, RING = "\u25a0", "\u25cf", "\u25cb"
-"""The signs of lines about roles, about nodes, and about what has a ring."""
+"""The signs at the begin of the legend's lines: of roles, of nodes, of what is marked by rings."""
 _SIGNS = {
     ROLE: ("legend:", STRIP - 28, 14),
     NODES: ("legend:nodes:", STRIP - 25, 12),
     RING: ("legend:rings:", STRIP - 25, 12),
 }
-"""The begin of the names of their actors, the left edge of words and their size, in pixels."""
+"""For each sign: prefix of the actors' names; left edge of the text, in pixels from the view's
+right edge; size of the letters."""
 
 
 def add_role_legend(stage: Stage, roles: Sequence[Role]) -> None:
-    """Write the roles in use into the upper right corner, each with its colour."""
+    """Draw the roles in use in the upper right corner, a line each, with its colour."""
     for row, role in enumerate(roles, start=1):
         _line(stage, ROLE, ROLES[role].colour, ROLES[role].label, down=14 + 24 * row)
 
 
 def add_point_legend(stage: Stage, top: float) -> float:
-    """Write what points and rings mean below ``top`` pixels; return where the last line ends."""
+    """Draw the meanings of points and rings, from ``top`` pixels below the view's upper edge.
+
+    Return the distance of the last line from there, in pixels.
+    """
     words = [(NODES, *line) for line in stage.point_words]
     words += [(RING, *line) for line in stage.ring_words]
     for row, (sign, word, colour) in enumerate(words, start=1):
@@ -131,7 +135,7 @@ def add_point_legend(stage: Stage, top: float) -> float:
 
 
 def _line(stage: Stage, sign: str, colour: str, word: str, *, down: float) -> None:
-    """Write a sign in its colour and a word, so far below the top."""
+    """Draw a sign in its colour and a text, ``down`` pixels below the view's upper edge."""
     # A role and the nodes of a type may have the same word.
     prefix, right, size = _SIGNS[sign]
     corner = _corner(1.0, 1.0)
@@ -152,7 +156,7 @@ def _line(stage: Stage, sign: str, colour: str, word: str, *, down: float) -> No
 
 
 def _corner(x: float, y: float) -> Any:
-    """Return a place of the view, of 1 by 1: what is counted from it is right in any size."""
+    """Return a vtkCoordinate relative to the view (0 to 1), as reference of pixel positions."""
     from vtkmodules.vtkRenderingCore import vtkCoordinate
 
     corner = vtkCoordinate()
@@ -162,7 +166,7 @@ def _corner(x: float, y: float) -> Any:
 
 
 def clear_legend(plotter: Any) -> None:
-    """Remove the legend of roles and the colour bar, and the plate below it."""
+    """Remove the lines of the legend, the colour bar, and the plate."""
     for name in list(plotter.actors):
         if name.startswith(("legend:", "plate:")):
             plotter.remove_actor(name, reset_camera=False, render=False)
@@ -171,7 +175,10 @@ def clear_legend(plotter: Any) -> None:
 
 
 def add_colour_bar(stage: Stage, mapper: Any, what: ColourByTerm, inverted: bool) -> None:
-    """Draw the colour bar of a mapper, with ``inverted`` below if wanted; `place_bar` places it."""
+    """Add the colour bar of a mapper; `place_bar` places it.
+
+    ``inverted``: with a field for inverted cells at its lower end.
+    """
     scheme, font_scale, title, unit = stage.scheme, stage.font_scale, what.label, what.unit
     scale = stage.pixel_scale
     bar = stage.plotter.add_scalar_bar(
@@ -194,7 +201,7 @@ def add_colour_bar(stage: Stage, mapper: Any, what: ColourByTerm, inverted: bool
     bar.SetUseCustomLabels(True)
     bar.SetDrawNanAnnotation(inverted)
     bar.SetNanAnnotation("")
-    if inverted:  # the bar's own word would be to its left, where the mesh is
+    if inverted:  # VTK's own annotation would be to the bar's left, over the mesh
         word, right = pv.Text("inverted"), STRIP - 14 - _BAR - _GAP - _INDENT
         word.GetPositionCoordinate().SetReferenceCoordinate(_corner(1.0, _BOTTOM))
         word.GetPositionCoordinate().SetCoordinateSystemToViewport()
@@ -207,14 +214,15 @@ def add_colour_bar(stage: Stage, mapper: Any, what: ColourByTerm, inverted: bool
 
 
 def place_bar(plotter: Any, title: str, below: float, scale: float) -> Rect:
-    """Put the colour bar at the right edge of the view as it is now, ``below`` pixels from its top.
+    """Place the colour bar at the right edge of the view, for the view's present size.
 
-    There its title ends, where lines about points above it do. Return the room of bar and letters.
+    It begins ``below`` pixels (at normal letter size) under the view's upper edge, where lines
+    about points may be. Return the rectangle of the bar and its letters, with a margin.
     """
     width, height = (max(side, 1) for side in plotter.window_size)
     bar, bottom = plotter.scalar_bars[title], _BOTTOM
     bar.SetPosition(1.0 - (STRIP - 14) * scale / width, bottom)
-    # The title is in the middle of that: short ones keep away from the edge of the view.
+    # The title is centred on this width: a short one keeps away from the edge of the view.
     wide = STRIP - 20 if len(title) >= _LONG else 66
     bar.SetWidth(wide * scale / width)
     bar.SetBarRatio(_BAR / wide)
@@ -227,7 +235,7 @@ def place_bar(plotter: Any, title: str, below: float, scale: float) -> Rect:
 
 
 def _number(bar: Any, length: float) -> None:
-    """Write as many numbers beside a bar as have room in its length in pixels at normal size."""
+    """Set the numbers beside a bar, as many as fit in its length (pixels at normal letter size)."""
     from vtkmodules.util.numpy_support import numpy_to_vtk
 
     low, high = bar.GetLookupTable().GetRange()
@@ -237,12 +245,12 @@ def _number(bar: Any, length: float) -> None:
 
 
 def lines_room(plotter: Any, end: float, scale: float) -> Rect:
-    """Return the room of lines in the upper right corner, the last ``end`` pixels below the top."""
+    """Return the rectangle of the lines in the upper right corner, down to ``end`` pixels."""
     height = plotter.window_size[1]
     return _rect(plotter, height - (end + 13) * scale, height, scale)
 
 
 def _rect(plotter: Any, bottom: float, top: float, scale: float) -> Rect:
-    """Return the strip between two heights, in pixels."""
+    """Return the rectangle of the legend's strip between two heights, in pixels."""
     width, height = plotter.window_size
     return width - STRIP * scale, bottom, float(width), min(top, float(height))

@@ -28,33 +28,35 @@ from slideviz.session.state import Session
 from slideviz.terms import quantity_of
 
 FILL = 0.94
-"""How much of the height or width a section takes."""
+"""Part of the view's height or width that a fitted section takes."""
 
 READING = "its cells are being read from the file of the mesh"
 
 
 class FlatScene:
-    """One section of a session laid flat, with other passages; both axes to the same scale.
+    """One section of a session laid flat in a plotter, with those of neighbouring passages.
+
+    Both axes have the same scale.
 
     Parameters
     ----------
     plotter : pyvista.BasePlotter
         Where to draw.
     cuts : Cuts
-        Shared with the view in space.
+        The cuts of the 3D scene, shared with it.
     scheme : ColorScheme
 
     Attributes
     ----------
     section : Section or None
-        What is shown.
+        The section that is shown.
     polygons : Polygons or None
-        Its cells, flat.
+        The polygons that are drawn, laid flat.
     session : Session
         The state that is shown.
     camera : Camera
     beside : FlatScene or None
-        Another scene with the same camera: both are seen whole.
+        Another scene whose camera is linked: `fit` shows both sections whole.
     """
 
     def __init__(self, plotter: Any, cuts: Cuts, scheme: ColorScheme = LIGHT) -> None:
@@ -117,7 +119,7 @@ class FlatScene:
         elif only is not None:
             flat = only.among(flat)
         if not section.whole and len(flat):
-            # Nothing is in front of another, but folded cells overlap: they are drawn last.
+            # All is in one plane, where folded cells overlap others: they are drawn last.
             status = cut_frame(session.frame, section).quality.status
             flat = flat.with_last(status[flat.cells] == INVERTED)
             flat = flat.with_points(flat.points * (1.0, 1.0, 0.0))
@@ -125,9 +127,9 @@ class FlatScene:
         self._shown.show(flat)
 
     def _ahead(self, section: Section, session: Session) -> float | None:
-        """Return the angle that lies level: that of the undeformed mesh, alike in all views.
+        """Return the angle, in radians, that is put in the middle when unrolled (None for a plane).
 
-        Looked for only where it may be another.
+        It is that of the undeformed mesh, so that all views agree, and is cached.
         """
         key = (session.mesh, section.kind, section.origin, section.direction)
         if key != self._level[0]:
@@ -171,9 +173,9 @@ class FlatScene:
 
     @property
     def summary(self) -> str:
-        """Return in words how many cells are cut, and their min, mean and inverted ones.
+        """Return a sentence with the number of cells cut, their min, mean and inverted ones.
 
-        While a range chooses cells, these are those of the cells that it leaves.
+        With a threshold, it is about the cells within it.
         """
         if self.polygons is None or self._all is None or not len(self._all):
             awaited = (
@@ -217,7 +219,10 @@ class FlatScene:
             self.update(self.session, self.section)
 
     def bounds(self) -> tuple[FloatArray, FloatArray] | None:
-        """Return the lowest and highest corner (2,) of all that is drawn, or None."""
+        """Return the lower and upper corner (2,) of the section and its instances; None if empty.
+
+        Cells outside the threshold count too.
+        """
         if self._all is None or not len(self._all):
             return None
         own = self._all.points
@@ -231,7 +236,7 @@ class FlatScene:
         return low[:2], high[:2]
 
     def fit(self) -> None:
-        """Make the section fill the view."""
+        """Make the section (and that of ``beside``) fill the view."""
         scenes = [self] if self.beside is None else [self, self.beside]
         found = [box for box in (scene.bounds() for scene in scenes) if box is not None]
         if not found:
@@ -252,7 +257,7 @@ class FlatScene:
         self.stage.plotter.renderer.ResetCameraClippingRange()
 
     def ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return the ranges of the view from left to right, and from bottom to top."""
+        """Return the ranges of both axes that the view shows: left to right, bottom to top."""
         camera = self.stage.plotter.camera
         width, height = self.stage.plotter.window_size
         x, y, _ = camera.focal_point
@@ -262,18 +267,18 @@ class FlatScene:
 
 
 def flat_matrix(section: Section, pair: Pair, number: int, matrix: FloatArray) -> FloatArray:
-    """Return the matrix (4, 4) that moves the flat section as a power of the period does.
+    """Return the matrix (4, 4) that moves a flat section to that of a neighbouring passage.
 
     Parameters
     ----------
     section : Section
-        The matrix takes it onto itself.
+        A section that ``matrix`` maps onto itself.
     pair : Pair
-        The period.
+        The periodic boundaries.
     number : int
-        Its power.
+        The number of the passage: the power of the period.
     matrix : (4, 4) float64
-        The transformation in space.
+        The transformation to the passage in space.
     """
     turn = np.sign(section.basis[2] @ np.asarray(pair.axis)) if pair.kind == "rotational" else 0.0
     angle = turn * np.copysign(pair.period, pair.angle) * number

@@ -1,4 +1,4 @@
-"""Ghosts in the scene: the undeformed boundaries, and those where motions will take them."""
+"""Ghosts in the scene: transparent boundaries, undeformed or as the motions will move them."""
 
 from __future__ import annotations
 
@@ -18,25 +18,34 @@ from slideviz.session.state import Session
 from slideviz.terms import ROLES
 
 RIM, WIRE = "\nrim", "\nwire"
-"""What stands behind the name of an actor that draws the rim of a ghost, or the edges of its
-faces; no boundary has it."""
+"""Suffixes of the names of actors that draw the rim of a ghost, and the edges of its faces; no
+boundary's name has them."""
 STILL = 1e-9
-"""Part of its extent that rounding may move a boundary that stays where it is."""
+"""Displacement of a boundary, relative to its extent, that counts as a rounding error."""
 DEEPER = 330.0
-"""Units of depth that faces of ghosts are drawn behind where they are, and their rims before: of
-the 65536 from the nearest to the furthest point. A boundary that slides within its surface would
+"""Depth offset of ghosts: their faces are drawn this much behind their place, rims before it.
+
+In units of 1/65536 of the depth range. Without it, a boundary that slides within its surface would
 show through its ghost in patches."""
 ON_TOP = 70000.0
-"""As many units that the lines of a motion's ghost are before everything: one that goes into the
-solid, behind opaque boundaries, would not be seen at all."""
+"""Depth offset, in the same units, that draws the lines of a motion's ghost before everything.
+
+A ghost that enters the solid, behind opaque boundaries, would be invisible otherwise."""
+
 MOST_WIRE = 50_000
-"""Faces of a ghost whose edges are drawn: of more they are one colour, and take long."""
+"""Most faces of a ghost whose edges are drawn: more would be one area, and slow."""
 ARRIVED = 0.01
-"""Part of its displacement by which a boundary may miss its ghost and still cover it."""
+"""Distance of a boundary from its ghost, relative to its displacement, that counts as none."""
 
 
 class GhostLayer(Layer):
-    """Transparent boundaries: undeformed ones, and moved ones before anything is computed."""
+    """The ghosts: boundaries as they were undeformed, and as the motions will move them.
+
+    Attributes
+    ----------
+    moved : dict of str to (u, d) float64
+        The points of the nodes of each boundary that will move.
+    """
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
@@ -53,12 +62,12 @@ class GhostLayer(Layer):
         self._surfaces = {surface.name: surface for surface in surfaces}
 
     def clear(self) -> None:
-        """Forget the mesh."""
+        """Forget the mesh; the scene removes its actors."""
         self.moved, self._surfaces, self._actors, self._shapes = {}, {}, {}, {}
         self._session = Session()
 
     def set_moved(self, moved: Mapping[str, FloatArray]) -> None:
-        """Draw where boundaries will go: points (u, d) of the nodes of each."""
+        """Set and draw the moved boundaries: for each name, points (u, d) of its nodes."""
         for name in set(self.moved) - set(moved):
             for part in ("", RIM, WIRE):
                 key = f"motion:{name}{part}"
@@ -84,7 +93,7 @@ class GhostLayer(Layer):
             if surface is None:
                 continue
             key = f"motion:{name}"
-            # In the same place there is nothing to tell.
+            # A ghost in the boundary's own place is not drawn.
             if not shown or name in view.hidden or not is_apart(points, surface, session):
                 for part in ("", RIM, WIRE):
                     if f"{key}{part}" in self._actors:
@@ -111,7 +120,7 @@ class GhostLayer(Layer):
             _shift_depth(wire, -ON_TOP)
 
     def _rim_colour(self, colour: str) -> tuple[float, float, float]:
-        """Return a colour that is seen on that of the boundary itself."""
+        """Return a colour that contrasts with a ghost's own: mixed with that of the text."""
         own, text = (np.array(pv.Color(one).float_rgb) for one in (colour, self.stage.scheme.text))
         red, green, blue = (0.5 * (own + text)).tolist()
         return red, green, blue
@@ -132,7 +141,10 @@ class GhostLayer(Layer):
     def _parts(
         self, key: str, surface: Surface, opacity: float, nearer: float = DEEPER
     ) -> list[tuple[Any, Any]]:
-        """Return actor and shape of what a ghost is made of: lines; or faces, and their rim."""
+        """Return actor and data set of each part of a ghost: lines in 2D; faces and rim in 3D.
+
+        ``nearer`` is the depth offset of the rim.
+        """
         faces = self._part(key, lambda at, lift: actors.surface_shape(surface, at, lift))
         if surface.flat:
             faces[0].prop.opacity = opacity + 0.25
@@ -147,7 +159,7 @@ class GhostLayer(Layer):
         return [faces, rim]
 
     def _part(self, key: str, make: Callable[[FloatArray, float], Any]) -> tuple[Any, Any]:
-        """Return the actor and the shape of a name, made at the first call."""
+        """Return the actor and the data set of a name, made by ``make`` at the first call."""
         if key not in self._actors:
             mesh = self._session.mesh
             assert mesh is not None
@@ -160,7 +172,7 @@ class GhostLayer(Layer):
 
 
 def _shift_depth(actor: Any, units: float) -> None:
-    """Draw an actor deeper than its place by so much; a negative number is nearer."""
+    """Set an actor's depth offset in units of 1/65536 of the depth range; positive is further."""
     mapper = actor.mapper
     mapper.SetResolveCoincidentTopologyToPolygonOffset()
     mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(0.0, units)
@@ -168,10 +180,10 @@ def _shift_depth(actor: Any, units: float) -> None:
 
 
 def is_apart(points: FloatArray, surface: Surface, session: Session) -> bool:
-    """Tell whether the ghost of a boundary, at points (u, d), is apart from the boundary shown.
+    """Return whether a ghost at points (u, d) is visibly apart from the boundary as shown.
 
-    A run takes its boundary there but for the tolerance of the data reduction; the two would
-    flicker in the same place.
+    After a run the boundary is where its ghost is, except for the tolerance of the data reduction;
+    both would flicker there.
     """
     mesh = session.mesh
     assert mesh is not None
@@ -194,12 +206,11 @@ def rim_goes_along(points: FloatArray, surface: Surface, mesh: Mesh) -> bool:
 
 
 def is_planned(session: Session) -> bool:
-    """Tell whether a view shows where motions will take boundaries.
+    """Return whether a view shows the ghosts of the motions.
 
-    Of the undeformed mesh it should; of the steps of a run, where settings have changed since;
-    of a design, which is not what the panels have, where motions have changed since.
-    Two views beside each other say the same, or a ghost would look like a difference between
-    runs: they say it of motions that no run has shown yet.
+    It does for the undeformed mesh; for a run if its settings have changed since; for a design if
+    the motions in the panels have changed since. Two views that are compared agree, as a ghost
+    would look like a difference of the runs: they show ghosts of motions that no run has had.
     """
     if session.view.beside is not None:
         now = _motion(session.case)
@@ -211,5 +222,5 @@ def is_planned(session: Session) -> bool:
 
 
 def _motion(case: Case) -> tuple[object, ...]:
-    """Return what moves in a case, and how."""
+    """Return the moving boundaries and the motions of a case, to be compared."""
     return frozenset(case.markers_with("moving")), tuple(case.motions)

@@ -1,4 +1,4 @@
-"""Rings around inverted cells, of the same size at any zoom: slivers are found by them."""
+"""Rings around inverted cells, of the same size at any zoom, so that slivers can be found."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from slideviz.session.state import Session, StepFrame
 
 NAME = "points:inverted"
 MOST = 1000
-"""Rings that are drawn; of more cells some are left out, evenly in the order of their numbers."""
+"""Most rings that are drawn; of more cells, some are left out, evenly by their indices."""
 SIZES = ((0, 15.0), (50, 12.0), (300, 9.0))
-"""Pixels of a ring from so many on: many large ones would cover the mesh."""
+"""Pairs of a number of rings, and their diameter in pixels from that number on."""
 
 _DISC = "if (len2 > 1.0) { discard; }"
-"""How VTK's shader makes a round point of a square one."""
+"""The line of VTK's shader that makes a square point round; `_RING` replaces it."""
 _RING = "if (len2 > 1.0 || len2 < 0.42) { discard; }"
 
 
 class InvertedLayer(Layer):
-    """A ring in front of everything at the middle of each inverted cell.
+    """The rings, in front of everything, at the middle of inverted cells.
 
-    Where sections cut a 3D mesh, only those on them have one: others would be thought to be there.
+    If sections cut a 3D mesh, only the cells they cut have rings: others would seem to be on them.
 
     Parameters
     ----------
     stage : Stage
     sections : SectionLayer
-        Updated before this layer.
+        Says which cells are cut; updated before this layer.
     """
 
     def __init__(self, stage: Stage, sections: SectionLayer) -> None:
@@ -46,10 +46,10 @@ class InvertedLayer(Layer):
         self.clear()
 
     def clear(self) -> None:
-        """Forget the mesh."""
+        """Forget the mesh; the scene removes its actors."""
         self._key: tuple[object, ...] = ()
         self._cut: list[IntArray] = []
-        self._shape: Any = None  # kept here: what only VTK holds may come back without its points
+        self._shape: Any = None  # a reference in Python: VTK alone may return it without points
         self.stage.ring_words = ()
 
     def update(self, _old: Session | None, new: Session) -> None:
@@ -66,13 +66,13 @@ class InvertedLayer(Layer):
             self._draw(new.frame, cut)
 
     def _cut_cells(self, session: Session) -> list[IntArray]:
-        """Return the cells (k,) of the polygons of each section of a 3D mesh in memory."""
+        """Return, per section of a 3D mesh in memory, the cells (k,) of its polygons."""
         if session.mesh is None or session.mesh.dim == 2 or self.sections.from_file:
             return []
         return [cells for _, cells in self.sections.pickable()]
 
     def _draw(self, frame: StepFrame, cut: list[IntArray]) -> None:
-        """Draw the rings of a frame, of those cells only that are cut, where some are."""
+        """Draw the rings of a frame's inverted cells, only of those in ``cut`` if there is any."""
         own, count = frame.extra or frame, frame.quality.inverted
         cells = inverted_cells(own)
         if cut:
@@ -83,7 +83,7 @@ class InvertedLayer(Layer):
         if len(cells) > MOST:
             cells = cells[np.linspace(0, len(cells) - 1, MOST).astype(np.int64)]
         if not len(cells):
-            return  # of a mesh in its file not all of them are in memory
+            return  # a mesh in its file has few of them in memory, or none
         self._shape = pv.PolyData(lifted(middles(own.mesh, cells), 4.0 * self.stage.lift(own.mesh)))
         actor = self.stage.add(self._shape, NAME, lighting=False, pickable=False)
         size = next(size for least, size in reversed(SIZES) if len(cells) >= least)
@@ -96,7 +96,7 @@ class InvertedLayer(Layer):
 
 
 def _wanted(session: Session) -> bool:
-    """Tell whether inverted cells are marked: also in a threshold that has them."""
+    """Return whether rings are drawn: there are inverted cells, and toggle and threshold agree."""
     view, frame = session.view, session.frame
     if frame is None or not frame.quality.inverted or "inverted" not in view.drawn:
         return False

@@ -29,7 +29,7 @@ class LegendLayer(Layer):
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
-        # Of its own: that of an actor may be gone before the bar is.
+        # A mapper of its own: that of an actor may be removed before the bar.
         self._mapper = pv.DataSetMapper()
         self._mapper.lookup_table = stage.table
         self._drawn: tuple[object, ...] = ()
@@ -39,12 +39,12 @@ class LegendLayer(Layer):
         self._placed: tuple[float, ...] = ()
 
     def clear(self) -> None:
-        """Forget the mesh."""
+        """Remove the legend."""
         clear_legend(self.stage.plotter)
         self._drawn, self._bar, self._plate = (), None, None
 
     def update(self, _old: Session | None, new: Session) -> None:
-        """Draw another state of the session; a legend of other words is made anew."""
+        """Draw another state of the session; make the legend anew if its content has changed."""
         key = self._key(new)
         if key != self._drawn:
             self._drawn = key
@@ -58,7 +58,7 @@ class LegendLayer(Layer):
         stage, mesh, what = self.stage, session.mesh, session.view.colour_by
         assert mesh is not None
         self._placed = ()
-        # First: what comes after it lies above it.
+        # First, as later actors are drawn over it.
         self._plate = Plate(stage.plotter, PLATE, stage.scheme) if stage.has_plate else None
         if what == "role":
             used = {session.role(name) for name in mesh.marker_names}
@@ -73,11 +73,11 @@ class LegendLayer(Layer):
 
     @property
     def _has_lines(self) -> bool:
-        """Tell whether there are lines about points or rings, which are above the bar."""
+        """Return whether there are lines about points or rings above the bar."""
         return bool(self.stage.point_words or self.stage.ring_words)
 
     def _place(self) -> None:
-        """Put colour bar and plate where they belong in a view of this size."""
+        """Place colour bar and plate, if the view's size or pixel scale has changed."""
         plotter, scale = self.stage.plotter, self.stage.pixel_scale
         size = (*plotter.window_size, scale)
         if size == self._placed or not self._drawn:
@@ -91,7 +91,7 @@ class LegendLayer(Layer):
             self._plate.place(rect)
 
     def _key(self, session: Session) -> tuple[object, ...]:
-        """Return all words and colours of the legend."""
+        """Return everything that the legend's content depends on."""
         mesh, view = session.mesh, session.view
         names = mesh.marker_names if mesh is not None and view.colour_by == "role" else ()
         said = frozenset(session.role(name) for name in names) or has_inverted(session)
@@ -103,19 +103,19 @@ class LegendLayer(Layer):
 
 
 def has_inverted(session: Session) -> bool:
-    """Tell whether the frame that is shown has inverted cells."""
+    """Return whether the shown frame has inverted cells."""
     return session.frame is not None and session.frame.quality.inverted > 0
 
 
 SIZE = 92
-"""Pixels of the corner, at normal letter size."""
+"""Width and height in pixels of the corner with the axes, at normal letter size."""
 
 COLOURS = ("#c8452f", "#4c9a2a", "#3b7dd8")
-"""Those of x, y and z, seen on light and dark alike."""
+"""Colours of the axes x, y and z, visible on light and dark backgrounds."""
 
 
 class TriadLayer(Layer):
-    """Three arrows that turn with the camera, with the letters x, y and z."""
+    """The three axes in the lower left corner, which turn with the camera; two of a 2D mesh."""
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
@@ -145,7 +145,7 @@ class TriadLayer(Layer):
         for caption in self._captions(self._axes):
             letters = caption.GetCaptionTextProperty()
             set_letters(letters, self.stage.scheme, 13 * self.stage.font_scale)
-            # The mesh of a view that was zoomed into may lie behind.
+            # The mesh of a zoomed view may be behind the letters.
             letters.SetBackgroundColor(*pv.Color(self.stage.scheme.background).float_rgb)
             letters.SetBackgroundOpacity(OPACITY if self.stage.has_plate else 0.0)
         width, height = plotter.window_size
@@ -165,7 +165,7 @@ class TriadLayer(Layer):
             interactive=False, line_width=3, x_color=x, y_color=y, z_color=z, xlabel="x", ylabel="y"
         )
         for caption in self._captions(axes):
-            # A size of its own, whatever the corner's.
+            # The letters do not scale with the corner.
             caption.GetTextActor().SetTextScaleModeToNone()
         self.stage.plotter.renderer.axes_widget.SetZoom(1.3)
         return axes

@@ -1,4 +1,4 @@
-"""The layer that outlines the selected cell, in front of everything else."""
+"""The layer that outlines the marked cell, in front of everything else."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from slideviz.session.state import Session
 
 OUTLINE, FACES, DOT = "mark:outline", "mark:faces", "mark:dot"
 IN_FRONT = -66_000.0
-"""Units of depth that bring lines and points in front of all else; the whole range is 65536."""
+"""Depth offset, in 1/65536 of the depth range, that draws lines and points before everything."""
 
 
 class MarkLayer(Layer):
-    """The selected cell: its edges, its sides in the colour of its value, and a dot.
+    """The marked cell: its edges, its faces in the colour of its value (3D), and a dot.
 
-    The dot shows where it is when the cell is smaller than a pixel. Where the cell is inside a
-    3D mesh, the boundaries let it be seen (`slideviz.scene.mesh.BoundaryLayer`).
+    The dot shows a cell that is smaller than a pixel. If the cell is inside a 3D mesh, the
+    boundaries are made transparent (`slideviz.scene.mesh.BoundaryLayer`).
 
     Attributes
     ----------
     cell : int or None
-        Which cell is drawn.
+        The index of the cell that is drawn.
     """
 
     def __init__(self, stage: Stage) -> None:
@@ -39,7 +39,7 @@ class MarkLayer(Layer):
         self.clear()
 
     def clear(self) -> None:
-        """Forget the mesh."""
+        """Forget the mesh; the scene removes its actors."""
         self.cell: int | None = None
         self._drawn: dict[str, Any] = {}
         # Kept here: a data set that only VTK holds may come back from a mapper without points.
@@ -66,7 +66,7 @@ class MarkLayer(Layer):
             self._drawn[FACES].mapper.scalar_visibility = True
 
     def _add(self, mesh: Mesh, cell: int) -> None:
-        """Make the actors of another cell."""
+        """Make the actors of another cell, in place of the present ones."""
         for name in self._drawn:
             self.stage.remove(name)
         self._drawn = {}
@@ -91,7 +91,7 @@ class MarkLayer(Layer):
             actor.mapper.SetRelativeCoincidentTopologyPointOffsetParameter(IN_FRONT)
 
     def _place(self, mesh: Mesh, cell: int) -> None:
-        """Move the actors to where the cell is now."""
+        """Move the actors to the cell's place in a deformed mesh."""
         at, lift = mesh.points[nodes_of(mesh, cell)], 3.0 * self.stage.lift(mesh)
         actors.place(self._shapes[OUTLINE], at, lift)
         actors.place(self._shapes[DOT], at.mean(axis=0)[None], lift)

@@ -21,13 +21,13 @@ from slideviz.terms import ROLES
 FADED = 0.3
 """Opacity of a 2D mesh while sections show the cells on them."""
 GLASS = 0.15
-"""Opacity of boundaries around moving ones."""
+"""Opacity of boundaries that enclose moving ones, while colours show roles."""
 SEE_THROUGH = 0.25
-"""Opacity of boundaries around a marked cell that is not beside one of them."""
+"""Opacity of boundaries while the marked cell is inside the mesh, beside none of them."""
 
 
 def recoloured(old: Session | None, new: Session) -> bool:
-    """Tell whether cells have other values than before."""
+    """Return whether the cells' values may differ between two sessions."""
     return (
         old is None
         or old.frame is not new.frame
@@ -37,14 +37,14 @@ def recoloured(old: Session | None, new: Session) -> bool:
 
 
 class CellLayer(Layer):
-    """The cells of a 2D mesh; of a 3D mesh the outside of a part, or of all without markers.
+    """The cells of a 2D mesh; of a 3D mesh without boundaries, the outside of its cells.
 
     Attributes
     ----------
     part : (k,) int64 or None
-        The cells of a 3D mesh that are drawn; None is all of them.
+        Indices of the cells of a 3D mesh whose outside is drawn; None for all.
     order : (m,) int64 or None
-        In which the cells of a 2D mesh are drawn; None is that of the mesh.
+        Indices of the cells of a 2D mesh in the order of drawing; None for the mesh's order.
     """
 
     def __init__(self, stage: Stage) -> None:
@@ -70,15 +70,15 @@ class CellLayer(Layer):
         self.actor = self.stage.add(shape, "cells", lighting=mesh.dim == 3)
         self.actor.prop.line_width = 1.0
         if mesh.dim == 3:
-            # Together 1: more would give other colours than the bar has.
+            # A sum above 1 would give brighter colours than the colour bar has.
             self.actor.prop.ambient, self.actor.prop.diffuse = 0.6, 0.4
 
     def clear(self) -> None:
-        """Forget the mesh."""
+        """Forget the mesh; the scene removes its actors."""
         self.shape = self.actor = self.order = None
 
     def _stack(self, frame: StepFrame) -> None:
-        """Draw inverted cells last: folded cells overlap, and of these they are to be seen."""
+        """Draw the inverted cells of a 2D mesh last, so that overlapping cells do not hide them."""
         folded = frame.quality.status == INVERTED
         order = np.argsort(folded, kind="stable") if folded.any() else None
         if not np.array_equal(order, self.order):  # type: ignore[arg-type]  # None is equal to None
@@ -91,7 +91,7 @@ class CellLayer(Layer):
         return [] if self.shape is None else [self.shape]
 
     def points(self, mesh: Mesh) -> FloatArray:
-        """Return the points (k, d) of the cells drawn in another state of the mesh."""
+        """Return the points (k, d) of the drawn shape in another state of the mesh."""
         if self.shape is None or mesh.dim == 2:
             return mesh.points
         return np.asarray(mesh.points[self.shape.point_data[POINT]])
@@ -123,16 +123,16 @@ class CellLayer(Layer):
 
 
 class BoundaryLayer(Layer):
-    """The boundaries, an actor each, with a band around selected ones.
+    """The boundaries, an actor each, with a band around the selected ones.
 
     Attributes
     ----------
     drawn : dict of str to DrawnBoundary
-        By name.
+        The boundaries by name.
     bands : dict of str to Band
-        Of those that are, or were, selected.
+        The bands by name of the boundaries that are selected, or have been.
     glass : frozenset of str
-        Those that are seen through, as moving ones are inside of them.
+        Names of the boundaries that are transparent because they enclose moving ones.
     """
 
     def __init__(self, stage: Stage) -> None:
@@ -154,7 +154,7 @@ class BoundaryLayer(Layer):
         self._closed, self._enclosed = found.closed, found.inner
 
     def clear(self) -> None:
-        """Forget the mesh."""
+        """Forget the mesh; the scene removes its actors."""
         self.drawn, self.bands, self.glass = {}, {}, frozenset()
 
     def shapes(self) -> list[Any]:
@@ -169,14 +169,14 @@ class BoundaryLayer(Layer):
         return DrawnBoundary(surface, shape, actor)
 
     def _add_band(self, surface: Surface, points: FloatArray) -> Band:
-        """Return the band of a boundary, made at the first call: most are never selected."""
+        """Return a new band of a boundary, hidden or shown by `_style`."""
         rim = actors.rim_shape(surface, points, self._lift)
         band = self.stage.add(rim, f"selected:{surface.name}", lighting=False)
         band.prop.color = SELECTED_COLOUR
         band.prop.line_width = 11 if surface.flat else 6
         band.prop.opacity = 1.0
         if not surface.flat:
-            # Lines on a face flicker unless they are drawn a little nearer.
+            # Lines on a face flicker unless they have a depth offset.
             band.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-4.0, -4.0)
         return Band(rim, band)
 
@@ -193,13 +193,13 @@ class BoundaryLayer(Layer):
         self.glass, self._buried = self._glass(new), self._hides_mark(new)
         for name, one in self.drawn.items():
             self._style(name, one, new, by_value)
-        # Half of the faces look away; nobody sees them from outside, and they take their time.
+        # From outside, the back faces are invisible: culled, they cost no drawing time.
         culled = self._closed and not self.glass and seen_from_outside(new)
         for one in self.drawn.values():
             one.actor.prop.culling = "back" if culled else "none"
 
     def _glass(self, session: Session) -> frozenset[str]:
-        """Return the boundaries that would hide moving ones, where colours show roles."""
+        """Return the names of boundaries that enclose moving ones, if colours show roles."""
         view = session.view
         within = (name for name in self._enclosed if name not in view.hidden)
         if view.colour_by != "role" or all(session.role(name) != "moving" for name in within):
@@ -207,7 +207,7 @@ class BoundaryLayer(Layer):
         return frozenset(self.drawn) - self._enclosed
 
     def _hides_mark(self, session: Session) -> bool:
-        """Tell whether the marked cell of a 3D mesh is beside none of the boundaries shown."""
+        """Return whether the marked cell of a 3D mesh is beside none of the boundaries shown."""
         cell, mesh, hidden = session.view.marked_cell, session.mesh, session.view.hidden
         if mesh is None or mesh.dim == 2 or session.frame is None or not session.frame.has(cell):
             return False
@@ -244,7 +244,7 @@ class BoundaryLayer(Layer):
 
 
 def looks_inside(session: Session) -> bool:
-    """Tell whether boundaries of a 3D mesh are transparent, as cells inside are shown."""
+    """Return whether boundaries of a 3D mesh are transparent: with a threshold or sections."""
     view = session.view
     if session.mesh is None or session.mesh.dim == 2:
         return False
@@ -252,15 +252,15 @@ def looks_inside(session: Session) -> bool:
 
 
 def is_faded(session: Session) -> bool:
-    """Tell whether cells of a 2D mesh are faint, as sections show some of them."""
+    """Return whether the cells of a 2D mesh are faint: while sections are shown."""
     if session.mesh is None or session.mesh.dim == 3:
         return False
     return any(section.shown and section.can_cut(2) for section in session.view.sections)
 
 
 def seen_from_outside(session: Session) -> bool:
-    """Tell whether boundaries around a 3D mesh are drawn with their outside only."""
+    """Return whether only the outer side of a 3D mesh's boundaries can be seen."""
     view = session.view
     glass = view.hidden or "perspective" in view.drawn or looks_inside(session)
-    # The outside of a folded cell is inside.
+    # The faces of inverted cells are oriented inwards.
     return not glass and session.frame is not None and session.frame.quality.inverted == 0

@@ -11,9 +11,10 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 TINY = 0.05
-"""Moved boundaries smaller than this part of the mesh are shown in detail."""
+"""Size of the moved boundaries, relative to the mesh's, below which a detail is shown."""
+
 MARGIN = 2.5
-"""A detail is this many times as wide as the boundaries that moved."""
+"""Width of a detail relative to that of the moved boundaries."""
 
 
 @dataclass(frozen=True)
@@ -23,9 +24,9 @@ class Detail:
     Attributes
     ----------
     centre : tuple of float
-        Its middle, two or three coordinates in the mesh's length unit.
+        Its centre, two or three coordinates in the mesh's length unit.
     width : float
-        How much of the mesh is seen from left to right, in the mesh's length unit.
+        The width that is seen, in the mesh's length unit.
     """
 
     centre: tuple[float, ...]
@@ -33,11 +34,13 @@ class Detail:
 
 
 Zoom = Detail | Literal["auto", "all"]
-"""A given detail, the whole mesh, or the whole unless what moved is tiny in it."""
+"""What a picture shows: a given detail, the whole mesh (``all``), or automatically one of both.
+
+``auto`` is the surroundings of the moved boundaries if these are tiny in the mesh, else all."""
 
 
 def require_detail(zoom: Zoom, mesh: Mesh) -> None:
-    """Raise SlidevizError where a given detail is no part of a mesh, before the work."""
+    """Raise SlidevizError if a given detail is not in the mesh or has the wrong dimension."""
     if not isinstance(zoom, Detail):
         return
     place = ", ".join(f"{x:g}" for x in zoom.centre)
@@ -57,16 +60,16 @@ def require_detail(zoom: Zoom, mesh: Mesh) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Overview:
-    """The cells of a mesh that are shown, and from where, as long as nobody chooses otherwise.
+    """The default view of a deformed mesh: the cells that are drawn, and the camera's direction.
 
     Attributes
     ----------
     cells : (k,) int64
-        Those of a 3D mesh that are drawn.
+        Indices of the cells that are drawn.
     towards, up : (3,) float64
-        From the mesh to the camera, and what is up.
+        Direction from the mesh to the camera, and the up vector.
     detail : Detail or None
-        The part that is seen; None is everything.
+        The part that is seen; None for everything.
     """
 
     cells: IntArray
@@ -78,13 +81,13 @@ class Overview:
     def of(cls, mesh: Mesh, base: Mesh, zoom: Zoom = "auto") -> Overview:
         """Return the overview of a deformed mesh whose undeformed one is ``base``.
 
-        A 2D mesh is seen from above. Of a 3D mesh the half behind a plane is seen, cells uncut;
-        the plane goes through what moved most and along the way it moved.
+        A 2D mesh is seen along z. Of a 3D mesh, the whole cells behind a plane are seen, which
+        goes through the boundary that moved most, along its displacement.
 
         Raises
         ------
         SlidevizError
-            The detail has not as many coordinates as the mesh, or is no part of it.
+            The detail has not as many coordinates as the mesh, or is outside the mesh.
         """
         require_detail(zoom, base)
         detail = tiny_motion(mesh, base) if zoom == "auto" else zoom
@@ -92,10 +95,10 @@ class Overview:
 
 
 def tiny_motion(mesh: Mesh, base: Mesh) -> Detail | None:
-    """Return the surroundings of moved nodes that would be a dot in a view of the whole mesh.
+    """Return the surroundings of the moved inner boundaries, if these are tiny in the mesh.
 
-    That are the boundaries inside the mesh that moved: an airfoil in a wide far field. None
-    when they are large enough, or when it is an outer boundary that moved.
+    An example is an airfoil in a wide far field. None if they are large enough, or if only outer
+    boundaries moved.
     """
     bodies = _inner_bodies(base, lengths(mesh, base))
     if not bodies:
@@ -115,23 +118,29 @@ def lengths(mesh: Mesh, base: Mesh) -> FloatArray:
 
 
 def _inner_bodies(base: Mesh, length: FloatArray) -> list[IntArray]:
-    """Return the nodes of each boundary that lies inside the mesh's box and moved."""
+    """Return the nodes of each boundary that is inside the mesh's box and moved.
+
+    ``length`` (n,) is the displacement of each node; the least that counts is 5 % of the largest.
+    """
     least = 0.05 * float(length.max())
     bodies = [marker.nodes for marker in base.markers if len(marker.nodes)]
     return [at for at in bodies if _is_inside(base, at) and length[at].max() > least]
 
 
 def _is_inside(base: Mesh, nodes: IntArray) -> bool:
-    """Tell whether nodes keep off the mesh's box in two directions or more, as a blade does."""
+    """Return whether nodes are strictly inside the mesh's box in two directions or more.
+
+    Those of an airfoil or blade are.
+    """
     low, high = base.points.min(axis=0), base.points.max(axis=0)
     at = base.points[nodes]
     return int(((at.min(axis=0) > low) & (at.max(axis=0) < high)).sum()) >= 2
 
 
 def half_of(mesh: Mesh, base: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the cells to show, the direction to the camera, and the direction that is up.
+    """Return the cells (k,) to show, the direction (3,) to the camera, and the up vector (3,).
 
-    All cells of a 2D mesh, seen from above; of a 3D mesh those behind a plane through what moved.
+    See `Overview.of`.
     """
     if mesh.dim == 2:
         return np.arange(len(mesh.cells)), np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
@@ -142,10 +151,10 @@ def half_of(mesh: Mesh, base: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
         strong = _moved_body(base, length)
         centre = base.points[strong].mean(axis=0)
         along = np.abs(mesh.points - base.points)[strong].mean(axis=0)
-        # Cut along the motion, and of such planes the one across the longest side.
+        # The plane contains the motion; of such planes, the one normal to the longest side.
         free = along < 0.5 * along.max()
         across = int(np.argmax(np.where(free, extent, -1.0))) if free.any() else int(along.argmin())
-    # By where the cells were: what lay in one layer of a structured mesh stays together.
+    # By undeformed positions, so that a layer of cells of a structured mesh stays together.
     cells = base.cells
     total = np.add.reduceat(base.points[cells.connectivity, across], cells.offsets[:-1])
     middle = total / np.diff(cells.offsets)
@@ -158,10 +167,10 @@ def half_of(mesh: Mesh, base: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
 
 
 def _moved_body(base: Mesh, length: FloatArray) -> IntArray:
-    """Return the nodes of the boundary to cut through: of those inside, what moved most.
+    """Return the nodes of the boundary to cut through: of the inner ones, that which moved most.
 
-    A blade or a block lies inside the mesh's box in two directions or three; the outer
-    boundaries, which may slide further than it, in none.
+    Inner boundaries, such as a blade, precede outer ones, which may slide further. Without
+    boundaries: the nodes that moved most. ``length`` (n,) is the displacement of each node.
     """
 
     def rank(nodes: IntArray) -> tuple[bool, float]:

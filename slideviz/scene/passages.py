@@ -1,4 +1,4 @@
-"""Neighbouring passages in the scene: the mesh again, under powers of its period."""
+"""Neighbouring passages in the scene: copies of the mesh, transformed by powers of its period."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from slideviz.session.passages import find_period, moved, passages, passages_aro
 from slideviz.session.state import Session
 
 PALER = 0.45
-"""How much of the cells' plain colour is mixed into the colours of a neighbour."""
+"""Part of the cells' plain colour that is mixed into the colours of a neighbouring passage."""
 
 DIRECTIONS = 200
-"""Evenly spread over the sphere; see `outermost`."""
+"""Number of directions, evenly spread over the sphere, in `outermost`."""
 
 UNENDING = 2
-"""Neighbours on each side where all are asked for and a row has no end."""
+"""Neighbours drawn on each side if all are wanted of a translational period, which is endless."""
 
 CELLS, THRESHOLD = "", "\n"
-"""What stands for the cells, and for those of the threshold, among the names of boundaries."""
+"""Keys, among names of boundaries, of the cells and of those within the threshold."""
 
 
 class Period:
-    """The period of a session's mesh, found once for each choice of boundaries."""
+    """Finds the period of a session's mesh, and caches it for the last periodic boundaries."""
 
     def __init__(self) -> None:
         self._found: tuple[object, Pair | None] | None = None
 
     def of(self, session: Session) -> Pair | None:
-        """Return the pair of boundaries whose period repeats the mesh, or None."""
+        """Return the pair of boundaries whose period repeats the mesh; None without a match."""
         case, mesh = session.case, session.mesh
         if mesh is None:
             return None
@@ -53,7 +53,10 @@ class Period:
 
 
 def matrices(session: Session, pair: Pair | None) -> dict[int, FloatArray]:
-    """Return the transformation (4, 4) of each neighbouring passage shown, by its number."""
+    """Return the transformation (4, 4) of each neighbouring passage shown, by its number.
+
+    The number is the power of the period; 0, the mesh itself, is left out.
+    """
     count = session.view.passages
     if pair is None or count == 0:
         return {}
@@ -65,30 +68,30 @@ def matrices(session: Session, pair: Pair | None) -> dict[int, FloatArray]:
 
 
 def outermost(points: FloatArray) -> FloatArray:
-    """Return the points of (n, 3) that are furthest in some of `DIRECTIONS` directions.
+    """Return those points of (n, 3) that are furthest in at least one of `DIRECTIONS` directions.
 
-    Seen from any side they fill the room of all, but for a few hundredths.
+    From any side their extent is that of all points, except for a few hundredths.
     """
     rank = np.arange(DIRECTIONS) + 0.5
     height, turn = 1.0 - 2.0 * rank / DIRECTIONS, np.pi * (1.0 + 5.0**0.5) * rank
     across = np.sqrt(1.0 - height**2)
     ways = np.column_stack([across * np.cos(turn), across * np.sin(turn), height])
-    # Even as seen from a mesh that is long in one direction and short in another.
+    # Scaled by the extents, so that they are evenly spread for a long or flat mesh too.
     ways /= np.maximum(np.ptp(points, axis=0), 1e-300)
     return np.asarray(points[np.unique((ways @ points.T).argmax(axis=1))])
 
 
 class PassageLayer(Layer):
-    """The neighbouring passages: boundaries, cells of a 2D mesh, and cells of the threshold.
+    """The neighbouring passages: boundaries, cells of a 2D mesh, cells within the threshold.
 
-    The actors of all neighbours share the data of the scene's own shapes, one mapper and one
-    property for each shape: a wheel takes the memory of one passage.
+    The actors of all neighbours share the data sets of the scene, and per data set one mapper and
+    one property: a whole wheel takes the memory of one passage.
 
     Parameters
     ----------
     stage : Stage
     cells, boundaries, threshold
-        The layers whose shapes are drawn again.
+        The layers whose data sets are drawn again.
     """
 
     def __init__(
@@ -106,7 +109,7 @@ class PassageLayer(Layer):
         self._actors: dict[str, list[Any]] = {}
 
     def clear(self) -> None:
-        """Forget the mesh."""
+        """Forget the mesh, and remove the actors of all passages."""
         self._period = Period()
         self._key, self._matrices = (), {}
         for copy in chain.from_iterable(self._actors.values()):
@@ -114,19 +117,19 @@ class PassageLayer(Layer):
         self._mappers, self._props, self._actors = {}, {}, {}
 
     def shapes(self) -> list[Any]:
-        """Return the outermost points of every passage."""
+        """Return the outermost points of each passage, as a data set each."""
         if not self._matrices:
             return []
-        # Those of the threshold are within these.
+        # The cells within the threshold are inside the boundaries.
         drawn = [*self._cells.shapes(), *self._boundaries.shapes()]
         every = [np.asarray(shape.points) for shape in drawn]
         ends = outermost(np.concatenate(every))
         return [pv.PolyData(moved(ends, matrix)) for matrix in self._matrices.values()]
 
     def update(self, _old: Session | None, new: Session) -> None:
-        """Draw another state of the session; points and values are those of the mesh itself."""
+        """Draw another state of the session, after the layers whose data sets are shared."""
         pair = self._period.of(new) if new.view.passages else None
-        # The threshold has no actor before it has cells for the first time.
+        # The threshold's actor is made when it first has cells.
         key = (pair, new.view.passages, self._threshold.actor)
         if key != self._key:
             self._key = key
@@ -135,7 +138,7 @@ class PassageLayer(Layer):
             self._style()
 
     def _sources(self) -> dict[str, tuple[Any, Any]]:
-        """Return shape and actor of all that every passage repeats, by name."""
+        """Return data set and actor of everything that the passages repeat, by name."""
         found = {name: (one.shape, one.actor) for name, one in self._boundaries.drawn.items()}
         if self._cells.shape is not None:
             found[CELLS] = self._cells.shape, self._cells.actor
@@ -144,7 +147,7 @@ class PassageLayer(Layer):
         return found
 
     def _redraw(self, wanted: dict[int, FloatArray]) -> None:
-        # Not by name through the plotter: it looks at all actors each time, and these are many.
+        # Not through the plotter, which goes through all its actors for each one.
         renderer = self.stage.plotter.renderer
         for copy in chain.from_iterable(self._actors.values()):
             renderer.RemoveActor(copy)
@@ -171,13 +174,13 @@ class PassageLayer(Layer):
         mapper.SetScalarModeToUseCellFieldData()
         mapper.SelectColorArray(actor.mapper.GetArrayName())
         mapper.SetLookupTable(self._table)
-        # Set once, or pyvista gives the table, which all share, the range of each new data set.
+        # Set before: otherwise pyvista sets the shared table to the range of each new data set.
         mapper.scalar_range = self._table.scalar_range
         mapper.SetUseLookupTableScalarRange(True)
         return mapper
 
     def _style(self) -> None:
-        """Give the passages the colours of the mesh itself, paler."""
+        """Set the colours of the passages: those of the mesh itself, paler."""
         self._pale_table()
         plain = np.array(pv.Color(self.stage.scheme.cell).float_rgb)
         for name, (shape, actor) in self._sources().items():
@@ -194,7 +197,7 @@ class PassageLayer(Layer):
                 copy.SetForceOpaque(actor.GetForceOpaque())
 
     def _pale_table(self) -> None:
-        """Give the passages the colours of the values, paler, over the same range."""
+        """Set the passages' table of colours: the stage's, paler, over the same range."""
         own = self.stage.table
         key = (own.cmap.name, tuple(own.scalar_range), self.stage.scheme)
         if key == self._table_key:

@@ -1,4 +1,4 @@
-"""The boundary and the cell under the mouse."""
+"""Find the boundary or the cell under the mouse; pixels are counted from the lower left."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.scene.actors import DrawnBoundary
 
 REACH = 9.0
-"""A click this many pixels beside a line still means the line."""
+"""Distance in pixels from a line up to which a click hits it."""
 
 
 def to_display(plotter: Any, points: FloatArray) -> FloatArray:
-    """Return the pixels (n, 2) of world points (n, 3), counted from the lower left."""
+    """Return the display coordinates (n, 2), in pixels from the lower left, of points (n, 3)."""
     renderer = plotter.renderer
     aspect = renderer.GetTiledAspectRatio()
     matrix = renderer.camera.GetCompositeProjectionTransformMatrix(aspect, -1, 1)
@@ -27,7 +27,7 @@ def to_display(plotter: Any, points: FloatArray) -> FloatArray:
 
 
 def nearest_line(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary]) -> str | None:
-    """Return the boundary of a 2D mesh nearest to a pixel, within `REACH`."""
+    """Return the name of a 2D mesh's boundary nearest to a pixel; None if none is in `REACH`."""
     best, found = REACH, None
     at = np.array([x, y])
     for one in drawn:
@@ -43,7 +43,7 @@ def nearest_line(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary
 
 
 def front_surface(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary]) -> str | None:
-    """Return the boundary of a 3D mesh that is in front at a pixel."""
+    """Return the name of a 3D mesh's foremost boundary at a pixel; None if there is none."""
     picker = _cell_picker()
     names = {}
     for one in drawn:
@@ -54,7 +54,7 @@ def front_surface(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundar
 
 
 def meets(plotter: Any, x: float, y: float, actors: Sequence[Any]) -> bool:
-    """Tell whether the line of sight through a pixel meets one of some actors."""
+    """Return whether one of the given actors is visible at a pixel, or hidden by others there."""
     if not actors:
         return False
     picker = _cell_picker()
@@ -75,7 +75,7 @@ def _cell_picker() -> Any:
 
 
 def on_plane(plotter: Any, x: float, y: float) -> tuple[float, float]:
-    """Return the point where the line of sight through a pixel meets the plane z = 0."""
+    """Return the point (x, y) where the line of sight through a pixel meets the plane z = 0."""
     renderer = plotter.renderer
     ends = []
     for depth in (0.0, 1.0):
@@ -92,7 +92,7 @@ def on_plane(plotter: Any, x: float, y: float) -> tuple[float, float]:
 def front_cell(
     plotter: Any, x: float, y: float, shown: Sequence[tuple[Any, IntArray | FloatArray]]
 ) -> int | None:
-    """Return the cell whose side is in front at a pixel.
+    """Return the index of the cell of the foremost polygon at a pixel; None if there is none.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def front_cell(
     x, y : float
         Pixels from the lower left.
     shown : sequence of (actor, (f,) int64)
-        What may be met, each with the cells that its polygons are the sides of.
+        The actors to look at, each with the index of the cell that each of its polygons is of.
     """
     from vtkmodules.vtkRenderingCore import vtkCellPicker
 

@@ -1,4 +1,4 @@
-"""Nodes in the scene as points: by their type, or the control nodes of a step."""
+"""Nodes drawn as points: the boundaries' nodes by their type, or the control nodes of a step."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from slideviz.session.state import Session
 from slideviz.terms import NODE_TYPES
 
 SIZES = ((0, 9.0), (1500, 7.0), (6000, 5.0))
-"""Pixels of a point from so many points on: many large ones would cover the mesh."""
+"""Pairs of a number of points, and their diameter in pixels from that number on."""
 
 _COLOUR = "point_colour"
 _RGB = np.array([pv.Color(term.colour).int_rgb for term in NODE_TYPES.values()], np.uint8)
 
 
 class PointLayer(Layer):
-    """Nodes drawn as small balls."""
+    """The nodes that the view asks for, drawn as small balls."""
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
@@ -39,7 +39,7 @@ class PointLayer(Layer):
         self._surfaces = tuple(surfaces)
 
     def clear(self) -> None:
-        """Forget the mesh."""
+        """Forget the mesh; the scene removes its actors."""
         self._types.clear()
         self._surfaces, self._actor, self._shape = (), None, None
         self._drawn, self._key = NOTHING, ()
@@ -58,14 +58,14 @@ class PointLayer(Layer):
             self._place(new)
 
     def _seen(self, typed: TypedNodes, session: Session) -> TypedNodes:
-        """Return the nodes that are on a boundary that is not hidden."""
+        """Return those of the nodes that are on a visible boundary."""
         if not session.view.hidden or not self._surfaces:
             return typed
         shown = [one.nodes for one in self._surfaces if one.name not in session.view.hidden]
         return typed.only(np.concatenate(shown) if shown else np.empty(0, np.int64))
 
     def _fill(self, typed: TypedNodes, session: Session) -> None:
-        """Draw other nodes."""
+        """Draw other nodes, and set their words in the legend."""
         self._drawn = typed
         count = len(typed.nodes)
         present = [NODE_TYPES[kind] for kind in typed.present]
@@ -93,9 +93,9 @@ class PointLayer(Layer):
         return lifted(session.frame.mesh.points[nodes], 4.0 * self.stage.lift(session.mesh))
 
     def _make(self) -> Any:
-        """Return the actor of the points."""
+        """Return the new actor of the points, added to the plotter."""
         mapper = pv.DataSetMapper(dataset=self._shape)
-        # Nearer than faces and their edges, or these would cut pieces out of the points.
+        # A depth offset, so that faces and edges do not cut into the points.
         mapper.SetResolveCoincidentTopologyToPolygonOffset()
         mapper.SetRelativeCoincidentTopologyPointOffsetParameter(-10.0)
         mapper.SetScalarModeToUsePointFieldData()
@@ -105,7 +105,7 @@ class PointLayer(Layer):
         actor = pv.Actor(mapper=mapper, name="points:nodes")
         prop = actor.prop
         prop.style, prop.render_points_as_spheres = "points", True
-        # The shade of a ball tells it from a face of its colour.
+        # Shading makes a ball visible on a face of the same colour.
         prop.ambient, prop.diffuse = 0.25, 0.85
         self.stage.plotter.add_actor(
             actor, name=actor.name, reset_camera=False, render=False, pickable=False

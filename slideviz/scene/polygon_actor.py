@@ -1,4 +1,4 @@
-"""Actors that show polygons of cells, and the same actors at other places (instances)."""
+"""Actors of polygons in the colours of their cells, and instances of them at other places."""
 
 from __future__ import annotations
 
@@ -16,27 +16,29 @@ from slideviz.sections.polygons import Polygons
 
 
 class PolygonActor:
-    """Draws polygons, or lines, in the colours of the cells they belong to.
+    """An actor that draws polygons, or lines, in the colours of the cells they belong to.
 
     Parameters
     ----------
     stage : Stage
     name : str
-        Of the actor.
+        The name of the actor.
     pickable : bool
-        Whether the mouse finds it.
+        Whether the mouse can pick it.
 
     Attributes
     ----------
     actor : pyvista.Actor
     mapper : pyvista.DataSetMapper
-        Its mapper, kept here: what Python knows of one that only VTK holds may be out of date.
+        The actor's mapper, referenced here as VTK alone may lose its Python attributes.
     shape : pyvista.PolyData
+        The data set that is drawn.
     polygons : Polygons
+        The polygons that are drawn.
     """
 
     def __init__(self, stage: Stage, name: str, pickable: bool = True) -> None:
-        # The plotter takes nothing that is empty, and a section may be.
+        # The plotter refuses an empty data set, which a section may have.
         self.shape = pv.PolyData(np.zeros((3, 3)), faces=[3, 0, 1, 2])
         self.shape.cell_data[VALUES] = np.zeros(1)
         self.actor = stage.add(self.shape, name, lighting=False, pickable=pickable)
@@ -45,28 +47,28 @@ class PolygonActor:
         self.actor.visibility = False
 
     def show(self, polygons: Polygons, lift: float = 0.0) -> None:
-        """Draw polygons, raised by ``lift`` in z, with 0 for their values."""
+        """Draw other polygons, raised by ``lift`` in z, all with the value 0."""
         self.polygons = polygons
         self.shape = polygon_shape(polygons, lift)
         self.mapper.dataset = self.shape
         self.actor.visibility = len(polygons) > 0
 
     def colour(self, values: FloatArray | None) -> None:
-        """Give the polygons the values of their cells, (q,); None: none."""
+        """Colour the polygons by values (q,), one per polygon; None: by the actor's own colour."""
         if values is not None:
             self.shape.cell_data[VALUES] = values
         self.mapper.scalar_visibility = values is not None
 
 
 def plain_colour(scheme: ColorScheme) -> tuple[float, float, float]:
-    """Return the colour of polygons without values, seen on any background."""
+    """Return the colour of polygons without values, visible on any background."""
     cell, ghost = (np.array(pv.Color(name).float_rgb) for name in (scheme.cell, scheme.ghost))
     red, green, blue = (0.7 * cell + 0.3 * ghost).tolist()
     return red, green, blue
 
 
 def polygon_shape(polygons: Polygons, lift: float = 0.0) -> Any:
-    """Return polygons, or lines, as PolyData with room for the values of their cells."""
+    """Return polygons, or lines, as PolyData, raised by ``lift`` in z, with values of 0."""
     shape = pv.PolyData()
     shape.points = polygons.points + np.array([0.0, 0.0, lift])
     table = pv.CellArray.from_arrays(polygons.offsets, polygons.connectivity)  # type: ignore[arg-type]
@@ -79,13 +81,18 @@ def polygon_shape(polygons: Polygons, lift: float = 0.0) -> Any:
 
 
 class Instances:
-    """Instances of one actor under matrices, with its data, mapper and property.
+    """Instances of one actor at other places, which share its data set, mapper and property.
 
     Parameters
     ----------
     stage : Stage
     base : PolygonActor
-        What is repeated; the instances are named like it, with their numbers.
+        The actor that is repeated; its name and a number are the name of an instance.
+
+    Attributes
+    ----------
+    drawn : dict of int to pyvista.Actor
+        The instances by number.
     """
 
     def __init__(self, stage: Stage, base: PolygonActor) -> None:
@@ -94,7 +101,7 @@ class Instances:
         self.drawn: dict[int, Any] = {}
 
     def show(self, matrices: Mapping[int, FloatArray]) -> None:
-        """Draw an instance for each matrix (4, 4), by its number; those of other numbers go."""
+        """Draw an instance for each matrix (4, 4), by number; remove those of other numbers."""
         for number in [number for number in self.drawn if number not in matrices]:
             self.stage.remove(self.drawn.pop(number).name)
         base = self.base.actor
@@ -105,7 +112,7 @@ class Instances:
                 self.stage.plotter.add_actor(
                     instance, name=instance.name, reset_camera=False, render=False, pickable=True
                 )
-                # One mapper has one shader: that of the actor that is drawn first.
+                # A shared mapper uses the shader of the actor that is drawn first: share it.
                 instance.SetShaderProperty(base.GetShaderProperty())
                 self.drawn[number] = instance
             self.drawn[number].user_matrix = matrix

@@ -1,8 +1,8 @@
 """The scene: boundaries, cells, sections, ghosts and legend in a given plotter.
 
-The plotter may be the window's or an off-screen one. A scene is made of layers, one for each
-kind of thing; only they, and `slideviz.scene.actors`, make VTK objects, all of it in the
-thread that owns the plotter.
+The plotter may be the window's or an off-screen one. A scene consists of layers, one for each
+kind of thing. Only they and `slideviz.scene.actors` make VTK objects, in the thread that owns the
+plotter.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from slideviz.session.state import Session
 from slideviz.session.store import tell_all
 
 NEAR = 8.0
-"""Sizes of a cell that the height of the view shows after flying to it."""
+"""Height of the view after flying to a cell, in sizes of the cell."""
 
 
 class Scene:
-    """A mesh and its boundaries in a plotter.
+    """Draws the state of a session into a plotter.
 
     Parameters
     ----------
@@ -50,7 +50,14 @@ class Scene:
     scheme : ColorScheme
         Colours of background, text and edges.
     font_scale : float
-        Enlarges the letters, for pictures of many pixels.
+        Factor of the letters' size, for pictures of many pixels.
+
+    Attributes
+    ----------
+    session : Session
+        The state that is shown.
+    camera : Camera
+    sections : SectionLayer
     """
 
     def __init__(self, plotter: Any, scheme: ColorScheme = LIGHT, font_scale: float = 1.0) -> None:
@@ -97,22 +104,22 @@ class Scene:
 
     @property
     def polygons(self) -> int:
-        """Return how many polygons of cells are drawn: of a 2D mesh, all its cells."""
+        """Return the number of polygons of cells drawn; boundaries and sections do not count."""
         return 0 if self._cells.shape is None else int(self._cells.shape.n_cells)
 
     # What is in the scene ---------------------------------------------------------------
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
-        """Draw another mesh; the camera sees all of it."""
+        """Draw another mesh with its boundaries, and fit it to the view."""
         for _ in self.opening(session, surfaces):
             pass
 
     def opening(
         self, session: Session, surfaces: Sequence[Surface], part: IntArray | None = None
     ) -> Iterator[None]:
-        """Draw another mesh, and yield between the pieces of this work.
+        """Draw another mesh as `open` does, yielding after each layer.
 
-        Of a 3D mesh ``part`` are the cells (k,) to draw where no boundaries are.
+        ``part`` are the indices (k,) of the cells of a 3D mesh to draw if ``surfaces`` is empty.
         """
         self.clear()
         self._cells.part = part
@@ -128,14 +135,14 @@ class Scene:
         self.look_from("+z" if session.mesh.dim == 2 else "iso")
 
     def clear(self) -> None:
-        """Remove everything."""
+        """Remove everything from the scene."""
         for layer in self.layers:
             layer.clear()
         self.plotter.clear_actors()
         self.session = Session()
 
     def update(self, session: Session) -> None:
-        """Draw another state of the same mesh; only differences are touched."""
+        """Draw another state of the same mesh; layers change only what differs."""
         session = as_drawn(session)
         old, self.session = self.session, session
         if session.mesh is None or old.mesh is None:
@@ -152,12 +159,12 @@ class Scene:
         self._again()
 
     def set_legend(self, drawn: bool) -> None:
-        """Draw the legend here, or leave it to a view beside this one."""
+        """Switch the legend and its strip on or off (off: a view beside this one has it)."""
         self.stage.has_legend = drawn
         self.resized()
 
     def resized(self) -> None:
-        """Put the legend at its place in a view of another size."""
+        """Place the legend anew after the view's size has changed."""
         self.camera.shift()
         self._again()
 
@@ -169,36 +176,39 @@ class Scene:
 
     @property
     def coarse(self) -> bool:
-        """Tell whether boundaries are drawn with fewer facets."""
+        """Return whether the coarse boundaries are drawn."""
         return self._coarse.on
 
     def draw_coarse(self, on: bool) -> bool:
-        """Draw boundaries with fewer facets, or all again; tell whether that was a change."""
+        """Switch to coarse boundaries, or back; return whether anything has changed."""
         return self._coarse.switch(on)
 
     def set_coarse_boundaries(self, surfaces: Sequence[Surface]) -> None:
-        """Set the coarse boundaries of the mesh that is opened next; none is a choice."""
+        """Set the coarse boundaries of the mesh opened next; if empty, it is always in detail."""
         self._coarse.surfaces = {one.name: one for one in surfaces}
 
     # Ghosts -----------------------------------------------------------------------------
 
     def set_motion_ghosts(self, ghosts: Mapping[str, FloatArray]) -> None:
-        """Draw ghosts of moved boundaries: points (u, d) of the nodes of each."""
+        """Draw ghosts of moved boundaries: for each name, points (u, d) of its nodes."""
         self._ghosts.set_moved(ghosts)
 
     @property
     def motion_ghosts(self) -> dict[str, FloatArray]:
-        """Return the points of the ghosts of moved boundaries."""
+        """Return the points (u, d) of the ghosts of moved boundaries, by name."""
         return dict(self._ghosts.moved)
 
     # Camera and mouse -------------------------------------------------------------------
 
     def look_from(self, side: str) -> None:
-        """Show all of the mesh from a side: a key of `slideviz.scene.camera.SIDES`."""
+        """Fit all of the mesh, seen from a side: a key of `slideviz.scene.camera.SIDES`."""
         self.camera.look_from(side, self._parallel())
 
     def look_along(self, view: Overview, meshes: Iterable[Mesh]) -> None:
-        """Show all that is drawn of some states of the mesh, or the detail of an overview."""
+        """Set the camera as an overview says: to its detail, or fitted to all ``meshes``.
+
+        ``meshes`` are the states of the mesh that a film shows, for example.
+        """
         mesh = self.session.mesh
         assert mesh is not None
         self.camera.turn(view.towards, view.up, True)
@@ -212,7 +222,7 @@ class Scene:
         self.camera.aim(padded(np.array([view.detail.centre]))[0], half, 2.0 * mesh.extent)
 
     def fit(self, names: Sequence[str] = ()) -> None:
-        """Make all that is drawn fill the view, or some boundaries, from the present side."""
+        """Fit everything drawn, or the named boundaries, to the view; the direction stays."""
         shapes = (self.drawn[name].shape for name in names if name in self.drawn)
         if names:
             self.camera.fit_part([np.asarray(shape.points) for shape in shapes])
@@ -227,9 +237,10 @@ class Scene:
         return [shape for layer in self.layers for shape in layer.shapes()]
 
     def pick(self, x: float, y: float) -> str | None:
-        """Return the visible boundary at a pixel counted from the lower left, or None.
+        """Return the name of the visible boundary at a pixel from the lower left, or None.
 
-        In 3D sections and cells of the threshold are none, and what is in front of them is glass.
+        In 3D it is None at a section or at cells within the threshold: the boundaries in front of
+        them are transparent then.
         """
         hidden = self.session.view.hidden
         drawn = [one for name, one in self.drawn.items() if name not in hidden]
@@ -237,7 +248,7 @@ class Scene:
             return None
         if drawn[0].surface.flat:
             return pick.nearest_line(self.plotter, x, y, drawn)
-        # What is seen through glass is meant, not the glass.
+        # A boundary seen through transparent ones is meant, not these.
         solid = [*self.sections.actors(), *(actor for actor, _ in self._threshold.pickable())]
         if pick.meets(self.plotter, x, y, solid):
             return None
@@ -246,16 +257,16 @@ class Scene:
         return pick.front_surface(self.plotter, x, y, drawn) if found is None else found
 
     def pick_cell(self, x: float, y: float) -> int | None:
-        """Return the cell at a pixel counted from the lower left, or None.
+        """Return the index of the cell at a pixel from the lower left, or None.
 
-        In 3D it is the one whose side is in front. While a range chooses cells, only these.
+        In 3D it is that of the foremost face. With a threshold, only cells within it are picked.
         """
         session = self.session
         if session.mesh is None or session.frame is None:
             return None
         if session.mesh.dim == 2:
             values = self.stage.values(session)
-            # Where cells overlap, an inverted one comes before the others.
+            # Where cells overlap, an inverted one is picked first.
             rank = np.where(np.isnan(values), -np.inf, values)
             only = self.stage.in_threshold(session)
             if only is not None:
@@ -263,14 +274,14 @@ class Scene:
             at = pick.on_plane(self.plotter, x, y)
             return cell_at(session.frame.mesh, *at, rank)
         if self.sections.from_file:
-            # Their cells have no place among those in memory, and boundaries are glass.
+            # The sections' cells have no index in memory, and the boundaries are transparent.
             return None
-        # Boundaries in front of a section are glass.
+        # Boundaries in front of a section are transparent: the section's cells come first.
         cut = pick.front_cell(self.plotter, x, y, self.sections.pickable())
         return pick.front_cell(self.plotter, x, y, self._pickable()) if cut is None else cut
 
     def _pickable(self) -> list[tuple[Any, IntArray]]:
-        """Return the actors of a 3D mesh whose cells can be picked, and whose sides they show."""
+        """Return the actors of a 3D mesh that can be picked, with the cell of each polygon."""
         if self._threshold.cells is not None:
             return self._threshold.pickable()
         hidden = self.session.view.hidden
@@ -283,7 +294,7 @@ class Scene:
         return shown
 
     def fly_to(self, cell: int) -> None:
-        """Aim at a cell of the frame that is shown, from the present side and near."""
+        """Move the camera near a cell of the shown frame; the direction stays."""
         frame = self.session.frame
         if frame is None or not frame.has(cell):
             return

@@ -23,17 +23,29 @@ from slideviz.session.section_cuts import Cuts, can_cut, cut_frame, is_awaited
 from slideviz.session.state import Session, StepFrame
 
 NAME, BAND, RIM = "section:", "band:", "rim:"
-"""What names of actors begin with: of what a section shows, and of what is below it in 2D."""
+"""Prefixes of actors' names: the section's cells; in 2D also the line below them and its rim."""
 WIDTHS = {BAND: 8.0, RIM: 10.0}
-"""Pixels of the line that a cut through a 2D mesh is, in the colours of its cells, and of what
-sets it off: where cells are smaller than pixels, these lines are what is seen."""
+"""Widths in pixels, for a 2D mesh, of the line in the colours of the cut cells, and of its rim.
+
+They make a section visible whose cells are smaller than pixels."""
 LIFTS = {NAME: 0.7, BAND: 0.6, RIM: 0.5}
-"""How far these are above the cells of a 2D mesh, as parts of `Stage.lift`."""
+"""Heights of the parts above the cells of a 2D mesh, relative to `Stage.lift`."""
 
 
 @dataclass(eq=False)
 class SectionDrawn:
-    """A section in the scene: the actor of its polygons, and what the polygons depend on."""
+    """A section in the scene: the actor of its polygons, and what they were made of.
+
+    Attributes
+    ----------
+    shown : PolygonActor
+    made_of : tuple
+        Everything that the polygons depend on, to be compared.
+    frame : StepFrame or None
+        The frame with the cut cells; for a mesh in its file, one made of those that were read.
+    of : Mesh or None
+        The mesh of the shown frame.
+    """
 
     shown: PolygonActor
     made_of: tuple[object, ...] = ()
@@ -57,10 +69,10 @@ class SectionLayer(Layer):
     Attributes
     ----------
     cuts : Cuts
-        What was cut, for others that show the same.
+        The cached cuts, shared with flat views.
     drawn : dict of str to SectionDrawn
-        By the name of the actor: ``section:0`` is the first section of the mesh itself,
-        ``section:0:1`` that of its next passage.
+        The sections by name of their actor: ``section:0`` is the first section through the mesh
+        itself, ``section:0:1`` that through its next passage.
     """
 
     def __init__(self, stage: Stage) -> None:
@@ -70,7 +82,7 @@ class SectionLayer(Layer):
         self.clear()
 
     def clear(self) -> None:
-        """Forget the mesh."""
+        """Forget the mesh; the scene removes its actors."""
         self.drawn: dict[str, SectionDrawn] = {}
         self._period = Period()
         self._instances: dict[str, Instances] = {}
@@ -79,7 +91,7 @@ class SectionLayer(Layer):
         self._box: tuple[tuple[object, ...], Box] | None = None
 
     def pickable(self) -> list[tuple[Any, IntArray]]:
-        """Return the actors of the mesh itself, each with the cells of its polygons."""
+        """Return the actors of sections through the mesh itself, with the cell of each polygon."""
         return [
             (one.actor, one.polygons.cells)
             for name, one in self.drawn.items()
@@ -88,20 +100,20 @@ class SectionLayer(Layer):
 
     @property
     def from_file(self) -> bool:
-        """Tell whether cells of sections are none of those of the mesh in memory."""
+        """Return whether the sections' cells were read from the mesh's file for them."""
         return any(
             one.frame is not None and one.frame.base is not None for one in self.drawn.values()
         )
 
     def actors(self) -> list[Any]:
-        """Return the actors of all sections, of neighbouring passages too."""
+        """Return the actors of all sections, including those of neighbouring passages."""
         instances = (
             instance for one in self._instances.values() for instance in one.drawn.values()
         )
         return [*(one.actor for one in self.drawn.values() if len(one.polygons)), *instances]
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Draw another state of the session; only differences are cut or coloured again."""
+        """Draw another state of the session; cut or colour anew only what differs."""
         if new.frame is None or not (new.view.sections or self.drawn):
             return
         wanted = self._wanted(new)
@@ -118,13 +130,13 @@ class SectionLayer(Layer):
             if number == 0 and (neighbours or name in self._instances):
                 base = self.drawn[name].shown
                 instances = self._instances.setdefault(name, Instances(self.stage, base))
-                # The period takes these onto themselves: nothing has to be cut again.
+                # The period maps the section onto itself: instances of the cut are enough.
                 instances.show({at: m for at, m in neighbours.items() if keeps(section, m)})
         if new.frame.mesh.dim == 2:
             self._draw_lines(new, neighbours)
 
     def _draw_lines(self, session: Session, neighbours: dict[int, FloatArray]) -> None:
-        """Draw the section lines of a 2D mesh across all that is drawn of the mesh."""
+        """Draw the lines of a 2D mesh's sections, across the mesh and its neighbouring passages."""
         assert session.frame is not None
         mesh, sections = session.frame.mesh, dict(shown_sections(session))
         key = (mesh, sections, tuple(neighbours), self.stage.scheme)
@@ -132,12 +144,12 @@ class SectionLayer(Layer):
             return
         self._lines_of = key
         if self._box is None or self._box[0] != (mesh, tuple(neighbours)):
-            # Not again for every place that a line is dragged to.
+            # Cached, as a line is dragged.
             self._box = (mesh, tuple(neighbours)), self._find_box(mesh, neighbours)
         self._lines.show(sections, self._box[1], self.stage.lift(mesh))
 
     def _find_box(self, mesh: Mesh, neighbours: dict[int, FloatArray]) -> Box:
-        """Return the box around a mesh and its neighbouring passages."""
+        """Return the corners of the box around a 2D mesh and its neighbouring passages."""
         own = mesh.points[self.cuts.cutter(mesh).used]
         every = [own, *(moved(own, matrix) for matrix in neighbours.values())]
         boxes = [box_around(points) for points in every]
@@ -148,7 +160,10 @@ class SectionLayer(Layer):
         return matrices(session, self._period.of(session) if session.view.passages else None)
 
     def _wanted(self, session: Session) -> dict[str, tuple[Section, int, FloatArray | None]]:
-        """Return section and passage of each cut, with the passage's matrix, by name."""
+        """Return section, number of the passage and its matrix for each cut, by actor name.
+
+        The mesh itself has number 0 and no matrix.
+        """
         found: dict[str, tuple[Section, int, FloatArray | None]] = {}
         neighbours = self._neighbours(session)
         for index, section in shown_sections(session):
@@ -170,19 +185,19 @@ class SectionLayer(Layer):
         kind = name[: name.index(":") + 1]
         frame, by_value = session.frame, session.view.colour_by != "role" and kind != RIM
         assert frame is not None
-        # The view's way to find the period may change with the case, and so the matrix.
+        # The matrix is part of the key, as another case may have another period.
         only = self.stage.in_threshold(session)
         cut = cut_frame(frame, section)
         key = (cut, section, number, None if matrix is None else matrix.tobytes(), only)
         one = self.drawn.get(name)
         if one is not None and one.of is frame.mesh and is_awaited(frame.mesh, section):
-            return  # until its cells are read, what was there stays
+            return  # until its cells are read, the old polygons stay
         if one is None:
             one = self.drawn[name] = SectionDrawn(PolygonActor(self.stage, name))
         if one.made_of != key:
             polygons = self.cuts.of(frame.mesh, section, matrix, only)
             if frame.mesh.dim == 2 or not section.whole:
-                # Folded cells overlap in one plane: show them.
+                # Folded cells overlap in one plane: draw the inverted ones last.
                 polygons = polygons.with_last(cut.quality.status[polygons.cells] == INVERTED)
             one.shown.show(polygons, LIFTS[kind] * self.stage.lift(frame.mesh))
             one.made_of, one.frame, one.of, again = key, cut, frame.mesh, True
@@ -196,7 +211,7 @@ class SectionLayer(Layer):
         prop, scheme = shown.actor.prop, self.stage.scheme
         prop.color = scheme.text if kind == RIM else plain_colour(scheme)
         solid = session.mesh is not None and session.mesh.dim == 3 and section.whole
-        # A cut has the very colours of the bar; whole cells need shades that set them apart.
+        # A cut has exactly the colours of the bar; whole cells need shading.
         prop.lighting = solid
         prop.ambient, prop.diffuse = (0.6, 0.4) if solid else (1.0, 0.0)
         self.stage.edges(prop, "edges" in session.view.drawn, session.view.colour_by == "role")
@@ -205,9 +220,9 @@ class SectionLayer(Layer):
 
 
 def _kinds(section: Section, session: Session) -> dict[str, Section]:
-    """Return what is drawn of a section, by what the names of its actors begin with.
+    """Return the sections to draw for one, by the prefix of their actors' names.
 
-    In 2D whole cells are above a line in their colours, and lines above a wider one.
+    In 2D, whole cells are drawn above a line in their colours, and a line above its wider rim.
     """
     section = replace(section, name="")
     found = {NAME: section}
@@ -218,7 +233,7 @@ def _kinds(section: Section, session: Session) -> dict[str, Section]:
 
 
 def shown_sections(session: Session) -> Iterator[tuple[int, Section]]:
-    """Yield the sections that are drawn, with their places in the list."""
+    """Yield the index and the section of each one that is shown and can cut the mesh."""
     for index, section in enumerate(session.view.sections):
         if section.shown and can_cut(session.mesh, section):
             yield index, section
@@ -226,14 +241,15 @@ def shown_sections(session: Session) -> Iterator[tuple[int, Section]]:
 
 LINE = "line:"
 WIDTH = 1.2
-"""Pixels."""
+"""Width of the thin line of a 2D section, in pixels."""
+
 ABOVE, BELOW = 0.9, 0.4
-"""How far lines are above the cells of the mesh, as parts of `Stage.lift`: above cells that are
-shown whole, and below a band in the colours of the cells."""
+"""Heights of the thin line above the mesh's cells, relative to `Stage.lift`: above whole cells, and
+below a band in the cells' colours."""
 
 
 class CutLines:
-    """The lines of sections of a 2D mesh, also in holes and beside the mesh.
+    """The thin lines of a 2D mesh's sections, which continue in holes and beside the mesh.
 
     Parameters
     ----------
@@ -245,13 +261,13 @@ class CutLines:
         self.clear()
 
     def clear(self) -> None:
-        """Forget the mesh."""
+        """Forget the mesh; the scene removes its actors."""
         self._actors: dict[str, Any] = {}
         # Kept here: a data set that only VTK holds may come back from a mapper without points.
         self._shapes: dict[str, Any] = {}
 
     def show(self, sections: Mapping[int, Section], box: Box, lift: float) -> None:
-        """Draw the lines of sections, by their places in the list; ``lift`` is the stage's."""
+        """Draw the lines of sections, by their index, within a box; ``lift`` is `Stage.lift`."""
         wanted = {f"{LINE}{index}": section for index, section in sections.items()}
         for name in [name for name in self._actors if name not in wanted]:
             self.stage.remove(name)
@@ -274,7 +290,7 @@ class CutLines:
 
 
 def polylines(parts: list[FloatArray], lift: float = 0.0) -> Any:
-    """Return lines through points (k, 2) each, as one data set at z = ``lift``."""
+    """Return polylines through points (k, 2) as one PolyData at z = ``lift``."""
     points = np.concatenate(parts)
     sizes = [len(part) for part in parts]
     offsets = np.concatenate([[0], np.cumsum(sizes)])

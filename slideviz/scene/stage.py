@@ -16,32 +16,32 @@ from slideviz.sections.threshold import CellsInRange
 from slideviz.session.state import Session, StepFrame
 
 USUAL_DPI = 72.0
-"""Dots per inch of a screen whose pixels are those of Qt."""
+"""VTK's dots per inch of a screen with a device pixel ratio of 1."""
 
 
 class Layer:
-    """A part of the scene that draws one kind of thing.
+    """The base of a scene's layers, each of which draws one kind of thing.
 
-    Its actors have names of their own, ``kind:name``, and are changed in place. A layer has those
-    of these methods in which it differs from what they do here.
+    A layer names its actors ``kind:name`` and changes them in place. All methods do nothing by
+    default.
     """
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
-        """Draw another mesh; nothing of the one before is left in the plotter."""
+        """Draw another mesh; the plotter is empty."""
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Draw another state of the same mesh, touching only differences; None: set all."""
+        """Draw another state of the same mesh: change what differs from ``old`` (None: all)."""
 
     def clear(self) -> None:
-        """Forget the mesh, whose actors are gone already."""
+        """Forget the mesh; the scene removes its actors afterwards."""
 
     def shapes(self) -> list[Any]:
-        """Return the data sets that `Camera.fit` shows; none where others are around them."""
+        """Return the data sets that `Camera.fit` shows, unless they are inside other layers'."""
         return []
 
 
 class Stage:
-    """The plotter of a scene and what is common to its layers.
+    """The plotter of a scene, and what its layers share.
 
     Attributes
     ----------
@@ -49,17 +49,17 @@ class Stage:
     scheme : ColorScheme
         Colours of background, text and edges.
     font_scale : float
-        Enlarges the letters, for pictures of many pixels.
+        Factor of the letters' size, for pictures of many pixels.
     table : pyvista.LookupTable
-        The colours of values, and of inverted cells; changed in place.
+        The colours of values, and of inverted cells (NaN); changed in place.
     point_words : tuple of (str, str)
-        Words and colours of the nodes drawn as points, for the legend.
+        Texts and colours of the legend for the nodes drawn as points.
     ring_words : tuple of (str, str)
-        The same of what is marked by rings.
+        Texts and colours of the legend for the rings.
     has_legend : bool
-        Whether the legend is drawn, if it is wanted, and its strip kept free.
+        Whether this scene may have a legend, and leaves its strip free.
     has_plate : bool
-        Whether the legend has a half-transparent plate; not where the background is left out.
+        Whether the legend has a half-transparent plate; False for a transparent background.
     """
 
     def __init__(self, plotter: Any, scheme: ColorScheme = LIGHT, font_scale: float = 1.0) -> None:
@@ -76,14 +76,14 @@ class Stage:
 
     @property
     def pixel_scale(self) -> float:
-        """Return how many pixels one is at normal letter size on a usual screen.
+        """Return the factor for lengths in pixels: ``font_scale`` times the screen's resolution.
 
-        Letters need no more than ``font_scale``: VTK enlarges them where pixels are small.
+        For letters ``font_scale`` is enough, as VTK scales them with the resolution.
         """
         return float(self.font_scale * self.plotter.render_window.GetDPI() / USUAL_DPI)
 
     def add(self, shape: Any, name: str, **options: Any) -> Any:
-        """Return the actor of a new data set, whose cells have no colour of their values yet."""
+        """Add a data set to the plotter and return its actor, not yet coloured by values."""
         valued = VALUES in shape.cell_data
         actor = self.plotter.add_mesh(
             shape,
@@ -99,7 +99,7 @@ class Stage:
         )
         draw_fine_edges(actor)
         if valued:
-            # The table's own range: pyvista gives each actor that of its data.
+            # Use the table's range: pyvista would set that of the actor's data.
             actor.mapper.SetUseLookupTableScalarRange(True)
         actor.mapper.scalar_visibility = False
         return actor
@@ -109,25 +109,28 @@ class Stage:
         self.plotter.remove_actor(name, reset_camera=False, render=False)
 
     def edges(self, prop: Any, shown: bool, plain: bool = False) -> None:
-        """Draw the edges of an actor's cells, or not; plain ones in the color scheme's colour."""
+        """Switch the edges of an actor's cells on or off.
+
+        ``plain``: in the color scheme's edge colour, else in that for cells coloured by values.
+        """
         prop.show_edges = shown
         prop.edge_color = self.scheme.edge if plain else VALUE_EDGE
         prop.edge_opacity = 0.45
 
     def lift(self, mesh: Mesh) -> float:
-        """Return how far lines of a mesh are drawn above its cells, in its length unit."""
+        """Return the height of lines above the cells of a 2D mesh, in its length unit; 0 in 3D."""
         return LIFT * mesh.extent if mesh.dim == 2 else 0.0
 
     def strip(self) -> float:
-        """Return the width of the legend's strip, in pixels."""
+        """Return the width of the legend's strip in pixels; 0 without a legend."""
         if not self.has_legend:
             return 0.0
         return min(STRIP * self.pixel_scale, 0.4 * self.plotter.window_size[0])
 
     def values(self, session: Session) -> FloatArray:
-        """Return the value of every cell of the frame that is shown, (m,), for the colours.
+        """Return the value (m,) of every cell of the shown frame by which it is coloured, cached.
 
-        Not a number for inverted cells. Made once for a frame, whatever layers ask for it.
+        It is NaN for inverted cells.
         """
         frame, what = session.frame, session.view.colour_by
         assert frame is not None
@@ -139,9 +142,9 @@ class Stage:
     def values_of(
         self, session: Session, cells: IntArray, of: StepFrame | None = None
     ) -> FloatArray:
-        """Return the values of some cells (k,) only, (k,): what nobody sees is not computed.
+        """Return the values (k,) by which cells (k,) are coloured, computed for these only.
 
-        ``of`` is the frame that has them, if it is not the one that is shown.
+        ``of`` is the frame with the cells, by default the shown one.
         """
         frame, what = of or session.frame, session.view.colour_by
         assert frame is not None
@@ -150,14 +153,14 @@ class Stage:
         return frame.shown_values(what, session.mesh, cells)
 
     def value_of(self, session: Session, cell: int) -> float:
-        """Return the value of one cell, also of a worst one that is not among those drawn."""
+        """Return the value of one cell, which may be a worst cell of a mesh in its file."""
         assert session.frame is not None
         frame, at = session.frame.place_of(cell)
         what = session.view.colour_by
         return float(frame.shown_values(what, session.mesh, np.array([at]))[0])
 
     def in_threshold(self, session: Session) -> CellsInRange | None:
-        """Return the cells within the threshold of the view, None where there is no threshold."""
+        """Return the cells within the view's threshold; None if there is no threshold."""
         threshold = session.view.threshold
         if threshold is None:
             return None
@@ -168,14 +171,14 @@ class Stage:
         return known[2]
 
     def set_colours(self, session: Session) -> None:
-        """Give the table of colours the map and the range of the session."""
+        """Set colour map and range of the table of colours to those of the session."""
         low, high = session.colour_range
         self.table.scalar_range = (low, high)
         if session.view.colour_map != self.table.cmap.name:
             self.table.apply_cmap(session.view.colour_map, 256)
 
     def set_background(self) -> None:
-        """Give the plotter the background of the color scheme."""
+        """Set the plotter's background to that of the color scheme."""
         scheme = self.scheme
         top = None if scheme.background == scheme.background_top else scheme.background_top
         self.plotter.set_background(scheme.background, top=top)

@@ -1,4 +1,4 @@
-"""The threshold: only the cells whose value is in a range, whole; the others faint or gone."""
+"""The threshold: the whole cells whose value is in a range; the others are faint (2D) or hidden."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ NAME = "threshold"
 class ThresholdLayer(Layer):
     """The cells within the threshold of the view.
 
-    In 2D the other cells keep a faint area without lines; in 3D the sides between the others
-    are left out, so that what is drawn grows with the surface of these cells.
+    In 2D the other cells are a faint area without edges; in 3D only the outer faces of the cells
+    within the threshold are drawn.
 
     Parameters
     ----------
     stage : Stage
     others : CellLayer
-        Draws all cells; it steps back while there is a threshold.
+        Draws all cells; made faint while there is a threshold.
 
     Attributes
     ----------
     cells : (k,) int64 or None
-        Which these are, in 2D the inverted ones last, None without a threshold.
+        Indices of the cells within the threshold, in 2D the inverted ones last; None without one.
     shape : pyvista.PolyData or None
-        What is drawn; ``owner`` tells whose sides its polygons are.
+        The data set of these cells.
     """
 
     def __init__(self, stage: Stage, others: CellLayer) -> None:
@@ -43,7 +43,7 @@ class ThresholdLayer(Layer):
         self.clear()
 
     def clear(self) -> None:
-        """Forget the mesh."""
+        """Forget the mesh; the scene removes its actors."""
         self.cells: IntArray | None = None
         self.shape: Any = None
         self.actor: Any = None
@@ -51,11 +51,11 @@ class ThresholdLayer(Layer):
 
     @property
     def owner(self) -> IntArray:
-        """Return the cell that each polygon of the shape is a side of, (f,)."""
+        """Return the index (f,) of the cell that each polygon of ``shape`` belongs to."""
         return np.asarray(self.shape.cell_data[CELL])
 
     def pickable(self) -> list[tuple[Any, IntArray]]:
-        """Return the actor of the cells, if there are some, with the cell of each polygon."""
+        """Return the actor of the cells with the cell of each polygon; empty if there are none."""
         if self.cells is None or not len(self.cells):
             return []
         return [(self.actor, self.owner)]
@@ -78,7 +78,7 @@ class ThresholdLayer(Layer):
             self.stage.edges(self.actor.prop, "edges" in new.view.drawn)
 
     def _fade(self, session: Session, on: bool) -> None:
-        """Make the cells beyond the threshold faint, or let them be as they were."""
+        """Make all cells, drawn below those within the threshold, faint or as usual again."""
         actor = self.others.actor
         if actor is None or session.mesh is None or not (on or self._faded):
             return
@@ -90,7 +90,7 @@ class ThresholdLayer(Layer):
             actor.prop.show_edges = False
 
     def _draw(self, session: Session) -> None:
-        """Draw the cells within the threshold, in place where they are the same as before."""
+        """Draw the cells within the threshold; in place if they are the same as before."""
         frame, threshold = session.frame, session.view.threshold
         assert frame is not None
         assert threshold is not None

@@ -244,7 +244,7 @@ class WorstTable(QTableView):
         self.setSortingEnabled(True)
 
     def _share(self) -> None:
-        """Measure the width that each column's texts need; it never shrinks for the same columns."""
+        """Measure the width that each column needs; it never shrinks for the same columns."""
         model = self.model()
         assert isinstance(model, WorstModel)
         if not model.rowCount():
