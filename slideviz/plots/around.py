@@ -1,4 +1,4 @@
-"""The cells around those that a 2D section cuts, drawn faintly."""
+"""The uncut cells around a section of a 2D mesh, drawn faintly."""
 
 from __future__ import annotations
 
@@ -17,16 +17,19 @@ from slideviz.sections.polygons import Polygons, joined
 from slideviz.session.passages import moved
 
 MOST = 150_000
-"""More cells than this are a grey area, and would take matplotlib too long."""
+"""Number of cells above which they are drawn as pixels without visible edges, which is faster."""
 _EDGE, _FACE = "#c9d0d8", "#f3f5f7"
 _LINE = 0.7
-"""Points."""
+"""Width of the section's line in points."""
 
 
 def surroundings(
     cutter: Cutter, points: FloatArray, matrices: Mapping[int, FloatArray]
 ) -> Polygons | None:
-    """Return all cells of all passages of a 2D mesh; None in 3D, where they would hide the cut."""
+    """Return all cells of a 2D mesh under each matrix (4, 4); None in 3D: they would hide the cut.
+
+    ``points`` are those of the mesh, ``matrices`` the transformations of the passages by number.
+    """
     if cutter.dim == 3:
         return None
     own = cutter.all_cells(points)
@@ -34,15 +37,16 @@ def surroundings(
 
 
 def window(cut: Box, around: Polygons, ratio: float) -> Box:
-    """Return the box to show around a cut, as wide and high as there is room.
+    """Return the box of a 2D mesh to show around a cut, with the ratio of the room on paper.
 
     Parameters
     ----------
     cut : (2,), (2,) float64
-        The box around what is cut: it is as large as it would be by itself.
+        Corners of the box around the cut, which the result contains.
     around : Polygons
+        All cells; the result is within the box around them.
     ratio : float
-        Of width to height of the room.
+        Width by height of the room.
     """
     low, high = cut
     size = high - low
@@ -50,7 +54,7 @@ def window(cut: Box, around: Polygons, ratio: float) -> Box:
     found = np.stack([(low + high - wanted) / 2.0, (low + high + wanted) / 2.0])
     corners = around.points[around.connectivity, :2]
     ends = np.stack([corners.min(axis=0), corners.max(axis=0)])
-    # Room beside the mesh shows nothing: where it ends on one side, more of the other is shown.
+    # Where the mesh ends on one side, the box is shifted to show more of the other.
     shift = np.maximum(ends[0] - found[0], 0.0) - np.maximum(found[1] - ends[1], 0.0)
     fits = ends[1] - ends[0] >= wanted
     found = np.where(fits, found + shift, np.stack([ends[0], ends[1]]))
@@ -58,7 +62,7 @@ def window(cut: Box, around: Polygons, ratio: float) -> Box:
 
 
 def draw_around(axes: Any, around: Polygons, section: Section, box: Box) -> None:
-    """Draw the cells of a box faintly, and the line or circle that cuts them.
+    """Draw the cells within a box faintly, and the line or circle of a section.
 
     Parameters
     ----------
@@ -66,7 +70,7 @@ def draw_around(axes: Any, around: Polygons, section: Section, box: Box) -> None
     around : Polygons
     section : Section
     box : (2,), (2,) float64
-        What the axes show.
+        Lower and upper corner of what the axes show.
     """
     from matplotlib.collections import LineCollection
 

@@ -8,15 +8,15 @@ from slideviz.color_scheme import INVERTED_COLOUR, PAPER
 from slideviz.plots.ticks import bar_ticks
 
 _LINE = 0.6
-"""Points of the outline."""
+"""Width of a bar's outline in points."""
 _THICK, GAP = 0.14, 0.12
-"""Inches of a bar, and between it and what it stands beside."""
+"""Thickness of a bar, and its distance from the axes beside it, in inches."""
 BELOW = 0.62
-"""Inches between axes with numbers and a label, and a bar below them."""
+"""Distance in inches between axes that have numbers and a label, and a bar below them."""
 
 
 def beside(axes: Any) -> Any:
-    """Return axes for a bar at the right of others, as high as these and laid out with them."""
+    """Return inset axes for a colour bar at the right of ``axes``, as high as these."""
     from matplotlib.transforms import ScaledTranslation, blended_transform_factory
 
     right = axes.figure.dpi_scale_trans + ScaledTranslation(1.0, 0.0, axes.transAxes)
@@ -25,7 +25,7 @@ def beside(axes: Any) -> Any:
 
 
 def below(axes: Any, length: float, gap: float = BELOW) -> Any:
-    """Return axes for a bar below others, laid out with them; of that length and gap in inches."""
+    """Return inset axes for a colour bar below ``axes``; its length and their gap in inches."""
     from matplotlib.transforms import ScaledTranslation
 
     middle = axes.figure.dpi_scale_trans + ScaledTranslation(0.5, 0.0, axes.transAxes)
@@ -35,21 +35,21 @@ def below(axes: Any, length: float, gap: float = BELOW) -> Any:
 def color_bar(
     axes: Any, scale: Any, label: str, letters: float, *, inverted: bool, upright: bool
 ) -> Any:
-    """Draw a colour bar, with as many numbers as there is room for, and return it.
+    """Draw a colour bar, with as many numbers as fit, and return it.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-        What becomes the bar; see `beside` and `below`.
+        The axes for the bar; see `beside` and `below`.
     scale : matplotlib.cm.ScalarMappable
         See `slideviz.plots.cells.color_scale`.
     label : str
     letters : float
-        Typographic points of the numbers; the label has one more.
+        Size of the numbers in points; the label's is one point more.
     inverted : bool
-        Show below its lower end the colour of inverted cells.
+        Whether the colour of inverted cells is shown at the lower end.
     upright : bool
-        It is vertical.
+        Whether the bar is vertical.
     """
     from matplotlib.cm import ScalarMappable
 
@@ -75,7 +75,7 @@ def color_bar(
 
 
 def _number(bar: Any, limits: tuple[float, float], letters: float) -> None:
-    """Have numbers at both ends of a bar and between them, by the length it is drawn with."""
+    """Set ticks at both ends of a bar and between them; how many depends on its drawn length."""
     from matplotlib.textpath import TextPath
     from matplotlib.ticker import FuncFormatter, Locator
 
@@ -89,7 +89,7 @@ def _number(bar: Any, limits: tuple[float, float], letters: float) -> None:
 
             def part(text: str) -> float:
                 box = TextPath((0.0, 0.0), text, size=letters).get_extents()
-                # A little air, for digits that nearly touch read as one number.
+                # With a gap: digits that nearly touch read as one number.
                 size = 1.4 * box.height if upright else box.width + 0.6 * letters
                 return float(size / points)
 

@@ -11,19 +11,19 @@ from slideviz.mesh.model import FloatArray
 from slideviz.sections.polygons import Polygons
 
 MANY = 200_000
-"""More polygons than these are pixels in SVG and PDF files too, or no viewer could open them."""
+"""Number of polygons above which they are pixels in SVG and PDF too, as viewers would fail."""
 
 THICKEST, _THINNEST, _PART = 0.45, 0.04, 0.06
-"""Mesh lines in points: a part of the thickness of their cell, within limits."""
+"""Width of mesh lines: largest and smallest in points; relative to the cell's thickness."""
 _HAIR = 0.15
-"""Points of a line in the cell's own colour, which hides the gap between neighbours."""
+"""Width in points of a line in the cell's own colour, which hides gaps between neighbours."""
 
 _AMBIENT = 0.7
-"""What is seen along its surface has this much of its colour, in space."""
+"""Brightness of a surface seen edge-on, relative to one seen face-on, with ``lit``."""
 
 
 def color_scale(colour_map: str, limits: tuple[float, float]) -> Any:
-    """Return the ScalarMappable of a colour map and its limits; not a number is inverted."""
+    """Return the ScalarMappable of a colour map and its limits; NaN has the inverted colour."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -42,25 +42,25 @@ def draw_cells(
     lit: bool = False,
     **options: Any,
 ) -> Any:
-    """Draw polygons onto axes, and return them as a PolyCollection.
+    """Draw polygons onto axes, and return their PolyCollection.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-        Laid out already, with their limits: the width of edges goes by the scale.
+        Laid out already, with their limits, as the widths of edges depend on the scale.
     cells : Polygons
-        As they lie on paper, what is nearest last.
+        x and y are drawn; the last polygon is drawn over the others.
     values : (q,) float64 or None
-        Of each polygon, not a number where it is inverted; without, all have one colour.
+        The value of each polygon, NaN if inverted; None: all have one colour.
     scale : matplotlib.cm.ScalarMappable
-        Of the values; see `color_scale`.
+        The colours of the values; see `color_scale`.
     edges : float
-        Points of mesh lines, thinner around thin cells, or boundary layers would turn black; 0
-        leaves them out.
+        Largest width of mesh lines in points; they are thinner around thin cells, so that boundary
+        layers do not turn black. 0: no lines.
     lit : bool
-        Darken what is seen at an angle.
+        Whether polygons are darker, the more they are tilted.
     **options
-        Of the collection.
+        Arguments of the PolyCollection.
     """
     from matplotlib.collections import PolyCollection
 
@@ -82,20 +82,20 @@ def draw_cells(
         shapes.set_array(None)
         shapes.set_facecolor(shaded)  # type: ignore[arg-type]  # an array is taken, too
     shapes.set_joinstyle("round")
-    # Moved to whole pixels, each by its own line's width, neighbours would not meet.
+    # Snapped to whole pixels by their own line's width, neighbours would not meet.
     shapes.set_snap(False)
     shapes.set_rasterized(len(cells) > MANY)
     return axes.add_collection(shapes, autolim=False)
 
 
 def rings_of(cells: Polygons) -> list[FloatArray]:
-    """Return the corners of each polygon in the plane, (k, 2)."""
+    """Return the corners (k, 2) of each polygon in the plane, as a list."""
     corners = cells.points[cells.connectivity, :2]
     return np.split(corners, cells.offsets[1:-1]) if len(cells) else []
 
 
 def _thickness(axes: Any, cells: Polygons) -> FloatArray:
-    """Return area by length of each polygon as it is drawn, (q,), in points."""
+    """Return the drawn thickness (q,) of each polygon in points: its area by its diagonal."""
     low, high = axes.get_xlim()
     points_per_length = 72.0 * axes.bbox.width / axes.figure.dpi / (high - low)
     found: FloatArray = np.abs(_normals(cells)[:, 2]) / _sizes(cells) * points_per_length
@@ -112,13 +112,13 @@ def _normals(cells: Polygons) -> FloatArray:
 
 
 def _sizes(cells: Polygons) -> FloatArray:
-    """Return the diagonal of the box around each polygon, (q,), greater than 0."""
+    """Return the diagonal (q,) of the box around each polygon in the plane, greater than 0."""
     low, high = boxes_of(cells)
     return np.maximum(np.linalg.norm(high - low, axis=1), 1e-300)
 
 
 def boxes_of(cells: Polygons) -> tuple[FloatArray, FloatArray]:
-    """Return the lowest and the highest coordinates of each polygon in the plane, (q, 2) each."""
+    """Return the lower and upper corners (q, 2) of the box around each polygon in the plane."""
     corner = cells.points[cells.connectivity, :2]
     low = np.minimum.reduceat(corner, cells.offsets[:-1])
     return low, np.maximum.reduceat(corner, cells.offsets[:-1])

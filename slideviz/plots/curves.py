@@ -1,4 +1,4 @@
-"""The series of a session's curves: its runs by step, by cycle, along the span."""
+"""The data of a session's curves: quality by step, greedy selection, quality along the span."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from slideviz.session.state import Run, Session, StepFrame
 Coordinate = Literal["r", "x", "y", "z"]
 
 UNDEFORMED = 4
-"""Number of the look of the undeformed mesh, which no run of a usual session has."""
+"""Series number of the undeformed mesh, which no run has."""
 
 
 def look_of(run: Run) -> int:
-    """Return the number of a run's series, the same in all plots."""
+    """Return the series number of a run, the same in all plots (see `Style.series`)."""
     number = run.number - 1
     return number if number < UNDEFORMED else number + 1
 
 
 def step_runs(session: Session) -> list[StepRun]:
-    """Return minimum and mean quality of each run from the undeformed mesh on.
+    """Return minimum and mean quality of each run with steps, from the undeformed mesh on.
 
-    The solid line of the first is below dashed ones, which let see it where both coincide.
+    They are in the order of their numbers: the solid line of the first is drawn below dashed ones,
+    so that it shows where lines coincide.
     """
     found = []
     first = session.first
@@ -48,7 +49,7 @@ def step_runs(session: Session) -> list[StepRun]:
 
 
 def greedy_run(session: Session) -> GreedyRun | None:
-    """Return the convergence of the selection in the step that is shown, or None."""
+    """Return the convergence of the greedy selection in the shown step; None if it had none."""
     frame, run = session.frame, session.run_shown
     if frame is None or run is None or frame.step is None or not frame.step.history:
         return None
@@ -64,13 +65,13 @@ def greedy_run(session: Session) -> GreedyRun | None:
 
 
 class Profiles:
-    """Quality along the span, each profile made once as long as its frame is there."""
+    """A cache of profiles of the quality along the span, kept as long as their frames exist."""
 
     def __init__(self) -> None:
         self._made: WeakKeyDictionary[StepFrame, dict[object, Profile]] = WeakKeyDictionary()
 
     def of(self, session: Session, coordinate: Coordinate) -> list[Profile]:
-        """Return the profiles of the step shown, of other runs' last, of the undeformed mesh.
+        """Return the profiles of the shown step, other runs' last steps, and the undeformed mesh.
 
         Raises
         ------
@@ -107,14 +108,17 @@ class Profiles:
 
 
 def coordinates(session: Session) -> dict[Coordinate, str]:
-    """Return the coordinates along the span, words by name."""
+    """Return the texts of the coordinates that layers can be along, by name."""
     if session.mesh is None or session.mesh.dim == 2:
         return {"y": "along y", "x": "along x", "r": "along the radius"}
     return {"r": "along the radius", "z": "along z", "y": "along y", "x": "along x"}
 
 
 def natural(session: Session) -> Coordinate:
-    """Return the usual coordinate along the span: the radius where the mesh turns."""
+    """Return the default coordinate along the span.
+
+    It is the radius if the mesh repeats by rotation; else y in 2D, or the axis of largest extent.
+    """
     if session.mesh is None or any(pair.kind == "rotational" for pair in session.pairs):
         return "r"
     extent = np.ptp(session.mesh.points, axis=0)

@@ -1,4 +1,4 @@
-"""Plots of designs: their quality, and other results, against the numbers that vary."""
+"""Plots of a table of designs: quality, or another result, against a number that varies."""
 
 from __future__ import annotations
 
@@ -26,33 +26,33 @@ RESULTS = {
     "control_nodes": "control nodes [-]",
     "seconds": "time of a design [s]",
 }
-"""What can be drawn, and the words of its axis."""
+"""The results that can be drawn, and the labels of their axes."""
 _MOST_LINES = 12
-"""Curves that are told apart by colours; of more, points are drawn."""
+"""Most curves drawn as lines in different colours; if there are more, only points are drawn."""
 _MOST_WORDS = 12
 _SIGN, _AXIS, _HIGHEST = 7, 0.6, 0.35
-"""Letters that have the room of a sign in the legend and of the gap beside it; inches of the words
-at the left of the axes; the part of the figure that a legend above the axes may take."""
+"""Width of a legend's sign and the gap beside it, in letters; width of the labels left of the axes,
+in inches; largest height of a legend above the axes, relative to the figure."""
 
 
 @dataclass(frozen=True, eq=False)
 class DesignCurve:
-    """A result against one column of a table of designs, the others being the same.
+    """A result of the designs that differ in one column only, against that column.
 
     Attributes
     ----------
     label : str
-        What the designs have in the other columns.
+        The values in the other columns.
     design : (k,) int64
-        Numbers of the designs.
+        Numbers of the designs, from 1.
     places : (k,) float64
-        Ascending: values of the column, or where its words stand.
+        Ascending horizontal coordinates: values of the column, or indices into ``words``.
     values, mean : (k,) float64
-        The result, and of the quality its mean.
+        The result (of the quality the minimum), and the mean quality.
     inverted : (k,) bool
-        Whether there are inverted cells.
+        Whether the design has inverted cells.
     words : tuple of str
-        What stands at 0, 1, 2 ..., where the column has no numbers.
+        The column's different texts if they are not all numbers, else empty.
     others : str
         The names of the other columns.
     """
@@ -68,9 +68,9 @@ class DesignCurve:
 
 
 def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurve]:
-    """Return a result against a column: a curve for each choice of the values in the others.
+    """Return the result ``what`` against a column: a curve per combination of the other columns.
 
-    Values that are no numbers stand in the order in which they come in the table.
+    Failed designs are left out. Texts that are no numbers are in the order of the table.
     """
     at = table.columns.index(column)
     place_of, words = _places(table, column)
@@ -101,14 +101,14 @@ def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurv
 
 
 def failed_designs(table: DesignTable, column: str) -> dict[int, float]:
-    """Return the place of each design that failed along a column, by its number."""
+    """Return the horizontal coordinate of each failed design, by its number."""
     at, (place_of, _) = table.columns.index(column), _places(table, column)
     failed = (number for number, row in sorted(table.results.items()) if row.problem)
     return {number: place_of[table.rows[number - 1][at]] for number in failed}
 
 
 def _places(table: DesignTable, column: str) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the place of each text of a column, and the words there if they are no numbers."""
+    """Return the coordinate of each text of a column, and the texts if not all are numbers."""
     at = table.columns.index(column)
     words = tuple(dict.fromkeys(row[at] for row in table.rows))
     if all(is_number(word) for word in words):
@@ -170,7 +170,7 @@ def against_designs(
 
 
 def _legend_place(axes: Axes, style: Style) -> dict[str, Any]:
-    """Return where the legend is: above the axes, beside them where it would be too high there."""
+    """Return the legend's arguments of its place: above the axes, or beside them if too high."""
     figure = axes.get_figure(root=True)
     assert figure is not None
     words = axes.get_legend_handles_labels()[1]
@@ -187,7 +187,7 @@ def _legend_place(axes: Axes, style: Style) -> dict[str, Any]:
 def _draw_curve(
     axes: Axes, curve: DesignCurve, style: Style, series: int | None, *, mean: bool
 ) -> None:
-    """Draw a curve in the look of a series; without one its points alone, as all others."""
+    """Draw a curve in the look of a series; ``series`` None: points only, all in one look."""
     look = style.series(series or 0)
     joined = series is not None and len(curve.places) > 1
     line: dict[str, Any] = {
@@ -217,7 +217,10 @@ def nearest_design(
     y: float,
     failed: Mapping[int, float] = MappingProxyType({}),
 ) -> int | None:
-    """Return the design whose point is nearest to (x, y): pixels of the figure, y upwards."""
+    """Return the number of the design whose point is nearest to (x, y); None without points.
+
+    x and y are pixels of the figure, y upwards; ``failed`` is that of `failed_designs`.
+    """
     best: tuple[float, int] | None = None
     for curve in curves:
         for values in (curve.values, curve.mean):

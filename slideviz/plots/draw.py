@@ -44,9 +44,9 @@ LABELS: dict[What, str] = {
     "max_error": "largest error [mesh units]",
 }
 _ROOM = 0.1
-"""Labels of numbers of steps are at least this part of the axis apart."""
+"""Least distance of two labels of numbers of steps, relative to the axis."""
 _CROWDED = 300
-"""Selections of more cycles than this get a thin line."""
+"""Number of cycles of a greedy selection above which its line is thin."""
 
 
 def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -> None:
@@ -54,7 +54,7 @@ def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -
     dress(axes, style, "step [-]", "quality [-]")
     for index, run in enumerate(runs):
         look = _line(style, place(run.series, index))
-        # Of many steps some markers do, those of each run at other steps.
+        # Some markers are enough for many steps; those of each run are at other steps.
         every = max(1, len(run.steps) // 6)
         last = len(run.steps) - 1
         look["markevery"] = sorted({*range(index % every, last, every), last})
@@ -79,7 +79,7 @@ def convergence(
 ) -> None:
     """Draw the error of greedy selections against control nodes, on a logarithmic axis.
 
-    Each tolerance is a thin line; markers show where levels begin, about ten of many.
+    Each tolerance is a thin line; markers show where levels begin (about ten if there are many).
     """
     dress(axes, style, "control nodes [-]", f"largest error [{unit}]")
     axes.set_yscale("log")
@@ -128,7 +128,7 @@ def against_steps(
     ----------
     axes : Axes
     rows : sequence of Outcome
-        In any order. Runs with inverted cells are crosses that no line joins.
+        In any order. Qualities of runs with inverted cells are crosses, not joined by the line.
     what : {"minimum", "mean", "seconds", "control_nodes", "max_error"}
     style : Style
     """
@@ -156,7 +156,7 @@ def against_steps(
 
 
 def _line(style: Style, index: int) -> dict[str, Any]:
-    """Return the arguments of ``Axes.plot`` of a series."""
+    """Return the arguments of ``Axes.plot`` for a series number."""
     look = style.series(index)
     return {
         "color": look.colour,
@@ -170,13 +170,13 @@ def _line(style: Style, index: int) -> dict[str, Any]:
 
 
 def _ratio(values: Sequence[float]) -> float:
-    """Return how many times the smallest positive value the largest one is."""
+    """Return the ratio of the largest to the smallest positive value; 1 if there is none."""
     good = [value for value in values if np.isfinite(value) and value > 0]
     return max(good) / min(good) if good else 1.0
 
 
 def _quality_limits(axes: Axes, values: Sequence[float]) -> None:
-    """Show 0 to 1, or less where the values leave much of it empty, but always from 0."""
+    """Set the vertical limits: from 0 to about 1, or to less if all values are below 0.75."""
     good = [value for value in values if np.isfinite(value)]
     top = max(good, default=1.0)
     axes.set_ylim(0.0, 1.02 if top > 0.75 else max(1.12 * top, 0.1))
@@ -189,7 +189,7 @@ def _whole_ticks(axes: Axes) -> None:
 
 
 def _step_ticks(axes: Axes, steps: Sequence[int]) -> None:
-    """Put ticks at the numbers of steps; on a logarithmic axis where they span a decade."""
+    """Set ticks at the numbers of steps; from a ratio of 8 on, the axis is logarithmic."""
     from matplotlib.ticker import NullLocator
 
     places = np.array(steps, np.float64)
@@ -204,7 +204,7 @@ def _step_ticks(axes: Axes, steps: Sequence[int]) -> None:
 
 
 def _apart(places: np.ndarray) -> list[int]:
-    """Return which of rising numbers (n,) have room for a label: the ends, and some between."""
+    """Return indices of ascending numbers (n,) to label: the ends, and those with enough room."""
     last = len(places) - 1
     if last < 1:
         return list(range(last + 1))

@@ -1,6 +1,6 @@
-"""The histogram of qualities, drawn onto axes that are given, with inverted cells apart.
+"""The histogram of values of cells, drawn onto given axes, with inverted cells counted apart.
 
-One distribution may be filled; all others are outlines in steps, which differ by colour and
+One distribution may be drawn as bars; all others are outlines in steps, which differ by colour and
 dashes, so that they can be told apart over the bars, over each other, and in grey.
 """
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 BAND, _STEMS = 0.12, 0.62
-"""Width of the strip left of the values where inverted cells are counted, as part of the range,
-and the part of it for counts; its name has the rest."""
+"""Width of the strip of inverted cells, left of the values, relative to the range of values; and
+the part of the strip for the counts, beside its label."""
 _PALER = 0.45
-"""How much of the background is mixed into bars, so that lines over them stand out."""
+"""Part of the background's colour mixed into bars, so that lines over them stand out."""
 _SWATCH = 5
-"""Colours of bars in a legend."""
+"""Number of colours that represent the bars in a legend."""
 
 
 def histogram(
@@ -35,7 +35,7 @@ def histogram(
     log: bool = False,
     style: Style = PRINT,
 ) -> None:
-    """Draw outlines of how many cells of each run have which quality.
+    """Draw the number of cells against their quality, an outline for each run.
 
     Parameters
     ----------
@@ -44,9 +44,9 @@ def histogram(
     metric : str
         Name of the value, for the axis.
     edges : (k + 1,) float64, optional
-        Of equal intervals; of 25 from 0 to 1 when left out.
+        Limits of equal intervals; by default 25 intervals from 0 to 1.
     log : bool
-        Whether the count is on a logarithmic axis, which shows a few bad cells among many.
+        Whether the counts' axis is logarithmic, which shows a few bad cells among many.
     style : Style
     """
     edges = np.linspace(0.0, 1.0, 26) if edges is None else edges
@@ -54,7 +54,7 @@ def histogram(
     for index, run in enumerate(runs):
         values = run.values if run.inverted is None else np.where(run.inverted, np.nan, run.values)
         found = Distribution.of(values, edges)
-        # A legend elsewhere serves several axes, with other numbers of inverted cells.
+        # A legend outside the axes is common to several, with other numbers of inverted cells.
         counted = found.inverted > 0 and style.legend
         label = f"{run.label} ({found.inverted} inverted)" if counted else run.label
         outlines.append(Outline(label, found, place(run.series, index)))
@@ -69,23 +69,23 @@ def draw_distribution(
     log: bool = False,
     style: Style = PRINT,
 ) -> None:
-    """Draw counts of cells: one distribution as bars, if it is given, and others as outlines.
+    """Draw the number of cells: one distribution as bars, if given, and others as outlines.
 
     Parameters
     ----------
     axes : Axes
     bars : Bars or None
     outlines : sequence of Outline
-        All have the same intervals, those of the bars.
+        All have the same intervals as the bars.
     metric : str
-        Label of the values.
+        Label of the values' axis.
     log : bool
-        Whether counts are on a logarithmic axis, which shows a few bad cells among many.
+        Whether the counts' axis is logarithmic, which shows a few bad cells among many.
     style : Style
     """
     dress(axes, style, metric, "cells [-]")
     foot = 0.5 if log else 0.0
-    # The undeformed mesh, in dots, can be told from any colour.
+    # The dotted line of the undeformed mesh alone is visible on bars of any colour.
     paler = any(outline.series is not None for outline in outlines)
     if bars is not None:
         _fill(axes, bars, paler, foot, style)
@@ -110,7 +110,7 @@ def draw_distribution(
 
 
 def _look(outline: Outline, style: Style) -> dict[str, Any]:
-    """Return how an outline is drawn."""
+    """Return the line arguments of an outline; ``series`` None is the undeformed mesh."""
     if outline.series is None:
         return {"color": style.scheme.ghost, "linestyle": (0, (1, 2.2)), "linewidth": 1.2}
     look = style.series(outline.series)
@@ -118,7 +118,10 @@ def _look(outline: Outline, style: Style) -> dict[str, Any]:
 
 
 def _fill(axes: Axes, bars: Bars, paler: bool, foot: float, style: Style) -> None:
-    """Draw bars with an outline, which is wider than those that may lie on it."""
+    """Draw bars from ``foot`` up, with an outline wider than the lines that may cover it.
+
+    ``paler``: in colours mixed with the background.
+    """
     one = bars.distribution
     axes.bar(
         one.edges[:-1],
@@ -142,7 +145,7 @@ def _fill(axes: Axes, bars: Bars, paler: bool, foot: float, style: Style) -> Non
 
 
 def _colours(bars: Bars, paler: bool, style: Style) -> list[tuple[float, ...]]:
-    """Return the colour of every bar, (red, green, blue)."""
+    """Return the colour (red, green, blue) of each bar."""
     from matplotlib.colors import to_rgb
 
     given = bars.colours if bars.colours is not None else [style.series(0).colour]
@@ -154,7 +157,7 @@ def _colours(bars: Bars, paler: bool, style: Style) -> list[tuple[float, ...]]:
 
 
 def _counts_axis(axes: Axes, bars: Bars | None, outlines: Sequence[Outline], log: bool) -> None:
-    """Let the axis of the counts begin and end where they do."""
+    """Set scale and limits of the counts' axis; the undeformed mesh does not affect the limits."""
     from matplotlib.ticker import NullLocator
 
     if log:
@@ -162,7 +165,7 @@ def _counts_axis(axes: Axes, bars: Bars | None, outlines: Sequence[Outline], log
         axes.yaxis.set_minor_locator(NullLocator())
         axes.set_ylim(bottom=0.5)
         return
-    # Cells of the undeformed mesh can be all alike: beside them nothing else would be seen.
+    # Cells of the undeformed mesh may all be alike: its count would dwarf the others.
     compared = [outline.distribution for outline in outlines if outline.series is not None]
     compared += [bars.distribution] if bars is not None else []
     highest = max((max(one.counts.max(), one.inverted) for one in compared), default=1)
@@ -177,7 +180,10 @@ def _strip(
     foot: float,
     style: Style,
 ) -> None:
-    """Count inverted cells in a strip of their own, left of all values."""
+    """Draw the numbers of inverted cells in a strip of their own, left of all values.
+
+    ``ends`` are the horizontal ends of the strip; counts begin at ``foot``.
+    """
     left, low = ends
     axes.axvspan(left, low, color=style.alarm, alpha=0.13, linewidth=0)
     room = _STEMS * (low - left)
@@ -207,7 +213,7 @@ def _strip(
 
 
 def _entries(axes: Axes, bars: Bars | None, paler: bool, style: Style) -> dict[str, Any]:
-    """Return what a legend has: the bars first, with the colours that they have."""
+    """Return the legend's arguments for its entries: the bars first, then the outlines."""
     from matplotlib.patches import Patch
 
     handles, labels = axes.get_legend_handles_labels()
@@ -225,7 +231,7 @@ def _entries(axes: Axes, bars: Bars | None, paler: bool, style: Style) -> dict[s
 
 
 def _swatch(colours: Sequence[Any], edge: str) -> Any:
-    """Return what draws a box with several colours side by side into a legend."""
+    """Return a legend handler that draws a box with several colours side by side."""
     from matplotlib.legend_handler import HandlerBase
     from matplotlib.patches import Rectangle
 

@@ -1,4 +1,4 @@
-"""The curve of a 2D section: the quality along its line or circle."""
+"""The curve of a 2D mesh's section: the cells' values along its line or circle."""
 
 from __future__ import annotations
 
@@ -20,23 +20,26 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 GAP = 1e-6
-"""Cells further apart than this part of the whole length are not neighbours."""
+"""Gap between two cells, relative to the whole length, above which the curve is interrupted."""
 _FILLED, _FOLDED = 0.85, 0.3
-"""How opaque the areas below a curve and those of inverted cells are."""
+"""Opacity of the areas below a curve, and of the marks of inverted cells."""
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The values of the cells along a section, from one end to the other.
+    """The values of the cells along a section of a 2D mesh, sorted by position.
 
     Attributes
     ----------
     ends : (q, 2) float64
-        From where to where a cell is cut, the smaller position first; sorted. Of a line in the
-        mesh's length unit, of a circle in degrees.
+        The positions between which each cell is cut, the smaller one first: along a line in the
+        mesh's length unit, along a circle in degrees.
     values : (q,) float64
+        The value of each cell.
     inverted : (q,) bool
+        Whether each cell is inverted.
     cells : (q,) int64
+        The index of each cell in the mesh.
     """
 
     ends: FloatArray
@@ -45,7 +48,7 @@ class Curve:
     cells: IntArray
 
     def cell_at(self, position: float) -> int | None:
-        """Return the cell at a position; where cells overlap, an inverted one before others."""
+        """Return the index of the cell at a position, or None; an inverted one before others."""
         here = np.flatnonzero((self.ends[:, 0] <= position) & (position <= self.ends[:, 1]))
         if not len(here):
             return None
@@ -58,10 +61,10 @@ def curve_of(lines: Polygons, section: Section, values: FloatArray, inverted: np
     Parameters
     ----------
     lines : Polygons
-        Of two corners each (see `slideviz.sections.cut.Cutter.cut`).
+        The cut: lines of two corners each (see `slideviz.sections.cut.Cutter.cut`).
     section : Section
     values, inverted : (m,)
-        Of all cells of the mesh.
+        The value of every cell of the mesh, and whether it is inverted.
     """
     corners = lines.points[lines.connectivity, :2].reshape(-1, 2, 2)
     ends = np.sort(section.in_plane.positions(section, corners), axis=1)
@@ -77,7 +80,7 @@ def position_label(section: Section) -> Label:
 
 @dataclass(frozen=True, eq=False)
 class CurveRow:
-    """A curve of a plot: its name, and the number of its series (None: its place)."""
+    """A curve of a plot with its name and series number (None: its index in the plot)."""
 
     label: str
     curve: Curve
@@ -86,7 +89,7 @@ class CurveRow:
 
 @dataclass(frozen=True)
 class Colours:
-    """The colours of values, for the areas below a single curve: map and range."""
+    """Colour map and range of the values, for the areas below a curve."""
 
     colour_map: str = COLOUR_MAP
     limits: tuple[float, float] = (0.0, 1.0)
@@ -99,18 +102,18 @@ def draw_curves(
     style: Style = PRINT,
     colours: Colours | None = None,
 ) -> None:
-    """Draw curves onto empty axes, as steps; where they have no cell, they are interrupted.
+    """Draw curves as steps onto empty axes; they are interrupted where there is no cell.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
     rows : sequence of CurveRow
-        The last one is that which is looked at: areas are below it, and inverted cells marked.
+        The last one is the main one: its inverted cells are marked, and areas are below it.
     labels : (str, str)
-        Of position and number.
+        Labels of the positions and of the values.
     style : Style
     colours : Colours, optional
-        Of the areas; none are drawn without.
+        Colours of the areas; without them no areas are drawn.
     """
     dress(axes, style, *labels)
     good = np.concatenate([row.curve.values for row in rows])
@@ -139,7 +142,7 @@ def draw_curves(
 
 
 def steps(curve: Curve) -> tuple[FloatArray, FloatArray]:
-    """Return a curve as positions and values of a polyline, not a number where it breaks."""
+    """Return positions and values, (n,) each, of a polyline of steps; NaN where it breaks."""
     whole = float(np.ptp(curve.ends)) if len(curve.ends) else 0.0
     breaks = np.flatnonzero(curve.ends[1:, 0] - curve.ends[:-1, 1] > GAP * whole) + 1
     x, y = curve.ends.ravel(), np.repeat(curve.values, 2)
@@ -147,7 +150,7 @@ def steps(curve: Curve) -> tuple[FloatArray, FloatArray]:
 
 
 def _areas(axes: Any, curve: Curve, colours: Colours, bottom: float) -> None:
-    """Fill what is below a curve in the colours of its numbers."""
+    """Fill the area from ``bottom`` to a curve, in the colours of its values."""
     from matplotlib.collections import PolyCollection
 
     shown = PolyCollection(
@@ -164,7 +167,7 @@ def _areas(axes: Any, curve: Curve, colours: Colours, bottom: float) -> None:
 
 
 def _folded(axes: Any, curve: Curve, style: Style) -> None:
-    """Mark where inverted cells are, over the whole height."""
+    """Mark the positions of inverted cells by areas over the whole height."""
     from matplotlib.collections import PolyCollection
 
     low, high = axes.get_ylim()

@@ -1,4 +1,4 @@
-"""The layout of a section on paper: flat or in space, places of several, numbers along axes."""
+"""The layout of a section's picture: flat or in space, the arrangement of two, axes, triad."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from slideviz.sections.polygons import Polygons, joined
 from slideviz.sections.shape import Label
 
 TITLE, LETTERS = 10.0, 9.0
-"""Points of the letters of the title, and of all others."""
+"""Size in points of the title's letters, and of all others."""
 _LETTER_WIDTH = 0.075
-"""Inches that a letter of a label takes."""
+"""Width of a label's letter in inches."""
 
 SIDES, ENDS, BAR = 0.7, 1.0, 0.7
-"""Inches, about, that numbers and labels take beside the axes, these and titles above and below
-them, and the colour bar on its side; by them it is decided what stands where."""
+"""Approximate room in inches for numbers and labels beside the axes; for these and titles above and
+below the axes; and for the colour bar. They decide the arrangement."""
 HIGHER = {True: 1.4, False: 2.0}
-"""The picture of two may be so many times as high as that of one, where they are beside or above
-each other."""
+"""Largest height of a picture of two runs, relative to one of one run: side by side (True), or one
+above the other (False)."""
 _NARROWEST = 2.2
-"""Inches that two sections beside each other need for their titles."""
+"""Least width in inches of each of two sections side by side, for their titles."""
 _THIN, _MARGIN = 25.0, 0.02
-"""Sections longer than so many times their height get air around them; all get a little, as a part
-of their length."""
+"""Largest ratio of length to height of the box that is shown; margin around all sections, relative
+to their length."""
 
 _ASIDE, _ABOVE = 0.55, 0.4
-"""How far the camera is off the straight view, for every length that it is away."""
+"""Offset of the camera from the straight view, to the side and up, relative to its distance."""
 
 
 def camera(piece: Polygons, section: Section) -> FloatArray:
-    """Return unit vectors to the right, up, and towards the camera, (3, 3).
+    """Return the camera's right and up vectors and the direction towards it, unit rows (3, 3).
 
-    The camera is somewhat to the side of the straight view: the plane's normal, or the
-    direction from the axis to the middle of the piece.
+    The camera is somewhat aside of the straight view, which is along the plane's normal, or from
+    the middle of the piece to the axis.
     """
     side, up, straight = section.shape.aslant(section, piece.points)
     eye = straight + _ASIDE * side + _ABOVE * up
@@ -49,7 +49,7 @@ def camera(piece: Polygons, section: Section) -> FloatArray:
 
 
 def in_space(pieces: Sequence[Polygons], section: Section) -> Polygons:
-    """Return the pieces as one, projected: x to the right, y up, z towards the camera."""
+    """Return all pieces in camera coordinates (x right, y up, z towards it), the nearest last."""
     every = joined(pieces)
     seen = every.with_points(every.points @ camera(pieces[0], section).T)
     return seen.by_depth()
@@ -58,15 +58,22 @@ def in_space(pieces: Sequence[Polygons], section: Section) -> Polygons:
 def laid_flat(
     pieces: Mapping[int, Polygons], section: Section, space: bool, beside: float | None = None
 ) -> tuple[Polygons, tuple[Label, Label] | None]:
-    """Return the pieces as they lie on paper, the nearest last, and what the axes are called.
+    """Return the pieces as drawn on paper, the nearest polygons last, and the axes' labels.
 
-    In ``space`` the axes have no names. The mesh itself lies where its middle is nearest to that
-    of another, ``beside``.
+    Parameters
+    ----------
+    pieces : mapping of int to Polygons
+        The cuts of each passage, by number; 0 is the mesh itself.
+    section : Section
+    space : bool
+        Whether they are shown in space, where the axes have no labels (None).
+    beside : float, optional
+        Middle angle, in radians, of another run's section: this one is unrolled next to it.
     """
     if space:
         return in_space(list(pieces.values()), section), None
     if not any(piece.points[:, 2].any() for piece in pieces.values()):
-        # A 2D mesh, or a plane that lies flat already.
+        # A 2D mesh, or a plane at z = 0.
         return joined(list(pieces.values())), (Label("x", "x"), Label("y", "y"))
     shape = section.shape
     own = shape.middle(section, pieces[min(pieces, key=abs)]) if beside is None else beside
@@ -76,7 +83,7 @@ def laid_flat(
         sorted(number for number in pieces if number >= 0),
         sorted((number for number in pieces if number < 0), reverse=True),
     ):
-        # Each passage beside the one before, from the mesh itself outwards.
+        # Each passage is unrolled next to the one before, from the mesh itself outwards.
         near = middles[min(found)] if found else own
         for number in numbers:
             found[number] = shape.flatten(section, pieces[number], near, own)
@@ -86,10 +93,19 @@ def laid_flat(
 
 
 def arranged(size: FloatArray, inches: tuple[float, float], count: int) -> tuple[bool, float]:
-    """Return whether sections of a size (2,) stand beside each other, and the scale that they have.
+    """Return whether sections are side by side, and their scale in inches per mesh unit.
 
-    The colour bar of those is at their right; of others, one above the other, it is below. Of one
-    section it stands where the section is larger.
+    If they are, the colour bar is upright at their right; else they are one above the other, with
+    the bar below. Of one section, only the bar's place is chosen. The larger scale is preferred.
+
+    Parameters
+    ----------
+    size : (2,) float64
+        Width and height of a section, in the mesh's length unit.
+    inches : (float, float)
+        Width and height of the picture.
+    count : int
+        Number of sections, 1 or 2.
     """
     width, height = inches
     high = {upright: height * (HIGHER[upright] if count > 1 else 1.0) for upright in (True, False)}
@@ -104,7 +120,7 @@ def arranged(size: FloatArray, inches: tuple[float, float], count: int) -> tuple
 
 
 def aired(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the box with a margin, and not thinner than one part in ``_THIN``."""
+    """Return the corners (2,) of a box with a margin, and not thinner than length by `_THIN`."""
     size = high - low
     longest = float(size.max()) or 1.0
     wanted = np.maximum(size + 2 * _MARGIN * longest, longest / _THIN)
@@ -113,7 +129,7 @@ def aired(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def number_axes(axes: Any, labels: tuple[Label, Label] | None) -> None:
-    """Give axes that are laid out labels and numbers, as there is room for them."""
+    """Set labels and numbers of axes already laid out, as many as fit; None hides the axes."""
     from matplotlib.ticker import MaxNLocator
 
     if labels is None:
@@ -122,7 +138,7 @@ def number_axes(axes: Any, labels: tuple[Label, Label] | None) -> None:
     axes.tick_params(labelsize=LETTERS - 1, width=0.6, length=3)
     axes.spines[:].set_linewidth(0.6)
     sizes = axes.bbox.size / axes.figure.dpi
-    # One number says nothing of the scale: two, where there is room for them.
+    # One number does not show the scale: at least two, if they fit.
     for axis, label, inches, step, two in zip(
         (axes.xaxis, axes.yaxis), labels, sizes, (0.65, 0.4), (1.3, 0.3), strict=True
     ):
@@ -136,14 +152,14 @@ def number_axes(axes: Any, labels: tuple[Label, Label] | None) -> None:
 
 
 def draw_triad(figure: Any, piece: Polygons, section: Section) -> None:
-    """Draw the directions of x, y and z in the lower left corner."""
+    """Draw the directions of x, y and z as seen by `camera`, in the lower left corner."""
     from matplotlib.lines import Line2D
 
     size, centre = figure.get_size_inches(), np.array([0.55, 0.5])
     for word, towards in zip("xyz", camera(piece, section)[:2].T, strict=True):
         ends = np.stack([centre, centre + 0.3 * towards]) / size
         figure.add_artist(Line2D(*ends.T, color=PAPER.text, linewidth=1.0))
-        # An axis that points at the camera has no length, but its letter needs room all the same.
+        # The letter of an axis that points at the camera is still put beside the origin.
         beside = towards / max(float(np.linalg.norm(towards)), 1e-12)
         at = ends[1] + 0.12 * beside / size
         figure.text(*at, word, fontsize=LETTERS, ha="center", va="center")

@@ -1,4 +1,4 @@
-"""The values that colour a section, and a summary of them in its cut."""
+"""The values by which a section's cells are coloured, and a summary of those that are cut."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ class Paint:
     Attributes
     ----------
     label : str
-        What it is.
+        The quantity.
     values : (m,) float64
+        Its value in every cell.
     inverted : (m,) bool
-        Cells that get the colour of inverted ones.
+        Whether each cell is inverted, and drawn in the colour of inverted cells.
     limits : (float, float)
-        What the ends of the colour map stand for.
+        The values at the ends of the colour map.
     colour_map : str
         A colour map of matplotlib.
     """
@@ -51,15 +52,15 @@ class Paint:
         return replace(self, limits=(low, high))
 
     def up_to(self, cells: IntArray) -> Paint:
-        """Return the paint with limits of 0 and the largest value of cells (c,)."""
+        """Return the paint with limits from 0 to the largest value of cells (c,)."""
         return replace(self, limits=(0.0, float(self.values[cells].max(initial=0.0)) or 1.0))
 
     def shown(self, cells: IntArray) -> FloatArray:
-        """Return the values of cells (c,), in the limits; not a number where inverted."""
+        """Return the values (c,) of cells (c,), clipped to the limits; NaN if inverted."""
         return np.where(self.inverted[cells], np.nan, np.clip(self.values[cells], *self.limits))
 
     def summary(self, cells: IntArray) -> dict[str, float | int]:
-        """Return number, min, mean, max, and inverted of cells (c,), each once, c > 0."""
+        """Return number, min, mean, max, inverted and worst cell of cells (c,), c > 0."""
         mine = self.values[cells]
         worst = cells[np.argmin(np.where(self.inverted[cells], -1.0, mine))]
         return {
@@ -72,9 +73,9 @@ class Paint:
         }
 
     def sentence(self, cells: IntArray, of: int | None = None, shown: str = "") -> str:
-        """Return the summary in words, for people.
+        """Return the summary of cells (c,) as a sentence.
 
-        Where the cells are only some ``of`` so many, ``shown`` says which.
+        If they are only those of ``of`` cells that a threshold leaves, ``shown`` is its text.
         """
         found = self.summary(cells)
         end = "max" if self.label == "displacement" else "min"
@@ -88,7 +89,7 @@ class Paint:
 
 
 def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = None) -> Paint:
-    """Return the values of all cells to colour them by.
+    """Return the paint of a mesh: a quantity of every cell, with its usual limits.
 
     Parameters
     ----------

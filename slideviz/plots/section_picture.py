@@ -1,4 +1,4 @@
-"""Pictures of a section, of one run or of two, drawn with matplotlib: PNG, SVG and PDF alike."""
+"""Pictures of a section, of one run or of two, drawn with matplotlib as PNG, SVG or PDF."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from slideviz.terms import QUANTITIES
 SUFFIXES = (".png", ".svg", ".pdf")
 
 _LONGEST = 36
-"""Letters of a name at the head of a title."""
+"""Most letters of the name that a title begins with."""
 
 
 @dataclass(frozen=True)
@@ -51,19 +51,19 @@ class SectionStyle:
     size : (int, int)
         Width and height of the picture in pixels; SVG and PDF keep their ratio.
     trimmed : bool
-        The height is the most: the picture is only as high as the section needs.
+        Whether the picture is only as high as the section needs, the height of ``size`` at most.
     edges : bool
-        Draw the mesh lines.
+        Whether mesh lines are drawn.
     in_space : bool
-        Show it in space instead of flat.
+        Whether the section is shown in space instead of flat.
     name : str
-        What was cut: it stands before the section in words, shortened where there is no room.
+        Name of the mesh, with which the title begins, shortened if it is long.
     dpi : float, optional
-        Pixels per inch; left out, letters can be read when the picture is as wide as a page.
+        Pixels per inch; by default such that the picture is 5 to 10 inches wide.
     title : bool
-        Say above it what was cut, where, and with which quality.
+        Whether it has a title: what was cut, where, and its quality.
     axes : bool
-        Have axes with numbers, where it is flat.
+        Whether a flat section has axes with numbers.
     """
 
     size: tuple[int, int] = (1600, 1000)
@@ -77,12 +77,12 @@ class SectionStyle:
 
     @property
     def inches(self) -> tuple[float, float]:
-        """Return width and height on paper."""
+        """Return width and height on paper, in inches."""
         return self.size[0] / self.pixels_per_inch, self.size[1] / self.pixels_per_inch
 
     @property
     def pixels_per_inch(self) -> float:
-        """Return the resolution: small pictures are printed small and large ones in full width."""
+        """Return ``dpi``, or a resolution by which the picture is 5 to 10 inches wide."""
         return self.dpi or self.size[0] / float(np.clip(self.size[0] / 200.0, 5.0, 10.0))
 
 
@@ -93,16 +93,16 @@ class SectionInRun:
     Attributes
     ----------
     pieces : mapping of int to Polygons
-        What the section shows of each passage; 0 is the mesh itself (see
+        The polygons that the section shows of each passage, by number; 0 is the mesh itself (see
         `slideviz.session.passages.show_passages`).
     paint : Paint
-        Its numbers are those of the cells that the pieces name.
+        The values of the mesh's cells, to which the pieces' cell indices refer.
     around : Polygons, optional
         The other cells of a 2D mesh (see `slideviz.plots.around.surroundings`).
     name, place : str
-        Which run it is, and which step of it.
+        The run and the step in words.
     note : str
-        Stands behind the numbers of the title.
+        A text behind the numbers of the title.
     """
 
     pieces: Mapping[int, Polygons]
@@ -119,13 +119,13 @@ class SectionInRun:
 
     @property
     def ids(self) -> IntArray:
-        """Return the cells that are cut: of the mesh itself, or of all where it is not cut."""
+        """Return the indices of the cut cells: of the mesh itself; if none, of all passages."""
         drawn = self.drawn
         return drawn[0].cell_ids if 0 in drawn else joined(list(drawn.values())).cell_ids
 
     @property
     def numbers(self) -> str:
-        """Return step, minimum and mean in words."""
+        """Return step, minimum and mean of the cut cells in words, with the note."""
         found = self.paint.sentence(self.ids) if self.drawn else "no cell is cut"
         if self.place:
             found = f"{self.place}: {found.removeprefix(f'{self.paint.label}: ')}"
@@ -133,13 +133,7 @@ class SectionInRun:
 
 
 def require_picture_name(file: Path) -> None:
-    """Raise if no picture can have this name.
-
-    Raises
-    ------
-    CaseError
-        The end of the name is none of ``SUFFIXES``.
-    """
+    """Raise CaseError unless a file's suffix is one of `SUFFIXES`."""
     if file.suffix.lower() not in SUFFIXES:
         raise CaseError(f"{file}: a section is drawn as {', '.join(SUFFIXES)}; end the name so")
 
@@ -155,16 +149,16 @@ def section_picture(
     Parameters
     ----------
     shown : sequence of SectionInRun
-        One run, or two: left or above, and right or below.
+        One run, or two: the first is left or above, the second right or below.
     section : Section
     file : str or Path
-        Ends with .png, .svg or .pdf.
+        A name ending with .png, .svg or .pdf.
     style : SectionStyle, optional
 
     Raises
     ------
     CaseError
-        There is nothing to draw, the name has another end, or the file cannot be written.
+        There is nothing to draw, the name has another suffix, or the file cannot be written.
     """
     target = Path(file)
     require_picture_name(target)
@@ -200,7 +194,7 @@ def draw_section(shown: Sequence[SectionInRun], section: Section, style: Section
 
 
 def _head(figure: Any, name: str, words: str, *, rest: Sequence[str]) -> None:
-    """Write the title of a figure; a long name at the head of it makes way for the rest."""
+    """Set the title of a figure; a long name at its begin is shortened."""
     if len(name) > _LONGEST:
         name = f"{name[: _LONGEST // 2]}…{name[-_LONGEST // 2 :]}"
     said = "\n".join([f"{name}: {words}" if name else words, *rest])
@@ -209,7 +203,7 @@ def _head(figure: Any, name: str, words: str, *, rest: Sequence[str]) -> None:
 
 
 def _curves(figure: Any, shown: Sequence[SectionInRun], section: Section) -> None:
-    """Draw the numbers along a line or circle into one plot, the first with its colours below."""
+    """Draw the values along a line or circle into one plot, with areas below the first run's."""
     rows = []
     for one in reversed(shown):
         if one.drawn:
@@ -225,7 +219,7 @@ def _curves(figure: Any, shown: Sequence[SectionInRun], section: Section) -> Non
 def _cells(
     figure: Any, shown: Sequence[SectionInRun], section: Section, style: SectionStyle
 ) -> None:
-    """Draw polygons, with one colour bar."""
+    """Draw the sections' polygons, each run into axes of its own, with one colour bar."""
     flats, labels = _laid_beside(shown, section, style)
     labels = labels if style.axes else None
     corners = np.concatenate([flat.points[flat.connectivity, :2] for flat in flats if len(flat)])
@@ -255,7 +249,7 @@ def _cells(
     ]
     if upright:
         place = beside(every[-1])
-    else:  # it has room for its numbers also where the axes are narrow
+    else:  # at least 2 inches long, for its numbers, even if the axes are narrow
         long = max(0.6 * scale * (high - low)[0], min(2.0, width - 1.5))
         place = below(every[-1], long, BELOW if labels else GAP)
     of = paint.label, LETTERS - 1.0
@@ -279,7 +273,7 @@ def _cells(
 def _laid_beside(
     shown: Sequence[SectionInRun], section: Section, style: SectionStyle
 ) -> tuple[list[Polygons], tuple[Label, Label] | None]:
-    """Return what lies on paper of each run, in the order it is drawn, and the axes' names."""
+    """Return the polygons of each run as laid on paper, in order of drawing, and axes' labels."""
     flats: list[Polygons] = []
     labels, near = None, None
     for one in shown:
@@ -290,7 +284,7 @@ def _laid_beside(
         if near is None:
             near = section.shape.middle(section, one.drawn[min(one.drawn, key=abs)])
         if not section.whole or not flat.points[:, 2].any():
-            # Nothing is in front of another, but folded cells overlap: show them.
+            # All is in one plane, where folded cells overlap others: draw them last.
             flat = flat.with_last(one.paint.inverted[flat.cells])
         flats.append(flat)
     return flats, labels

@@ -1,4 +1,4 @@
-"""The curves along a 2D section of a session: the undeformed mesh, and the runs shown."""
+"""The curves along a section of a 2D mesh: of the undeformed mesh, and of the runs shown."""
 
 from __future__ import annotations
 
@@ -17,23 +17,20 @@ from slideviz.terms import QUANTITIES, Quantity, quantity_of
 
 
 class CurveRows:
-    """The curves of sessions, with a memory of the undeformed mesh's cut.
-
-    The undeformed mesh has a cutter's memory of its own, and so has every view that cuts.
-    """
+    """Makes the curves of sessions, and caches the undeformed mesh's cuts."""
 
     def __init__(self) -> None:
         self._first = Cuts()
 
     def of(self, shown: Sequence[tuple[Session, Cuts]], section: Section) -> tuple[CurveRow, ...]:
-        """Return the curve of the undeformed mesh and one of each session.
+        """Return the curve of the undeformed mesh, then one per session, the first session's last.
 
-        Those that a section misses have none.
+        A mesh that the section misses has no curve; nor has the undeformed one for displacements.
 
         Parameters
         ----------
         shown : sequence of (Session, Cuts)
-            What the views show, the first one first, each with what it was cut by.
+            The session of each view, the first view first, with the view's cached cuts.
         section : Section
         """
         line = _line(section)
@@ -63,7 +60,7 @@ def what_of(session: Session) -> Quantity:
 
 
 def labels_of(session: Session, section: Section) -> tuple[str, str]:
-    """Return the names of the axes of the curves."""
+    """Return the labels of both axes of the curves."""
     return position_label(section).full, QUANTITIES[what_of(session)].axis
 
 
@@ -74,7 +71,7 @@ def colours_of(session: Session) -> Colours:
 
 
 def facts_of(session: Session, cuts: Cuts, section: Section) -> str:
-    """Return the number of cells that are cut, and their min, mean and inverted ones, in words."""
+    """Return a sentence with the number of cut cells, their min, mean and inverted ones."""
     frame = session.frame
     assert frame is not None
     lines = cuts.of(frame.mesh, _line(section))

@@ -1,4 +1,4 @@
-"""The series of plots: qualities, steps, greedy selections, outcomes of runs."""
+"""The data of plots: qualities, steps, greedy selections, outcomes of runs."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class QualityRun:
     values : (m,) float64
         0 to 1.
     inverted : (m,) bool, optional
-        Cells to count apart instead of at 0.
+        Cells to count apart, whatever their value.
     series : int, optional
-        Number of its look; its place in the sequence when left out.
+        Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot.
     """
 
     label: str
@@ -37,15 +37,15 @@ class QualityRun:
 
 @dataclass(frozen=True, eq=False)
 class Distribution:
-    """Counts of the cells of one mesh.
+    """The number of cells of one mesh in intervals of a value.
 
     Attributes
     ----------
     counts : (k,) int64
     edges : (k + 1,) float64
-        Of the intervals; what is outside is in the first or the last.
+        Limits of the intervals; values outside are counted in the first or the last.
     inverted : int
-        Cells that are inverted and in no interval.
+        Number of inverted cells, which are in no interval.
     """
 
     counts: IntArray
@@ -54,7 +54,7 @@ class Distribution:
 
     @classmethod
     def of(cls, values: FloatArray, edges: FloatArray) -> Distribution:
-        """Return the counts of values (m,) in equal intervals; NaN is an inverted cell."""
+        """Return the distribution of values (m,) in equal intervals; NaN is an inverted cell."""
         right = values[np.isfinite(values)]
         low, high, count = edges[0], edges[-1], len(edges) - 1
         places = np.clip((right - low) * (count / (high - low)), 0, count - 1).astype(np.int64)
@@ -63,7 +63,7 @@ class Distribution:
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """A distribution drawn as bars: its words, and a colour for each bar or for all."""
+    """A distribution drawn as bars: its label, and a colour per bar (or a list of one for all)."""
 
     label: str
     distribution: Distribution
@@ -72,9 +72,9 @@ class Bars:
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """A distribution to compare with: its words, and the number of its series.
+    """A distribution drawn as an outline, with its label and series number.
 
-    ``series`` None is the undeformed mesh, in a thin line of its own.
+    ``series`` None is the undeformed mesh, drawn as a thin dotted line.
     """
 
     label: str
@@ -93,7 +93,7 @@ class StepRun:
         Numbers of the steps; 0 is the undeformed mesh.
     minimum, mean : (k,) float64
     series : int, optional
-        Number of its look; its place in the sequence when left out.
+        Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot.
     """
 
     label: str
@@ -105,7 +105,7 @@ class StepRun:
 
 @dataclass(frozen=True, eq=False)
 class GreedyRun:
-    """Convergence of a greedy selection.
+    """The convergence of a greedy selection, cycle by cycle.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class GreedyRun:
         Number of the level of each cycle.
     tolerance : float or None
     series : int, optional
-        Number of its look; its place in the sequence when left out.
+        Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot.
     """
 
     label: str
@@ -146,7 +146,7 @@ class Outcome:
     max_error : float
         In the mesh's length unit.
     series : int, optional
-        Number of the look of its label; the place of the label among all when left out.
+        Series number of its label; by default the index of the label among all labels.
     """
 
     label: str

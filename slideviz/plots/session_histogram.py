@@ -1,4 +1,4 @@
-"""The histogram of a session: the step that is shown, and other runs to compare."""
+"""The histogram of a session: of the shown step, and of other runs to compare."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 
 
 LEAST_SPREAD = 0.05
-"""Part of the quality's 0 to 1 that is shown at least."""
+"""Least range of qualities that the axis shows."""
 
 MOST = 4
-"""Runs that are compared with the one that is shown: of more lines none would be seen."""
+"""Most runs that are compared with the shown one, so that lines can be told apart."""
 
 Range = tuple[float, float]
 
 
 class FrameCounts:
-    """The counts of frames, made once as long as a frame is there."""
+    """A cache of the frames' distributions, kept as long as their frames exist."""
 
     def __init__(self) -> None:
         self._kept: WeakKeyDictionary[StepFrame, dict[object, Distribution]] = WeakKeyDictionary()
@@ -42,9 +42,10 @@ class FrameCounts:
         )
 
     def limits(self, session: Session, whole: bool) -> Range:
-        """Return round numbers around the values that cells have, or can have.
+        """Return the limits of the axis: round numbers around the cells' values.
 
-        They are the same for all steps of a run, so that bars can be compared as it is played.
+        They are the same for all steps of the shown run, so that bars can be compared during play.
+        ``whole``: all values that are possible (of the displacement, from 0).
         """
         what = shown_measure(session)
         shown = [*session.frames, *(run.last for run in session.runs if run.last is not None)]
@@ -55,12 +56,12 @@ class FrameCounts:
         found = [ends for frame in shown if (ends := self._spreads[frame][what]) is not None]
         low, high = min((e[0] for e in found), default=0.0), max((e[1] for e in found), default=1.0)
         if what != "displacement":
-            # Closer, differences that mean nothing would look large.
+            # A smaller range would enlarge meaningless differences.
             return (0.0, 1.0) if whole else rounded_out(min(low, high - LEAST_SPREAD), high)
         return rounded_out(0.0 if whole else low, high)
 
     def of(self, session: Session, frame: StepFrame, limits: Range) -> Distribution:
-        """Return the counts of a frame of the session between limits."""
+        """Return the distribution of a frame's values between limits."""
         what = shown_measure(session)
         kept = self._kept.setdefault(frame, {})
         if (what, limits) not in kept:
@@ -71,7 +72,7 @@ class FrameCounts:
 def draw_histogram(
     counts: FrameCounts, session: Session, figure: Figure, style: Style, *, log: bool, whole: bool
 ) -> None:
-    """Draw the histogram of a session; nothing without a mesh.
+    """Draw the histogram of a session into a figure; nothing without a mesh.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ def draw_histogram(
     log : bool
         Whether the axis of the counts is logarithmic.
     whole : bool
-        Whether the other axis has all values that there can be, not only those of the cells.
+        Whether the other axis shows all possible values, not only those of the cells.
     """
     if session.frame is None:
         return
@@ -98,7 +99,7 @@ def draw_histogram(
         for other in runs
         if other.last is not None
     ]
-    # Nothing has moved there.
+    # The undeformed mesh has no displacement.
     if session.first is not None and session.view.frame > 0 and what != "displacement":
         outlines.append(Outline("undeformed", counts.of(session, session.first, limits), None))
     axes = figure.add_subplot()
@@ -112,10 +113,10 @@ def draw_histogram(
 
 
 def compared(session: Session) -> tuple[list[Run], int]:
-    """Return the runs to compare with the one that is shown, and the number of those left out.
+    """Return at most `MOST` runs to compare with the shown one, and the number of those left out.
 
-    First comes the run that is beside it, then those with the same motion, then newer ones. Of
-    each, the last step is meant: that of the run that is shown is what is played to.
+    Preferred are the run shown beside it, then those with the same motion, then newer ones. The
+    result is in the order of their numbers.
     """
     shown = session.run_shown
     others = [run for run in session.runs if run.last is not None and run is not shown]
@@ -129,21 +130,21 @@ def compared(session: Session) -> tuple[list[Run], int]:
 
 
 def first_value(axes: Axes) -> float:
-    """Return the lowest value of a histogram, right of the strip of inverted cells."""
+    """Return the lowest value of a drawn histogram: where its bars begin."""
     bars = [patch for patch in axes.patches if patch.get_gid() == "shown"]
     return min(float(bar.get_x()) for bar in bars)  # type: ignore[attr-defined]
 
 
 def shown_measure(session: Session) -> Quantity:
-    """Return the quantity that the histogram counts: that of the colours, or size-skew.
+    """Return the quantity of the histogram: that of the view's colours.
 
-    Of a mesh in its file only size-skew is known of all cells.
+    For a mesh that stays in its file it is size-skew, the only one known of all cells.
     """
     return quantity_of("size-skew" if session.in_file else session.view.colour_by)
 
 
 def _colours(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
-    """Return the colours of the bars: those of their values in the view."""
+    """Return the colour of each bar: that of its middle value in the view."""
     import matplotlib as mpl
 
     low, high = session.colour_range
@@ -154,7 +155,7 @@ def _colours(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
 
 _MIDDLES = (np.arange(FINE) + 0.5) / FINE
 BINS = 25
-"""So many that a step of an outline is wide enough for its dashes in a panel of the window."""
+"""Number of intervals: few enough that an outline's steps show its dashes in a narrow panel."""
 
 
 def distribution(
@@ -163,7 +164,10 @@ def distribution(
     limits: tuple[float, float] = (0.0, 1.0),
     undeformed: Mesh | None = None,
 ) -> Distribution:
-    """Return the counts of the cells of a frame in `BINS` equal intervals between limits."""
+    """Return the distribution of a frame's values ``what`` in `BINS` equal intervals of limits.
+
+    ``undeformed`` is needed for displacements.
+    """
     edges = np.linspace(*limits, BINS + 1)
     if isinstance(frame.quality, PartQuality):
         tally = frame.quality.all
@@ -186,5 +190,5 @@ def spread(
 
 
 def _values(frame: StepFrame, what: ColourBy, undeformed: Mesh | None) -> FloatArray:
-    """Return the values of the cells of a frame without those of a halo."""
+    """Return the values of a frame's counted cells (those of a halo are not); NaN if inverted."""
     return np.asarray(frame.shown_values(what, undeformed)[frame.quality.counted])

@@ -1,7 +1,7 @@
 """Quality along the span: minimum and mean of the cells in layers of equal height.
 
-Layers are counted along the radius about an axis (blades; thesis Figure 6.19), or along a
-direction. A cell belongs to the layer that its middle (the mean of its nodes) lies in.
+Layers are along the radius about an axis (blades; thesis Figure 6.19), or along a direction. A
+cell belongs to the layer in which its middle (the mean of its nodes) lies.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MOST_LAYERS = 40
-"""When their number is left open."""
+"""Most layers, if their number is not given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,17 +31,17 @@ class Profile:
     Attributes
     ----------
     label : str
-        Of the run.
+        Name of the run.
     coordinate : str
-        What the layers are counted along: ``r``, ``x``, ``y``, ``z`` or ``s``.
+        The coordinate of the layers: ``r``, ``x``, ``y``, ``z``, or ``s`` for another direction.
     edges : (k + 1,) float64
         Borders of the layers, in the mesh's length unit.
     minimum, mean : (k,) float64
-        NaN in a layer without cells.
+        Minimum and mean in each layer; NaN in a layer without cells.
     count : (k,) int64
         Cells in each layer.
     series : int, optional
-        Number of its look; its place in the sequence when left out.
+        Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot.
     """
 
     label: str
@@ -59,7 +59,7 @@ class Profile:
 
     @property
     def fraction(self) -> FloatArray:
-        """Return the middles of the layers (k,) as parts of the span, 0 to 1."""
+        """Return the middles of the layers (k,) relative to the span, 0 to 1."""
         return (self.position - self.edges[0]) / (self.edges[-1] - self.edges[0])
 
 
@@ -186,9 +186,9 @@ def spanwise(
     profiles : sequence of Profile
     what : {"minimum", "mean"}
     fraction : bool
-        Whether the vertical axis is the part of the span instead of the coordinate.
+        Whether the vertical axis is relative to the span, instead of the coordinate.
     unit : str
-        Of the coordinate.
+        Unit of the coordinate, for the label.
     style : Style
     """
     coordinate = profiles[0].coordinate if profiles else "r"
@@ -208,7 +208,7 @@ def spanwise(
             linewidth=style.width,
             marker=look.marker,
             markersize=4,
-            # Markers of lines that coincide are side by side.
+            # Shifted, so that markers of coinciding lines are side by side.
             markevery=(index, max(len(profiles), int(there.sum()) // 8)),
             label=profile.label,
         )

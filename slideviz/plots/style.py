@@ -20,7 +20,7 @@ _ON_DARK = (
     *(PALETTE["sky blue"], PALETTE["orange"], "#2bc49a", "#e39bc4", "#ffffff"),
     *(PALETTE["yellow"], "#f08040"),
 )
-"""Colours of the palette, those that are too dark for it made lighter on dark."""
+"""The colours of series on a dark background; those too dark for it are lighter."""
 
 _DASHES: tuple[Any, ...] = (
     "solid",
@@ -36,7 +36,7 @@ _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 @dataclass(frozen=True)
 class Series:
-    """Colour, marker and dash of a series.
+    """The look of a series: colour, marker and dash.
 
     Attributes
     ----------
@@ -57,13 +57,13 @@ class Style:
     Attributes
     ----------
     scheme : ColorScheme
-        Background and letters; series have lighter colours on a dark one.
+        Colours of background and letters; series have lighter colours on a dark background.
     size : float
-        Height of letters in points, 8 or more at the printed size.
+        Size of letters in points, 8 or more at the printed size.
     width : float
-        Of lines, in points.
+        Width of lines in points.
     legend : bool
-        Whether the axes get a legend of their own (when there is more than one series).
+        Whether axes with more than one series get a legend.
     """
 
     scheme: ColorScheme = PAPER
@@ -73,11 +73,11 @@ class Style:
 
     @property
     def dark(self) -> bool:
-        """Tell whether letters are lighter than the background."""
+        """Return whether letters are lighter than the background."""
         return _brightness(self.scheme.text) > _brightness(self.scheme.background)
 
     def series(self, index: int) -> Series:
-        """Return the series of that number, from 0; 49 of them differ."""
+        """Return the look of series number ``index``, from 0; the first 49 differ."""
         palette = _ON_DARK if self.dark else _ON_LIGHT
         turn = index // len(palette)
         return Series(
@@ -93,12 +93,12 @@ class Style:
 
 
 def place(given: int | None, index: int) -> int:
-    """Return the number of a series: the given one, or else the place in the sequence."""
+    """Return the number of a series: ``given``, or if None its index in the plot."""
     return index if given is None else given
 
 
 def _brightness(colour: str) -> int:
-    """Return the sum of the parts of a colour ``#rrggbb``."""
+    """Return the sum of red, green and blue of a colour ``#rrggbb``."""
     return sum(bytes.fromhex(colour[1:]))
 
 
@@ -108,7 +108,7 @@ ON_DARK = Style(DARK)
 
 
 def dress(axes: Axes, style: Style, x_label: str, y_label: str) -> None:
-    """Give axes their labels, colours, letters and a quiet grid."""
+    """Set labels, colours, letters and a faint grid of axes."""
     text, size = style.scheme.text, max(style.size, SMALLEST)
     axes.set_facecolor(style.scheme.background)
     figure = axes.get_figure()
@@ -128,7 +128,7 @@ def dress(axes: Axes, style: Style, x_label: str, y_label: str) -> None:
 
 
 def add_legend(axes: Axes, style: Style, **options: Any) -> None:
-    """Add a legend if the style wants one and there is something to tell apart."""
+    """Add a legend if the style has one and there are two entries or more."""
     handles = options.get("handles") or axes.get_legend_handles_labels()[0]
     if not style.legend or len(handles) < 2:
         return

@@ -1,4 +1,4 @@
-"""Figures of matplotlib: made empty, trimmed, and written; the one place that says how."""
+"""Make empty matplotlib figures, trim them, fit texts, and write files, the same way everywhere."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ SETTINGS = {
 }
 
 _AIR = 0.08
-"""Inches between the parts of a figure, and around them."""
+"""Space in inches between the parts of a figure, and around them."""
 SMALLEST = 8.0
-"""Points; no letter is smaller at the printed size."""
+"""Smallest size of letters in points, at the printed size."""
 
 
 def empty_figure(inches: tuple[float, float], dpi: float, layout: str = "none") -> Any:
-    """Return an empty white figure, whose parts matplotlib lays out as ``layout`` says."""
+    """Return an empty white figure with a layout engine (see `lay_out`)."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -37,14 +37,14 @@ def empty_figure(inches: tuple[float, float], dpi: float, layout: str = "none") 
 
 
 def lay_out(figure: Any, layout: str) -> None:
-    """Let matplotlib lay out the parts of a figure: "constrained", "compressed" or "none"."""
+    """Set a figure's layout engine: "constrained", "compressed" or "none"."""
     figure.set_layout_engine(layout)
     if layout != "none":
         figure.get_layout_engine().set(h_pad=_AIR / 2.0, w_pad=_AIR / 2.0, hspace=0.0)
 
 
 def trim(figure: Any, rows: Sequence[Sequence[Any]]) -> None:
-    """Make a figure no higher than its words and rows of axes are when they are laid out."""
+    """Reduce a figure's height to that of its texts and rows of axes as laid out."""
     from matplotlib.transforms import Bbox
 
     figure.draw_without_rendering()
@@ -56,10 +56,10 @@ def trim(figure: Any, rows: Sequence[Sequence[Any]]) -> None:
 
 
 def fitted(words: str, inches: float, size: float) -> tuple[str, float]:
-    """Return words broken to fit a width of so many inches, and the size of their letters.
+    """Return a text that fits a width in inches, and the size of its letters in points.
 
-    They are up to ``size`` points high, smaller where a line is too long, and where it is so even
-    with the smallest ones, in more lines.
+    The size is at most ``size``, smaller if a line is too long, and not below `SMALLEST`; lines
+    still too long are wrapped.
     """
     from matplotlib.textpath import TextPath
 
@@ -72,23 +72,23 @@ def fitted(words: str, inches: float, size: float) -> tuple[str, float]:
     size = min(size, max(room / max(widths.values(), default=1.0), SMALLEST))
     for line in words.split("\n"):
         lines = math.ceil(widths.get(line, 0.0) * size / room - 1e-9)
-        # Of several lines one has more of the wide letters than another.
+        # With a margin, as some of the wrapped lines have more wide letters than others.
         most = int(0.93 * len(line) * room / (widths[line] * size)) if lines > 1 else len(line)
         found += textwrap.wrap(line, max(most, 8)) or [""]
     return "\n".join(found), size
 
 
 def figure_bytes(figure: Any, kind: str, dpi: float = 300.0, transparent: bool = False) -> bytes:
-    """Return a matplotlib figure as the content of a file.
+    """Return the content of a file with a matplotlib figure.
 
     Parameters
     ----------
     figure : matplotlib.figure.Figure
     kind : "png", "svg" or "pdf"
     dpi : float
-        Pixels per inch, in PDF and SVG of what cannot be drawn with lines.
+        Pixels per inch; in PDF and SVG of the parts that are drawn as pixels.
     transparent : bool
-        Whether the background is left out.
+        Whether the background is transparent.
     """
     from matplotlib import rc_context
 
@@ -106,7 +106,7 @@ def write_figure(
     error: type[SlidevizError] = CaseError,
     transparent: bool = False,
 ) -> None:
-    """Write a figure as the end of the file's name says, whole or not at all.
+    """Write a figure to a PNG, SVG or PDF file, by its suffix, whole or not at all.
 
     Raises
     ------
