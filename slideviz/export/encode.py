@@ -1,7 +1,7 @@
-"""Images in a row written as MP4, as GIF, or as numbered PNG files; whole or not at all.
+"""Write a sequence of images as MP4, as GIF, or as numbered PNG files; whole or not at all.
 
-Each writer is a context manager that gives a function: called with an image and the seconds it
-is shown for, it writes one. When the block raises, or its generator is closed, nothing is left.
+Each writer is a context manager that yields a function `Add`, which is called with each image and
+the seconds it is shown. If the block raises, or its generator is closed, no file is left.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
 
 Pixels = NDArray[np.uint8]
 Add = Callable[[Pixels, float], None]
-"""Writes an image (height, width, 3) that is shown for some seconds."""
+"""A function that writes an image (height, width, 3) to be shown for a number of seconds."""
 
 SUFFIXES = (".mp4", ".gif", ".png")
 SLOWEST = 10
-"""Images in a second of an MP4 at the least: players stumble over fewer. Longer ones repeat."""
+"""Least frame rate of an MP4, as players fail with lower ones; images shown longer are repeated."""
 FASTEST = {".mp4": 60.0, ".gif": 50.0, ".png": float("inf")}
-"""Images a second: what screens show, and what browsers play of a GIF."""
+"""Largest frame rate by kind: what screens show, and what browsers play of a GIF."""
 _NUMBER = re.compile(r"(%(?:0\d)?d)")
 
 
@@ -49,11 +49,11 @@ class Take:
     size : (int, int)
         Width and height in pixels.
     count : int
-        How many images come.
+        Number of images.
     fps : float
-        Images a second.
+        Images per second.
     samples : callable
-        Gives a few of the images, from all over the film, to choose common colours by.
+        Returns a few images from all over the film, by which a GIF's palette is chosen.
     """
 
     size: tuple[int, int]
@@ -63,12 +63,14 @@ class Take:
 
 
 def kind_of(file: Path) -> str:
-    """Return ".mp4", ".gif" or ".png" (a folder or a pattern of numbered pictures).
+    """Return the kind of a film by its name: ".mp4", ".gif", or ".png" for numbered pictures.
+
+    ".png" is that of a folder, or of a name with one number such as ``step_%03d.png``.
 
     Raises
     ------
     SlidevizError
-        It is none of them.
+        The name is none of these.
     """
     suffix = file.suffix.lower()
     if file.is_dir() or not (suffix or file.exists()):
@@ -88,7 +90,7 @@ def kind_of(file: Path) -> str:
 
 
 def targets(file: Path, count: int) -> list[Path]:
-    """Return the files that a film of ``count`` images will be: one, or one for each image."""
+    """Return the files of a film of ``count`` images: one file, or one per image."""
     if kind_of(file) != ".png":
         return [file]
     if file.is_dir() or not file.suffix:
@@ -98,13 +100,13 @@ def targets(file: Path, count: int) -> list[Path]:
 
 
 def writer(file: Path, take: Take) -> AbstractContextManager[Add]:
-    """Return the writer that suits the name of the file."""
+    """Return the writer for the kind of a file (see `kind_of`)."""
     return _WRITERS[kind_of(file)](file, take)
 
 
 @contextmanager
 def _mp4(file: Path, take: Take) -> Iterator[Add]:
-    """Encode with H.264 as every browser plays it."""
+    """Write an MP4 with H.264 as every browser plays it, encoded by ffmpeg."""
     fps = Fraction(take.fps).limit_denominator(1000)
     rate = fps * max(1, -(-SLOWEST // fps))
     with atomic_write(file, SlidevizError) as out, tempfile.TemporaryFile() as log:
@@ -134,7 +136,7 @@ def _mp4(file: Path, take: Take) -> Iterator[Add]:
 
 @contextmanager
 def closed(pipe: IO[bytes]) -> Iterator[None]:
-    """Close a pipe at the end; unread data is lost where nobody reads any more."""
+    """Close a pipe at the end of the context; ignore errors, as its reader may have ended."""
     try:
         yield
     finally:
@@ -148,7 +150,7 @@ def _start_ffmpeg(
     import imageio_ffmpeg
 
     given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate)]
-    # The colours of high definition, and said so: otherwise players guess by the size.
+    # BT.709 colours, declared in the file: otherwise players guess by the size.
     said = ":".join(f"{name}=bt709" for name in ("colorspace", "color_primaries", "color_trc"))
     colours = f"scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,setparams={said}"
     made = ["-vf", colours, "-c:v", "libx264", "-preset", "veryfast", "-crf", "16"]
@@ -159,7 +161,7 @@ def _start_ffmpeg(
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=log,
-            # Ctrl+C is for us: ffmpeg would end the film early as if that were its end.
+            # Ctrl+C must not reach ffmpeg, which would end the film early without an error.
             start_new_session=True,
         )
     except (OSError, RuntimeError) as problem:
@@ -179,7 +181,7 @@ def _raise_ffmpeg(file: Path, process: subprocess.Popen[bytes], log: IO[bytes]) 
 
 @contextmanager
 def _gif(file: Path, take: Take) -> Iterator[Add]:
-    """Write image by image, each only where it differs from the one before."""
+    """Write a GIF, of each image only the rectangle that differs from the one before."""
     from PIL import GifImagePlugin, Image
 
     palette = _palette(take.samples())
@@ -197,7 +199,7 @@ def _gif(file: Path, take: Take) -> Iterator[Add]:
             box = _changed(colours, before)
             before = colours
             shown += seconds
-            # A GIF counts hundredths of a second: rounded in sum, not one by one.
+            # A GIF counts hundredths of a second: round the sum, not each duration.
             duration = max(round(100 * shown) - ticks, 2)
             ticks += duration
             part, length = image.crop(box), 10 * min(duration, 65535)
@@ -209,7 +211,7 @@ def _gif(file: Path, take: Take) -> Iterator[Add]:
 
 
 def _changed(colours: NDArray, before: NDArray | None) -> tuple[int, int, int, int]:
-    """Return left, top, right and bottom of what differs; one pixel where nothing does."""
+    """Return left, top, right, bottom of the part that differs; one pixel if nothing does."""
     if before is None:
         return 0, 0, colours.shape[1], colours.shape[0]
     differs = colours != before
@@ -220,10 +222,10 @@ def _changed(colours: NDArray, before: NDArray | None) -> tuple[int, int, int, i
 
 
 def _palette(samples: Sequence[Pixels]) -> Image:
-    """Return an image with 256 colours that suit all samples.
+    """Return an image whose palette of 256 colours suits all samples.
 
-    One half covers all colours there are, however rare (an inverted cell), the other those that
-    fill most of the images (shades of the colour map), which the first half would make coarse.
+    One half covers the range of all colours, however rare (an inverted cell), the other has the
+    most frequent ones (shades of the colour map).
     """
     from PIL import Image
 
@@ -237,7 +239,7 @@ def _palette(samples: Sequence[Pixels]) -> Image:
 
 @contextmanager
 def _pngs(file: Path, take: Take) -> Iterator[Add]:
-    """Write each image as a picture; those of before stay until the last one is there."""
+    """Write numbered PNG files; existing ones are replaced only after the last image is drawn."""
     paths = targets(file, take.count)
     folder = paths[0].parent
     is_new = not folder.exists()

@@ -1,7 +1,7 @@
-"""The steps of a deformation as a film: MP4, GIF, or one picture each.
+"""Films of the steps of a deformation: MP4, GIF, or one picture per image.
 
-Films are generators that draw one image between two pulls: whoever pulls them owns progress and
-cancel. Closing one early leaves no file. They must be pulled in the thread that may draw.
+A film is a generator that draws one image per `next`: its caller has control of progress and
+cancelling. Closing it early leaves no file. It must be advanced in the thread that may use VTK.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from slideviz.session.pieces import Beside, GoingOn, never
 from slideviz.session.state import Session, StepFrame
 
 _NARROWEST = 160
-"""Pixels that each of two pictures beside each other has at least for the mesh."""
+"""Least width in pixels for the mesh in each of two pictures side by side."""
 
 
 @dataclass(frozen=True)
 class Shot:
-    """A frame, and the words for its place in the film.
+    """A frame of a film, with the texts of its place in the run.
 
-    ``place`` is what stands beside the name of the run: of one step, nothing.
+    ``words`` always names the step; ``place`` is empty for the only step of a run.
     """
 
     frame: StepFrame
@@ -49,7 +49,7 @@ class Shot:
 
 
 Titles = Callable[[Sequence[Shot]], tuple[Sequence[str], float]]
-"""Returns the words above what is shown, and the size of their letters; 1 is the usual one."""
+"""A function that returns the titles of the runs shown, and their letters' size (1: usual)."""
 
 
 def film(
@@ -60,11 +60,10 @@ def film(
     zoom: Zoom = "auto",
     overwrite: bool = False,
 ) -> Generator[FilmProgress, None, None]:
-    """Yield after each image of a film of one run, or of two beside each other.
+    """Write a film of one run, or of two side by side, and yield its progress after each image.
 
-    Of two runs beside each other the film has the steps of the run that has more of them. Of the
-    other it shows the step that is as far deformed, or, with images in between, a mesh between
-    two steps.
+    A film of two runs has the steps of the run with more of them. Of the other run it shows the
+    step that is as far deformed, or, with images in between, a mesh between two steps.
 
     Parameters
     ----------
@@ -97,7 +96,7 @@ def film(
 
 
 def film_options(size: tuple[int, int], both: bool = False) -> PictureOptions:
-    """Return the usual options of the images of a film."""
+    """Return the usual options of a film's images; ``both``: of two runs side by side."""
     return PictureOptions(size, title=True, both=both, letters=LETTERS, film=True, lines=1 + both)
 
 
@@ -110,20 +109,20 @@ def filming(
     titles: Titles | None = None,
     overwrite: bool = False,
 ) -> Generator[object, Any, None]:
-    """Yield `Drawn` after each image of a film of a renderer, and between the image's pieces.
+    """Write a film drawn by a renderer; yield `FilmProgress` after each image, and between pieces.
 
     Parameters
     ----------
     renderer : OffscreenRenderer
-        Knows the session, whose steps are shown, and the camera.
+        Holds the session, whose steps are shown, and the camera.
     options : PictureOptions
-        What an image has.
+        The options of each image.
     file : Path
         A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
     reel : Reel
         Speed, and images in between.
     titles : callable, optional
-        Other words above the images than run, step and quality.
+        Returns the titles of the images; by default run, step and quality.
     overwrite : bool
         Allow files that exist.
 
@@ -154,7 +153,7 @@ def filming(
 
 
 def posing(renderer: OffscreenRenderer, options: PictureOptions) -> Generator[object, Any, None]:
-    """Aim the camera of a renderer for a film: the step that needs most room is seen whole."""
+    """Aim a renderer's camera so that the largest step is seen whole, yielding between pieces."""
     yield from renderer.arranging()
     frames = renderer.session.frames
     widest = yield Beside(lambda _: max(range(len(frames)), key=lambda k: frames[k].mesh.extent))
@@ -163,7 +162,7 @@ def posing(renderer: OffscreenRenderer, options: PictureOptions) -> Generator[ob
 
 
 def require_pair(size: tuple[int, int]) -> None:
-    """Raise SlidevizError where a film is too narrow for two runs beside each other."""
+    """Raise SlidevizError if a film's size is too narrow for two runs side by side."""
     options = film_options(size, both=True)
     room = panes(options, options.gap)[0].size[0]
     if room < _NARROWEST:
@@ -175,14 +174,17 @@ def require_pair(size: tuple[int, int]) -> None:
 
 
 def require_steps(frames: Sequence[StepFrame], file: Path, reel: Reel, overwrite: bool) -> None:
-    """Raise SlidevizError where there are no steps, or no such film can be made of them."""
+    """Raise SlidevizError if there are no steps, or `check_film` refuses the film."""
     if len(frames) < 2:
         raise SlidevizError("there are no steps to make a film of; run the case first")
     check_film(file, reel, frames=len(frames), overwrite=overwrite)
 
 
 def shot_at(frames: Sequence[StepFrame], position: float, going_on: GoingOn = never) -> Shot:
-    """Return a step, or, between two steps, a mesh on the way from one to the next."""
+    """Return the shot at a position in a run: a step, or a mesh interpolated between two steps.
+
+    ``position`` is the number of the step, 0 the undeformed mesh; ``frames`` are all of these.
+    """
     step, steps = int(position), len(frames) - 1
     place = place_words(position, steps)
     if position == step:
@@ -194,7 +196,10 @@ def shot_at(frames: Sequence[StepFrame], position: float, going_on: GoingOn = ne
 def _blend(
     start: StepFrame, end: StepFrame, part: float, first: StepFrame, going_on: GoingOn
 ) -> StepFrame:
-    """Return the mesh on the way from one frame to the next, with its own quality."""
+    """Return a frame interpolated between two, with its own quality; ``part`` is 0 to 1.
+
+    ``first`` is the undeformed mesh, to which the quality refers.
+    """
     points = (1.0 - part) * start.mesh.points + part * end.mesh.points
     mesh = end.mesh.with_points(points)
     found = quality(mesh, reference=first.mesh, metric=end.quality.metric, going_on=going_on)
@@ -202,17 +207,17 @@ def _blend(
 
 
 def _showing(session: Session, frame: StepFrame) -> Session:
-    """Return the session with one frame in the place of all its steps, colours as they are."""
+    """Return the session with one frame in place of all its run's steps, and the same colours."""
     run = session.run_shown
     assert run is not None
     runs = tuple(replace(run, frames=(frame,)) if one is run else one for one in session.runs)
-    # The range of the whole run: that of one frame would change from image to image.
+    # The colour range of the whole run: that of one frame would change from image to image.
     view = replace(session.view, frame=1, colour_range=session.colour_range)
     return replace(session, runs=runs, view=view)
 
 
 def _titles(session: Session, options: PictureOptions) -> Titles:
-    """Return what writes run, step and quality above the images."""
+    """Return the function of the titles of one run: run, step and quality."""
     letters = options.size[0] / (LETTER_WIDTH * options.scale)
     longest = LONGEST.format(len(session.frames) - 1)
 
@@ -226,7 +231,11 @@ def _titles(session: Session, options: PictureOptions) -> Titles:
 def _titles_of_runs(
     runs: Sequence[Session], options: PictureOptions, detail: bool, between: bool
 ) -> Titles:
-    """Return what writes step and quality above the images, and what two runs are called."""
+    """Return the function of the titles: step and quality, and of two runs their names.
+
+    ``detail``: note that only a part of the mesh is shown; ``between``: there are images in
+    between.
+    """
     pair, what = len(runs) == 2, runs[0].view.colour_by
 
     def words(session: Session, place: str, found: Quality) -> str:
@@ -235,7 +244,7 @@ def _titles_of_runs(
             return f"{run.name}{DETAIL if detail else ''}\n{text}"
         return text + (DETAIL if detail else "")
 
-    # Letters must not change from image to image.
+    # The letters' size must not change from image to image: it follows from the longest line.
     far = LONGEST if between else "step {0} of {0}"
     every = [
         words(one, far.format(len(one.frames) - 1), frame.quality)

@@ -1,4 +1,4 @@
-"""An off-screen plotter, its letters, and its image as numbers or as a PNG file."""
+"""An off-screen plotter, its title, and its image as an array or as a PNG file."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ from slideviz.errors import SlidevizError
 from slideviz.scene.color_legend import set_letters
 
 SMALLEST, LARGEST = 64, 8192
-"""Pixels that a picture may be wide or high; graphics drivers draw no larger ones."""
+"""Least and largest width or height of a picture in pixels; drivers draw no larger ones."""
 TITLE = 16
 """Height of the title's letters in pixels, at normal size."""
 _NORMAL_HEIGHT = 620
-"""A picture this high has letters of normal size."""
+"""Height in pixels of a picture with letters of normal size."""
 CAPTION_AT = 0.02
-"""Where in the width the words above a picture or a film begin."""
+"""Left end of the title of a picture or film, relative to the width."""
 LETTERS = 1.25
-"""Letters of pictures and films over those of the view: they are often shown small."""
+"""Size of the letters of pictures and films relative to the view's; they are often shown small."""
 
 
 @contextmanager
 def offscreen(size: tuple[int, int]) -> Iterator[Any]:
-    """Give an off-screen plotter of ``size`` pixels that works without a screen, too.
+    """Yield an off-screen plotter of ``size`` pixels, which works without a display too.
 
     Raises
     ------
     SlidevizError
-        The size is not one that can be drawn.
+        The size cannot be drawn.
     """
     import pyvista as pv
 
     check_size(size)
     if sys.platform.startswith("linux") and not x_answers():
-        # VTK would first try X, and complain, before it turns to EGL.
+        # VTK would try X first, and log errors, before it uses EGL.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     plotter = pv.Plotter(off_screen=True, window_size=list(size))
     try:
@@ -56,7 +56,7 @@ def offscreen(size: tuple[int, int]) -> Iterator[Any]:
 
 
 def check_size(size: tuple[int, int]) -> None:
-    """Raise SlidevizError when a picture cannot have this width and height in pixels."""
+    """Raise SlidevizError if a picture cannot have this width and height in pixels."""
     if not all(SMALLEST <= length <= LARGEST for length in size):
         raise SlidevizError(
             f"a picture of {size[0]}x{size[1]} pixels cannot be drawn; width and height are "
@@ -65,22 +65,31 @@ def check_size(size: tuple[int, int]) -> None:
 
 
 def font_scale(size: tuple[int, int]) -> float:
-    """Return how much larger than normal the letters of a picture are."""
+    """Return the size of the letters, relative to normal, of a picture of a size in pixels."""
     return max(size[1] / _NORMAL_HEIGHT, 0.6)
 
 
 def write_title(plotter: Any, words: str, scheme: ColorScheme, letters: float, room: float) -> None:
-    """Write a line or two along the upper edge, in the middle of so many pixels of height.
+    """Draw a title of one line or two at the left of the upper edge.
 
-    They begin at the left, so that those of a film do not tremble when a digit more comes, and
-    pictures have them where films do. ``letters`` is their height in pixels.
+    It is left-aligned so that a film's title does not move when its number of digits changes.
+
+    Parameters
+    ----------
+    plotter : pyvista.BasePlotter
+    words : str
+    scheme : ColorScheme
+    letters : float
+        Size of the letters.
+    room : float
+        Height in pixels of the room in which the title is vertically centred.
     """
     import pyvista as pv
 
     title = pv.Text(words)
     set_letters(title.prop, scheme, letters)
     title.prop.SetLineSpacing(1.25)
-    # The mesh of a view that was zoomed into may lie behind.
+    # The mesh of a zoomed view may be behind it.
     title.prop.SetBackgroundColor(*pv.Color(scheme.background_top).float_rgb)
     title.prop.SetBackgroundOpacity(0.7)
     title.prop.SetVerticalJustificationToCentered()
@@ -91,19 +100,19 @@ def write_title(plotter: Any, words: str, scheme: ColorScheme, letters: float, r
 
 
 def resize(plotter: Any, size: tuple[int, int]) -> None:
-    """Give the next image of a plotter another size; pyvista's way would draw one at once."""
+    """Set the size of a plotter's next image; unlike pyvista's setter, it draws nothing now."""
     plotter.render_window.SetSize(*size)
 
 
 def image_of(plotter: Any, transparent: bool = False) -> NDArray[np.uint8]:
-    """Return the image of the plotter, (height, width, 3), or 4 when ``transparent``."""
+    """Draw the plotter, and return its image (height, width, 3), or 4 if ``transparent``."""
     plotter.render()
     image = plotter.screenshot(return_img=True, transparent_background=transparent)
     return np.ascontiguousarray(image, dtype=np.uint8)
 
 
 def png_bytes(image: NDArray[np.uint8]) -> bytes:
-    """Return an image (height, width, 3 or 4) as a PNG file."""
+    """Return the content of a PNG file with an image (height, width, 3 or 4)."""
     from PIL import Image
 
     data = BytesIO()
@@ -112,19 +121,19 @@ def png_bytes(image: NDArray[np.uint8]) -> bytes:
 
 
 def check_png(file: Path) -> None:
-    """Raise SlidevizError when the name of a picture does not end with .png."""
+    """Raise SlidevizError if the name of a picture does not end with .png."""
     if file.suffix.lower() != ".png":
         raise SlidevizError(f"{file}: pictures are PNG; end the name with .png")
 
 
 def x_answers() -> bool:
-    """Tell whether the X server that ``DISPLAY`` names is there and lets us in."""
+    """Return whether the X server named by ``DISPLAY`` accepts connections."""
     if not os.environ.get("DISPLAY"):
         return False
     try:
         library = ctypes.CDLL("libX11.so.6")
     except OSError:
-        return True  # nobody to ask
+        return True  # without libX11 it cannot be tested
     library.XOpenDisplay.restype = ctypes.c_void_p
     library.XOpenDisplay.argtypes = [ctypes.c_char_p]
     library.XCloseDisplay.argtypes = [ctypes.c_void_p]
@@ -135,7 +144,7 @@ def x_answers() -> bool:
 
 
 def wayland_answers() -> bool:
-    """Tell whether the compositor that ``WAYLAND_DISPLAY`` names is there."""
+    """Return whether the compositor named by ``WAYLAND_DISPLAY`` accepts connections."""
     name = os.environ.get("WAYLAND_DISPLAY")
     if not name:
         return False
@@ -149,7 +158,7 @@ def wayland_answers() -> bool:
 
 
 def missing_screen() -> str:
-    """Return the reason, in words, why no window can be shown, or nothing."""
+    """Return why no window can be shown, in words; empty if a display is available."""
     if x_answers() or wayland_answers():
         return ""
     named = [

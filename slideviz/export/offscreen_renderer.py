@@ -1,4 +1,4 @@
-"""The offscreen renderer: pictures and images of films of a session."""
+"""The offscreen renderer, which draws pictures of a session and the images of its films."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ class OffscreenRenderer:
     Parameters
     ----------
     session : Session
-        What is shown and how.
+        The session that is drawn.
     surfaces : sequence of Surface
         The boundaries of its mesh.
     like : Scene, optional
-        The view whose camera, colours and ghosts are taken.
+        The scene of a view whose camera, color scheme and ghosts are used.
     overview : Overview, optional
-        What is seen, and from where, if there is no such view: every step of the runs shown.
+        The cells and the camera without such a view; all steps of the runs are fitted.
     """
 
     def __init__(
@@ -71,12 +71,12 @@ class OffscreenRenderer:
 
     @classmethod
     def of_runs(cls, session: Session, zoom: Zoom = "auto") -> OffscreenRenderer:
-        """Return a renderer that shows what the runs of a session did to its mesh.
+        """Return a renderer with the overview of the run with the largest displacement.
 
         Raises
         ------
         SlidevizError
-            The detail has not as many coordinates as the mesh, or is no part of it.
+            The detail has not as many coordinates as the mesh, or is outside the mesh.
         """
         base = session.mesh
         assert base is not None
@@ -86,11 +86,11 @@ class OffscreenRenderer:
         return cls(session, find_surfaces(base) if base.dim == 2 else (), overview=overview)
 
     def arranging(self) -> Iterator[None]:
-        """Yield between the pieces of the work before the first picture.
+        """Prepare the plotter and the scene, yielding between pieces of this work.
 
-        Where nobody pulls all of it, the first picture does the rest at once.
+        What remains of it is done with the first picture.
         """
-        # Not "yield from": whoever stops pulling would end it.
+        # Not "yield from": closing this generator would close the other.
         for _ in self._making:
             yield
 
@@ -99,7 +99,7 @@ class OffscreenRenderer:
 
         self._plotter = self._stack.enter_context(offscreen((640, 400)))
         yield
-        self._plotter.render_window.Render()  # begins with the graphics
+        self._plotter.render_window.Render()  # initializes OpenGL
         yield
         self._scene = Scene(self._plotter, PAPER)
         shown, overview = PictureOptions().showing(self.session), self.overview
@@ -107,7 +107,7 @@ class OffscreenRenderer:
         yield from self._scene.opening(shown, self.surfaces, part)
         if self.like is not None:
             self._scene.set_motion_ghosts(self.like.motion_ghosts)
-        if overview is None:  # else nobody waits for it
+        if overview is None:  # in the window, which must stay responsive
             yield from appearing(self._plotter)
 
     def __enter__(self) -> OffscreenRenderer:
@@ -122,26 +122,26 @@ class OffscreenRenderer:
         self.close()
 
     def close(self) -> None:
-        """Free the graphics."""
+        """Release the graphics resources."""
         self._stack.close()
 
     @property
     def fills(self) -> bool:
-        """Tell whether a picture may show the mesh larger than the view, which has all of it."""
+        """Return whether pictures are fitted to the mesh by default: the view shows all of it."""
         return self.like is None or self.like.camera.sees_all(0.02)
 
     @property
     def shows_detail(self) -> bool:
-        """Tell whether a moved part is shown large, with the rest of the mesh out of sight."""
+        """Return whether pictures show a detail, with the rest of the mesh out of view."""
         return self.overview is not None and self.overview.detail is not None
 
     @property
     def beside(self) -> Session | None:
-        """Return the session of the second view, or None."""
+        """Return the session as the second view shows it, or None without a comparison."""
         return next((one for one in shown_views(self.session) if one is not self.session), None)
 
     def image(self, options: PictureOptions) -> Pixels:
-        """Return the picture, (height, width, 3), or 4 with a transparent background.
+        """Draw a picture and return it, (height, width, 3), or 4 with a transparent background.
 
         Raises
         ------
@@ -153,17 +153,17 @@ class OffscreenRenderer:
     def picturing(
         self, options: PictureOptions, aim: bool = True, frame: int | None = None
     ) -> Generator[None, None, Pixels]:
-        """Return the picture as `image` does, and yield between the pieces of the work.
+        """Draw and return a picture as `image` does, yielding between pieces of the work.
 
-        Nothing else may be drawn meanwhile.
+        The renderer must not draw anything else meanwhile.
 
         Parameters
         ----------
         options : PictureOptions
         aim : bool
-            Whether to aim the camera; else it stays where it was for the last picture.
+            Whether to aim the camera; if not, it is that of the last picture.
         frame : int, optional
-            Another step than the session shows.
+            The number of the step to draw, by default the one that the session shows.
         """
         shown = self.session if frame is None else show_frame(self.session, frame)
         check_size(options.size)
@@ -174,7 +174,7 @@ class OffscreenRenderer:
         return (yield from self.drawing(sessions, options, headings(sessions, options)))
 
     def shown(self, session: Session, options: PictureOptions) -> tuple[Session, ...]:
-        """Return the sessions in a picture, from left to right: one, or two runs."""
+        """Return the sessions in a picture, from left to right: one, or two of a comparison."""
         return shown_views(session) if options.both else (session,)
 
     def drawing(
@@ -183,10 +183,10 @@ class OffscreenRenderer:
         options: PictureOptions,
         titles: tuple[Sequence[str], float],
     ) -> Generator[None, None, Pixels]:
-        """Return the picture of one session or two with titles, and yield between the pieces.
+        """Draw and return the picture of one session or two, yielding between pieces of the work.
 
-        The camera stays where it is: in both a length is as long. Titles come with the size of
-        their letters, where 1 is that of others.
+        The camera stays; both have the same scale. ``titles`` are the titles, and the size of
+        their letters relative to the usual one.
         """
         words, size = titles
         if len(sessions) == 1:
@@ -198,7 +198,7 @@ class OffscreenRenderer:
         return np.ascontiguousarray(np.concatenate([left, between, right], axis=1))
 
     def pose(self, options: PictureOptions, frame: int | None = None) -> Scene:
-        """Return the scene with camera and colours as for a picture, or for a film."""
+        """Aim the camera as for a picture of a step, by default the shown one; return the scene."""
         shown = self.session if frame is None else show_frame(self.session, frame)
         for _ in self.arranging():
             pass
@@ -207,7 +207,7 @@ class OffscreenRenderer:
         return scene
 
     def window(self, options: PictureOptions) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return the ranges of x and of y in a picture of a 2D mesh."""
+        """Return the ranges of x and of y that a picture of a 2D mesh shows."""
         self.pose(options)
         camera, (width, height) = self._plotter.camera, options.size
         unit = 2.0 * camera.parallel_scale / height
@@ -240,21 +240,21 @@ class OffscreenRenderer:
     def _pane(
         self, session: Session, options: PictureOptions, words: str, size: float
     ) -> Generator[None, None, Pixels]:
-        """Return the picture of one session with a title; ``size`` is that of its letters."""
+        """Draw and return the picture of one session, with a title whose letters have ``size``."""
         self._prepare(session, options)
         yield
         plotter = self._plotter
         plotter.remove_actor("title", reset_camera=False, render=False)
         if words:
             room = options.title_room * options.scale
-            # Those of a film are smaller than its other letters: it has more to say.
+            # A film's title is longer, and has smaller letters than the rest.
             letters = TITLE * size * options.scale / (LETTERS if options.film else 1.0)
             write_title(plotter, words, self._scene.scheme, letters, room)
         name_mark(plotter, self._scene, options.scale)
         return image_of(plotter, options.background == "transparent")
 
     def _prepare(self, session: Session, options: PictureOptions) -> None:
-        """Show a session in the size of a picture; the camera stays."""
+        """Update the scene to a session, in the size and style of a picture; the camera stays."""
         plotter, scene = self._plotter, self._scene
         resize(plotter, options.size)
         scene.stage.font_scale = options.scale
@@ -262,17 +262,17 @@ class OffscreenRenderer:
         scene.stage.has_plate = options.background != "transparent"
         scene.update(options.showing(session))
         if options.background == "transparent":
-            plotter.set_background("white")  # a gradient would stay opaque
+            plotter.set_background("white")  # VTK draws a gradient opaquely
         self._keep_room(options)
 
     def _keep_room(self, options: PictureOptions) -> None:
-        """Keep the rooms of legend and title free of the mesh."""
+        """Shift the picture so that the room of legend and title stays free."""
         right = self._scene.stage.strip() / options.size[0]
         self._plotter.camera.SetWindowCenter(right, options.top)
         self._plotter.renderer.ResetCameraClippingRange()
 
     def _aim(self, session: Session, options: PictureOptions) -> None:
-        """Look from where the view looks, in its colours, at what a picture shows."""
+        """Set camera and color scheme for a picture: of the view, of the overview, or fitted."""
         scene, camera, like = self._scene, self._plotter.camera, self.like
         if len(self.shown(session, options)) == 2:
             options = panes(options, options.gap)[0]
@@ -286,7 +286,7 @@ class OffscreenRenderer:
             scene.camera.fit()
         elif like is not None:
             scene.camera.show_width_of(like.camera)
-        # Below the title; a detail has the width that was asked for.
+        # Zoom out for the title's room; a detail keeps the width that was asked for.
         if camera.parallel_projection and not self.shows_detail:
             camera.parallel_scale = camera.parallel_scale / (1.0 - options.top)
         self._keep_room(options)

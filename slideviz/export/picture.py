@@ -20,18 +20,19 @@ from slideviz.session.state import Run, Session, StepFrame
 
 SIZE = PictureOptions.size
 WHITE = 250
-"""Above this in red, green and blue, a pixel is background."""
+"""Least red, green and blue (0 to 255) of a pixel that counts as background."""
+
 _SMALL = 10
-"""Pixels: cells smaller than this, on average, are drawn without edges."""
+"""Mean size of cells in pixels below which they are drawn without edges."""
 
 
 def picture(
     session: Session, file: str | Path, size: tuple[int, int] = SIZE, zoom: Zoom = "auto"
 ) -> None:
-    """Write a PNG of a mesh in the colours of its quality, with the quality in words.
+    """Write a PNG of a mesh in the colours of its quality, with name and quality as title.
 
-    A 2D mesh is shown whole. Of a 3D mesh the half behind a plane is shown, cells uncut; the
-    plane goes through what moved most and along the way it moved.
+    A 2D mesh is shown whole. Of a 3D mesh, the whole cells behind a plane are shown, which goes
+    through the boundary that moved most, along its displacement.
 
     Parameters
     ----------
@@ -63,11 +64,11 @@ def pictures_alike(frames: Sequence[StepFrame], base: Mesh, side: int) -> list[P
     Parameters
     ----------
     frames : sequence of StepFrame
-        What became of the mesh.
+        The deformed meshes, at least one.
     base : Mesh
         The undeformed mesh.
     side : int
-        Pixels.
+        Width and height of each picture in pixels.
     """
     runs = [Run(k, Case(), (frame,), "done") for k, frame in enumerate(frames, start=1)]
     session = of_runs(StepFrame(base, frames[0].quality), runs)
@@ -80,6 +81,6 @@ def pictures_alike(frames: Sequence[StepFrame], base: Mesh, side: int) -> list[P
             return whole(renderer.drawing([shown], options, ([""], 1.0)))
 
         inked = int((draw(runs[0], options) < WHITE).any(axis=2).sum())
-        # Edges of small cells would hide their colours.
+        # The edges of small cells would hide their colours.
         options = replace(options, edges=inked >= scene.polygons * _SMALL**2)
         return [draw(run, options) for run in runs]

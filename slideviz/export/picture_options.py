@@ -1,4 +1,4 @@
-"""Picture options: size, background, legend and title of a picture; and the title's words."""
+"""Picture options: size, background, legend and title of a picture; and the title's text."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ BACKGROUNDS: dict[Background, str] = {
     "shown": "as in the view",
     "transparent": "transparent",
 }
-"""What is behind the mesh, and the words for it."""
+"""The kinds of background, and their words in the dialog."""
 TITLE_ROOM = 40.0
-"""Pixels at the top that are the title's, at normal letter size; a second line has 20 more."""
+"""Height of a title of one line in pixels, at normal letter size; a second line adds 20."""
 GAP = 12.0
-"""Pixels between two pictures beside each other, at normal letter size."""
+"""Distance in pixels between two pictures side by side, at normal letter size."""
 
 
 @dataclass(frozen=True)
@@ -43,27 +43,27 @@ class PictureOptions:
         Width and height in pixels.
     background : {"white", "shown", "transparent"}
     legend, edges, triad : bool
-        The legend of roles or the colour bar; edges of cells; directions of the axes.
+        Whether there are the legend of roles or the colour bar; edges of cells; the axes.
     title : bool
-        A line that says what is shown, with minimum, mean and inverted cells.
+        Whether there is a title: what is shown, with minimum, mean and inverted cells.
     fill : bool
-        Make the whole mesh fill the picture, instead of showing what the view shows of it.
+        Whether the whole mesh is fitted to the picture, instead of the view's part of it.
     both : bool
-        Draw the run of the second view, too, where there is one.
+        Whether the session of the second view is drawn too, if there is one.
     letters : float
-        How large letters are; 1 is 13 pixels in 620 of the height.
+        Size of the letters; 1 is 13 pixels in a picture 620 pixels high.
     dpi : float or None
-        Pixels per inch on paper, for programs that place the picture.
+        Pixels per inch on paper, stored in the file.
     film : bool
         Whether it is an image of a film.
     named : bool
-        Say which run it is also without a title: it stands beside that of another.
+        Whether it has the name of its run even without a title, as one of two side by side.
     marked : bool
-        Draw the cell that is marked, if one is, and name it.
+        Whether the marked cell is drawn, with its number and value.
     lines : int
-        Lines of the title.
+        Number of lines of the title.
     heading : str
-        The title itself, if it is another one.
+        A title instead of the usual one; empty for the usual one.
     """
 
     size: tuple[int, int] = (1600, 1000)
@@ -84,7 +84,7 @@ class PictureOptions:
 
     @property
     def headed(self) -> bool:
-        """Tell whether words stand above the picture."""
+        """Return whether there is a text above the mesh: a title, or the name of the run."""
         return self.title or self.named
 
     @property
@@ -94,21 +94,21 @@ class PictureOptions:
 
     @property
     def top(self) -> float:
-        """Return the title's part of the height."""
+        """Return the height of the title relative to the picture; 0 without one, 0.3 at most."""
         return min(self.title_room * self.scale / self.size[1], 0.3) if self.headed else 0.0
 
     @property
     def gap(self) -> int:
-        """Return the pixels between two pictures beside each other."""
+        """Return the distance in pixels between two pictures side by side."""
         return max(round(GAP * self.scale), 1)
 
     @property
     def scale(self) -> float:
-        """Return the size of the letters over 13 pixels."""
+        """Return the size of the letters in units of 13 pixels, and so of all lengths in pixels."""
         return font_scale(self.size) * self.letters
 
     def within(self, box: tuple[int, int]) -> PictureOptions:
-        """Return the same picture as large as it can be in a box of pixels."""
+        """Return the options of the same picture, scaled down to fit a box of pixels."""
         width, height = self.size
         part = min(box[0] / width, box[1] / height, 1.0)
         size = tuple(max(round(part * length), SMALLEST) for length in self.size)
@@ -116,21 +116,24 @@ class PictureOptions:
         return replace(self, size=(size[0], size[1]), letters=letters)
 
     def showing(self, session: Session) -> Session:
-        """Return the session of the picture: nothing selected, no clutter."""
+        """Return the session as the picture shows it: the view's toggles replaced by the options.
+
+        Nothing is selected, and the motions' ghosts are left out if values are shown.
+        """
         session = as_drawn(session)
         view = session.view
         drawn: dict[Shown, bool] = {"legend": self.legend, "edges": self.edges, "triad": self.triad}
         if view.colour_by != "role":
-            drawn["motion_ghost"] = False  # of a result, it would hide what is to be seen
+            drawn["motion_ghost"] = False  # it would hide the values
         view = view.with_drawn(drawn)
         marked = view.marked_cell if self.marked else None
         return replace(session, view=replace(view, selected=(), marked_cell=marked))
 
 
 def panes(options: PictureOptions, gap: int) -> tuple[PictureOptions, PictureOptions]:
-    """Return the options of the two halves of a picture of two runs.
+    """Return the options of the left and the right part of a picture of two runs, ``gap`` apart.
 
-    The legend is at the right of the second; both have the same room for the mesh.
+    The legend is at the right of the second; both parts have the same width for the mesh.
     """
     width, height = options.size
     strip = STRIP * options.scale if options.legend else 0.0
@@ -145,7 +148,7 @@ def panes(options: PictureOptions, gap: int) -> tuple[PictureOptions, PictureOpt
 
 
 def title_of(session: Session, options: PictureOptions) -> str:
-    """Return the words above a picture: run, step and quality; less where it is narrow."""
+    """Return the title of a picture: run, step and quality; shortened to fit its width."""
     frame: StepFrame | None = session.frame
     assert frame is not None
     steps = len(session.frames) - 1
@@ -155,15 +158,15 @@ def title_of(session: Session, options: PictureOptions) -> str:
 
 
 def titles_of(pair: Sequence[Session], options: PictureOptions) -> tuple[list[str], float]:
-    """Return the words above two pictures beside each other, and how large their letters are.
+    """Return the titles of two pictures side by side, and their letters' relative size.
 
-    ``options`` is the narrower of both; 1 is the size of other titles.
+    ``options`` are those of the narrower picture; 1 is the usual size.
     """
     return fitting(pair_titles(pair, options.title), letters_across(options))
 
 
 def headings(shown: Sequence[Session], options: PictureOptions) -> tuple[list[str], float]:
-    """Return the words above a picture of one session or two, and how large their letters are."""
+    """Return the titles of a picture of one session or two, and their letters' relative size."""
     if len(shown) == 2:
         return titles_of(shown, panes(options, options.gap)[0])
     if not options.headed:
@@ -174,7 +177,7 @@ def headings(shown: Sequence[Session], options: PictureOptions) -> tuple[list[st
 
 
 def letters_across(options: PictureOptions) -> float:
-    """Return the number of letters that a line of the title has room for."""
+    """Return the number of letters that fit into a line of the title."""
     letters = LETTER_WIDTH * options.scale / (LETTERS if options.film else 1.0)
     return (1.0 - 2.0 * CAPTION_AT) * options.size[0] / letters
 

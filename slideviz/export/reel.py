@@ -1,4 +1,4 @@
-"""The settings of a film: size, speed, images in between; and checks of them."""
+"""The settings of a film: size, speed, images in between; checks of them; the loop over images."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from slideviz.export.offscreen import check_size
 from slideviz.session.pieces import Beside, here
 
 SIZES = {".mp4": (1280, 800), ".gif": (800, 500), ".png": (1600, 1000)}
-"""Width and height in pixels unless others are asked for."""
+"""Default width and height in pixels, by the kind of film."""
 FPS, SECONDS = 10.0, 3.0
-"""Images a second unless asked for; fewer of them where a film would be shorter than this."""
+"""Default images per second; and the duration in seconds below which there are fewer per second."""
 
 
 @dataclass(frozen=True)
 class Reel:
-    """Size, speed and images in between of a film.
+    """The size, speed and images in between of a film.
 
     Attributes
     ----------
     size : (int, int) or None
-        Width and height in pixels, even for an MP4; None is what suits the kind of file.
+        Width and height in pixels, even numbers for an MP4; None: the default of the kind of file.
     fps : float or None
-        Images a second; None is ten, and fewer where there are few, so that it lasts 3 s.
+        Images per second; None: ten, or fewer, so that a film of few images lasts 3 s.
     hold : float
-        Seconds that the last image stays.
+        Seconds that the last image is shown.
     between : int
-        Images put between two steps, with the nodes on straight lines from one to the next and
-        the quality of that mesh.
+        Number of images between two steps, whose nodes are interpolated linearly, with the quality
+        of that mesh.
     """
 
     size: tuple[int, int] | None = None
@@ -44,35 +44,35 @@ class Reel:
     between: int = 0
 
     def pixels(self, file: Path) -> tuple[int, int]:
-        """Return width and height of the film in this file."""
+        """Return width and height in pixels of the film in a file."""
         return self.size or SIZES[kind_of(file)]
 
     def count(self, frames: int) -> int:
-        """Return the number of images for so many frames."""
+        """Return the number of images of a film of ``frames`` frames, with the undeformed mesh."""
         return frames + (frames - 1) * self.between
 
     def pace(self, frames: int) -> float:
-        """Return the images a second for so many frames."""
+        """Return the images per second of a film of ``frames`` frames, with the undeformed mesh."""
         return self.fps or min(FPS, max(1.0, self.count(frames) / SECONDS))
 
 
 USUAL = Reel()
-"""What a film is like unless something else is asked for."""
+"""The default settings of a film."""
 
 
 def check_film(
     file: Path, reel: Reel, *, frames: int | None = None, overwrite: bool = False
 ) -> None:
-    """Raise SlidevizError where a film cannot be made like that; the message says what helps.
+    """Raise SlidevizError if a film cannot be made with these settings or in this file.
 
     Parameters
     ----------
     file : Path
         A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
     reel : Reel
-        How it is made.
+        The settings.
     frames : int, optional
-        The number of frames, when it is known already.
+        The number of frames, if it is known already.
     overwrite : bool
         Allow files that exist.
     """
@@ -111,14 +111,14 @@ def check_film(
 
 @dataclass(frozen=True)
 class FilmProgress:
-    """Progress of a film: images written, of so many in all."""
+    """The progress of a film: number of images written, and of all images."""
 
     done: int
     total: int
 
 
 def images_drawn(pieces: Generator[object, Any, None]) -> Generator[FilmProgress, None, None]:
-    """Yield the progress of a film, all of its pieces done here."""
+    """Do all pieces of a film here, without threads, and yield its progress after each image."""
     run = here(pieces)
     try:
         yield from (piece for piece in run if isinstance(piece, FilmProgress))
@@ -132,17 +132,19 @@ def exposing(
     reel: Reel,
     draw: Callable[[float], Generator[object, Any, Pixels]],
 ) -> Generator[object, Any, None]:
-    """Yield `Drawn` after each image that the encoder took, and between the image's pieces.
+    """Draw and encode all images; yield `FilmProgress` after each one, and between its pieces.
+
+    Encoding is yielded as `Beside`, to be done in a thread.
 
     Parameters
     ----------
     frames : int
-        The undeformed mesh and every step.
+        Number of the undeformed mesh and all steps.
     file : Path
     reel : Reel
     draw : callable
-        Draws a position in the film in pieces: the number of a step, or something between two.
-        What is written is written beside.
+        Given a position (the number of a step, or a number between two), returns a generator that
+        draws the image in pieces and returns it.
     """
     total, pace = reel.count(frames), reel.pace(frames)
     samples = []
@@ -166,7 +168,7 @@ def _add(add: Callable[[Pixels, float], None], image: Pixels, seconds: float, _:
 
 
 def _positions(steps: int, between: int) -> Iterator[float]:
-    """Yield the steps and the places between them."""
+    """Yield the position of each image: the numbers of the steps, and numbers between them."""
     for step in range(steps):
         yield from (step + k / (between + 1) for k in range(between + 1))
     yield float(steps)

@@ -1,4 +1,4 @@
-"""The picture of a section as a job beside the window."""
+"""The job that writes the picture of a section."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Paper:
 
     @classmethod
     def of_cm(cls, width: float, height: float, dpi: float = 300.0) -> Paper:
-        """Return the paper of a picture of so many centimetres."""
+        """Return the format of a picture of a width and maximum height in centimetres."""
         return cls((round(width / 2.54 * dpi), round(height / 2.54 * dpi)), dpi)
 
 
@@ -64,14 +64,14 @@ def save_section(
     report: Report,
     stopped: Stopped,
 ) -> Path:
-    """Write the picture of a section as the view shows it: step, colours, neighbours.
+    """Write the picture of a section as the view shows it: step, colours, neighbouring passages.
 
-    Of two views beside each other both are in it.
+    With a comparison, it shows both views. Return the path.
 
     Raises
     ------
     CaseError
-        No mesh is open, the section cuts no cell that is shown, the name has another end than a
+        No mesh is open, the section cuts no cell that is shown, the name has a suffix other than a
         picture's, or the file cannot be written.
     """
     if session.frame is None:
@@ -102,7 +102,7 @@ def save_section(
 
 
 def _shown(session: Session, name: str, section: Section) -> SectionInRun:
-    """Return the cuts of a section in a view with a name."""
+    """Return the cut of a section in one view, which is called ``name``."""
     frame = session.frame
     assert frame is not None
     by = session.view.colour_by
@@ -126,7 +126,7 @@ def _shown(session: Session, name: str, section: Section) -> SectionInRun:
 
 
 def _choice(session: Session, section: Section) -> CellsInRange | None:
-    """Return the cells that the range of the view leaves; a curve goes through all of them."""
+    """Return the cells within the view's threshold; None without one, and for a curve."""
     frame, threshold = session.frame, session.view.threshold
     curve = session.mesh is not None and session.mesh.dim == 2 and not section.whole
     if frame is None or threshold is None or curve:

@@ -1,4 +1,4 @@
-"""Titles of pictures and films: run, step and quality; and the words of the selected cell."""
+"""Titles of pictures and films: run, step and quality; and the label of the marked cell."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ if TYPE_CHECKING:
 
 
 LETTER_WIDTH = 9.6
-"""Pixels that a letter of a title takes, at normal size."""
+"""Width of a title's letter in pixels, at normal size."""
 DETAIL = " (whole mesh; detail shown)"
-"""Beside the quality of a mesh of which a part is seen."""
+"""Text behind the quality of a mesh of which a detail is shown."""
 _SMALLEST = 0.6
-"""Letters of two titles beside each other become so small, as a part of their size."""
+"""Smallest size of the letters of titles, relative to the usual one."""
 LONGEST = "step {0}.00 of {0}, interpolated"
-"""The place in a film that needs most room: a title must not change from image to image."""
+"""The longest text of a place in a film, by which the form of its titles is chosen once."""
 
 
 def caption(name: str, found: Quality, colour_by: ColourBy = "size-skew") -> str:
-    """Return the name of a picture's subject and its quality, in a line."""
+    """Return a line with a name and the size-skew quality: min, mean, inverted cells."""
     what = "" if colour_by == "size-skew" else "size-skew "
     text = f"{name}: {what}min {found.min:.4f}, mean {found.mean:.4f}"
     if found.inverted:
@@ -41,7 +41,7 @@ def caption(name: str, found: Quality, colour_by: ColourBy = "size-skew") -> str
 
 
 def place_words(position: float, steps: int) -> str:
-    """Return the step of a mesh, or its place between two, in words; nothing for an only step."""
+    """Return the position in a run in words: a step, or between two; empty for an only step."""
     if position == 0:
         return "undeformed"
     whole = position == int(position)
@@ -51,9 +51,10 @@ def place_words(position: float, steps: int) -> str:
 
 
 def names_of(session: Session) -> list[str]:
-    """Return names of the run that is shown, each shorter than the one before.
+    """Return names of the shown run, each shorter than the one before.
 
-    With what sets it apart from the other runs; with its name or method; its number only.
+    They are its number with its name (or method) and what distinguishes it from other runs, if
+    anything; the number with the name; the number only.
     """
     run = session.run_shown
     if run is None:
@@ -67,19 +68,20 @@ def names_of(session: Session) -> list[str]:
 def title_words(
     session: Session, frame: StepFrame, place: str, letters: float, longest: str = ""
 ) -> str:
-    """Return a title for a room of so many letters.
+    """Return the longest title of a frame that fits into a number of letters.
 
     Parameters
     ----------
     session : Session
-        With the runs there are.
+        Has the runs, and the shown one.
     frame : StepFrame
-        What is shown.
+        The frame that is shown.
     place : str
-        Where in the run that is (`place_words`).
+        Its position in the run (`place_words`).
     letters : float
+        The number of letters that fit.
     longest : str
-        The place that needs most room, where several titles are to be alike.
+        The longest place of a film, so that all its titles have the same form.
     """
     what = session.view.colour_by
 
@@ -104,9 +106,9 @@ def title_words(
 
 
 def pair_names(pair: Sequence[Session]) -> list[str]:
-    """Return the names of the runs of two views, in one form, with all that sets them apart."""
+    """Return the names of the runs of two views, in the same form, with all differences."""
     runs = [one.run_shown for one in pair]
-    # Beside the undeformed mesh both views have the same run.
+    # In a comparison with the undeformed mesh, both sessions have the same run.
     alone = runs[0] is runs[-1]
     both = [run for run in runs if run is not None]
     names = []
@@ -125,14 +127,14 @@ def _methods_differ(runs: Sequence[Run]) -> bool:
 
 
 def pair_titles(pair: Sequence[Session], quality: bool) -> list[str]:
-    """Return the words above two pictures beside each other, in one form.
+    """Return the titles of two pictures side by side, in the same form.
 
     Parameters
     ----------
     pair : (Session, Session)
-        What they show.
+        The sessions that they show.
     quality : bool
-        With a second line: step, minimum, mean and inverted cells.
+        Whether there is a second line: step, minimum, mean and inverted cells.
     """
     names = pair_names(pair)
     if not quality:
@@ -151,10 +153,10 @@ def pair_titles(pair: Sequence[Session], quality: bool) -> list[str]:
 
 
 def fitting(titles: Sequence[str], letters: float) -> tuple[list[str], float]:
-    """Return titles of a line or two cut to so many letters, and the size of the letters.
+    """Return titles fitted to a number of letters per line, and the relative size of the letters.
 
-    All are as much smaller as the longest line asks for, 1 being as they were; where that would
-    be too small to be read, lines end with an ellipsis.
+    The size is at most 1 and the same for all: the longest line fits. It is not below `_SMALLEST`;
+    lines too long even then are cut with an ellipsis.
     """
     longest = max(len(line) for title in titles for line in title.splitlines())
     part = min(1.0, max(letters / longest, _SMALLEST))
@@ -168,11 +170,11 @@ def _cut(line: str, most: int) -> str:
 
 NAME = "mark:words"
 _AWAY = 9.0
-"""Pixels between the cell and its words, at normal size."""
+"""Distance in pixels between the cell and its label, at normal letter size."""
 
 
 def mark_words(session: Session) -> str:
-    """Return the number of the selected cell, and its value; nothing where none is selected."""
+    """Return the label of the marked cell: its number and value; empty if none is marked."""
     cell, frame = session.view.marked_cell, session.frame
     if cell is None or frame is None or not 0 <= cell < len(frame.mesh.cells):
         return ""
@@ -187,9 +189,9 @@ def mark_words(session: Session) -> str:
 
 
 def name_mark(plotter: Any, scene: Scene, scale: float) -> None:
-    """Write the words beside the selected cell of a scene as its camera sees it.
+    """Draw the label beside the marked cell of a scene; none if the cell is out of the picture.
 
-    Not where the cell is out of the picture.
+    ``scale`` is the factor of lengths and letters.
     """
     import pyvista as pv
     from vtkmodules.vtkRenderingCore import vtkCoordinate
@@ -213,7 +215,7 @@ def name_mark(plotter: Any, scene: Scene, scale: float) -> None:
     text.prop.SetBackgroundColor(*pv.Color(scene.scheme.background_top).float_rgb)
     text.prop.SetBackgroundOpacity(0.7)
     text.prop.SetVerticalJustificationToCentered()
-    # Towards the middle, where there is room for it.
+    # On the side towards the picture's middle, where there is room.
     side = 1.0 if seen[0] < 0.6 else -1.0
     if side < 0.0:
         text.prop.SetJustificationToRight()
@@ -227,15 +229,15 @@ def name_mark(plotter: Any, scene: Scene, scale: float) -> None:
     plotter.add_actor(text, name=NAME, reset_camera=False, render=False, pickable=False)
 
 
-def draw_mark(axes: Any, session: Session, point: float) -> None:
-    """Draw the selected cell of a 2D mesh and its words; ``point`` as for a figure's cells."""
+def draw_mark(axes: Any, session: Session, pixel_pt: float) -> None:
+    """Draw the marked cell of a 2D mesh and its label; a pixel is ``pixel_pt`` points wide."""
     from matplotlib.patches import Polygon
 
     words = mark_words(session)
     if not words:
         return
     corners = _corners(session)
-    outline = Polygon(corners, fill=False, edgecolor=SELECTED_COLOUR, linewidth=2.0 * point)
+    outline = Polygon(corners, fill=False, edgecolor=SELECTED_COLOUR, linewidth=2.0 * pixel_pt)
     outline.set(zorder=4, gid="mark")
     axes.add_patch(outline)
     middle = corners.mean(axis=0)
@@ -243,11 +245,11 @@ def draw_mark(axes: Any, session: Session, point: float) -> None:
     axes.annotate(
         words,
         middle,
-        xytext=(_AWAY * point if right else -_AWAY * point, 0.0),
+        xytext=(_AWAY * pixel_pt if right else -_AWAY * pixel_pt, 0.0),
         textcoords="offset points",
         ha="left" if right else "right",
         va="center",
-        fontsize=13.0 * point,
+        fontsize=13.0 * pixel_pt,
         color=PAPER.text,
         bbox={"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 0.5},
         annotation_clip=True,
@@ -256,7 +258,7 @@ def draw_mark(axes: Any, session: Session, point: float) -> None:
 
 
 def _corners(session: Session) -> FloatArray:
-    """Return the nodes of the selected cell, (k, d)."""
+    """Return the points (k, d) of the marked cell's nodes."""
     assert session.frame is not None
     assert session.view.marked_cell is not None
     mesh = session.frame.mesh

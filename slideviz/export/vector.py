@@ -30,13 +30,13 @@ from slideviz.terms import COLOUR_BY, ROLES
 
 SUFFIXES = (".svg", ".pdf")
 MOST_CELLS = 100_000
-"""More cells make files that programs take minutes to show."""
+"""Most cells of such a picture: viewers take minutes to show more."""
 _SCREEN_DPI = 200.0
-"""Pixels per inch of a picture that was asked for in pixels."""
+"""Pixels per inch of a picture whose size is given in pixels only."""
 _LETTERS, _LINE, _CUT, _EDGE = 13.0, 1.4, 0.8, 0.3
-"""Pixels of letters, boundaries, the lines of sections and edges, at normal size."""
+"""Size of letters, and widths of boundaries, section lines and edges, in pixels at normal size."""
 _ORDER = {RIM: 1.3, BAND: 1.4, NAME: 1.5}
-"""Above the cells of the mesh, which are at 1, and below its boundaries, which are at 2."""
+"""matplotlib's zorder of sections: above the mesh's cells (1), and below its boundaries (2)."""
 
 
 def write_vector(renderer: OffscreenRenderer, options: PictureOptions, file: Path) -> None:
@@ -45,11 +45,11 @@ def write_vector(renderer: OffscreenRenderer, options: PictureOptions, file: Pat
     Parameters
     ----------
     renderer : OffscreenRenderer
-        Knows the session and from where to where the view reaches.
+        Holds the session, and says what part of the mesh is shown.
     options : PictureOptions
-        What the picture has; its background is white or transparent.
+        The options of the picture; its background is white or transparent.
     file : Path
-        Ends with .svg or .pdf.
+        A name ending with .svg or .pdf.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def write_vector(renderer: OffscreenRenderer, options: PictureOptions, file: Pat
 
 
 def require_vector(session: Session, file: Path) -> None:
-    """Raise SlidevizError where no SVG or PDF of that name can be made of a session."""
+    """Raise SlidevizError if a session cannot be drawn as SVG or PDF, or not in this file."""
     if file.suffix.lower() not in SUFFIXES:
         raise SlidevizError(f"{file}: drawn as lines are {', '.join(SUFFIXES)}; end the name so")
     mesh = session.mesh
@@ -76,7 +76,7 @@ def require_vector(session: Session, file: Path) -> None:
 
 
 def draw_vector(renderer: OffscreenRenderer, options: PictureOptions) -> Any:
-    """Return the matplotlib figure of a 2D mesh as the renderer sees it."""
+    """Return the matplotlib figure of a 2D mesh, showing the same part as the renderer would."""
     dpi = options.dpi or _SCREEN_DPI
     width, height = options.size
     figure = empty_figure((width / dpi, height / dpi), dpi)
@@ -86,7 +86,7 @@ def draw_vector(renderer: OffscreenRenderer, options: PictureOptions) -> Any:
     if len(sessions) == 2:
         left, right = panes(options, options.gap)
         parts = [(left, 0), (right, left.size[0] + options.gap)]
-    # The same length of the mesh for each pixel in both.
+    # Both have the same scale.
     (x, _), y = renderer.window(parts[0][0])
     unit = (y[1] - y[0]) / height
     for session, (part, start), title in zip(sessions, parts, titles, strict=True):
@@ -103,14 +103,17 @@ def draw_vector(renderer: OffscreenRenderer, options: PictureOptions) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class _Paint:
-    """The colours of cells: values (m,), or one colour; and the points of their edges."""
+    """How cells are drawn: by values (m,) and a ScalarMappable, or in one colour (None).
+
+    ``edge`` is the width of their edges in points.
+    """
 
     values: FloatArray | None
     colors: Any
     edge: float
 
     def draw(self, axes: Any, cells: Polygons, **style: Any) -> None:
-        """Draw cells."""
+        """Draw cells onto axes, inverted ones last."""
         if self.values is None:
             style["facecolors"] = PAPER.cell
         else:  # folded cells overlap: inverted ones are to be seen
@@ -119,22 +122,22 @@ class _Paint:
         draw_cells(axes, cells, values, self.colors, edges=self.edge, **style)
 
     def lines(self, cut: Polygons) -> dict[str, Any]:
-        """Return the colours of the lines that a section cuts of cells."""
+        """Return the colour arguments of a LineCollection of the lines that a section cuts."""
         if self.values is None:
             return {"colors": PAPER.cell}
         found = self.colors
         return {"array": self.values[cut.cells], "cmap": found.cmap, "norm": found.norm}
 
 
-def _draw_mesh(axes: Any, session: Session, options: PictureOptions, point: float) -> None:
-    """Draw cells, sections and boundaries; ``point`` is the size of a pixel at normal size."""
+def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: float) -> None:
+    """Draw cells, sections and boundaries; a pixel at normal size is ``pixel_pt`` points wide."""
     from matplotlib.collections import LineCollection
 
     frame, view = session.frame, session.view
     assert frame is not None
     assert session.mesh is not None
     mesh, cutter = frame.mesh, Cutter.of(frame.mesh)
-    edge, only = _EDGE * point * options.edges, None
+    edge, only = _EDGE * pixel_pt * options.edges, None
     paint = _Paint(None, None, edge)
     if view.colour_by != "role":
         values = frame.shown_values(view.colour_by, session.mesh)
@@ -150,41 +153,45 @@ def _draw_mesh(axes: Any, session: Session, options: PictureOptions, point: floa
             ends = list(cut.points[cut.connectivity, :2].reshape(-1, 2, 2))
             style: dict[str, Any]
             for kind, colors in ((RIM, {"colors": PAPER.text}), (BAND, paint.lines(cut))):
-                style = {"linewidths": WIDTHS[kind] * point, "zorder": _ORDER[kind]}
+                style = {"linewidths": WIDTHS[kind] * pixel_pt, "zorder": _ORDER[kind]}
                 axes.add_collection(LineCollection(ends, **style, **colors), autolim=False)
             if section.whole:
                 paint.draw(axes, cutter.show(mesh.points, section, only), zorder=_ORDER[NAME])
-        # Above whole cells, below a band.
+        # The thin line is above whole cells, and below a band.
         order = _ORDER[NAME] + 0.05 if section.whole else _ORDER[RIM] - 0.05
-        line: dict[str, Any] = {"colors": PAPER.text, "linewidths": _CUT * point, "zorder": order}
+        line: dict[str, Any] = {
+            "colors": PAPER.text,
+            "linewidths": _CUT * pixel_pt,
+            "zorder": order,
+        }
         axes.add_collection(LineCollection(trace(section, box), **line), autolim=False)
     if "undeformed" in view.drawn:
         parts = [part for name in mesh.marker_names for part in _lines(session.mesh, name)]
-        style = {"colors": PAPER.ghost, "linestyles": "dashed", "linewidths": 0.7 * point}
+        style = {"colors": PAPER.ghost, "linestyles": "dashed", "linewidths": 0.7 * pixel_pt}
         axes.add_collection(LineCollection(parts, **style))
     for name in mesh.marker_names:
         if name not in view.hidden:
-            style = {"colors": ROLES[session.role(name)].colour, "linewidths": _LINE * point}
+            style = {"colors": ROLES[session.role(name)].colour, "linewidths": _LINE * pixel_pt}
             axes.add_collection(LineCollection(list(_lines(mesh, name)), **style))
     if options.marked:
-        draw_mark(axes, session, point)
+        draw_mark(axes, session, pixel_pt)
 
 
 def _lines(mesh: Mesh, name: str) -> FloatArray:
-    """Return the segments of a boundary, (s, 2, 2)."""
+    """Return the segments (s, 2, 2) of a 2D mesh's boundary."""
     parts = [mesh.points[nodes] for _, nodes in mesh.marker(name).cells.by_type.values()]
     return np.concatenate([part for part in parts if part.shape[1] == 2] or [np.empty((0, 2, 2))])
 
 
 def _title(figure: Any, words: str, options: PictureOptions, *, size: float, left: float) -> None:
-    """Write a title from ``left`` on, a part of the width; ``size`` 1 is that of other titles."""
+    """Draw a title; ``left`` is its left end, relative to the width; ``size`` 1 is usual."""
     high = 1.0 - 0.5 * options.title_room * options.scale / options.size[1]
     points = size * TITLE * options.scale * 72.0 / figure.dpi
     figure.text(left, high, words, ha="left", va="center", fontsize=points, color=PAPER.text)
 
 
 def _legend(figure: Any, session: Session, options: PictureOptions) -> None:
-    """Draw the roles in use, or the colour bar, in the strip at the right, on a plate."""
+    """Draw the legend at the right, on a half-transparent plate: the roles, or the colour bar."""
     from matplotlib.patches import Patch, Rectangle
 
     width, scale = options.size[0], options.scale
@@ -203,7 +210,7 @@ def _legend(figure: Any, session: Session, options: PictureOptions) -> None:
         figure.legend(handles=roles, loc="upper right", fontsize=letters, **look)
         return
     inverted = session.frame is not None and session.frame.quality.inverted > 0
-    # Above the plate, which is above the mesh.
+    # The bar is above the plate, which is above the mesh.
     left, wide = 1.0 - (STRIP - 14) * scale / width, 20 * scale / width
     place = figure.add_axes((left, 0.16, wide, 0.62), zorder=1)
     colors = color_scale(session.view.colour_map, session.colour_range)
