@@ -18,7 +18,7 @@ UNDEFORMED = 4
 """Series number of the undeformed mesh, which no run has."""
 
 
-def look_of(run: Run) -> int:
+def series_of(run: Run) -> int:
     """Return the series number of a run, the same in all plots (see `Style.series`)."""
     number = run.number - 1
     return number if number < UNDEFORMED else number + 1
@@ -42,7 +42,7 @@ def step_runs(session: Session) -> list[StepRun]:
                 np.arange(len(frames)),
                 np.array([frame.quality.min for frame in frames]),
                 np.array([frame.quality.mean for frame in frames]),
-                look_of(run),
+                series_of(run),
             )
         )
     return found
@@ -60,7 +60,7 @@ def greedy_run(session: Session) -> GreedyRun | None:
         np.array([cycle.error for cycle in cycles]),
         np.array([cycle.level for cycle in cycles]),
         frame.step.tolerance,
-        look_of(run),
+        series_of(run),
     )
 
 
@@ -103,7 +103,7 @@ class Profiles:
                 made = along_radius(mesh, values, case.axis, case.origin, label=label)
             else:
                 made = along(mesh, values, coordinate, label=label)
-            kept[key] = replace(made, series=UNDEFORMED if run is None else look_of(run))
+            kept[key] = replace(made, series=UNDEFORMED if run is None else series_of(run))
         return kept[key]
 
 
@@ -114,7 +114,7 @@ def coordinates(session: Session) -> dict[Coordinate, str]:
     return {"r": "along the radius", "z": "along z", "y": "along y", "x": "along x"}
 
 
-def natural(session: Session) -> Coordinate:
+def usual_coordinate(session: Session) -> Coordinate:
     """Return the default coordinate along the span.
 
     It is the radius if the mesh repeats by rotation; else y in 2D, or the axis of largest extent.

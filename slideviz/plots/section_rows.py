@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from slideviz.mesh.quality import INVERTED
-from slideviz.plots.curves import UNDEFORMED, look_of
+from slideviz.plots.curves import UNDEFORMED, series_of
 from slideviz.plots.section_curve import Colours, CurveRow, curve_of, position_label
 from slideviz.plots.section_paint import Paint
 from slideviz.sections.model import Section
@@ -51,7 +51,7 @@ class CurveRows:
         curve = curve_of(lines, line, values, frame.quality.status == INVERTED)
         if run is None or session.view.frame == 0:
             return CurveRow("undeformed", curve, UNDEFORMED)
-        return CurveRow(run.label, curve, look_of(run))
+        return CurveRow(run.label, curve, series_of(run))
 
 
 def what_of(session: Session) -> Quantity:

@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.case.motion_words import deformation
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.plots.curves import look_of
+from slideviz.plots.curves import series_of
 from slideviz.plots.histogram import draw_distribution
 from slideviz.plots.series import Bars, Distribution, Outline
 from slideviz.plots.style import Style
@@ -95,7 +95,7 @@ def draw_histogram(
     metric = term.axis if term.unit else f"{term.label} quality [-]"
     runs, left_out = compared(session)
     outlines = [
-        Outline(other.label, counts.of(session, other.last, limits), look_of(other))
+        Outline(other.label, counts.of(session, other.last, limits), series_of(other))
         for other in runs
         if other.last is not None
     ]

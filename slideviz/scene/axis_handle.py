@@ -15,7 +15,7 @@ from slideviz.sections.around_axis import TURN, Patch, PlaceOnSection, axis_shap
 from slideviz.sections.model import Section
 from slideviz.session.section_cuts import Cuts
 
-Seen = Callable[[FloatArray], FloatArray]
+PixelsOf = Callable[[FloatArray], FloatArray]
 """A function that returns the display coordinates (n, 2), in pixels, of points (n, 3)."""
 
 _ROOM = 0.015
@@ -63,14 +63,14 @@ def frame_of(section: Section, patch: Patch) -> list[FloatArray]:
     return [shape.surface(section, line, section.size) for line in (*arcs, *sides)]
 
 
-def drag(
-    seen: Seen, section: Section, place: PlaceOnSection, size: float
+def pixel_and_slope(
+    pixels_of: PixelsOf, section: Section, place: PlaceOnSection, size: float
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Return the pixel of a place on a section, and how it moves with the section's size.
 
     Parameters
     ----------
-    seen : callable
+    pixels_of : callable
         Returns display coordinates.
     section : Section
     place : (float, float)
@@ -93,7 +93,7 @@ def drag(
     ways = shape.ways(section.sized(size), place[0])
     (here,) = shape.surface(section, np.array([place]), size)
     step = 1e-3 * section.size * lever
-    at = seen(np.concatenate([here[None], here + step * ways]))
+    at = pixels_of(np.concatenate([here[None], here + step * ways]))
     slopes = (at[1:] - at[0]) / step
     scale = float(np.linalg.norm(slopes, axis=1).max())
     steep = float(np.linalg.norm(slopes[0])) < _STEEP * scale
@@ -101,13 +101,18 @@ def drag(
 
 
 def dragged_size(
-    seen: Seen, section: Section, place: PlaceOnSection, *, start: FloatArray, now: FloatArray
+    pixels_of: PixelsOf,
+    section: Section,
+    place: PlaceOnSection,
+    *,
+    start: FloatArray,
+    now: FloatArray,
 ) -> float:
     """Return the size of a section after one of its places was dragged.
 
     Parameters
     ----------
-    seen : callable
+    pixels_of : callable
         Returns display coordinates.
     section : Section
         The section when the drag began.
@@ -120,13 +125,13 @@ def dragged_size(
         section.size,
         (_LEAST * section.size, axis_shape(section).size.high * (1.0 - _LEAST)),
     )
-    at, slope, steep = drag(seen, section, place, size)
+    at, slope, steep = pixel_and_slope(pixels_of, section, place, size)
     target = at + now - start
     if steep:
         return float(np.clip(size + float((now - start)[1] / slope[1]), *ends))
     # Newton's method: in perspective, the pixel is not linear in the size.
     for _ in range(4):
-        at, slope, steep = drag(seen, section, place, size)
+        at, slope, steep = pixel_and_slope(pixels_of, section, place, size)
         if steep:
             break
         size = float(np.clip(size + float((target - at) @ slope / (slope @ slope)), *ends))

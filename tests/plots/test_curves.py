@@ -41,7 +41,7 @@ def test_quality_by_step_begins_with_the_undeformed_mesh(two_runs):
 
 
 def test_a_run_has_one_look_in_every_plot_and_never_that_of_the_undeformed_mesh(two_runs):
-    looks = [curves.look_of(replace(two_runs.runs[0], number=number)) for number in range(1, 9)]
+    looks = [curves.series_of(replace(two_runs.runs[0], number=number)) for number in range(1, 9)]
     assert len(set(looks)) == 8
     assert curves.UNDEFORMED not in looks
     steps = {run.label: run.series for run in curves.step_runs(two_runs)}
@@ -104,10 +104,10 @@ def test_a_mesh_without_extent_that_way_is_refused(two_runs):
 
 
 def test_the_span_is_the_radius_where_a_mesh_repeats_about_an_axis(session, cube):
-    assert curves.natural(session) == "y"
+    assert curves.usual_coordinate(session) == "y"
     assert "z" not in curves.coordinates(session)
     solid = changes.open_mesh(StepFrame(cube, quality(cube)), None)
-    assert curves.natural(solid) in ("x", "y", "z")
+    assert curves.usual_coordinate(solid) in ("x", "y", "z")
     assert list(curves.coordinates(solid)) == ["r", "z", "y", "x"]
     turned = replace(solid, pairs=(SimpleNamespace(kind="rotational"),))
-    assert curves.natural(turned) == "r"
+    assert curves.usual_coordinate(turned) == "r"

@@ -10,7 +10,7 @@ from slideviz.color_scheme import COLOUR_MAP
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.plots import around as section_around
 from slideviz.plots.around import surroundings, window
-from slideviz.plots.curves import UNDEFORMED, look_of
+from slideviz.plots.curves import UNDEFORMED, series_of
 from slideviz.plots.section_curve import (
     Colours,
     Curve,
@@ -170,7 +170,7 @@ def test_a_session_has_the_curve_of_its_run_above_that_of_the_undeformed_mesh(se
     made = CurveRows()
     rows = made.of([(session, Cuts())], LINE)
     assert [one.label for one in rows] == ["undeformed", "run 1"]
-    assert [one.series for one in rows] == [UNDEFORMED, look_of(session.runs[0])]
+    assert [one.series for one in rows] == [UNDEFORMED, series_of(session.runs[0])]
     assert np.array_equal(rows[1].curve.values, session.frame.quality.values[rows[1].curve.cells])
     assert rows[0].curve.values == pytest.approx(1.0)
     first = changes.show_frame(session, 0)

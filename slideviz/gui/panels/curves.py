@@ -107,7 +107,7 @@ class CurvesPanel(Panel):
             self.coordinate.clear()
             for name, text in curves.coordinates(session).items():
                 self.coordinate.addItem(text, name)
-            self.coordinate.show_value(curves.natural(session))
+            self.coordinate.show_value(curves.usual_coordinate(session))
         kind = self.kind.currentData()
         missing = self._missing(session, kind)
         self.kind.setToolTip(TIPS[kind])

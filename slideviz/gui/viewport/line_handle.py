@@ -62,7 +62,7 @@ class Handle2D(MouseHandle[tuple[Section, Box]]):
 
     # Drawing ---------------------------------------------------------------------------
 
-    def seen(self) -> Box:
+    def seen_box(self) -> Box:
         """Return the lower and upper corner of the part of the mesh's plane that the view shows.
 
         A margin at the edges, and the strip of the legend, are not part of it.
@@ -78,7 +78,7 @@ class Handle2D(MouseHandle[tuple[Section, Box]]):
         """Draw the handle's points in the visible part of the plane, where the mouse can reach."""
         if self.section is None:
             return
-        seen = self.seen()
+        seen = self.seen_box()
         # The camera's event comes after each drawing too, which sets the clipping planes.
         key = (self.section, self._lift, self._scheme, self._part, *seen[0], *seen[1])
         if key == self._placed:
@@ -148,9 +148,9 @@ class Handle2D(MouseHandle[tuple[Section, Box]]):
     def grasp(self) -> tuple[Section, Box]:
         """Return the section and the visible box, as they are when a drag begins."""
         assert self.section is not None
-        return self.section, self.seen()
+        return self.section, self.seen_box()
 
-    def pulled(self, grasp: tuple[Section, Box], start: FloatArray, end: FloatArray) -> Section:
+    def dragged(self, grasp: tuple[Section, Box], start: FloatArray, end: FloatArray) -> Section:
         """Return the line or circle moved, turned, or with another radius, after a drag."""
         section, box = grasp
         return dragged(section, cast("Part", self._part), (start, end), box)

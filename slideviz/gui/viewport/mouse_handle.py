@@ -59,7 +59,7 @@ class MouseHandle(QObject, Generic[Grasp]):
         self._mouse = QPoint(-1, -1)
         self._start: tuple[Grasp, FloatArray] | None = None
         self._at: FloatArray | None = None
-        self._soon = later(self, self.tell)
+        self._soon = later(self, self.report)
         view.installEventFilter(self)
         watched, event = self.watched()
         tag = watched.AddObserver(event, lambda *_: self.put())  # type: ignore[arg-type]
@@ -104,7 +104,7 @@ class MouseHandle(QObject, Generic[Grasp]):
         """Draw the handle at its place, with the part under the mouse highlighted."""
         raise NotImplementedError
 
-    def pulled(self, grasp: Grasp, start: FloatArray, end: FloatArray) -> Section:
+    def dragged(self, grasp: Grasp, start: FloatArray, end: FloatArray) -> Section:
         """Return the section after a drag.
 
         Parameters
@@ -155,7 +155,7 @@ class MouseHandle(QObject, Generic[Grasp]):
         self._mouse = where
         if self._at is not None:
             self._at = self.place_of(where)
-            self.tell()
+            self.report()
         self._start = self._at = None
         self._dragging(False)
         self.put()
@@ -175,7 +175,7 @@ class MouseHandle(QObject, Generic[Grasp]):
         self.put()
         self.view.render_soon()
 
-    def tell(self) -> None:
+    def report(self) -> None:
         """Call ``moved`` with the section as dragged so far."""
         if self._start is not None and self._at is not None:
-            self._moved(self.pulled(*self._start, self._at))
+            self._moved(self.dragged(*self._start, self._at))

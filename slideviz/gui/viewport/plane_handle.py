@@ -57,7 +57,7 @@ class PlaneHandle:
         self.widget.SetInteractor(view.iren.interactor)
         self._bounds: Bounds | None = None
         self.dragging = False
-        self._soon = later(None, self.tell)
+        self._soon = later(None, self.report)
         for event, call in (
             ("StartInteractionEvent", lambda *_: self._grab(True)),
             ("InteractionEvent", lambda *_: self._soon.start()),
@@ -85,7 +85,7 @@ class PlaneHandle:
         self.widget.RemoveAllObservers()
         self.widget.SetInteractor(None)  # type: ignore[arg-type]  # None is taken, too
 
-    def tell(self) -> None:
+    def report(self) -> None:
         """Call ``moved`` with origin and normal of the dragged plane."""
         origin, normal = np.array(self.shape.GetOrigin()), np.array(self.shape.GetNormal())
         # Nobody aims at more decimals, and they would fill the fields of the normal.
@@ -102,7 +102,7 @@ class PlaneHandle:
             self.shape.SetInteractionState(vtkImplicitPlaneRepresentation.Pushing)
         if not dragging:
             self._soon.stop()
-            self.tell()
+            self.report()
         self._dragging(dragging)
 
     def _colour(self, scheme: ColorScheme) -> None:

@@ -22,7 +22,7 @@ from slideviz.gui.viewport.mouse_handle import (
     MouseHandle,
 )
 from slideviz.mesh.model import FloatArray
-from slideviz.scene.axis_handle import drag, dragged_size, frame_of
+from slideviz.scene.axis_handle import dragged_size, frame_of, pixel_and_slope
 from slideviz.scene.marked_cell import IN_FRONT
 from slideviz.scene.pick import to_display
 from slideviz.sections.around_axis import Patch, PlaceOnSection, axis_shape
@@ -64,7 +64,7 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
         self._drawn.remove()
         super().close()
 
-    def seen(self, points: FloatArray) -> FloatArray:
+    def pixels_of(self, points: FloatArray) -> FloatArray:
         """Return the display coordinates (n, 2) of points (n, 3), in pixels from the lower left."""
         return to_display(self.view, points)
 
@@ -73,7 +73,7 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
         if self.section is None or self._patch is None:
             return
         self.place = self._start[0][1] if self._start is not None else self._in_reach(self._patch)
-        at, way, _ = drag(self.seen, self.section, self.place, self.section.size)
+        at, way, _ = pixel_and_slope(self.pixels_of, self.section, self.place, self.section.size)
         self._drawn.draw_ball(at, way / np.linalg.norm(way))
         self._drawn.highlight(self._part is not None)
         if self._part is not None and not self.dragging and self.part_at(self._mouse) is None:
@@ -84,7 +84,7 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
         """Return the ball's place: the patch's middle, or if that is out of view, a visible one."""
         assert self.section is not None
         places = np.concatenate([np.array([patch.middle]), patch.places])
-        pixels = self.seen(
+        pixels = self.pixels_of(
             axis_shape(self.section).surface(self.section, places, self.section.size)
         )
         wide, high = self.view.window_size
@@ -106,7 +106,7 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
         """Return ``"ball"`` if it is in reach of a position in the widget, else None."""
         if self.section is None or self.place is None:
             return None
-        at, *_ = drag(self.seen, self.section, self.place, self.section.size)
+        at, *_ = pixel_and_slope(self.pixels_of, self.section, self.place, self.section.size)
         reach = REACH_PX * self.view.devicePixelRatioF()
         return "ball" if np.linalg.norm(at - self.place_of(where)) <= reach else None
 
@@ -116,12 +116,12 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
         assert self.place is not None
         return self.section, self.place
 
-    def pulled(
+    def dragged(
         self, grasp: tuple[Section, PlaceOnSection], start: FloatArray, end: FloatArray
     ) -> Section:
         """Return the section with the radius or angle to which the ball was dragged."""
         section, place = grasp
-        size = dragged_size(self.seen, section, place, start=start, now=end)
+        size = dragged_size(self.pixels_of, section, place, start=start, now=end)
         return section.sized(rounded(size, section.size))
 
 

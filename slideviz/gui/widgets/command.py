@@ -181,10 +181,10 @@ def solid(now: Now) -> bool:
 
 def bounded(now: Now) -> bool:
     """Return whether there are selected or moving boundaries."""
-    return opened(now) and bool(meant(now.session))
+    return opened(now) and bool(boundaries_meant(now.session))
 
 
-def meant(session: Session) -> tuple[str, ...]:
+def boundaries_meant(session: Session) -> tuple[str, ...]:
     """Return the boundaries a command acts on: the selected ones, or else those that move."""
     return session.view.selected or session.case.markers_with("moving")
 

@@ -93,7 +93,7 @@ class Faults(QObject):
 
     def _take(self, error: BaseException) -> None:
         self.count += 1
-        key, now = _place(error), self._clock()
+        key, now = _identity(error), self._clock()
         times, last = self._known.get(key, (0, float("-inf")))
         fresh = now - last >= REST_S
         self._known[key] = (1 if fresh else times + 1, now)
@@ -109,7 +109,7 @@ class Faults(QObject):
         self._banner.count(self._known[self._shown][0])
 
 
-def _place(error: BaseException) -> tuple[object, ...]:
+def _identity(error: BaseException) -> tuple[object, ...]:
     """Return what identifies an error: its type, and file and line that raised it.
 
     Without a trace: its type and its text.
