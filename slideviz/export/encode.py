@@ -33,11 +33,14 @@ Add = Callable[[Pixels, float], None]
 """A function that writes an image (height, width, 3) to be shown for a number of seconds."""
 
 SUFFIXES = (".mp4", ".gif", ".png")
+"""The kinds of films (see `kind_of`)."""
+
 SLOWEST = 10
 """Least frame rate of an MP4, as players fail with lower ones; images shown longer are repeated."""
 FASTEST = {".mp4": 60.0, ".gif": 50.0, ".png": float("inf")}
 """Largest frame rate by kind: what screens show, and what browsers play of a GIF."""
 _NUMBER = re.compile(r"(%(?:0\d)?d)")
+"""The place of the number in the name of numbered pictures."""
 
 
 @dataclass(frozen=True)
@@ -280,3 +283,4 @@ _WRITERS: dict[str, Callable[[Path, Take], AbstractContextManager[Add]]] = {
     ".gif": _gif,
     ".png": _pngs,
 }
+"""The writer of each kind."""

@@ -19,6 +19,8 @@ from slideviz.session.pieces import whole
 from slideviz.session.state import Run, Session, StepFrame
 
 SIZE = PictureOptions.size
+"""Default width and height in pixels."""
+
 WHITE = 250
 """Least red, green and blue (0 to 255) of a pixel that counts as background."""
 

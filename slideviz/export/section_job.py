@@ -29,6 +29,7 @@ from slideviz.session.state import Session
 from slideviz.terms import quantity_of
 
 _SHOWN = "shown: "
+"""Begin of the note about a threshold."""
 
 
 @dataclass(frozen=True)

@@ -169,6 +169,8 @@ def _cut(line: str, most: int) -> str:
 
 
 NAME = "mark:words"
+"""Name of the actor of the marked cell's label."""
+
 _AWAY = 9.0
 """Distance in pixels between the cell and its label, at normal letter size."""
 

@@ -29,6 +29,8 @@ from slideviz.session.state import Session
 from slideviz.terms import COLOUR_BY, ROLES
 
 SUFFIXES = (".svg", ".pdf")
+"""Suffixes of such pictures."""
+
 MOST_CELLS = 100_000
 """Most cells of such a picture: viewers take minutes to show more."""
 _SCREEN_DPI = 200.0

@@ -13,6 +13,8 @@ from qtpy.QtWidgets import QDockWidget, QMainWindow, QMenu, QTabBar, QWidget
 from slideviz.gui.responsiveness.timers import later
 
 TIP = "Double click: a window of its own. Drag it away to put the panel elsewhere."
+"""Tooltip of a tab."""
+
 _DOWN = 24
 """Distance in pixels, left and down, at which a dock appears that is made a window of its own."""
 

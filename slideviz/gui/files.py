@@ -69,8 +69,7 @@ class Files(QObject):
     def folder(self) -> Path:
         """Return the folder in which file dialogs start: that of the last file, if it exists.
 
-        Else the working directory; the home folder if that is the root or not writable, as when
-        started from a desktop.
+        Else the working directory, or the home folder if that is the root or not writable.
         """
         path = Path(str(self.settings.value("folder", "")))
         if self.settings.value("folder", "") and path.is_dir():
@@ -108,10 +107,7 @@ class Files(QObject):
             self.open_sample(found[0], size=found[1])
 
     def open_sample(self, name: str, run: bool = False, size: int | None = None) -> None:
-        """Start the job that writes a sample case to `sample_folder` and opens it.
-
-        ``run``: deform it then; ``size``: see `ask_and_open_sample`, by default the usual one.
-        """
+        """Start the job that writes a sample case to `sample_folder` and opens (and runs) it."""
         if not self.ask_about_unsaved(lambda: self.open_sample(name, run, size)):
             return
         self.window.running.start_job(
@@ -150,8 +146,7 @@ class Files(QObject):
         Parameters
         ----------
         again : callable
-            Called after the mesh was saved, which is done by a job: False is returned then, and
-            ``again`` repeats what was asked about.
+            Repeats the action; called after a job has saved the mesh, for which False is returned.
         before : str
             What the user wants to do that would lose the changes, in words.
         """
@@ -226,10 +221,7 @@ class Files(QObject):
         )
 
     def ask_output(self) -> Path | None:
-        """Ask for the file of the deformed mesh, needed if the mesh stays in its file; or None.
-
-        The mesh's own file is refused, as a run reads it while it writes.
-        """
+        """Ask for the deformed mesh's file, not that of a mesh that stays in its file; or None."""
         session = self.window.store.session
         assert session.mesh is not None
         default = session.case.mesh_out or self.folder() / f"{self.stem()}_deformed.su2b"

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow
 
 SIZE = (1280, 800)
+"""Width and height of the window in pixels."""
+
 APART, MANY, EXACT = 192, 40, 24
 """Numbers of colours in a picture's palette: mutually distant; of large areas; most frequent."""
 

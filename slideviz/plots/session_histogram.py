@@ -154,6 +154,8 @@ def _colours(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
 
 
 _MIDDLES = (np.arange(FINE) + 0.5) / FINE
+"""Middles of the fine intervals (`FINE`) of a tally of qualities."""
+
 BINS = 25
 """Number of intervals: few enough that an outline's steps show its dashes in a narrow panel."""
 

@@ -16,6 +16,8 @@ _ON_LIGHT = tuple(
     PALETTE[name]
     for name in ("blue", "vermilion", "green", "purple", "black", "sky blue", "orange")
 )
+"""The colours of series on a light background."""
+
 _ON_DARK = (
     *(PALETTE["sky blue"], PALETTE["orange"], "#2bc49a", "#e39bc4", "#ffffff"),
     *(PALETTE["yellow"], "#f08040"),
@@ -31,7 +33,10 @@ _DASHES: tuple[Any, ...] = (
     (0, (6, 1.4, 1.2, 1.4, 1.2, 1.4)),
     (0, (10, 2)),
 )
+"""The dashes of series, as line styles of matplotlib."""
+
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+"""The markers of series."""
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ SETTINGS = {
     # TrueType; journals refuse the Type 3 fonts that matplotlib writes otherwise.
     "pdf.fonttype": 42,
 }
+"""matplotlib's settings while a figure is written."""
 
 _AIR = 0.08
 """Space in inches between the parts of a figure, and around them."""

@@ -184,6 +184,7 @@ the values.
 
 _DEPTH = "//VTK::Depth::Impl"
 _BEHIND = _DEPTH + "\n  gl_FragDepth = 1.0;"
+"""The replacement of `_DEPTH`: the greatest depth for every pixel."""
 
 
 def draw_fine_edges(actor: Any) -> None:

@@ -20,6 +20,8 @@ from slideviz.session.state import Session
 from slideviz.terms import ROLES
 
 BASE, MOVED, BEHIND, LABELS = "boxes:undeformed", "boxes:moved", "boxes:behind", "boxes:-labels"
+"""Names of actors: undeformed boxes, moved ones, parts behind the mesh, labels."""
+
 ENDS = (0, 0, 0), (-1, 0, 0), (0, -1, 0), (0, 0, -1)
 """Indices of a box's first control point, and of those at the ends of its edges in i, j and k."""
 

@@ -31,6 +31,7 @@ FILL = 0.94
 """Part of the view's height or width that a fitted section takes."""
 
 READING = "its cells are being read from the file of the mesh"
+"""Summary while cells are being read."""
 
 
 class FlatScene:

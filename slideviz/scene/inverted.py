@@ -26,6 +26,7 @@ SIZES = ((0, 15.0), (50, 12.0), (300, 9.0))
 _DISC = "if (len2 > 1.0) { discard; }"
 """The line of VTK's shader that makes a square point round; `_RING` replaces it."""
 _RING = "if (len2 > 1.0 || len2 < 0.42) { discard; }"
+"""The replacement of `_DISC`: a ring instead of a disc."""
 
 
 class InvertedLayer(Layer):

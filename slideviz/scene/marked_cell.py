@@ -18,6 +18,8 @@ from slideviz.session.inspect import nodes_of
 from slideviz.session.state import Session
 
 OUTLINE, FACES, DOT = "mark:outline", "mark:faces", "mark:dot"
+"""Names of the actors."""
+
 IN_FRONT = -66_000.0
 """Depth offset, in 1/65536 of the depth range, that draws lines and points before everything."""
 

@@ -51,13 +51,6 @@ class Scene:
         Colours of background, text and edges.
     font_scale : float
         Factor of the letters' size, for pictures of many pixels.
-
-    Attributes
-    ----------
-    session : Session
-        The state that is shown.
-    camera : Camera
-    sections : SectionLayer
     """
 
     def __init__(self, plotter: Any, scheme: ColorScheme = LIGHT, font_scale: float = 1.0) -> None:

@@ -38,13 +38,10 @@ class SectionDrawn:
 
     Attributes
     ----------
-    shown : PolygonActor
     made_of : tuple
         Everything that the polygons depend on, to be compared.
-    frame : StepFrame or None
-        The frame with the cut cells; for a mesh in its file, one made of those that were read.
-    of : Mesh or None
-        The mesh of the shown frame.
+    frame, of : StepFrame, Mesh
+        The frame with the cut cells (of a mesh in its file: those read); the shown frame's mesh.
     """
 
     shown: PolygonActor
@@ -240,6 +237,8 @@ def shown_sections(session: Session) -> Iterator[tuple[int, Section]]:
 
 
 LINE = "line:"
+"""Prefix of the actors' names of thin lines."""
+
 WIDTH = 1.2
 """Width of the thin line of a 2D section, in pixels."""
 

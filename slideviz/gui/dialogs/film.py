@@ -20,6 +20,7 @@ from slideviz.gui.widgets.build import QuietBar, hint_label, in_column, in_row, 
 from slideviz.gui.widgets.pixmaps import drawn_for, fitted, framed, preview_label, to_image
 
 PREVIEW = (360, 225)
+"""Largest width and height of a preview, in pixels."""
 
 
 class FilmDialog(QDialog):

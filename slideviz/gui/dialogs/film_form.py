@@ -20,6 +20,8 @@ KINDS = {
     ".gif": "GIF, for slides and web pages",
     "": "one PNG picture for each image",
 }
+"""Kinds of films by the suffix of their file; empty: a folder of pictures."""
+
 SIZE_WORDS = {
     "800x500": "800 × 500",
     "1280x800": "1280 × 800",

@@ -47,6 +47,7 @@ MOUSE = (
     ("Menu key or right click on a motion", "duplicate, copy, paste, order, remove"),
     ("Drop a file", "open it"),
 )
+"""What the mouse does, and where."""
 
 
 class Help(QObject):

@@ -61,6 +61,8 @@ SIZES = {
     "paper": "on paper, in cm",
     "other": "other",
 }
+"""Sizes that can be chosen: in pixels, or by a name."""
+
 TEXT = {0.8: "small", 1.0: "normal", 1.4: "large"}
 """Sizes of letters relative to the normal one."""
 
@@ -79,6 +81,7 @@ OPTIONS = {
     "marked": ("Marked cell", "Its outline, with its number and its value."),
     "both": ("Both runs beside each other", "As the two views, with one legend."),
 }
+"""Text and tip of the check box for each field of `PictureOptions` that is a bool."""
 
 
 class PictureDialog(QDialog):

@@ -36,6 +36,8 @@ KINDS = {
     "greedy": "Convergence",
     "span": "Along the span",
 }
+"""The plots that can be chosen."""
+
 TIPS = {
     "steps": "Minimum and mean quality against the step; click at a step to go there.",
     "greedy": "Largest error against control nodes, as the greedy selection adds them.",

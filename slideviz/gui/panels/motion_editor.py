@@ -27,6 +27,7 @@ from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.session.motions import Axis, radial
 
 Z = (0.0, 0.0, 1.0)
+"""Axis of rotations in 2D."""
 
 
 class MotionEditor(MotionForm):

@@ -21,6 +21,7 @@ ABOUT = {
     "radial": "radial through its centroid",
     "point": "a point",
 }
+"""What a motion leaves in place, by the choice's value."""
 
 
 class MotionForm(QWidget):
@@ -125,6 +126,7 @@ KINDS: dict[type, str] = {
     Ffd: MOTION_KINDS["ffd"].label,
     FromFile: MOTION_KINDS["file"].label,
 }
+"""Labels of the kinds of motion, by class."""
 
 
 def control_point(values: Sequence[float]) -> str:

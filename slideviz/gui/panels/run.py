@@ -30,6 +30,8 @@ from slideviz.session.state import Session
 from slideviz.session.store import Store
 
 LONG = 100
+"""Number of letters from which a text is shortened (see `_short`)."""
+
 SETTINGS, NOTES = "settings", "notes"
 """Targets of links in the text: take the settings of the shown run, show its notes."""
 

@@ -24,6 +24,7 @@ STEPS = 1000
 
 FREE = "free"
 AXES: dict[str, Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+"""The directions that can be chosen by name."""
 
 
 class SectionEditor(QWidget):

@@ -43,6 +43,8 @@ HINTS = {
     3: f"Cut the mesh with a {names()} to see its cells inside.",
     2: f"Lay a {names(2)} through the mesh to see the cells on it, and their quality along it.",
 }
+"""Hint shown while there are no sections, by the mesh's dimension."""
+
 BUTTONS_IN_ROW = 3
 """Most buttons that add a section in one row."""
 

@@ -18,6 +18,8 @@ from slideviz.session.inspect import WorstCells
 from slideviz.session.locate import Around, coordinates, decimals
 
 SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
+"""Short names of cell types."""
+
 COLUMNS = ("Cell", "Quality", "Worst\nstep")
 CELL, QUALITY, SINCE = range(3)
 """The first columns; then come the coordinates, and the cell type if there are several."""

@@ -27,6 +27,7 @@ from slideviz.sections.line import Box
 from slideviz.sections.model import Section
 
 NAMES = ("handle:rim", "handle:points", "handle:held")
+"""Names of the actors: rims of the points, the points, and those under the mouse."""
 
 
 class Handle2D(MouseHandle[tuple[Section, Box]]):

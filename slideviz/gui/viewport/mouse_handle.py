@@ -17,6 +17,8 @@ from slideviz.mesh.model import FloatArray
 from slideviz.sections.model import Section
 
 HANDLE_COLOUR = "#2f6fb5"
+"""Colour of a handle that the mouse is not over."""
+
 POINT_PX, RIM_PX = 11.0, 15.0
 """Diameters of a handle's point and of the rim around it, in pixels."""
 

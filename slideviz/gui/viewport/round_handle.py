@@ -126,7 +126,11 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
 
 
 FRAME, RIM, BALL = "handle:frame", "handle:rim", "handle:ball"
+"""Names of the actors."""
+
 _WIDTH = 1.5
+"""Width of the frame's lines, in pixels."""
+
 _CORNERS = 32
 """Number of corners of the polygon that is drawn as the ball."""
 
@@ -134,6 +138,8 @@ _FAR_PX, _HEAD_PX, _SHAFT_PX = 25.0, 8.0, 2.5
 """Of an arrow, in pixels: distance of its tip from the middle, head length, shaft thickness."""
 
 _NECK_PX = _FAR_PX - _HEAD_PX
+"""Distance from the middle to where an arrow's head begins, in pixels."""
+
 _ARROW = (
     np.array([(0.0, -0.5), (_NECK_PX, -0.5), (_NECK_PX, 0.5), (0.0, 0.5)]) * (1.0, _SHAFT_PX),
     np.array([(_FAR_PX, 0.0), (_NECK_PX, 0.5), (_NECK_PX, -0.5)]) * (1.0, _HEAD_PX),

@@ -26,6 +26,7 @@ from slideviz.session.state import Session
 from slideviz.session.store import Store
 
 NOTHING = "The section cuts no cell."
+"""Text shown instead of the plot."""
 
 
 class CurveView(QWidget):

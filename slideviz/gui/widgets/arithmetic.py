@@ -8,6 +8,8 @@ import re
 from collections.abc import Callable
 
 _ALLOWED = re.compile(r"[\d.eE+\-*/() ]+\Z")
+"""The letters that an expression may have."""
+
 _SIGNS: dict[type[ast.unaryop], Callable[[float], float]] = {
     ast.UAdd: operator.pos,
     ast.USub: operator.neg,

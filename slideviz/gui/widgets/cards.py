@@ -18,6 +18,8 @@ from slideviz.terms import ROLES
 SIZE = (152, 96)
 """Width and height of a picture in pixels, at a device pixel ratio of 1."""
 BODY, WALL, REPEAT = (ROLES[role].colour for role in ("moving", "sliding", "periodic"))
+"""Colours of moving, sliding and periodic boundaries."""
+
 Map = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 """A map from coordinates (u, v) in the unit square, (n,) each, to pixels (x, y) of a picture."""
 
@@ -188,3 +190,4 @@ _DRAWINGS: dict[str, Callable[[], str]] = {
     "turbine-row": _row,
     "stator": _stator,
 }
+"""The function that draws each sample; others get a plain square mesh."""

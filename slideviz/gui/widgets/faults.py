@@ -40,6 +40,8 @@ PACKAGES = (
     "pyvistaqt",
     "PySide6_Essentials",
 )
+"""Distributions whose versions belong into a bug report."""
+
 _LEVELS = {
     QtMsgType.QtDebugMsg: logging.DEBUG,
     QtMsgType.QtInfoMsg: logging.INFO,
@@ -47,6 +49,8 @@ _LEVELS = {
     QtMsgType.QtCriticalMsg: logging.ERROR,
     QtMsgType.QtFatalMsg: logging.CRITICAL,
 }
+"""Log levels of Qt's messages."""
+
 log = logging.getLogger("slideviz")
 
 

@@ -59,6 +59,7 @@ STROKES = {
     "log": '<path d="M4 5h16v14H4z"/><path d="M7 9l3 3-3 3M12 15h5"/>',
     "theme": '<circle cx="12" cy="12" r="8"/><path d="M12 4a8 8 0 0 1 0 16z" fill="{c}"/>',
 }
+"""SVG elements of each icon in a box of 24 by 24; ``{c}`` is the colour."""
 
 _ROLE_STROKES = {
     "moving": '<path d="M4 12h14M12.5 6l6 6-6 6"/>',
@@ -70,6 +71,7 @@ _ROLE_STROKES = {
     "internal": '<circle cx="12" cy="12" r="8" stroke-dasharray="3 2.4"/>'
     '<circle cx="12" cy="12" r="2.4" fill="{c}"/>',
 }
+"""SVG elements of the sign of each role, likewise."""
 
 _SVG = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 24 24"><g fill="none" stroke="{c}" '

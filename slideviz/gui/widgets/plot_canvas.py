@@ -28,6 +28,8 @@ from slideviz.plots.draw import PRINT, Style
 from slideviz.plots.written import figure_bytes
 
 FIGURE_INCHES = (4.2, 3.1)
+"""Width and height of a saved figure, in inches."""
+
 PLOT_FILTERS = "PNG picture (*.png);;SVG drawing (*.svg);;PDF drawing (*.pdf)"
 
 

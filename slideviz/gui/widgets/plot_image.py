@@ -21,6 +21,8 @@ DPI = 100
 
 
 THREAD = "slideviz-plot"
+"""Name of the threads that draw plots."""
+
 _ONE = Lock()  # matplotlib is not made for several threads
 
 Draw = Callable[[Figure, Style], None]

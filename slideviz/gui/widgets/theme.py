@@ -11,6 +11,7 @@ from qtpy.QtWidgets import QApplication, QToolTip
 from slideviz.color_scheme import DARK, LIGHT, ColorScheme
 
 THEMES = ("system", "light", "dark")
+"""The themes that can be chosen."""
 
 _PALETTE = {
     "Window": ("#f4f6f8", "#262b31"),
@@ -96,6 +97,7 @@ QPushButton[recent="true"]:focus {{ border: 1px solid {accent}; }}
 QFrame#banner {{ background: {banner}; border: 1px solid {bad}; border-radius: 4px; }}
 QFrame#banner[calm="true"] {{ background: {note}; border: 1px solid {noted}; }}
 """
+"""The style sheet, with the keys of `_PALETTE` and `_STYLE` in place of colours."""
 
 FRAMED = (
     "QCheckBox",
