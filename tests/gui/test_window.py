@@ -203,7 +203,6 @@ def test_a_click_in_the_view_selects_and_the_right_button_assigns_a_role_and_iso
     assert set(window.boundaries.selected()) == {"outflow", "airfoil"}
     QTest.mouseClick(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, QPoint(4, 4))
     assert window.boundaries.selected() == ()
-    window, mesh = opened.window, opened.session.mesh
     nodes = mesh.marker("inflow").cells.connectivity.reshape(-1, 2)
     middle = mesh.points[nodes[len(nodes) // 2]].mean(axis=0)
 
@@ -278,6 +277,10 @@ def test_a_translation_and_a_scaling_are_typed_and_the_ghost_moves_at_once(opene
 def test_a_rotation_is_typed_and_an_intersection_is_told_meanwhile_of_the_last_motion_only(
     opened, monkeypatch
 ):
+    from slideviz.color_scheme import INTERSECTION_COLOUR
+    from slideviz.session import intersections
+    from slideviz.terms import ROLES
+
     opened.add_motion(Rotate)
     editor = opened.window.motions.editor
     opened.type(editor.angle, "90")
@@ -293,9 +296,6 @@ def test_a_rotation_is_typed_and_an_intersection_is_told_meanwhile_of_the_last_m
     assert np.allclose(ghost(opened), np.stack([-start[:, 1], start[:, 0]], 1))
     assert not editor.axis.isVisible(), "a 2D mesh has but one axis"
     opened.window.store.change(changes.set_case, motions=())
-    from slideviz.color_scheme import INTERSECTION_COLOUR
-    from slideviz.terms import ROLES
-
     window, panel = opened.window, opened.window.run_panel
     # Periodic sides that move along may be passed; others may not.
     window.store.change(changes.set_case, periodic="periodic")
@@ -317,9 +317,7 @@ def test_a_rotation_is_typed_and_an_intersection_is_told_meanwhile_of_the_last_m
     assert drawn.prop.color == ROLES["moving"].colour
     assert panel.text.text() == "Ready."
     opened.window.store.change(changes.set_case, motions=())
-    from slideviz.session import intersections
-
-    window, asked = opened.window, []
+    asked = []
 
     def listening(case, mesh, report, stopped):
         asked.append(case.motions[0].vector[1])
@@ -386,7 +384,6 @@ def test_motions_are_reordered_changed_and_removed_and_need_a_moving_boundary(op
     assert not opened.session.case.motions
     assert not panel.editor.isVisible()
     opened.role("airfoil", "fixed")
-    panel = opened.window.motions
     assert not panel.add.isEnabled()
     assert "moving" in panel.hint.text()
     assert "moving" in panel.add.toolTip()
@@ -414,14 +411,14 @@ def test_settings_reach_the_case_and_impossible_numbers_do_not(opened):
     assert (case.steps, case.influence_factor, case.feature_angle_deg) == (12, 3.5, 35.0)
     assert (case.quality_metric, case.kernel) == ("rbf-slide", "wendland-c4")
     assert "λ =" in method.found.text()
-    field = opened.window.method.more.influence_factor
+    field = more.influence_factor
     opened.window.store.change(changes.set_case, influence_factor=2.5)
     field.selectAll()
     QTest.keyClicks(field, "-1")
     assert field.property("bad")
     assert "-1 is out of range; needed is a number above 1e-06" in field.toolTip()
     assert opened.session.case.influence_factor == 2.5
-    kernel = opened.window.method.more.kernel
+    kernel = more.kernel
     assert kernel.count() == 14
     assert {kernel.itemData(row) for row in range(14)} >= {"wendland-c2", "gaussian"}
 
@@ -469,8 +466,6 @@ def test_data_reduction_has_a_tolerance_in_length_and_keeps_its_settings(opened)
     assert opened.session.case.reduction is None
     opened.choose(method.reduction, "YES")
     assert opened.session.case.reduction == wanted
-    method, extent = opened.window.method, opened.session.mesh.extent
-    opened.window.docks["method"].raise_()
     given = Reduction(relative=1e-4, gamma=20.0)
     opened.window.store.change(changes.set_case, reduction=given)
     assert method.tolerance.value == pytest.approx(1e-4 * extent, rel=1e-5)
@@ -592,6 +587,7 @@ def test_playing_ends_at_the_last_step_and_its_speed_is_chosen_also_meanwhile(ra
     player.speed_button.menu().actions()[0].trigger()
     assert (player.speed_button.text(), player._timer.interval()) == ("0.5×", 1000)
     player.stop()
+    player.go(3)
     player.set_speed(4.0)
     ran.click(player.buttons["play"])
     assert ran.session.view.frame == 0
@@ -622,7 +618,7 @@ def test_a_run_shows_its_steps_and_the_quality_and_no_size_changes_with_the_numb
         QApplication.processEvents()
         assert [part.width() for part in parts] == widths
     player.go(3)
-    session, window = ready.session, ready.window
+    session = ready.session
     assert len(session.frames) == 4
     assert session.view.frame == 3
     assert session.view.colour_by == "size-skew"
@@ -656,7 +652,7 @@ def test_numbers_without_room_are_shorter_and_a_narrow_player_leaves_out_speed_b
     ran.window.resize(1280, 800)
     ran.qtbot.waitUntil(player.speed_button.isVisible)
     assert player.step_text.text() == "Step 3 of 3"
-    result = ran.window.player.result
+    result = player.result
     full, *short = [[plain(part) for part in form] for form in result_parts(ran.session)]
     result.resize(5000, 20)
     assert [part.strip() for part in plain(result.text()).split("·")] == full
