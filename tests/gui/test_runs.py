@@ -515,10 +515,10 @@ def test_the_theme_reaches_both(ran):
 
 
 @pytest.mark.usefixtures("painted")
-def test_comparing_twenty_times_leaves_nothing_behind(ran):
+def test_comparing_ten_times_leaves_nothing_behind(ran):
     viewing, gone = ran.window.viewing, []
     observed = viewing.view.camera.HasObserver
-    for turn in range(20):
+    for turn in range(10):
         compare(ran, turn % 2)
         gone += [weakref.ref(viewing.second), weakref.ref(viewing.second_scene)]
         ran.window.store.change(changes.show_beside, None)
