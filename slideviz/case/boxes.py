@@ -1,4 +1,4 @@
-"""The boxes for free-form deformation that a case can use, and what they do to boundaries."""
+"""The FFD boxes that a case can use (of its mesh, or its own), and the displacements they give."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.model import IntArray, Mesh
 
 OFF = 1e-6
-"""By how much, as a part of the box, the coordinates in a mesh file may miss their points."""
+"""Largest distance between a node and the point that the mesh file's parametric coordinates give
+for it, over the size of the box, that gets no warning."""
 
 _EMBEDDED: WeakKeyDictionary[Mesh, dict[tuple[Box, str], tuple[Embedding, float]]] = (
     WeakKeyDictionary()
@@ -27,23 +28,25 @@ _DEFINED: WeakKeyDictionary[Mesh, dict[object, dict[str, Box]]] = WeakKeyDiction
 
 
 def boxes_for(case: Case, mesh: Mesh) -> dict[str, Box]:
-    """Return the boxes of the mesh, and those of the case that it does not have, by name.
+    """Return the boxes of the mesh and of the case, by name; of two with one name the mesh's.
 
     Raises
     ------
     SlidevizError
-        The mesh's section or the case's definition has mistakes.
+        The boxes in the mesh file or in FFD_DEFINITION have mistakes.
     """
     return {**defined_boxes(case, mesh), **{box.name: box for box in boxes_of(mesh)}}
 
 
 def defined_boxes(case: Case, mesh: Mesh) -> dict[str, Box]:
-    """Return the boxes that the case defines, undeformed, by name.
+    """Return the boxes that FFD_DEFINITION of the case defines, undeformed, by name.
+
+    They are found once for each mesh.
 
     Raises
     ------
     CaseError
-        A box is not possible.
+        The corners, degrees or orders of a box make none.
     """
     key = case.ffd_boxes, case.ffd_degrees, case.ffd_blending, case.ffd_orders
     kept = _DEFINED.setdefault(mesh, {})
@@ -70,7 +73,7 @@ def _defined(
 
 
 def ffd_problems(case: Case, mesh: Mesh, motion: Ffd) -> tuple[str, ...]:
-    """Return why the mesh cannot have a motion."""
+    """Return why a motion of a box is impossible with a mesh, a sentence for each reason."""
     try:
         boxes = boxes_for(case, mesh)
     except SlidevizError as problem:
@@ -86,7 +89,15 @@ def ffd_problems(case: Case, mesh: Mesh, motion: Ffd) -> tuple[str, ...]:
 
 
 def missing_box(mesh: Mesh, name: str, boxes: Iterable[str], none: str) -> str:
-    """Return a sentence on a box that a mesh has not; ``none`` is said where it has none."""
+    """Return the message that there is no box of a name, with those there are.
+
+    Parameters
+    ----------
+    boxes
+        The names of the boxes there are.
+    none : str
+        The end of the message where there are none.
+    """
     zone = mesh.origin.ffd_elsewhere.get(name)
     if zone is not None:
         return (
@@ -99,10 +110,11 @@ def missing_box(mesh: Mesh, name: str, boxes: Iterable[str], none: str) -> str:
 
 
 def embedding(box: Box, mesh: Mesh, marker: str) -> tuple[Embedding, float]:
-    """Return the nodes of a marker that are in a box, and by how much they are not its points.
+    """Return the nodes of a marker in a box, embedded there, and how far off they are at most.
 
-    Their parametric coordinates are those of the mesh file where it lists some of this marker.
-    By how much is a part of the size of the box. All is found once for each mesh.
+    Their parametric coordinates are read from the mesh file, where it has some for this marker;
+    else they are computed. How far off: the distance of a node from the point of its parametric
+    coordinates, over the size of the box. Both are found once for each mesh.
     """
     kept = _EMBEDDED.setdefault(mesh, {})
     if (box, marker) not in kept:
@@ -121,7 +133,7 @@ def embedding(box: Box, mesh: Mesh, marker: str) -> tuple[Embedding, float]:
 
 
 def off_points(box: Box, mesh: Mesh, marker: str) -> list[str]:
-    """Return a warning where the points of a box on a marker are not those of the mesh."""
+    """Return a warning where the nodes of a marker in a box are off (`embedding`); else []."""
     _, off = embedding(box, mesh, marker)
     said = (
         f"{mesh.name}: the surface points of the FFD box {box.name!r} on {marker} are not those of "
@@ -132,12 +144,12 @@ def off_points(box: Box, mesh: Mesh, marker: str) -> list[str]:
 
 
 def ffd_displacements(case: Case, mesh: Mesh, names: Iterable[str]) -> dict[object, Displacements]:
-    """Return what each motion of a box does to the nodes of the moving markers ``names``.
+    """Return the displacements of the nodes of the moving markers ``names``, by motion of a box.
 
     Raises
     ------
     CaseError
-        None of the nodes that a motion should move is in its box: all such motions.
+        None of the nodes that a motion should move is in its box; a line for each such motion.
     """
     motions = [motion for motion in case.motions if isinstance(motion, Ffd)]
     boxes = boxes_for(case, mesh) if motions else {}
@@ -173,7 +185,10 @@ def _is_in(name: str, mesh: Mesh) -> bool:
 
 
 def _moved(box: Box, mesh: Mesh, motion: Ffd, on: Mapping[str, IntArray]) -> Displacements | None:
-    """Return the displacement of the nodes of markers; None where no node is in the box."""
+    """Return the displacements that a motion of a box gives all nodes of some markers.
+
+    None where no node is in the box. ``on`` has the nodes (k,) of each marker.
+    """
     nodes = np.unique(np.concatenate([*on.values(), np.empty(0, np.int64)]))
     vectors = np.zeros((len(nodes), mesh.dim))
     change = box.change(motion.index, motion.vector)
@@ -187,9 +202,10 @@ def _moved(box: Box, mesh: Mesh, motion: Ffd, on: Mapping[str, IntArray]) -> Dis
 
 
 def moved_boxes(case: Case, mesh: Mesh, part: float = 1.0) -> Mesh:
-    """Return the mesh with its boxes where a part of the motions takes them.
+    """Return the mesh with its boxes deformed by the motions of the case times ``part``, 0 to 1.
 
-    Where other motions move boundaries too, no box can follow, and all stay as they were.
+    Where the case has motions of other kinds too, the boxes are left as they are: no control
+    points could follow these.
     """
     motions = [motion for motion in case.motions if isinstance(motion, Ffd)]
     if not motions or len(motions) < len(case.motions):

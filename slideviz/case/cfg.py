@@ -1,6 +1,6 @@
-"""The case file: ``KEY= value`` in the manner of SU2, a superset of RBF-SliDe's.
+"""Reading and writing the case file: lines ``KEY= value`` as in SU2, with all keys of RBF-SliDe.
 
-Everything that a file has wrong is reported at once. Paths in it are relative to its folder.
+All mistakes in a file are reported at once. Paths in it are relative to its folder.
 """
 
 from __future__ import annotations
@@ -48,18 +48,18 @@ def read_case(path: Path) -> Case:
 def write_case(path: Path, case: Case, remarks: Iterable[str] = ()) -> None:
     """Write a case file that ``read_case`` reads back without loss.
 
-    Files below, or near, its folder are named relative to it, so that folders can be moved.
-    Remarks, of one line each, stand at its top as comments.
+    Paths in it are relative to its folder, so that both can be moved together; absolute where they
+    have nothing but the root in common. Remarks, of one line each, are comments at its top.
 
     Raises
     ------
     CaseError
-        The file cannot be written, or the case has something that no case file can hold.
+        The file cannot be written, or a value of the case has no form in a case file.
     """
     folder = Path(os.path.realpath(path.parent))
     named = _with_paths(case, lambda file: _to_folder(file, folder))
     text = "".join(f"% {remark}\n" for remark in remarks) + _text(named, path)
-    # Whatever is saved can be opened again: better no file than one that has to be mended.
+    # Whatever is saved can be opened again: better no file than one with mistakes.
     again, problems, _ = _parsed(path, text)
     if not problems and again.change(source=case.source, warnings=case.warnings) != named:
         problems = [(0, "a case file cannot hold some of its values; check points and motions")]
@@ -72,9 +72,9 @@ def write_case(path: Path, case: Case, remarks: Iterable[str] = ()) -> None:
 def set_key(case: Case, key: str, value: str) -> Case:
     """Return the case with another value of a key, as ``--set KEY=VALUE`` asks for.
 
-    A list of markers replaces the list, and its markers lose the role they had. A path is
-    relative to the current folder. Contradictions between keys are found by ``check_case``, so
-    that several keys can be set one after the other.
+    A list of markers replaces all markers with that role; one that had another role loses it. A
+    path is relative to the current folder. Contradictions between keys are not looked for here
+    but by ``check_case``, so that several keys can be set one after the other.
 
     Raises
     ------
@@ -102,7 +102,10 @@ def set_key(case: Case, key: str, value: str) -> Case:
 
 
 def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]]:
-    """Return the case with paths as written, the problems, and warnings."""
+    """Return the case of a text, its problems, and warnings; paths are as written in it.
+
+    ``path`` is for messages only.
+    """
     entries, problems = entries_of(text)
     require_no_mesh(path, entries)
     rows: dict[str, Entry] = {}
@@ -130,7 +133,7 @@ def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]
             remark = key.kind.remark(entry.value)
             remarks += [f"{path}:{entry.line}: {name}: {remark}"] if remark else []
     twice = _second_roles(rows, values)
-    # What follows from a mistyped key or from two roles is not worth telling again.
+    # A mistyped key, or two roles of a marker, make contradictions that are not reported as well.
     doubtful = {key for key in KEYS for _, text in problems if f"did you mean {key}?" in text}
     doubtful |= {"MARKER_MOVING"} if twice else set()
     problems += twice
@@ -150,7 +153,7 @@ def _value(key: Key, entry: Entry) -> Any:
 
 
 def _second_roles(rows: Mapping[str, Entry], values: Mapping[str, Any]) -> list[Problem]:
-    """Return the markers that stand in two lists, at the later of their lines."""
+    """Return a problem for each marker in two lists of roles, at the later one's line."""
     problems: list[Problem] = []
     first: dict[str, Entry] = {}
     lists = [entry for key, entry in rows.items() if key in _ROLE_OF and key in values]
@@ -193,7 +196,7 @@ def _without_role(case: Case, role: str, names: tuple[str, ...]) -> Case:
 
 
 def _with_paths(case: Case, change: Callable[[Path], Path]) -> Case:
-    """Return the case with all its paths changed."""
+    """Return the case with ``change`` applied to all its paths."""
     return case.change(
         mesh_file=change(case.mesh_file) if case.mesh_file else None,
         mesh_out=change(case.mesh_out) if case.mesh_out else None,
@@ -205,15 +208,15 @@ def _with_paths(case: Case, change: Callable[[Path], Path]) -> Case:
 
 
 def _from_folder(file: Path, folder: Path) -> Path:
-    """Return the path of a file named in a case file in that folder."""
+    """Return the path of what a case file in ``folder`` names ``file``, shortened if possible."""
     path = folder / file
     short = Path(os.path.normpath(path))
-    # `link/..` is not where the link stands, so shorten only what stays the same file.
+    # `link/..` is the parent of the link's target, so shorten only if it is the same file then.
     return short if os.path.realpath(short) == os.path.realpath(path) else path
 
 
 def _to_folder(file: Path, folder: Path) -> Path:
-    """Return the path as a case file in that (real) folder names it."""
+    """Return the path of a file as a case file in ``folder`` (a real path) names it."""
     real = Path(os.path.realpath(file.parent)) / file.name
     if len(os.path.commonpath([real, folder])) > 1:
         return Path(os.path.relpath(real, folder))

@@ -36,7 +36,7 @@ _LISTED = 12
 
 
 def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
-    """Return the reasons against deforming this mesh, a sentence each; empty if nothing.
+    """Return why this mesh cannot be deformed as the case asks, a sentence for each; () if it can.
 
     Displacement files are not read here.
     """
@@ -52,32 +52,27 @@ def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
 
 
 def require_valid(case: Case, mesh: Mesh) -> None:
-    """Check that the case fits the mesh.
+    """Raise where the case does not fit the mesh (`check_case`).
 
     Raises
     ------
     CaseError
-        It does not; the text has a line for each problem.
+        It does not; the message has a line for each problem.
     """
     raise_all(check_case(case, mesh))
 
 
 def raise_all(problems: tuple[str, ...]) -> None:
-    """Raise the problems, one in each line, if there are any.
-
-    Raises
-    ------
-    CaseError
-        There are.
-    """
+    """Raise a CaseError with a line for each problem, if there are any; equal ones count once."""
     if problems:
         raise CaseError("\n".join(dict.fromkeys(problems)))
 
 
 def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
-    """Return the contradictions in the case: the keys involved, and a sentence.
+    """Return the keys that contradict each other, with a sentence, whatever the mesh.
 
-    What only matters when the case is run is not here, so that ``--set`` can put it right.
+    What else a run needs is found by `check_case`: a case without it can be read from a file, and
+    put right with ``--set``.
     """
     found: list[tuple[tuple[str, ...], str]] = []
     moving = case.markers_with("moving")
@@ -106,7 +101,7 @@ def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
 
 
 def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
-    """Return the markers of the case that the mesh lacks, and whether any marker moves."""
+    """Return a sentence for each marker of the case that the mesh lacks, and if no marker moves."""
     nothing = "no marker moves; name one in MARKER_MOVING"
     named = {name: ROLES[role].key for name, role in case.roles.items()}
     return (*unknown_markers(mesh, named), *[nothing] * (not case.markers_with("moving")))
@@ -125,7 +120,7 @@ def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:
 
 
 def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
-    """Return which moving markers lack a motion, and which motions the mesh cannot have."""
+    """Return a sentence for each moving marker without motion, and each motion that is unfit."""
     boxed = any(isinstance(motion, Ffd) for motion in case.motions)
     of_all = ", or let (*, ffd, ...) move what is in the box of all moving markers" if boxed else ""
     found = [
@@ -184,7 +179,7 @@ def _prescribed_problems(case: Case, mesh: Mesh, motion: Prescribed) -> Iterator
 
 
 def _value_problems(case: Case) -> Iterator[str]:
-    """Yield the settings out of range, as a case made by a program may have them."""
+    """Yield a sentence for each value out of range: a case made by a program may have such."""
     for key in KEYS.values():
         value = key.get(case)
         if key.group in (FILES, BOUNDARIES, MOTION) or value is None:
@@ -226,7 +221,7 @@ def _periodic_problems(case: Case, mesh: Mesh) -> Iterator[str]:
 
 
 def idle_roles(case: Case) -> tuple[str, ...]:
-    """Return sentences about roles that this method does not use, which is seldom meant."""
+    """Return a sentence for each role without effect in the case's modes, seldom on purpose."""
     found = []
     periodic, sliding = case.markers_with("periodic"), case.markers_with("sliding")
     if periodic and case.periodic == "none":
@@ -252,7 +247,7 @@ _SLIDES = {
 
 
 def _halo_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
-    """Return which boundaries are asked to move although those they are copies of do not."""
+    """Return a sentence for each moving halo copy of a boundary that does not move."""
     return tuple(
         f"{mesh.name}: {copy} is asked to move, but by the mesh's SEND_RECEIVE markers it is a "
         f"copy of {origin}, which it follows; let {origin} move, too, or alone"
@@ -262,7 +257,7 @@ def _halo_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
 
 
 def idle_settings(case: Case) -> tuple[str, ...]:
-    """Return sentences about settings without effect: not used by this method, or by none."""
+    """Return a note for each setting of the case without effect: with its method, or with any."""
     usual = type(case)()
     idle = [
         _with_switch(key, case)
@@ -289,13 +284,13 @@ def idle_settings(case: Case) -> tuple[str, ...]:
 
 
 def _with_switch(key: Key, case: Case) -> str:
-    """Return what a message calls a setting: that it is on, or its key."""
+    """Return the key of a setting for a message, with ``= YES`` if that is its value."""
     value = key.get(case)
     return f"{key.name}= YES" if value is True or value == "YES" else key.name
 
 
 def effective(case: Case) -> Case:
-    """Return the case without the settings that change no result."""
+    """Return the case with those settings at their defaults that never change a result."""
     usual = type(case)()
     fields = (key.field for key in KEYS.values() if key.no_effect)
     return case.change(**{field: getattr(usual, field) for field in fields})

@@ -24,21 +24,21 @@ _ENOUGH = 1000
 
 
 PART = 4000
-"""Lines that are turned into numbers at a time."""
+"""Lines that are turned into numbers at a time, so that other threads get a turn."""
 
 
 @dataclass(frozen=True)
 class Form:
-    """What the numbers of a node are.
+    """The columns of a file with a line for each node, such as displacements or coordinates.
 
     Attributes
     ----------
     what : str
-        For messages.
+        What the numbers of a node are together, for messages.
     names : (str, str, str)
-        Of the columns after the node.
+        The names of the columns after that of the node, for messages.
     flat : bool
-        Whether a plane mesh may have a third, of zeros.
+        Whether files for a 2D mesh may have a third number, which is 0.
     """
 
     what: str
@@ -46,7 +46,7 @@ class Form:
     flat: bool = False
 
     def columns(self, dim: int) -> str:
-        """Return the names of all columns."""
+        """Return the names of all columns for a mesh of ``dim`` dimensions, with blanks between."""
         return " ".join(("node", *self.names[:dim]))
 
 
@@ -55,7 +55,7 @@ DISPLACEMENT = Form("displacement", ("dx", "dy", "dz"))
 
 @dataclass(frozen=True, eq=False)
 class Displacements:
-    """Prescribed displacements.
+    """Prescribed displacements of nodes.
 
     Attributes
     ----------
@@ -76,14 +76,14 @@ class Displacements:
         object.__setattr__(self, "vectors", frozen_array(self.vectors, np.float64))
 
     def at(self, nodes: IntArray) -> FloatArray:
-        """Return the displacements (m, d) of nodes (m,), which must be among these."""
+        """Return the displacements (m, d) of ``nodes`` (m,), which must be among ``self.nodes``."""
         return self.vectors[np.searchsorted(self.nodes, nodes)]
 
 
 def read_displacements(
     path: Path, nodes: IntArray, shape: tuple[int, ...], of: str
 ) -> Displacements:
-    """Return the displacement of each of ``nodes``; those the file does not list get zero.
+    """Return the displacements that a file lists for ``nodes``, zero for those not in it.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def read_displacements(
 def parse_displacements(
     text: str, path: Path, nodes: IntArray, shape: tuple[int, ...], of: str
 ) -> Displacements:
-    """Return the displacement of each of ``nodes`` that the text of a displacement file lists.
+    """Return the displacements that the text of a file lists for ``nodes``, zero for others.
 
     Parameters as of `read_displacements`; ``path`` is for messages only.
 
@@ -137,9 +137,9 @@ def parse_rows(
     of: str,
     form: Form = DISPLACEMENT,
 ) -> FloatArray:
-    """Return nodes and their numbers, (k, 1 + d), each node once and in ascending order.
+    """Return the table in a text, (k, 1 + d): a node and its d numbers, by ascending node.
 
-    Parameters as of `read_displacements`; ``path`` and ``form`` are for messages.
+    Parameters as of `read_displacements`; ``path`` is for messages only. Each node is there once.
 
     Raises
     ------
@@ -158,12 +158,12 @@ def parse_rows(
 
 
 def _table(path: Path, lines: list[str], dim: int, form: Form) -> FloatArray:
-    """Return the numbers of the file, (m, 1 + d).
+    """Return the numbers in the lines, (m, 1 + d), in their order.
 
     Raises
     ------
     CaseError
-        It has none, or lines with something else.
+        There are none, or some line is no row of finite numbers.
     """
     if not any(line.strip() for line in lines):
         raise CaseError(f"{path}: the file lists no node; needed are lines {form.columns(dim)}")
@@ -176,7 +176,7 @@ def _table(path: Path, lines: list[str], dim: int, form: Form) -> FloatArray:
     flat = form.flat and dim == 2 and table.shape[1] == 4
     if flat and np.isfinite(table).all() and not table[:, 3].any():
         return table[:, :3]
-    # Slower, but it tells every line that is wrong.
+    # Slower, but finds every line that is wrong.
     rows: list[list[float]] = []
     problems: list[Problem] = []
     for line, content in enumerate(lines, start=1):
@@ -190,7 +190,7 @@ def _table(path: Path, lines: list[str], dim: int, form: Form) -> FloatArray:
 
 
 def _numbers(lines: list[str]) -> FloatArray:
-    """Return the numbers of lines that hold some; other threads get a turn between two parts."""
+    """Return the numbers (m, c) in lines of which none is empty."""
     parts = (lines[first : first + PART] for first in range(0, len(lines), PART))
     return np.concatenate(
         [np.loadtxt(part, dtype=np.float64, comments=None, ndmin=2) for part in parts]
@@ -198,7 +198,13 @@ def _numbers(lines: list[str]) -> FloatArray:
 
 
 def _row(content: str, dim: int, form: Form) -> list[list[float]]:
-    """Return the numbers of a line, as one row or, of an empty line, none."""
+    """Return a list with the numbers of a line as its one row; without a row for an empty line.
+
+    Raises
+    ------
+    CaseError
+        The line has another number of columns, or words that are no numbers.
+    """
     words = content.split()
     if form.flat and dim == 2 and len(words) == 4:
         if number(words[3]) != 0.0:
@@ -215,7 +221,7 @@ def _row(content: str, dim: int, form: Form) -> list[list[float]]:
 def _table_problems(
     table: FloatArray, lines: list[str], nodes: IntArray, *, count: int, of: str, what: str
 ) -> list[Problem]:
-    """Return the lines whose node is none of ``nodes``, or has other numbers before."""
+    """Return a problem for each line whose node is not in ``nodes``, or was given otherwise."""
     index = table[:, 0]
     broken = index != np.floor(index)
     outside = ~broken & ((index < 0) | (index >= count))

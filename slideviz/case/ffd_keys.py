@@ -28,7 +28,7 @@ NUMBERS = 24
 
 
 def _groups(text: str) -> list[list[Word]]:
-    """Return the words of each box; ``NONE`` has no box."""
+    """Return the words of each box in a value, without brackets; none for ``NONE``."""
     words = words_of(text)
     return [] if is_none(words) else [group for group in groups_of(words) if group]
 
@@ -79,7 +79,7 @@ def _write_orders(orders: Degrees) -> str:
 
 
 def _said_where_needed(row: Key) -> Key:
-    """Return the row of a key that a file has only where it says something."""
+    """Return the row of a key, changed so that a file has the key only where it has an effect."""
     usual = getattr(Case(), row.field)
 
     def get(case: Case) -> Any:
@@ -90,12 +90,12 @@ def _said_where_needed(row: Key) -> Key:
 
 
 def without_definition(case: Case) -> str:
-    """Return why the other keys do nothing in a case."""
+    """Return why FFD keys besides FFD_DEFINITION have no effect in a case; "" if they have."""
     return "" if case.ffd_boxes else "FFD_DEFINITION defines no box"
 
 
 def ffd_contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
-    """Return the contradictions between the keys: those involved, and a sentence."""
+    """Return the FFD keys that contradict each other, with a sentence."""
     boxes, degrees = len(case.ffd_boxes), len(case.ffd_degrees)
     if boxes == degrees or not boxes:
         return []

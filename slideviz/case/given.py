@@ -1,4 +1,4 @@
-"""Displacements that are found before motions are performed: those of files and of boxes."""
+"""Displacements from files and FFD boxes, which are found before the motions are performed."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from slideviz.errors import CaseError
 from slideviz.mesh.model import IntArray, Mesh
 
 Given = Mapping[object, Displacements]
-"""Displacements by what `key_of` returns of their motions."""
+"""Displacements by the key (`key_of`) of their motion."""
 
 
 def key_of(motion: FromFile | Ffd) -> object:
-    """Return under what the displacements of a motion are kept: equal ones are the same."""
+    """Return the key of a motion in `Given`; motions with the same displacements share it."""
     return motion if isinstance(motion, Ffd) else (motion.path, motion.marker)
 
 
 def read_files(case: Case, mesh: Mesh) -> dict[object, Displacements]:
-    """Return what files and boxes displace, for `slideviz.case.motion.displacement_of`.
+    """Return the displacements that the case's files and FFD boxes give, by `key_of` their motion.
 
     Raises
     ------
     CaseError
-        Some cannot be read or have mistakes: those of all files at once. A box has none of the
-        nodes that it should move.
+        A file cannot be read or has mistakes, or a box has none of the nodes that it should move;
+        the message has all of these.
     """
     on = {
         name: mesh.marker(name).nodes
@@ -61,7 +61,10 @@ def read_files(case: Case, mesh: Mesh) -> dict[object, Displacements]:
 
 
 def _read_file(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Displacements:
-    """Return the displacements of nodes, which a file calls by their numbers in the whole mesh."""
+    """Return the displacements of ``nodes`` (k,) of a mesh, which may be a part of a larger one.
+
+    In the file nodes have their numbers in the whole mesh.
+    """
     if mesh.part is None:
         return read_displacements(path, nodes, mesh.points.shape, of)
     whole = mesh.part.n_points, mesh.dim

@@ -1,4 +1,4 @@
-"""A row of the table of keys, and makers of the usual rows."""
+"""A row of the table of keys of the case file, and functions that make the usual rows."""
 
 from __future__ import annotations
 
@@ -27,36 +27,37 @@ class Key:
     Attributes
     ----------
     name, group : str
-        The key in upper case, and the heading it stands under.
+        The key in upper case, and the heading above it in files and in the reference.
     kind : Kind
         How its value is read and written.
     meaning : str
         What it does, in a sentence.
     put, get : callable
-        Put a value into a case (``CaseError`` where it contradicts what is there), and take it
-        out: None where the file need not say anything.
+        ``put`` returns a case with a value in it, or raises ``CaseError`` where the value
+        contradicts the case; ``get`` returns the value, or None where a file need not have it.
     default : str
-        The text of the value that holds when the file does not have the key.
+        The text of the value where the file does not have the key.
     rbf_slide : bool
         Whether RBF-SliDe has the key too.
     field : str
-        The field of ``Case``, or of its ``Reduction``, that has the value; empty where it is in
-        several or in a part of one.
+        The field of ``Case``, or of its ``Reduction``, that is the value; empty where the value is
+        made of several fields, or is only a part of one.
     label, unit : str
         What the window calls it, and the unit of its value, if it has one.
     form : "main", "more" or None
-        Where the method panel has a field for it: among the first, below "More settings", nowhere.
+        Whether the method panel has a field for it: among the first ones, below "More settings",
+        or not.
     tip : str
-        What it does, for who looks at that field; the meaning where it is empty.
+        The tip of that field; empty: ``meaning``.
     said : str or None
-        What is said of a run of which it differs from others, with ``{}`` for the value; the
-        label and the value where it is None, nothing where it is empty.
+        Words in the label of a run whose value differs from those of other runs, with ``{}`` for
+        the value. None: the key's label and the value; empty: no words.
     method : str or None
         The only method that uses it.
     unless : callable
-        Why it does nothing in a case that has that method; empty where it does something.
+        Returns why the key has no effect in a case with that method; empty where it has one.
     no_effect : str
-        Why it changes no result of any case, for those that RBF-SliDe's files have.
+        Why it never changes a result: for keys that are read only because RBF-SliDe has them.
     """
 
     name: str
@@ -79,16 +80,19 @@ class Key:
 
     @property
     def title(self) -> str:
-        """Return the label with the unit."""
+        """Return the label, with the unit in brackets if there is one."""
         return f"{self.label} ({self.unit})" if self.unit else self.label
 
     def idle(self, case: Case) -> str:
-        """Return why the key does nothing in a case; empty where it does something."""
+        """Return why the key has no effect in a case; "" where it has one."""
         return other_method(case, self.method) or self.unless(case)
 
 
 def other_method(case: Case, method: Method | None) -> str:
-    """Return that the method of a case is another one, which does not use a setting."""
+    """Return the message that the case's method does not use a setting of ``method``.
+
+    "" where it is that method, or ``method`` is None: all use it.
+    """
     if method in (None, case.method):
         return ""
     label = METHODS[case.method].label
@@ -100,14 +104,17 @@ def _field(field: str) -> tuple[Put, Get]:
 
 
 def setting(name: str, group: str, kind: Kind, field: str, meaning: str, **window: Any) -> Key:
-    """Return the row of a plain field of ``Case``; ``window`` has further attributes of the row."""
+    """Return the row of a key whose value is a field of ``Case``.
+
+    ``window`` has further attributes of the row (`Key`), mostly for the window.
+    """
     value = getattr(Case(), field)
     default = NO_DEFAULT if value is None else kind.write(value)
     return Key(name, group, kind, meaning, *_field(field), default, field=field, **window)
 
 
 def role(name: str, kind: Kind, wanted: Role, meaning: str) -> Key:
-    """Return the row of the list of the markers that have a role."""
+    """Return the row of a key whose value is the list of the markers with the role ``wanted``."""
 
     def put(case: Case, names: tuple[str, ...]) -> Case:
         return case.change(roles={**case.roles, **dict.fromkeys(names, wanted)})

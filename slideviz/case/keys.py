@@ -1,7 +1,7 @@
-"""All keys of a case file, one row each: the table reads, checks, writes and explains them.
+"""The table of all keys of a case file, by which they are read, checked, written and explained.
 
-The rows are applied in the order of the table, whatever their order in the file. Groups with many
-rows have a module each.
+Values are put into a case in the order of the table, whatever their order in the file. Groups with
+many keys have modules of their own.
 """
 
 from __future__ import annotations
@@ -22,34 +22,34 @@ from slideviz.terms import FILE_FORMATS, METRICS
 
 
 def put_boundaries(case: Case, names: tuple[str, ...]) -> Case:
-    """Let markers slide that no other list has: RBF-SliDe's meaning of MARKER_BDRY."""
+    """Return the case where those ``names`` slide that have no role (RBF-SliDe's MARKER_BDRY)."""
     return case.change(roles={**dict.fromkeys(names, "sliding"), **case.roles})
 
 
 def _leading_file(case: Case) -> tuple[Motion, ...]:
-    """Return the displacement file of all moving markers, if the motions begin with one."""
+    """Return the first motion if it is a displacement file of all moving markers, (1,); else ()."""
     return tuple(m for m in case.motions[:1] if isinstance(m, FromFile) and not m.marker)
 
 
 def put_file(case: Case, path: Path | None) -> Case:
-    """Return the case whose motions begin with this displacement file, or with none."""
+    """Return the case with ``path`` as the leading displacement file, or None: without one."""
     rest = case.motions[len(_leading_file(case)) :]
     return case.change(motions=rest if path is None else (FromFile(path), *rest))
 
 
 def get_file(case: Case) -> Path | None:
-    """Return the displacement file of all moving markers that the motions begin with."""
+    """Return the displacement file of all moving markers, if motions begin with one, or None."""
     files = [motion.path for motion in _leading_file(case) if isinstance(motion, FromFile)]
     return files[0] if files else None
 
 
 def put_motions(case: Case, motions: tuple[Motion, ...]) -> Case:
-    """Return the case with these motions after its displacement file."""
+    """Return the case with ``motions`` after its leading displacement file, if it has one."""
     return case.change(motions=(*_leading_file(case), *motions))
 
 
 def get_motions(case: Case) -> tuple[Motion, ...] | None:
-    """Return the motions after the displacement file, None if there are none."""
+    """Return the motions after the leading displacement file, None if there are none."""
     return case.motions[len(_leading_file(case)) :] or None
 
 
@@ -152,4 +152,4 @@ _FIRST = (
     *("SELECTION", "MULTILEVEL", "LVL_SIZE", "GAMMA"),
 )
 BY_WEIGHT = tuple(KEYS[name] for name in dict.fromkeys((*_FIRST, *KEYS)))
-"""All rows, those that matter most first: the order of the forms and of the words of a run."""
+"""All rows, the most important first: the order of fields in the window and of words on a run."""

@@ -24,7 +24,7 @@ LARGEST = {
     "file of sensitivities": 2_000_000_000,
     "table of designs": 100_000_000,
 }
-"""Bytes that a kind of file may have: most have a line for each node at most."""
+"""Most bytes of a file, by its kind: larger ones are not read. Most kinds have a line a node."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,8 @@ def read_text(path: Path, what: str) -> tuple[str, tuple[str, ...]]:
     Raises
     ------
     CaseError
-        It cannot be read, is empty, too large, or not text. ``what`` is one of ``LARGEST``.
+        It cannot be read, is empty, too large, or not text; the message calls it ``what``, one of
+        ``LARGEST``.
     """
     try:
         with suppress(FileNotFoundError):  # reported below
@@ -74,7 +75,7 @@ def read_text(path: Path, what: str) -> tuple[str, tuple[str, ...]]:
 
 
 def entries_of(text: str, signs: str = COMMENT_SIGNS) -> tuple[list[Entry], list[Problem]]:
-    """Return the entries of a case file in order, and what is wrong with its lines.
+    """Return the entries of a case file in order, and a problem for each line that is none.
 
     Comments begin with one of ``signs``.
     """
@@ -96,7 +97,11 @@ def require_no_mesh(path: Path, entries: list[Entry]) -> None:
 
 
 def _joined(text: str, problems: list[Problem], signs: str) -> Iterator[tuple[int, str]]:
-    """Return the lines that hold something, each with what goes on in the lines after it."""
+    """Yield line number and content of each line, joined with those that continue it.
+
+    Comments and empty lines are left out. A problem is added to ``problems`` where a backslash
+    joins a line with a key to the one before.
+    """
     start = 0
     parts: list[str] = []
     for line, raw in enumerate(_END_OF_LINE.split(text), start=1):
@@ -123,10 +128,10 @@ def _joined(text: str, problems: list[Problem], signs: str) -> Iterator[tuple[in
 
 
 def listed(path: Path, problems: list[Problem]) -> str:
-    """Return the problems in the order of their lines, one ``file:line: sentence`` each.
+    """Return the problems by ascending line, one ``file:line: sentence`` each.
 
-    Of a file with very many (it may be no case file at all) the first are listed. Line 0 is what
-    is not in the file, but was given beside it.
+    Where there are very many (it may be no case file at all), only the first are listed. Line 0 is
+    for a problem that is not in the file, but was given beside it.
     """
     places = ((f"{path}:{line}" if line else f"{path}", said) for line, said in sorted(problems))
     lines = [f"{place}: {sentence}" for place, sentence in places]

@@ -1,4 +1,4 @@
-"""Keys of a case file about the method: how nodes slide and inner nodes follow, in which steps."""
+"""Keys of a case file about the method: how nodes slide, how inner nodes follow, how many steps."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _WAYS = " or ".join(f"{name} ({way})" for way, name in names(SLIDING).items() if
 
 
 def nothing_slides(case: Case) -> str:
-    """Return why it does not matter in a case how nodes slide."""
+    """Return why SLIDING_MODE has no effect in a case; "" where some boundary may slide."""
     slides = {"sliding", "periodic", "internal"}.intersection(case.roles.values())
     return "" if slides else "no boundary has the role “sliding” or “periodic”"
 
 
 def steps_kind() -> Kind:
-    """Return the kind of a number of steps: a whole number from 1, or auto (0 in the case)."""
+    """Return the kind of the value of STEPS: a whole number from 1, or auto (0 in the case)."""
     counted = whole(1)
     allowed = f"{counted.allowed}, or auto"
 

@@ -36,7 +36,7 @@ from slideviz.terms import (
 
 Point = tuple[float, ...] | Literal["centroid"]
 Target = str | tuple[str, ...]
-"""What a motion moves: a marker, several as one body, or all that move where it is empty."""
+"""The markers a motion moves: one, several as one body, or, where it is empty, all moving ones."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,10 @@ class Translate:
 
 @dataclass(frozen=True)
 class Rotate:
-    """Turn a marker by ``angle_deg`` about ``point`` and ``axis`` (right-handed; any length).
+    """Rotate a marker by ``angle_deg`` about an axis through ``point`` (right-handed; any length).
 
-    In 2D the axis is that of z: positive angles turn counter-clockwise. The centroid of several
-    markers is their common one.
+    In 2D the axis is z: positive angles turn counter-clockwise. Several markers have one common
+    centroid.
     """
 
     marker: Target
@@ -63,7 +63,7 @@ class Rotate:
 
 @dataclass(frozen=True)
 class Scale:
-    """Enlarge a marker by ``factors``, one for all or one for each axis, about ``point``."""
+    """Scale a marker about ``point`` by ``factors``: one for all axes, or one for each."""
 
     marker: Target
     factors: tuple[float, ...]
@@ -74,8 +74,8 @@ class Scale:
 class Radial:
     """Push a marker away from an axis: each radius r becomes ``factor`` r + ``distance``.
 
-    ``factor`` 1.03 is 3 % outwards. The axis goes through ``point`` (d,) along ``axis``, that of
-    z in 2D; ``distance`` is in the mesh's length unit. Nodes on the axis stay on it.
+    ``factor`` 1.03 is 3 % outwards. The axis goes through ``point`` (d,) along ``axis``; in 2D it
+    is z. ``distance`` is in the mesh's length unit. Nodes on the axis stay on it.
     """
 
     marker: Target
@@ -101,11 +101,12 @@ class FromFile:
 
 @dataclass(frozen=True)
 class Ffd:
-    """Move control points of a box for free-form deformation, and with them what is inside.
+    """Move control points of a box for free-form deformation, and with them the nodes inside.
 
-    ``box`` is one of the mesh's or of ``Case.ffd_boxes``, ``index`` the control point (i, j, k),
-    where -1 is all of that direction, ``vector`` its shift (dx, dy, dz), with dz 0 in 2D. What a
-    node takes of it depends on where it was in the undeformed box, whatever other motions do.
+    ``box`` is the name of a box of the mesh or of ``Case.ffd_boxes``, ``index`` the control point
+    (i, j, k), where -1 takes all of a direction, ``vector`` its shift (dx, dy, dz), dz 0 in 2D. The
+    displacement of a node depends on its undeformed place in the undeformed box, whatever motions
+    come before.
     """
 
     marker: Target
@@ -116,9 +117,9 @@ class Ffd:
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
-    """Displace nodes (k,) by vectors (k, d), which a program gives; no case file can hold it.
+    """Displace nodes (k,) by vectors (k, d), given by a program; it cannot be in a case file.
 
-    Nodes are sorted, each once; nodes of the markers that are not among them stay.
+    Nodes are ascending, each once. Nodes of the markers that are not among them stay in place.
     """
 
     nodes: NDArray[np.int64]
@@ -143,12 +144,12 @@ Motion = Translate | Rotate | Scale | Radial | Ffd | FromFile | Prescribed
 
 
 def named(target: Target) -> tuple[str, ...]:
-    """Return the markers that a target names; none where the target is all that move."""
+    """Return the names of the markers in a target; () where it is all moving markers."""
     return (target,) * bool(target) if isinstance(target, str) else target
 
 
 def moves(motion: Motion, marker: str) -> bool:
-    """Tell whether a motion is one of this moving marker."""
+    """Return whether a motion moves the moving marker ``marker``."""
     return not motion.marker or marker in named(motion.marker)
 
 
@@ -164,17 +165,23 @@ _KINDS = (
 class Case:
     """A deformation case, the content of a ``.cfg`` file.
 
-    Every marker of the mesh that ``roles`` does not name is fixed. Defaults are those of the
-    thesis. Paths are absolute, or relative to the current folder; the formats of the meshes are
-    None where their endings tell. ``direction`` is the component of the frame in which the mesh
-    repeats (0, 1, 2 for x, y, z or r, theta, z), None where none is given; it and ``curved`` are
-    RBF-SliDe's and without effect, since the matching of the periodic markers and the shape of the
-    boundaries tell both; ``steps`` is 0, or "auto", for as many as it takes (see ``steps_gain`` in
-    ``slideviz keys``); ``reduction`` is None where all boundary nodes are control nodes, however
-    many, ``idw_power`` where it is the number of dimensions. ``view`` has how a window showed the
-    case, by key: it changes no result. ``ffd_boxes`` are boxes for free-form deformation that the
-    mesh does not have: their names and 8 corners (24 numbers; in 2D the first 4 count),
-    ``ffd_degrees`` their degrees, ``ffd_orders`` the orders of B-splines.
+    Markers of the mesh that are not in ``roles`` are fixed. Paths are absolute, or relative to the
+    current folder. Of the other fields, of which ``slideviz keys`` has all:
+
+    * ``mesh_format``, ``mesh_out_format``: None: by the ending of the file.
+    * ``axis``, ``origin``: direction and a point of the axis of rotational periodicity.
+    * ``direction``, ``curved``: RBF-SliDe's, without effect: both are found from the mesh.
+      ``direction`` is 0, 1, 2 for x, y, z or r, theta, z, or None.
+    * ``feature_angle_deg``: the angle in degrees from which a bend in a boundary is an edge; the
+      default is ``DEFAULT_FEATURE_ANGLE_DEG`` of `slideviz.mesh.topology`.
+    * ``steps``: 0, or "auto", finds the number of steps; ``steps_gain`` is when to stop.
+    * ``reduction``: None: all boundary nodes are control nodes, however many.
+    * ``idw_power``: None: the number of dimensions.
+    * ``view``: how the window showed the case, by key; changes no result.
+    * ``ffd_boxes``: boxes for free-form deformation that are not in the mesh file: name and 8
+      corners (24 numbers; in 2D the first 4 corners count). ``ffd_degrees`` are their degrees,
+      ``ffd_orders`` the orders of B-splines.
+    * ``source``: the file that the case was read from; ``warnings``: what reading it found.
 
     Examples
     --------
@@ -243,12 +250,12 @@ class Case:
             object.__setattr__(self, "steps", 0)
 
     def change(self, **values: Any) -> Case:
-        """Return the case with other values.
+        """Return the case with other values of some fields.
 
         Raises
         ------
         CaseError
-            A case has no such value, or it is none of an enumeration.
+            A case has no such field, or it cannot have such a value.
         """
         names = [each.name for each in fields(self)]
         for name in values:
@@ -257,11 +264,11 @@ class Case:
         return replace(self, **values)
 
     def markers_with(self, role: Role) -> tuple[str, ...]:
-        """Return the names that have this role, in order."""
+        """Return the names of the markers with a role, in the order of ``roles``."""
         return tuple(name for name, given in self.roles.items() if given == role)
 
     def inputs(self) -> dict[Path, str]:
-        """Return the files that the case is read from or names, and their roles in words."""
+        """Return the files that the case is read from or names, with words for what each is."""
         found = {} if self.mesh_file is None else {self.mesh_file: "the input mesh"}
         if self.source is not None:
             found[self.source] = "the case file"

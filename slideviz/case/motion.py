@@ -1,8 +1,8 @@
-"""Motions of markers: from what the case asks for to the displacement of every moving node.
+"""Motions of markers: from the motions of a case to the displacement of every moving node.
 
-All is computed in one order with plain sums, so that the same case gives the same bits
-everywhere. Displacements are added up rather than positions, since the difference of two large
-positions has lost the digits of a small displacement.
+Sums are made in a fixed order, so that the same case gives the same bits on every machine.
+Displacements are added up rather than positions: the difference of two large positions would have
+lost the last digits of a small displacement.
 """
 
 from __future__ import annotations
@@ -52,27 +52,29 @@ __all__ = [
 ]
 
 AGREE = 1e-9
-"""Largest difference, as a part of the mesh's extent, of two displacements of one node."""
+"""Largest allowed difference of two displacements of one node, over the mesh's extent."""
 
 ALIKE = 1e-6
-"""The same as a part of the largest displacement."""
+"""Largest allowed difference of two displacements of one node, over the largest displacement. The
+smaller of both holds (`same`)."""
 
 ROUNDING = 1e-13
-"""What displacements may be off, as a part of the largest coordinate."""
+"""Rounding error that displacements may have, over the largest coordinate of the mesh."""
 
 
 def displacements(case: Case, mesh: Mesh) -> Displacements:
     """Return the displacement of every node of the moving markers, sorted by node.
 
-    A node of two moving markers has the displacement that the first of them gives it.
+    A node on two moving markers has the displacement that the first of them gives it.
 
     Raises
     ------
     CaseError
         A marker is unknown or has no motion, a motion does not fit the dimension of the mesh, a
-        displacement file has mistakes, or two markers displace one node differently.
+        displacement file has mistakes, two markers displace one node differently, or a node goes
+        too far to compute with.
     """
-    # The motions of markers that do not move are no obstacle here; `check_case` tells them.
+    # Motions of markers that do not move are ignored here; `check_case` reports them.
     raise_all((*marker_problems(case, mesh), *motion_problems(case, mesh)))
     names = case.markers_with("moving")
     on = {name: mesh.marker(name).nodes for name in names}
@@ -96,7 +98,7 @@ def displacements(case: Case, mesh: Mesh) -> Displacements:
 
 
 def _require_size(mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> None:
-    """Raise CaseError where a node would go to where nothing can be computed."""
+    """Raise CaseError where a coordinate would become larger than can be computed with."""
     there = mesh.points[nodes] + vectors
     if not within(there, LARGEST) and within(mesh.points, LARGEST):
         k = int(np.argmax(~(np.abs(there) <= LARGEST).all(axis=1)))
@@ -110,7 +112,9 @@ def _require_size(mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> None:
 def moved_together(
     motions: Iterable[Motion], points: FloatArray, on: Mapping[str, IntArray], files: Given
 ) -> dict[str, FloatArray]:
-    """Return the displacement (k, d) of the nodes of each marker, by motions in sequence.
+    """Return the displacement (k, d) of the nodes of each marker after all motions, in sequence.
+
+    Markers that one motion moves are moved as one body: about their common centroid.
 
     Parameters
     ----------
@@ -118,8 +122,8 @@ def moved_together(
     points : (n, d) float64
         Undeformed positions of all nodes.
     on : mapping of str to (k,) int64
-        The nodes of the moving markers.
-    files : mapping of (path, target) to Displacements
+        The nodes of each moving marker.
+    files : mapping of object to Displacements
         As in `displacement_of`.
     """
     total = {name: np.zeros_like(points[nodes]) for name, nodes in on.items()}
@@ -132,17 +136,20 @@ def moved_together(
 
 
 def _as_one(motion: Motion, points: Mapping[str, FloatArray], on: Mapping[str, IntArray]) -> Motion:
-    """Return a motion of several markers with their common centroid, where it has one."""
+    """Return a motion about a centroid with the common centroid of its markers; others unchanged.
+
+    ``points`` (k, d) are where the nodes ``on`` (k,) of each marker are before the motion.
+    """
     if not isinstance(motion, Rotate | Scale) or motion.point != "centroid":
         return motion
-    # What two of them share counts once, in the order of the nodes: not in that of the markers.
+    # Common nodes of two markers count once; sums in the order of nodes, not in that of markers.
     _, first = np.unique(np.concatenate([on[name] for name in points]), return_index=True)
     centre = np.concatenate(list(points.values()))[first].mean(axis=0)
     return replace(motion, point=tuple(centre.tolist()))
 
 
 def same(vectors: FloatArray, mesh: Mesh) -> float:
-    """Return by how much two displacements of one node may differ, given all of them (k, d)."""
+    """Return the length by which displacements of one node may differ, given all (k, d)."""
     largest = float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
     rounding = ROUNDING * largest_coordinate(mesh.points)
     return min(AGREE * mesh.extent, ALIKE * largest) + rounding
@@ -154,7 +161,7 @@ def moved_points(
     nodes: IntArray | None = None,
     files: Given | None = None,
 ) -> FloatArray:
-    """Return where the points of one marker go: (k, d). Parameters as of `displacement_of`."""
+    """Return the points (k, d) of one marker after its motions; parameters as `displacement_of`."""
     return points + displacement_of(motions, points, nodes, files)
 
 
@@ -164,18 +171,19 @@ def displacement_of(
     nodes: IntArray | None = None,
     files: Given | None = None,
 ) -> FloatArray:
-    """Return the displacement of the points of one marker, (k, d), by motions in sequence.
+    """Return the displacement (k, d) of the nodes of one marker after all motions, in sequence.
 
     Parameters
     ----------
     motions : iterable of Motion
-        The motions of this marker, and files of all markers.
+        The motions of this marker.
     points : (k, d) float64
         Undeformed positions of its nodes.
     nodes : (k,) int64
-        Their indices; needed for displacement files only.
-    files : mapping of (path, marker) to Displacements
-        The displacement files, read; a file that is not among them displaces nothing.
+        Their indices; needed for displacements of files, boxes and programs only.
+    files : mapping of object to Displacements
+        The displacements of files and boxes, by `slideviz.case.given.key_of` their motion; a motion
+        that is not among them displaces nothing.
     """
     total = np.zeros_like(points)
     for motion in motions:
@@ -186,7 +194,7 @@ def displacement_of(
 def _change(
     motion: Motion, points: FloatArray, nodes: IntArray | None, files: Given | None
 ) -> FloatArray:
-    """Return by how much a motion displaces the points of a marker from where they are, (k, d)."""
+    """Return the displacement (k, d) by one motion of the nodes of a marker, now at ``points``."""
     if isinstance(motion, Prescribed):
         return _prescribed(motion, points, nodes)
     if not isinstance(motion, FromFile | Ffd):
@@ -198,7 +206,7 @@ def _change(
 
 
 def _prescribed(motion: Prescribed, points: FloatArray, nodes: IntArray | None) -> FloatArray:
-    """Return the displacement of nodes (k,), zero for those that are not given."""
+    """Return the displacement (k, d) of nodes (k,) by a motion, zero for nodes it does not have."""
     out = np.zeros_like(points)
     if nodes is not None:
         _, here, given = np.intersect1d(nodes, motion.nodes, return_indices=True)
@@ -207,7 +215,7 @@ def _prescribed(motion: Prescribed, points: FloatArray, nodes: IntArray | None) 
 
 
 def _increment(motion: Translate | Rotate | Scale | Radial, points: FloatArray) -> FloatArray:
-    """Return by how much a motion displaces the points from where they are, (k, d)."""
+    """Return the displacement (k, d) by a motion that is a formula, of points (k, d)."""
     if isinstance(motion, Translate):
         return np.broadcast_to(np.array(motion.vector, np.float64), points.shape)
     if isinstance(motion, Radial):
@@ -225,10 +233,10 @@ def _centre(point: Point, points: FloatArray) -> FloatArray:
 
 
 def _turned(arm: FloatArray, angle: float, axis: tuple[float, float, float]) -> FloatArray:
-    """Return the change of vectors (k, d) by a rotation (Rodrigues), zero for a zero angle.
+    """Return the change of vectors (k, d) by a rotation, ``angle`` in radians (Rodrigues).
 
     ``sin(a) k x v + (1 - cos(a)) k x (k x v)``, with ``1 - cos(a) = 2 sin(a/2)^2``, which keeps
-    all digits of a small angle.
+    all digits of a small angle; exactly zero for a zero angle.
     """
     sine, versine = math.sin(angle), 2.0 * math.sin(0.5 * angle) ** 2
     length = math.hypot(*axis)
@@ -260,7 +268,15 @@ def _pushed(motion: Radial, points: FloatArray) -> FloatArray:
 def _disagreements(
     mesh: Mesh, names: tuple[str, ...], nodes: IntArray, pairs: IntArray
 ) -> list[str]:
-    """Return a sentence for each pair of markers (m, 2) that displace nodes (m,) differently."""
+    """Return a sentence for each pair of markers that displace common nodes differently.
+
+    Parameters
+    ----------
+    nodes : (m,)
+        Nodes that two markers displace differently.
+    pairs : (m, 2)
+        These two markers, as places in ``names``.
+    """
     found, where = np.unique(pairs, axis=0, return_inverse=True)
     lines = []
     for place, (one, other) in enumerate(found):

@@ -1,6 +1,7 @@
-"""The grammar of ``MOTION``: which marker moves how, one pair of brackets for each motion.
+"""Reading and writing the value of ``MOTION``: a pair of brackets for each motion of a marker.
 
-``MOTION= (BLADE, translate, 0.1, 0.0) ; (BLADE, rotate, 5.0, centroid)``; ``GRAMMAR`` has all.
+``MOTION= (BLADE, translate, 0.1, 0.0) ; (BLADE, rotate, 5.0, centroid)``; all forms are in
+``GRAMMAR``.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ def read_motions(text: str) -> tuple[Motion, ...]:
     Raises
     ------
     CaseError
-        Some are wrong: a sentence for each, with the number of the motion.
+        Some have mistakes: a sentence for each, with the number of the motion.
     """
     groups = _groups(words_of(text), text)
     if not [group for group in groups if group]:
@@ -53,15 +54,23 @@ def read_motions(text: str) -> tuple[Motion, ...]:
 
 
 def write_motions(motions: tuple[Motion, ...]) -> str:
-    """Return the value of ``MOTION`` that ``read_motions`` reads back, without loss.
+    """Return the value of ``MOTION`` that ``read_motions`` reads back without loss.
 
-    Each motion after the first stands in a line of its own.
+    It has a line for each motion.
+
+    Raises
+    ------
+    CaseError
+        A motion has no form in a case file.
     """
     return " ; \\\n    ".join(_motion_text(motion) for motion in motions) or "( )"
 
 
 def _groups(words: list[Word], text: str) -> list[list[Word]]:
-    """Return the words in each outer pair of brackets, inner brackets among them."""
+    """Return the words in each outer pair of brackets, with inner brackets as words.
+
+    ``text`` is the whole value, for messages.
+    """
     groups: list[list[Word]] = []
     depth = 0
     if is_none(words):
@@ -108,7 +117,7 @@ def _read_motion(group: list[Word]) -> Motion:
 
 
 def _read_target(items: list[Word]) -> tuple[Target, list[Word]]:
-    """Return what a motion moves, and the words that follow."""
+    """Return the marker or markers that a motion moves, and the words after them."""
     head = items[0]
     if not head.is_sign("("):
         if not head.text or head.is_sign(")"):

@@ -1,4 +1,4 @@
-"""Motions in words: each in full, and those of several cases in as few as tell them apart."""
+"""Motions and meshes in words: a motion in full, or in few words that distinguish cases."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from slideviz.mesh.model import Mesh
 from slideviz.terms import AXES
 
 ALONG = 1e-12
-"""What the cosine of the angle between a direction and an axis may miss of 1."""
+"""A direction is along an axis where the cosine of their angle differs from 1 by less than this."""
 NOTHING = 1e-10
-"""Part of the extent of a mesh below which a coordinate is what rounding left of zero."""
+"""A coordinate smaller than this part of the mesh's extent is written as 0: it is rounding."""
 
 
 def describe(motion: Motion, dim: int = 2, extent: float = 0.0) -> str:
@@ -37,7 +37,7 @@ def describe(motion: Motion, dim: int = 2, extent: float = 0.0) -> str:
     dim : int
         Dimensions of the mesh; in 3D a rotation has an axis.
     extent : float
-        Size of the mesh: of a point, what rounding left of zero beside it is written as 0.
+        Extent of the mesh: coordinates that are only rounding beside it are written as 0.
     """
     return f"{target_words(motion.marker)}: {_in_full(motion, dim, extent)}"
 
@@ -70,15 +70,15 @@ def _in_full(motion: Motion, dim: int, extent: float) -> str:
 
 
 def deformation(case: Case) -> tuple[object, ...]:
-    """Return the part of a case that moves boundaries: the same for cases to compare."""
+    """Return what cases must have in common to be compared: moving markers, and motions."""
     return frozenset(case.markers_with("moving")), case.motions
 
 
 def motion_labels(cases: Sequence[Case]) -> list[str]:
-    """Return for each case its motions in few words; empty texts where all have the same.
+    """Return a label for each case: its motions in few words; all "" where all have the same.
 
-    A boundary is named where several move; points, axes and folders are given where the rest
-    would read alike.
+    Labels name boundaries only where motions of different ones occur, and points, axes and folders
+    only where different motions would have the same label without.
     """
     if len({case.motions for case in cases}) < 2:
         return [""] * len(cases)
@@ -103,7 +103,7 @@ def _label(case: Case, several: bool, exact: bool) -> str:
 
 
 def _briefly(motion: Motion) -> str:
-    """Return what a motion does, without where, in some words."""
+    """Return a motion in few words, without its point and axis."""
     if isinstance(motion, Translate):
         moved = [at for at, value in enumerate(motion.vector) if value]
         if len(moved) == 1:
@@ -124,7 +124,7 @@ def _briefly(motion: Motion) -> str:
 
 
 def _exactly(motion: Motion) -> str:
-    """Return all that a motion says, with every digit."""
+    """Return a motion in words, with its point and axis, and numbers with 15 digits."""
     if isinstance(motion, FromFile):
         return str(motion.path)
     if isinstance(motion, Ffd):
@@ -143,7 +143,10 @@ def _exactly(motion: Motion) -> str:
 
 
 def mesh_words(mesh: Mesh) -> tuple[str, str]:
-    """Return dimensions, counts and size of a mesh in a line, and in other lines its ends."""
+    """Return one line on a mesh (dimensions, counts, size), and further lines.
+
+    The further lines: its halo, what of it is in memory, lowest and highest coordinates.
+    """
     halo = "" if mesh.halo is None else f"  (halo: {int(mesh.halo.cells.sum()):,})"
     about = "" if mesh.halo is None else f"With {mesh.halo.describe()}.\n"
     size, ends = box_words(mesh)
@@ -157,7 +160,10 @@ def mesh_words(mesh: Mesh) -> tuple[str, str]:
 
 
 def box_words(mesh: Mesh) -> tuple[str, str]:
-    """Return the size of a mesh along each axis, and the ends of it, a line for each axis."""
+    """Return the size of a mesh along each axis, and lines with lowest and highest coordinates.
+
+    Both are "" for a mesh without points.
+    """
     if not len(mesh.points):
         return "", ""
     low, high = mesh.bounds
@@ -168,7 +174,7 @@ def box_words(mesh: Mesh) -> tuple[str, str]:
 
 
 def vector_words(values: Sequence[float], form: str = ".4g") -> str:
-    """Return a vector in words, its numbers with four digits unless ``form`` says otherwise."""
+    """Return a vector as text, its numbers in the format ``form``: by default four digits."""
     return f"({', '.join(format(value, form) for value in values)})"
 
 
@@ -183,7 +189,7 @@ def _push(motion: Radial) -> str:
 
 
 def _control(motion: Ffd) -> str:
-    """Return the control points that a motion moves, in words."""
+    """Return the control points that a motion moves, and their box, in words."""
     at = ", ".join("all" if index < 0 else str(index) for index in motion.index)
     return f"({at}) of {motion.box or '(no box yet)'}"
 
@@ -203,7 +209,7 @@ def _along(axis: Sequence[float]) -> str:
 
 
 def direction_words(direction: Sequence[float]) -> str:
-    """Return a direction as x, -x and so on where it is one, else its components."""
+    """Return ``x``, ``-x`` and so on for a direction along an axis, else the vector as text."""
     whole = (*direction, 0.0)[:3]
     least = (1.0 - ALONG) * math.hypot(*whole)
     for name, value in zip(AXES, whole, strict=True):

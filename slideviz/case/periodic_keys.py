@@ -10,12 +10,18 @@ from slideviz.terms import PERIODIC_DIRECTIONS, PERIODIC_MODES, PERIODIC_TYPES
 
 
 def no_pair(case: Case) -> str:
-    """Return why settings of periodicity do nothing in a case."""
+    """Return why settings of periodicity have no effect in a case; "" where they have one."""
     return "" if "periodic" in case.roles.values() else "no boundary has the role “periodic”"
 
 
 def put_direction(case: Case, word: str) -> Case:
-    """Return the case with that direction, and the type of periodicity that it implies."""
+    """Return the case with the direction of a word, and the type of periodicity that it implies.
+
+    Raises
+    ------
+    CaseError
+        The case has another type of periodicity.
+    """
     direction, implied = PERIODIC_DIRECTIONS[word]
     if implied is not None and case.periodic_type not in ("auto", implied):
         raise CaseError(
@@ -26,7 +32,7 @@ def put_direction(case: Case, word: str) -> Case:
 
 
 def get_direction(case: Case) -> str | None:
-    """Return the number of the direction as text, None if it is left to the matching."""
+    """Return the number of the direction as text, None if the case has none."""
     return None if case.direction is None else str(case.direction)
 
 

@@ -1,4 +1,8 @@
-"""Keys of a case file about data reduction: which boundary nodes the interpolation takes."""
+"""Keys of a case file about data reduction: which boundary nodes are control nodes.
+
+The numbers of DATA_REDUCTION= AUTO in the text below are EXACT_NODES and AUTO_TOLERANCE of
+`slideviz.deformation.reduction`.
+"""
 
 from __future__ import annotations
 
@@ -13,25 +17,29 @@ from slideviz.terms import DATA_REDUCTIONS, LEVEL_CRITERIA, SELECTIONS, DataRedu
 
 
 def why_no_reduction(case: Case) -> str:
-    """Return why settings of data reduction do nothing in a case."""
+    """Return why settings of data reduction have no effect in a case; "" where they have one."""
     off = "" if case.reduction is not None else "data reduction is off"
     return other_method(case, "rbf") or off
 
 
 def why_no_tolerance(case: Case) -> str:
-    """Return why a given tolerance of data reduction does nothing in a case."""
+    """Return why a tolerance of data reduction has no effect in a case; "" where it has one."""
     auto = case.reduction is not None and case.reduction.auto
     return why_no_reduction(case) or ("it is automatic" if auto else "")
 
 
 def why_no_levels(case: Case) -> str:
-    """Return why settings of the levels of data reduction do nothing in a case."""
+    """Return why settings of levels have no effect in a case; "" where they have one."""
     levels = case.reduction is not None and case.reduction.multilevel
     return why_no_reduction(case) or ("" if levels else "there are no levels")
 
 
 def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Key:
-    """Return the row of a field of ``Reduction``; without data reduction it is checked only."""
+    """Return the row of a key whose value is a field of ``Reduction``.
+
+    Where a case has no data reduction, the value is checked and not kept. ``window`` has further
+    attributes of the row (`Key`), mostly for the window.
+    """
 
     def put(case: Case, value: Any) -> Case:
         if case.reduction is None:
@@ -47,7 +55,7 @@ def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Ke
         if given is None:
             return None
         value = getattr(given, field)
-        # Without effect, it is said only where somebody gave one.
+        # A tolerance without effect is written to a file only where it is not the default.
         idle = given.auto and window["unless"] is why_no_tolerance and value == usual
         return None if idle else value
 
@@ -55,20 +63,23 @@ def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Ke
 
 
 def put_double_edge(case: Case, wanted: bool) -> Case:
-    """Return the case that selects two nodes at a time, or one: RBF-SliDe's DOUBLE_EDGE."""
+    """Return the case that selects two nodes in a cycle, or one: RBF-SliDe's DOUBLE_EDGE.
+
+    A case without data reduction stays as it is.
+    """
     if case.reduction is None:
         return case
     return case.change(reduction=replace(case.reduction, selection="double" if wanted else "one"))
 
 
 def put_reduction(case: Case, wanted: DataReduction) -> Case:
-    """Return the case with data reduction (its settings kept) or without."""
+    """Return the case with data reduction (with the settings it has), automatic, or without."""
     given = replace(case.reduction or Reduction(), auto=wanted == "AUTO")
     return case.change(reduction=None if wanted == "NO" else given)
 
 
 def get_reduction(case: Case) -> DataReduction:
-    """Return whether a case asks for data reduction."""
+    """Return whether a case asks for data reduction: "YES", "NO" or "AUTO"."""
     if case.reduction is None:
         return "NO"
     return "AUTO" if case.reduction.auto else "YES"

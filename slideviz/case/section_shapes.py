@@ -1,6 +1,6 @@
-"""The shapes that a section can have: their names, numbers and words, without their geometry.
+"""The table of the shapes that a section can have: names, numbers and words of each.
 
-The geometry of each is in `slideviz.sections.model.SHAPES`, by the same names.
+Their geometry is in `slideviz.sections.model.SHAPES`, by the same names.
 """
 
 from __future__ import annotations
@@ -11,18 +11,19 @@ from math import inf
 
 @dataclass(frozen=True)
 class Words:
-    """The words for a shape in meshes of 3 or of 2 dimensions.
+    """The window's words for a shape, in 3D meshes or in 2D meshes.
 
     Attributes
     ----------
     name : str
-        On the button that adds one.
+        Text of the button that adds a section of the shape.
     action : str
-        The same in the menu, with its letter marked.
+        Text of the menu that does so, with its mnemonic letter after "&".
     add, handle, flat, look : str
-        What the button to add one, the handle, the flat view and the button to look do.
+        Tips: of the button that adds one, of its handle, of its flat view, and of the button that
+        turns the camera to it.
     flat_name : str
-        What the flat view is called.
+        The name of the flat view.
     """
 
     name: str
@@ -36,24 +37,24 @@ class Words:
 
 @dataclass(frozen=True)
 class Size:
-    """The number of a shape beside a point and a direction; it is above 0.
+    """A number of a shape besides its point and direction, such as a radius; always above 0.
 
     Attributes
     ----------
     field : str
         Its name in `slideviz.sections.model.Section` and in reports.
     label, word : str
-        In a form and in a sentence.
+        What it is called in a form, and in a sentence.
     unit : str
-        Of what, in a tip.
+        Its unit in words, for a tip.
     remedy : str
-        What to give instead of a wrong one.
-    high : float
-        What it is below.
-    usual : float
-        One to start from.
+        What to give instead of a wrong value, for messages.
     example : str
-        One on the command line.
+        An example of the option of the command line, in words.
+    high : float
+        Values must be below this.
+    usual : float
+        The value where none is given.
     """
 
     field: str
@@ -66,7 +67,7 @@ class Size:
     usual: float = 1.0
 
     def fault(self, value: float) -> str:
-        """Return why a number is no size, after its value; nothing where it is one."""
+        """Return why a value is not allowed, as the end of a sentence; "" where it is."""
         if not value > 0:
             return "is not positive"
         return "" if value < self.high else f"is not below {self.high:g}"
@@ -81,28 +82,31 @@ class ShapeTerms:
     value : str
         Its name in case files, on the command line and in reports.
     direction : str
-        What its direction is.
+        What its direction is called: normal or axis.
     point : str
-        What its point is called in a form; empty where the position says it.
+        The label of its point in a form; empty where a position along the direction is given
+        instead.
     about : str
-        What its point is.
+        What its point is, in words.
     size : Size or None
-        Its own number, the one that a slider moves; without one, the position along the direction.
+        Its own number, which a slider moves; None: the slider moves its position along the
+        direction.
     flat : str
-        What stands in a case file where it is laid flat beside the view.
+        The word in a case file for a section that is shown in a flat view, too.
     numbers, meaning : str
-        Of a case file: its numbers, and what they are.
+        Its numbers in a case file, as symbols and in words.
     option : str
-        Help of the option of the command line.
+        Help text of the option of the command line.
     tip_to_add : str
-        What the action that adds one does.
+        Tip of the action that adds a section of the shape.
     words : dict of int to Words
-        By the dimensions of the mesh; it can cut only meshes of these.
+        The window's words, by the dimensions of meshes that the shape can cut.
     one_way : bool
-        Whether it is another section in the opposite direction.
+        Whether the opposite direction gives another section.
     key : str
-        Of the keyboard, to add one.
+        The shortcut that adds a section of the shape; empty for none.
     metavar : str or None
+        The placeholder for its value in the help of the command line.
     """
 
     value: str
@@ -122,7 +126,7 @@ class ShapeTerms:
 
     @property
     def count(self) -> int:
-        """Return how many numbers a shape has in a case file: size, direction and point."""
+        """Return the count of a shape's numbers in a case file: size, direction and point."""
         return 6 if self.size is None else 7
 
     @property
@@ -131,12 +135,12 @@ class ShapeTerms:
         return self.numbers.partition(",")[0]
 
     def point_tip(self, dim: int) -> str:
-        """Return the tip of the point."""
+        """Return the tip of the fields of the point, for meshes of ``dim`` dimensions."""
         name = self.words[dim].name.lower()
         return f"The middle of the {name}" if dim == 2 else self.about.capitalize()
 
     def tip(self, dim: int) -> str:
-        """Return the tip of the number that a slider moves."""
+        """Return the tip of the number that a slider moves, for meshes of ``dim`` dimensions."""
         if self.size is not None:
             return f"The {self.size.word}, in {self.size.unit}."
         name = self.words[dim].name.lower()
@@ -268,10 +272,10 @@ SECTION_SHAPES = {
         ),
     )
 }
-"""By name; see `ShapeTerms`."""
+"""All shapes by their ``value``."""
 
 
 def names(dim: int = 3) -> str:
-    """Return the names of shapes in meshes of 3 or 2 dimensions, as a list in a sentence."""
+    """Return the names of the shapes for meshes of ``dim`` dimensions, as in "plane or cone"."""
     every = [row.words[dim].name.lower() for row in SECTION_SHAPES.values() if dim in row.words]
     return f"{', '.join(every[:-1])} or {every[-1]}"

@@ -1,7 +1,7 @@
-"""The kinds of values that a key can have: how each is read, checked and written.
+"""The kinds of values that a key of a case file can have: how each is read, checked and written.
 
-A kind reads a text to a Python value and writes it back: ``read(write(value)) == value`` for
-every value that ``read`` can return. Numbers are written with ``repr``, which loses no bit.
+A kind turns a text into a Python value and back: ``read(write(value)) == value`` for every value
+that ``read`` can return. Numbers are written with ``repr``, which loses no bit.
 """
 
 from __future__ import annotations
@@ -27,11 +27,12 @@ from slideviz.errors import CaseError
 from slideviz.terms import AXES, Term, labels
 
 Entry = Literal["text", "choice", "switch", "real", "whole", "axis", "point"]
-"""How a value is entered in a window."""
+"""The kind of field by which the window lets users enter a value."""
 
 LARGEST_WHOLE = 999_999_999
+"""The largest whole number: it has 9 digits, which ``_WHOLE`` allows."""
 MAX_STEPS = 9999
-"""Steps that the window offers; a case file may ask for more."""
+"""Largest number of steps that the window offers; a case file may ask for more."""
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_./~:@=,+-]([A-Za-z0-9_./~:@=,+ -]*[A-Za-z0-9_./~:@=,+-])?\Z")
 _WHOLE = re.compile(r"[+-]?[0-9]{1,9}\Z")
@@ -41,27 +42,27 @@ _SU2_PAIR, _SU2_GROUP = 2, 11
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of value.
+    """A kind of value of a key.
 
     Attributes
     ----------
     allowed : str
-        What may be written, for the reference and for messages.
+        The texts that are allowed, in words, for the reference and for messages.
     read : callable
-        Text to value; raises ``CaseError`` with one sentence.
+        Returns the value of a text; raises ``CaseError`` with one sentence.
     write : callable
-        Value to text; raises ``CaseError`` if no text stands for it.
+        Returns the text of a value; raises ``CaseError`` if it has none.
     remark : callable
-        Text to a warning about it, empty if there is none.
+        Returns a warning about a text, empty if there is none.
     details : tuple of str
-        More lines for the reference.
+        Further lines for the reference.
     entry : str
-        How it is entered in a window; ``text`` where no field of it takes such values.
-    words : mapping
-        What the window calls values, where that is not what a case file calls them.
-    tips : mapping
-        What the values mean, for who is about to choose one.
-    span : tuple of int
+        The kind of field in the window.
+    words : mapping of value to str
+        The window's words for values, where they differ from those of a case file.
+    tips : mapping of value to str
+        The window's tips on values.
+    span : (int, int)
         The smallest and the largest whole number that the window offers.
     """
 
@@ -76,7 +77,7 @@ class Kind:
     span: tuple[int, int] = (0, LARGEST_WHOLE)
 
     def problem(self, text: str) -> str:
-        """Return why a text is no value of the kind; empty where the text is one."""
+        """Return why a text cannot be read as a value of the kind; "" where it can."""
         try:
             self.read(text)
         except CaseError as problem:
@@ -84,7 +85,7 @@ class Kind:
         return ""
 
     def called(self, text: str) -> str:
-        """Return the window's word for the value of a text of a case file."""
+        """Return the window's word for the value of a text; the text itself where it has none."""
         try:
             return self.words.get(self.read(text), text)
         except CaseError:
@@ -92,7 +93,10 @@ class Kind:
 
 
 def choice(words: Mapping[str, Any]) -> Kind:
-    """Return the kind of the words in the table, in any case; the first of a value is written."""
+    """Return the kind of the words of a table, which are read as the values there.
+
+    Upper or lower case does not matter. Of several words with one value the first is written.
+    """
     written: dict[Any, str] = {}
     for word, value in words.items():
         written.setdefault(value, word)
@@ -112,7 +116,7 @@ def choice(words: Mapping[str, Any]) -> Kind:
 
 
 def one_of(terms: Mapping[Any, Term], also: Mapping[str, str] | None = None) -> Kind:
-    """Return the kind of the values of an enumeration, some of which have other words, too."""
+    """Return the kind of the values of an enumeration; ``also`` has further words for some."""
     kind = choice({**{value: value for value in terms}, **(also or {})})
     tips = {value: term.tip for value, term in terms.items() if term.tip}
     return replace(kind, entry="choice", words=labels(terms), tips=tips)
@@ -133,7 +137,7 @@ def whole(low: int) -> Kind:
 
 
 def real(low: float, high: float | None = None, closed: bool = False) -> Kind:
-    """Return the kind of numbers above ``low`` and below ``high`` (up to it, if closed)."""
+    """Return the kind of numbers above ``low`` and below ``high`` (or equal to it, if closed)."""
     allowed = f"a number above {low:g}"
     if high is not None:
         allowed += f" {'up to' if closed else 'and below'} {high:g}"
@@ -162,12 +166,17 @@ def _read_path(text: str) -> Path | None:
 
 
 def path_text(path: Path, plain: re.Pattern[str] = _PLAIN_PATH) -> str:
-    """Return a path as it is written in a case file, with slashes and where needed in quotes.
+    """Return a path as it is written in a case file: with slashes, in quotes where needed.
+
+    Parameters
+    ----------
+    plain : pattern
+        Paths that it matches need no quotes.
 
     Raises
     ------
     CaseError
-        A case file cannot hold it.
+        A case file cannot have it: it is empty, or has a line break or a backslash.
     """
     text = path.as_posix()
     check_writable(text)
@@ -224,12 +233,12 @@ def _remark_pairs(text: str) -> str:
 
 
 def read_vector(items: list[Word], what: str) -> tuple[float, ...]:
-    """Return the numbers of a list of two or three.
+    """Return the numbers of a vector, 2 or 3; messages call it ``what``.
 
     Raises
     ------
     CaseError
-        They are not two or three, or not numbers.
+        The words are not two or three, or not numbers.
     """
     if len(items) not in (2, 3):
         raise CaseError(f"{what} has {len(items)} values; needed are 2 or 3 numbers")
@@ -237,12 +246,12 @@ def read_vector(items: list[Word], what: str) -> tuple[float, ...]:
 
 
 def read_axis(items: list[Word]) -> tuple[float, float, float]:
-    """Return the direction that ``x``, ``y``, ``z`` or three numbers stand for.
+    """Return the direction given as ``x``, ``y``, ``z`` or three numbers; not of unit length.
 
     Raises
     ------
     CaseError
-        It is none of these, or has no length.
+        The words are none of these, or the direction has no length.
     """
     if len(items) == 1 and items[0].text.lower() in AXES:
         return AXES[items[0].text.lower()]
@@ -256,12 +265,12 @@ def read_axis(items: list[Word]) -> tuple[float, float, float]:
 
 
 def vector_text(values: tuple[float, ...]) -> str:
-    """Return the numbers in brackets, without loss."""
+    """Return the numbers of a vector in brackets, without loss."""
     return f"({', '.join(repr(float(value)) for value in values)})"
 
 
 def axis_text(axis: tuple[float, float, float]) -> str:
-    """Return ``x``, ``y`` or ``z``, or the three numbers."""
+    """Return ``x``, ``y`` or ``z`` for a direction that is just this, else its three numbers."""
     for name, unit in AXES.items():
         # By text, since -0.0 == 0.0 and the two do not give the same bits.
         if repr(tuple(map(float, axis))) == repr(unit):

@@ -1,6 +1,6 @@
-"""Keys of a case file for the view of the window; runs without a window ignore them.
+"""Keys of a case file about the view of the window; runs without a window ignore them.
 
-They are kept in ``Case.view`` as values by key; `slideviz.session.keep` puts them into a view.
+Their values are in ``Case.view``, by key; `slideviz.session.keep` makes a view of them and back.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from slideviz.errors import CaseError
 from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN, SHOWN
 
 HIDDEN = "hidden"
-"""What stands at the very end of a section that is not drawn."""
+"""The last word of a section that is not drawn."""
 
 SectionText = tuple[str, tuple[float, ...], bool, bool, bool]
-"""Form, numbers, and whether whole cells are shown, it is laid flat, and it is drawn."""
+"""A section: shape, numbers, whether whole cells are shown, has a flat view, and is drawn."""
 
 
 def numbers(count: int, allowed: str, rising: bool = False, more: int = 0) -> Kind:
-    """Return the kind of a list of so many numbers, each larger than the one before if rising.
+    """Return the kind of a list of ``count`` to ``count + more`` numbers.
 
-    There may be ``more`` of them.
+    With ``rising``, each must be larger than the one before. ``allowed`` is for messages.
     """
 
     def read(text: str) -> tuple[float, ...]:
@@ -43,7 +43,7 @@ def numbers(count: int, allowed: str, rising: bool = False, more: int = 0) -> Ki
 
 
 def words(known: tuple[str, ...]) -> Kind:
-    """Return the kind of a list of words of the table."""
+    """Return the kind of a list of words out of ``known``; it is read in the order of these."""
     allowed = f"a list of {', '.join(known)}"
 
     def read(text: str) -> tuple[str, ...]:
@@ -62,7 +62,7 @@ def read_sections(text: str) -> tuple[SectionText, ...]:
     Raises
     ------
     CaseError
-        One has another form, or a wrong count of numbers.
+        One has another form, a wrong count of numbers, or numbers that give no section.
     """
     found = []
     for place, part in enumerate((p for p in text.split(";") if p.strip(" ()")), start=1):
@@ -122,7 +122,7 @@ SECTIONS = Kind(
 
 
 def hyphened(shown: str) -> str:
-    """Return the word of a case file for something that is drawn or not."""
+    """Return the word of VIEW_SHOW for a value of ``Shown``: hyphens instead of underscores."""
     return shown.replace("_", "-")
 
 

@@ -1,8 +1,8 @@
-"""The words of a value: names, numbers, brackets and quoted text.
+"""Splits a value of a case file into words: names, numbers, brackets, commas and quoted text.
 
 ``MARKER_MOVING= (BLADE, "tip #2")`` has the words ``(``, ``BLADE``, ``,``, ``tip #2``, ``)``.
-What stands between double quotes is taken as it is, and a doubled quotation mark inside is one
-of them. So a name may hold any character but the end of a line.
+Text between double quotes is one word, whatever it has; two quotation marks inside are read as
+one. So a name may have any character but a line break.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ _PLAIN_NAME = re.compile(r"[A-Za-z0-9_.:/@+-]+\Z")
 
 @dataclass(frozen=True)
 class Word:
-    """A word of a value; a quoted one is never a sign, a number or ``NONE``."""
+    """A word of a value; one in quotes is never taken as a sign, a number or ``NONE``."""
 
     text: str
     quoted: bool = False
 
     def is_sign(self, sign: str) -> bool:
-        """Tell whether the word is this bracket, comma or semicolon."""
+        """Return whether the word is the bracket, comma or semicolon ``sign``."""
         return not self.quoted and self.text == sign
 
     @property
     def is_number(self) -> bool:
-        """Tell whether the word reads as a number."""
+        """Return whether the word is a decimal number."""
         return not self.quoted and is_number(self.text)
 
 
@@ -58,7 +58,7 @@ def words_of(text: str) -> list[Word]:
 
 
 def groups_of(words: Iterable[Word]) -> list[list[Word]]:
-    """Return the words between semicolons, without brackets and commas."""
+    """Return the words of each part between semicolons, without brackets and commas."""
     groups: list[list[Word]] = [[]]
     for word in words:
         if word.is_sign(";"):
@@ -69,7 +69,7 @@ def groups_of(words: Iterable[Word]) -> list[list[Word]]:
 
 
 def without_comment(line: str, signs: str = COMMENT_SIGNS) -> str:
-    """Return the line up to its comment sign; one between quotes is no comment."""
+    """Return the line up to the first of the comment ``signs`` that is not in quotes."""
     inside = False
     for place, sign in enumerate(line):
         if sign == '"':
@@ -80,7 +80,7 @@ def without_comment(line: str, signs: str = COMMENT_SIGNS) -> str:
 
 
 def list_of(text: str) -> list[Word]:
-    """Return the items of a list: ``(A, B)``, ``A, B``, ``A B``, or none in ``( )``, ``(NONE)``.
+    """Return the items of a list like ``(A, B)``, ``A, B`` or ``A B``; [] for ``( )``, ``(NONE)``.
 
     Raises
     ------
@@ -103,22 +103,22 @@ def list_of(text: str) -> list[Word]:
 
 
 def is_none(words: Sequence[Word]) -> bool:
-    """Tell whether the words are SU2's ``NONE``, which stands for nothing."""
+    """Return whether the only word is ``NONE``, SU2's word for an empty list or value."""
     return len(words) == 1 and not words[0].quoted and words[0].text.upper() == "NONE"
 
 
 def is_number(text: str) -> bool:
-    """Tell whether the text is a decimal number; ``nan``, ``inf`` and ``1_000`` are not."""
+    """Return whether the text is a decimal number; ``nan``, ``inf`` and ``1_000`` are not."""
     return _NUMBER.match(text) is not None
 
 
 def number(text: str) -> float:
-    """Return the finite number that the text stands for.
+    """Return the number that a text is.
 
     Raises
     ------
     CaseError
-        It is none.
+        It is no number, or not finite.
     """
     if not is_number(text):
         hint = "; write decimals with a point" if is_number(text.replace(",", ".")) else ""
@@ -130,12 +130,12 @@ def number(text: str) -> float:
 
 
 def name_text(name: str) -> str:
-    """Return a name as it is written in a case file, between quotes if it needs them.
+    """Return a name as it is written in a case file, in quotes where needed.
 
     Raises
     ------
     CaseError
-        No case file can hold it.
+        A case file cannot have it (`check_writable`).
     """
     check_writable(name)
     if _PLAIN_NAME.match(name) and not is_number(name) and name.upper() != "NONE":
@@ -144,12 +144,12 @@ def name_text(name: str) -> str:
 
 
 def check_writable(text: str) -> None:
-    """Check that a line of a case file can hold the text.
+    """Raise where a text cannot be written in a line of a case file.
 
     Raises
     ------
     CaseError
-        It is empty, has the end of a line in it, or is no text.
+        It is empty, has a line break or a zero byte, or cannot be written in UTF-8.
     """
     if not text:
         raise CaseError("an empty name cannot be written to a case file; give it a name")
@@ -166,7 +166,7 @@ def check_writable(text: str) -> None:
 
 
 def shown(text: str) -> str:
-    """Return the text between quotes, cut to a length that a message can hold."""
+    """Return the text in quotes for a message, cut to 60 characters."""
     return repr(text if len(text) <= 60 else f"{text[:57]}...")
 
 
@@ -183,7 +183,7 @@ def not_one_of(value: object, known: Iterable[str]) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Return ``; did you mean X?`` with the known name most like a text, or nothing."""
+    """Return ``; did you mean X?`` with the known name most similar to ``name``; "" if none is."""
     by_lower = {other.lower(): other for other in known}
     close = get_close_matches(name.lower(), list(by_lower), n=1, cutoff=0.6)
     return f"; did you mean {by_lower[close[0]]}?" if close else ""
