@@ -1,10 +1,11 @@
-"""Whether the cells of a mesh larger than memory are numbered in both directions, or folded.
+"""Whether cells of negative volume are numbered the other way round, or folded; block by block.
 
-A cell with a negative volume is either. In memory its neighbours tell (`mesh.orientation`). Here
-each facet gets a number, at random but always the same, with the sign of the direction in which
-its cell, turned round where its volume is negative, traverses it. Two cells that are turned right
-traverse their facet in opposite directions: their numbers cancel. So the sum over all facets that
-no marker has is 0 where every cell is right, and of 2**63 other cases in one.
+For a mesh in memory, `mesh.orientation` compares neighbours. A mesh larger than memory is only
+proved to have no folded cell: each facet gets a hash of its nodes, with the sign of the direction
+in which its cell traverses it, after cells of negative volume were turned round. Two cells that
+are numbered alike traverse their common facet in opposite directions, so their hashes cancel. The
+sum over all facets that are in no marker is then 0 (modulo 2**64) where no cell is folded; where
+one is, it is 0 with a probability of about 2**-63.
 """
 
 from __future__ import annotations
@@ -29,7 +30,10 @@ Numbers = NDArray[np.uint64]
 
 @contextmanager
 def facing(path: Path, zone: int | None) -> Iterator[Callable[[tuple[int, int]], int]]:
-    """Return what adds up the numbers of the facets of a part of the cells."""
+    """Context with a function that sums the signed hashes of the inner facets of some cells.
+
+    Its argument is the first of these cells and the one after the last, by place in the file.
+    """
     with path.open("rb") as file:
         source = BinaryFile(path, file)
         place = find_zone(source, zone)
@@ -56,12 +60,21 @@ def facing(path: Path, zone: int | None) -> Iterator[Callable[[tuple[int, int]],
 
 
 def require_right(found: Iterable[int], name: str, also: str = "") -> None:
-    """Raise where the numbers of all parts do not add up to 0; ``also`` is one more remedy.
+    """Raise where the sums of the hashes of all parts of the cells do not add up to 0.
+
+    Parameters
+    ----------
+    found : iterable of int
+        The sum of each part, of `facing`.
+    name : str
+        The mesh, for the message.
+    also : str
+        One more remedy for the message.
 
     Raises
     ------
     MeshError
-        They do not.
+        They do not: some cell is folded, or a part of the boundary is in no marker.
     """
     if sum(found) % 2**64:
         raise MeshError(
@@ -75,7 +88,7 @@ _NONE = np.empty(0, np.uint64)
 
 
 def _of_markers(cells: Cells) -> Numbers:
-    """Return the numbers of the elements of a marker."""
+    """Return the hashes (f,) of the elements of a marker, in no particular order."""
     found = [_NONE]
     for _, nodes in cells.by_type.values():
         found.append(_numbers(np.sort(nodes, axis=1)))
@@ -83,7 +96,7 @@ def _of_markers(cells: Cells) -> Numbers:
 
 
 def _numbers(facets: IntArray) -> Numbers:
-    """Return a number for each facet, by its nodes (k, n), ascending; splitmix64 of each."""
+    """Return a hash (f,) of each facet (f, k) of ascending nodes: splitmix64, node by node."""
     found = np.zeros(len(facets), np.uint64)
     for column in facets.T:
         found += column.astype(np.uint64) + np.uint64(0x9E3779B97F4A7C15)
@@ -94,7 +107,7 @@ def _numbers(facets: IntArray) -> Numbers:
 
 
 def _in(numbers: Numbers, some: Numbers) -> NDArray[np.bool_]:
-    """Tell which numbers are among some (k,), ascending."""
+    """Return a mask (n,) of the numbers (n,) that are among ``some`` (k,), which is ascending."""
     if not len(some):
         return np.zeros(len(numbers), bool)
     at = np.minimum(np.searchsorted(some, numbers), len(some) - 1)

@@ -16,7 +16,10 @@ from slideviz.rbf.images import find_images
 
 
 def roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
-    """Return the case with the role of its donors for each side that only follows, and notes."""
+    """Return the case with the roles of halo copies replaced, and notes for the user.
+
+    A boundary that is a copy of another one, by the mesh's halo, gets the other's role.
+    """
     roles, notes = dict(case.roles), []
     for copy, origin in mesh.halo.sides if mesh.halo is not None else ():
         own, other = (case.roles.get(name, "fixed") for name in (copy, origin))
@@ -37,9 +40,10 @@ def roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
 def find_period(
     case: Case, mesh: Mesh, boundary: Boundary
 ) -> tuple[tuple[Pair, ...], Frame, FloatArray, IntArray]:
-    """Return periodic pairs, frame, coordinates in it (n, d), and the image that stands for each.
+    """Return periodic pairs, frame, coordinates (n, d) in it, and representatives (n,) of nodes.
 
-    Of all periodic images of a node one stands for all of them: (n,).
+    The representative of a node is the one of its periodic images that stands for all of them in
+    the system; of a node without images, itself (`Classes.stands`).
 
     Raises
     ------
@@ -57,10 +61,9 @@ def find_period(
 
 
 def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
-    """Return the periodic pairs; none are looked for when periodicity is not asked for.
+    """Return the periodic pairs of the case; none where neither images nor frame need them.
 
-    With PERIODIC_MODE= none a rotational case still works in the cylindrical frame, which its
-    pairs give; there markers that do not match are no mistake.
+    With PERIODIC_MODE= none a rotational case needs them still: they give the cylindrical frame.
     """
     names = case.markers_with("periodic")
     if not names or (case.periodic == "none" and case.periodic_type != "rotational"):
@@ -71,7 +74,7 @@ def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
 def find_classes(
     case: Case, mesh: Mesh, boundary: Boundary, fans: Fans, frame: Frame, stands: IntArray
 ) -> Classes:
-    """Return the classes of all nodes, given which of its images stands for each (n,)."""
+    """Return the classes of all nodes, given their representatives ``stands`` (n,)."""
     normals = fan_normals(boundary, fans, mesh.points)
     return classify(
         fans,

@@ -29,13 +29,15 @@ from slideviz.mesh.threads import Tick
 from slideviz.terms import FileFormat
 
 Warn = Callable[[str], object]
-"""Is called with a sentence on what the new file will not have of the mesh; "" for nothing."""
+"""Called with a sentence on what of the mesh the new file will lack; with "" if nothing."""
 PLACE = 8
-"""Bytes of disk for each cell, while a text is written of cells in another order."""
+"""Bytes of disk for each cell: its place in the binary file, should cells not be in order there."""
 
 
 def streamed_kind(source: Path, target: Path) -> FileFormat | None:
-    """Return the format of a mesh that can be converted piece by piece, None if it cannot be.
+    """Return the format of ``source`` where it can be converted to ``target`` piece by piece.
+
+    That is from SU2 text to SU2 binary or back; None for all others.
 
     Raises
     ------
@@ -55,7 +57,7 @@ def convert_streamed(
     Parameters
     ----------
     source, target : Path
-        Of such formats (`streamed_kind`); what is at ``target`` is replaced.
+        One is SU2 text, the other SU2 binary (`streamed_kind`); a file at ``target`` is replaced.
     zone : int or None
         The zone, from 1; all of them when None.
 
@@ -96,12 +98,12 @@ def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: T
 
 
 def _require_binary(text: Text, name: str) -> None:
-    """Raise where an SU2 binary file cannot hold a zone of a text.
+    """Raise where an SU2 binary file cannot hold a zone: with a halo, or long or odd marker names.
 
     Raises
     ------
     MeshError
-        As of `slideviz.mesh.io.su2b.write.require_binary`.
+        As by `slideviz.mesh.io.su2b.write.require_binary`, for a mesh in memory.
     """
     if text.zone.sends:
         raise halo_error(name)
@@ -120,7 +122,7 @@ def _to_text(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tic
         sizes = [text_size(place) for place in places]
         more = PLACE * max(place.cells.count for place in places)
         require_room(target, target, sum(sizes) + more)
-        for place in places:  # every mistake is found as by its reader
+        for place in places:  # finds every mistake in the file, as reading it whole would
             read_skin(source, place.number, part_of(tick, 0.0, 0.3))
         written = 0
         with atomic_write(target) as out:

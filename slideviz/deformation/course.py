@@ -1,4 +1,4 @@
-"""How far a streamed run is, and how long all that is left of it may take."""
+"""How far a streamed run is, and an estimate of the seconds that are left of it."""
 
 from __future__ import annotations
 
@@ -9,27 +9,28 @@ from time import monotonic
 from slideviz.deformation.steps import Progress
 
 SECONDS = {"text": 4.3, "read": 1.0, "solve": 5.0, "evaluate": 3.2, "quality": 2.7, "write": 3.0}
-"""What the stages of a run take, of two million hexahedra on two cores; only ratios count.
+"""Seconds of the stages of a run, measured with two million hexahedra on two cores.
 
-``text`` is reading a text, ``solve`` all that is done with the boundary alone.
+Only their ratios matter. ``text`` is reading a text mesh, ``read`` a binary one, ``solve`` all that
+is done with the boundary alone.
 """
 SURE = 0.1
-"""From this part of a stage on its own pace tells how long it takes; the first one says nothing
-of the others before so many of the seconds above are done of it."""
+"""Least evidence for an estimate. From this part of a stage on, the rest of it is estimated from
+its own pace. Before stages worth so many seconds of `SECONDS` are done, nothing is estimated."""
 
 
 class Course:
-    """The stages of a streamed run, told as they pass with the seconds that are left of all.
+    """The stages of a streamed run: passes each `Progress` on, with the seconds that are left.
 
-    All but the stage ``solve``, which is of the boundary alone and has a pace of its own, are of
-    as many points and cells, so that those that are done tell how long the others may take.
+    All stages but ``solve`` go through all points or cells. So the time that those took which are
+    done, over their `SECONDS`, is the pace of the others. ``solve`` depends on the boundary alone.
 
     Parameters
     ----------
     tell : callable
-        Called with each `Progress`, which has ``left`` then.
+        Called with each `Progress`, its ``left`` filled in.
     stages : str
-        In order, of `SECONDS`.
+        Names of `SECONDS`, in order.
     """
 
     def __init__(self, tell: Callable[[Progress], None], *stages: str) -> None:
@@ -46,7 +47,7 @@ class Course:
         self._begin, self._part = monotonic(), 0.0
 
     def __call__(self, progress: Progress) -> None:
-        """Tell a progress with the time that is left."""
+        """Pass a progress on, with the seconds that are left."""
         stage = self._rest[0]
         if stage == "solve":
             self._part = (progress.step - 1) / progress.total
@@ -57,7 +58,7 @@ class Course:
         self._tell(replace(progress, left=self._left()))
 
     def _left(self) -> float | None:
-        """Return the seconds that are left, None where nothing tells."""
+        """Return an estimate of the seconds that are left; None before there is enough evidence."""
         stage, now = self._rest[0], monotonic() - self._begin
         spent, usual = self._spent, self._usual
         if stage != "solve":

@@ -1,4 +1,7 @@
-"""The mesh that is streamed: an SU2 binary one as it is, a text one by a binary copy of it."""
+"""The mesh file that a streamed run reads: the SU2 binary file itself, or a binary copy of a text.
+
+The copy is made first, and removed after the run.
+"""
 
 from __future__ import annotations
 
@@ -43,23 +46,24 @@ from slideviz.mesh.threads import Tick
 from slideviz.terms import FileFormat
 
 SCANNED, FILLED, COPIED = 0.15, 0.75, 0.8
-"""Where, of the time for reading a text, its lines are found, its binary made, and added up."""
+"""Parts of the time for reading a text after which its lines are found, its copy is made, and the
+checksums of the copy are computed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """A mesh that is streamed.
+    """A mesh to be streamed, in an SU2 binary file.
 
     Attributes
     ----------
     path : Path
-        The binary file.
+        The binary file: the user's, or a copy of a text.
     zone : int or None
-        The zone in it.
+        The zone in it, from 1; the first where it is None.
     text : Text or None
-        What it is the binary form of.
+        The text that ``path`` is a copy of.
     is_left : bool
-        Whether a stopped run has left that binary form.
+        Whether the copy was made by an earlier run that was stopped.
     """
 
     path: Path
@@ -68,7 +72,7 @@ class Given:
     is_left: bool = False
 
     def text_size(self, place: ZonePlace) -> int:
-        """Return about how many bytes the mesh, whose binary form stands there, has as a text."""
+        """Return about how many bytes the zone at ``place`` has as a text."""
         if self.text is not None:
             return self.text.lines.raw.size
         return text_size(place)
@@ -87,17 +91,17 @@ class Given:
 
 
 def part_of(tick: Tick, begin: float, end: float = 1.0) -> Tick:
-    """Return what tells a part of the progress."""
+    """Return a tick for a part of the work: its 0 to 1 becomes ``begin`` to ``end`` of ``tick``."""
     return lambda done: tick(begin + (end - begin) * done)
 
 
 def require_su2(path: Path, file_format: FileFormat | None = None) -> FileFormat:
-    """Return the format of a mesh that can be streamed.
+    """Return the format of a mesh file, SU2 text or binary: only these can be streamed.
 
     Raises
     ------
     MeshError
-        It is of no such format.
+        It is of another format.
     """
     kind = format_of(path, file_format)
     if kind is None:
@@ -109,12 +113,12 @@ def require_su2(path: Path, file_format: FileFormat | None = None) -> FileFormat
 
 
 def _streamable(path: Path, zone: int | None, tick: Tick) -> Text:
-    """Return a text that can be streamed.
+    """Return the places of points, cells and markers in an SU2 text.
 
     Raises
     ------
     MeshError
-        It has a mistake, or a halo, whose copies are no boundary.
+        It has a mistake, or a halo: nodes that follow others are not all on the boundary.
     """
     text = find_text(path, zone, part_of(tick, 0.0, SCANNED))
     if text.zone.sends:
@@ -134,7 +138,9 @@ def given_mesh(
     folder: Path,
     file_format: FileFormat | None = None,
 ) -> Iterator[Given]:
-    """Return a mesh to look at; the binary copy of a text is in ``folder`` meanwhile.
+    """Context with a mesh that is only looked at; the binary copy of a text is in ``folder``.
+
+    The copy is removed at the end.
 
     Raises
     ------
@@ -177,20 +183,22 @@ def given_for(
     ranks: Alone,
     later: int = 0,
 ) -> Iterator[Given]:
-    """Return a mesh to be deformed; the binary copy of a text stands beside the output meanwhile.
+    """Context with a mesh to be deformed; the binary copy of a text is beside the output.
+
+    The copy is removed at the end, but kept where the run is stopped, to go on with.
 
     Parameters
     ----------
     is_text : bool
         Whether the output is a text.
     version : str
-        Of the program: a copy that another one has left is made anew.
+        The program's version: a copy made by another version is not used again.
     resume : bool
         Whether to use the copy that a stopped run has left.
     warn : callable
-        Called with a sentence on what the output will not have of the mesh; "" for nothing.
+        Called with a sentence on what of the mesh the output will lack; with "" if nothing.
     later : int
-        Bytes for each cell that are written beside the output afterwards.
+        Bytes for each cell that the caller writes beside the output afterwards.
 
     Raises
     ------
@@ -228,12 +236,12 @@ def given_for(
 
 
 def _lost_in_text(output: Path, path: Path, zone: int | None) -> str:
-    """Return in words what a text will not have of a binary mesh; "" for nothing.
+    """Return a sentence on the other zones of a binary mesh, which a text lacks; "" if none.
 
     Raises
     ------
     MeshError
-        The name of a boundary cannot stand in a text.
+        The name of a boundary cannot be written in a text.
     """
     with path.open("rb") as file:
         source = BinaryFile(path, file)
@@ -246,14 +254,16 @@ def _lost_in_text(output: Path, path: Path, zone: int | None) -> str:
 def text_blocks(
     given: Given, source: BinaryFile, place: ZonePlace, after: Path, ffd: bytes | None
 ) -> Iterator[bytes]:
-    """Yield a text with other coordinates: those that stand in ``after`` as in its binary copy.
+    """Yield the text of ``given`` block by block, with the coordinates in the file ``after``.
 
     Parameters
     ----------
     source, place
-        The binary copy.
+        The binary copy of the text, and its zone.
+    after : Path
+        A file with the new points where the binary copy has the old ones.
     ffd : bytes or None
-        The boxes for free-form deformation that stand in place of those it has.
+        Boxes for free-form deformation, in place of those in the text; None keeps these.
     """
     text = given.text
     assert text is not None

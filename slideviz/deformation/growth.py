@@ -1,7 +1,8 @@
-"""Growth of results: nodes that go far beyond the motion, and systems that were not solved.
+"""Results that cannot be right: nodes that overshoot the motion, and systems that were not solved.
 
-A smooth function that has to turn from one displacement to another within a thin layer overshoots
-behind it: a wall that moves along itself beside a wall that stays, with cells of 1e-6 between them.
+A smooth function that has to change from one displacement to another within a thin layer
+overshoots behind it: for example at a wall that moves along itself, beside a wall that is fixed,
+with cells of a height of 1e-6 between the two.
 """
 
 from __future__ import annotations
@@ -14,19 +15,20 @@ from slideviz.mesh.threads import PART, in_parts
 from slideviz.rbf.problem import Solution
 
 GROWTH = 5.0
-"""How many times as far as the motion reaches no node may go. Interpolation with sliding nodes gets
-to 2 on the thesis's cases, and to 4 around a thin sharp profile that slides."""
+"""A displacement overshoots where it is longer than this times the reach of the motion (`_reach`).
+Sliding nodes get to 2 on the thesis's cases, and to 4 around a thin sharp profile that slides."""
 
 TAKEN = 1.5
-"""Sliding boundaries that go farther than so many times the largest displacement have overshot
-themselves: what they do to others is no reason for anything."""
+"""Boundaries that went farther than this times the largest displacement asked for have overshot
+themselves, so that they do not count for the reach of the motion."""
 
 STEEP = 100.0
-"""A slope between neighbours explains an overshoot when it is so many times that of the largest
-displacement over the whole mesh."""
+"""Neighbouring boundary nodes explain an overshoot where the difference of their displacements over
+their distance is this times the largest displacement over the mesh's extent."""
 
 HOPELESS = 0.1
-"""A system whose solution misses its own data by this part of the largest was not solved."""
+"""A system was not solved where its solution misses the displacement of a control node by more than
+this part of the largest displacement."""
 
 
 def unsoundness(
@@ -37,17 +39,17 @@ def unsoundness(
     part: float,
     least: float = 0.0,
 ) -> str | None:
-    """Return a sentence where the result of a step cannot be right: why, and what helps.
+    """Return why the result of a step cannot be right, and what helps; None where it may be.
 
     Parameters
     ----------
     moved : (n, d)
-        Coordinates in the frame after the step. Angles count with the largest radius, so that a
-        body that turns takes nothing farther than itself.
+        Coordinates in the frame after the step. In a cylindrical one angles are times the largest
+        radius: so a body that turns about the axis carries no node farther than itself.
     part : float
-        Of the whole displacement, 0 to 1.
+        The part of the whole displacement that is reached after the step, 0 to 1.
     least : float
-        A distance up to which any motion may carry nodes, however small it is.
+        A length: the whole displacement counts as at least so long, where it is smaller.
     """
     largest = part * setup.largest
     if solution.lost > HOPELESS * largest:
@@ -68,7 +70,7 @@ def unsoundness(
         return None  # as nearly always: the motion reaches that far at least
     shift = moved - setup.coords
     length = np.linalg.norm(shift, axis=1)
-    # Sliding nodes first, for what they do is data to all others.
+    # Sliding nodes are compared with moving boundaries only: they are data for all other nodes.
     reach = np.full(len(length), _reach(setup, shift, largest, ("moving", "fixed", "sliding")))
     slid = setup.classes.sliding
     reach[slid] = _reach(setup, shift, largest, ("moving",))
@@ -88,14 +90,16 @@ def unsoundness(
 def overshoot_of_rest(
     setup: Setup, mesh: Mesh, after: FloatArray, part: float, length: float
 ) -> str | None:
-    """Return in words that a node that is no boundary goes too far: ``length``, in the frame.
+    """Return that a node outside of the skin overshoots, as the end of a sentence; None if not.
 
     Parameters
     ----------
     mesh, after
-        The skin of a mesh that such nodes are not in, and its points (n, d) after the step.
+        The skin of a mesh, and its points (n, d) after the step.
     part : float
-        Of the whole displacement, 0 to 1.
+        The part of the whole displacement that is reached after the step, 0 to 1.
+    length : float
+        How far the node has gone, in the frame.
     """
     largest = part * setup.largest
     if length <= GROWTH * largest:
@@ -111,11 +115,20 @@ def overshoot_of_rest(
 
 
 def _reach(setup: Setup, shift: FloatArray, largest: float, kinds: tuple[str, ...]) -> float:
-    """Return how far the displacement of boundaries of some kinds may carry nodes.
+    """Return the reach of the motion: how far its boundaries may carry nodes.
 
-    A body that turns or is stretched takes what is smooth around it along, the farther the more:
-    a small profile turned in a large far field, all of it, up to its edge. So does what slides
-    around a small body.
+    That is the largest displacement, or the largest strain of a boundary times the mesh's extent:
+    a smooth function continues the turning or stretching of a body around it, so that a small
+    profile turned in a large far field carries nodes the farther, the farther they are from it.
+
+    Parameters
+    ----------
+    shift : (n, d)
+        Displacement of all nodes in the frame.
+    largest : float
+        The largest displacement asked for.
+    kinds
+        Classes of boundary nodes that count: "moving", "fixed", "sliding".
     """
     chosen = np.zeros(len(shift), bool)
     for kind in kinds:
@@ -133,7 +146,7 @@ def _reach(setup: Setup, shift: FloatArray, largest: float, kinds: tuple[str, ..
 
 
 def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
-    """Return why the interpolation fails, and what helps."""
+    """Return why the interpolation fails, and what helps, as the end of a sentence."""
     nodes = np.concatenate([setup.known, setup.classes.sliding])
     at, shift = setup.coords[nodes], (moved - setup.coords)[nodes]
     from scipy.spatial import cKDTree  # takes long to load

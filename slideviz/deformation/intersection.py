@@ -20,30 +20,31 @@ from slideviz.mesh.threads import PART, in_parts
 from slideviz.mesh.topology import facet_vectors, unit
 
 MOST = 30_000
-"""Facets that are compared with each other while somebody waits: three seconds."""
+"""Most facets of moving boundaries that are tested for crossing each other: takes three seconds."""
 LOOKED_AT = 5
-"""Facets of a moved body that are asked whether they are inside; one that is will do."""
+"""Facets of a moved body that are tested; the body is in the mesh where one of them is."""
 BESIDE = 1e-4
-"""How far off its surface, in sizes of a facet, the mesh beside a body is looked for."""
+"""Distance from a facet of a point in the cells beside it, over the size of the facet."""
 OPEN = 0.1
-"""What the winding of markers may miss of 1 where they are closed but for small gaps."""
+"""The markers form a closed surface, but for small gaps, where their winding around a point inside
+differs from 1 by no more than this."""
 HALF = 0.5
-"""Winding between those of inside and outside."""
+"""A point is outside of a surface that winds around it less often than this."""
 
 
 def intersection_message(
     case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray
 ) -> str | None:
-    """Return a sentence when a moved boundary ends up inside another one or out of the mesh.
+    """Return a sentence when a moved boundary crosses another one or ends up out of the mesh.
 
-    None when all is well. Boundaries that share nodes are not compared: where a blade stands on a
-    sliding hub, both lie on the same curved surface only roughly. Nor are those that move along:
-    internal ones, and periodic ones with periodic displacement.
+    None when it does neither. Boundaries that share nodes are not compared: a blade and the hub on
+    which it slides have a common line, but the facets of a curved hub only come near to it.
+    Nor are boundaries that give way: internal ones, and periodic ones that are displaced.
 
     Parameters
     ----------
     nodes, vectors : (k,), (k, d)
-        The displacement of the moving nodes.
+        The moving nodes and their displacement.
     """
     after = np.array(mesh.points)
     after[nodes] += vectors
@@ -58,7 +59,7 @@ def intersection_message(
 
 
 def _movers(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> list[str]:
-    """Return the moving markers, last those of which most nodes stay where they are."""
+    """Return the names of the moving markers, last those with most nodes at zero displacement."""
     still = np.ones(len(mesh.points), bool)
     still[nodes] = ~vectors.any(axis=1)
     stays = {n: still[mesh.marker(n).nodes].sum() for n in case.markers_with("moving")}
@@ -66,7 +67,7 @@ def _movers(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> lis
 
 
 def _giving_way(case: Case, wall: str) -> str:
-    """Return what would let a boundary move with the one that goes through it."""
+    """Return words on how to let the boundary ``wall`` move with the one that goes through it."""
     if case.roles.get(wall) == "periodic":
         mode = "fixed" if case.sliding == "none" else "moving"
         return f"choose PERIODIC_MODE= {mode}, with which {wall} moves along"
@@ -76,9 +77,9 @@ def _giving_way(case: Case, wall: str) -> str:
 def _new_crossing(
     mesh: Mesh, after: FloatArray, moved: Cells, others: list[tuple[str, Cells]]
 ) -> Crossing | None:
-    """Return where a moved boundary goes through one that it did not cross before.
+    """Return where a moved boundary crosses one that it did not cross before the motion, or None.
 
-    Twisted quadrilaterals close to each other do, for each is taken for two triangles.
+    Twisted quadrilaterals close to each other may cross before, as each is taken as two triangles.
     """
     while (hit := first_crossing(after, moved, others)) is not None:
         wall = [(name, cells) for name, cells in others if name == hit.marker]
@@ -89,7 +90,7 @@ def _new_crossing(
 
 
 def jump_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:
-    """Return a sentence when a moved node crosses another boundary on its straight way."""
+    """Return a sentence when a moved node crosses another boundary on its straight way, or None."""
     after = np.array(mesh.points)
     after[nodes] += vectors
     for name in case.markers_with("moving"):
@@ -104,9 +105,9 @@ def jump_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -
 
 
 def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:
-    """Return a sentence when what moves goes through itself, where it did not before.
+    """Return a sentence when moving boundaries cross themselves or each other after the motion.
 
-    Of more than ``MOST`` facets that is not asked.
+    None when they do not, when they did so before, or when they have more than ``MOST`` facets.
     """
     after = np.array(mesh.points)
     after[nodes] += vectors
@@ -127,9 +128,9 @@ def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray
 
 
 def _outside(case: Case, mesh: Mesh, nodes: IntArray, after: FloatArray) -> str | None:
-    """Return a sentence when a body is beyond the boundaries as a whole, however it came there.
+    """Return a sentence when a whole moving body is out of the mesh, whatever its way, or None.
 
-    What only reaches out of them crosses one.
+    A body is a connected part of a moving marker. One that is partly out crosses a boundary.
     """
     boundary = boundary_of(mesh)
     for name in case.markers_with("moving"):
@@ -154,11 +155,11 @@ def _outside(case: Case, mesh: Mesh, nodes: IntArray, after: FloatArray) -> str 
 
 
 def _is_lost(case: Case, mesh: Mesh, after: FloatArray, facets: IntArray) -> bool:
-    """Tell whether all of a moved body (k, c) is out of the mesh and of its periodic images."""
+    """Return whether a moved body, of facets (k, c), is out of the mesh and its periodic images."""
     some = facets[np.linspace(0, len(facets) - 1, LOOKED_AT).astype(np.int64)]
     before, there = (_beside(points, some) for points in (mesh.points, after))
     whole = boundary_of(mesh).facets
-    # A surface with holes has no inside.
+    # The markers have holes, so that they have no inside: take all sides of one cell alone.
     if abs(winding(mesh.points, whole, before[:1])[0] - 1.0) > OPEN:
         whole = shell_of(mesh)
     # Beside twisted facets, which are taken for triangles, a point may be on the wrong side.
@@ -170,8 +171,8 @@ def _is_lost(case: Case, mesh: Mesh, after: FloatArray, facets: IntArray) -> boo
 
 
 def _beside(points: FloatArray, facets: IntArray) -> FloatArray:
-    """Return a point (k, d) of the mesh close to the middle of each facet (k, c)."""
-    # Three corners are in one plane.
+    """Return a point (k, d) inside the mesh, close to the middle of each facet (k, c)."""
+    # Of a quadrilateral the first three nodes, which are in one plane.
     facets = facets if facets.shape[1] == 2 else facets[:, [0, 1, 2, 2]]
     vectors = facet_vectors(points, facets)
     sizes = np.linalg.norm(vectors, axis=1) ** (1.0 / (points.shape[1] - 1))
@@ -180,12 +181,15 @@ def _beside(points: FloatArray, facets: IntArray) -> FloatArray:
 
 
 def _is_out(facets: IntArray, points: FloatArray, at: FloatArray) -> bool:
-    """Tell whether all points are outside of a closed surface."""
+    """Return whether all points ``at`` (m, d) are outside of a closed surface of facets (f, k)."""
     return all(winding(points, facets, point[None])[0] < HALF for point in at)
 
 
 def _images(case: Case, mesh: Mesh, at: FloatArray, around: FloatArray) -> Iterator[FloatArray]:
-    """Yield the images of points (m, d) that may be within points ``around`` (n, d), by periods."""
+    """Yield the periodic images (m, d) of points ``at`` that may lie among ``around`` (n, d).
+
+    A translational image is left out where its range along the period misses that of ``around``.
+    """
     names = case.markers_with("periodic")
     if case.periodic not in ("fixed", "moving") or not names:
         return
@@ -207,7 +211,10 @@ def _images(case: Case, mesh: Mesh, at: FloatArray, around: FloatArray) -> Itera
 
 
 def _others(case: Case, mesh: Mesh, moved: str) -> list[tuple[str, Cells]]:
-    """Return the boundaries that a moving one must not enter."""
+    """Return names and elements of the boundaries that the moving marker ``moved`` must not cross.
+
+    These share no node with it, and do not give way (`intersection_message`).
+    """
     own = mesh.marker(moved).nodes
     passable = ("internal", "periodic") if case.periodic in ("fixed", "moving") else ("internal",)
     return [
@@ -224,9 +231,9 @@ def _place(hit: Crossing) -> str:
 
 
 def winding(points: FloatArray, facets: IntArray, at: FloatArray) -> FloatArray:
-    """Return how often a surface winds around each point, (m,): 1 inside it, 0 outside.
+    """Return the winding number (m,) of a surface around each point: 1 inside it, 0 outside.
 
-    Whole numbers for a closed surface, whatever its shape; near them where it has small gaps.
+    An integer, but for rounding, for any closed surface; close to one where it has small gaps.
 
     Parameters
     ----------
@@ -239,8 +246,9 @@ def winding(points: FloatArray, facets: IntArray, at: FloatArray) -> FloatArray:
 
     Notes
     -----
-    The sum of the angles that the facets are seen at: in 3D solid ones, by Van Oosterom and
-    Strackee (IEEE Trans. Biomed. Eng. 30, 1983), of two triangles for each quadrilateral.
+    The sum of the signed angles under which the point sees the facets, over the full angle. In 3D
+    the solid angles of two triangles for each quadrilateral, by Van Oosterom and Strackee (IEEE
+    Trans. Biomed. Eng. 30, 1983).
     """
     if facets.shape[1] == 2:
         return np.array([_plane(points[facets] - p) for p in at])
@@ -248,13 +256,16 @@ def winding(points: FloatArray, facets: IntArray, at: FloatArray) -> FloatArray:
 
 
 def _plane(arms: FloatArray) -> float:
-    """Return the winding of lines with these ends (f, 2, 2) around 0."""
+    """Return the winding number of line segments around the origin, from their ends (f, 2, 2)."""
     (a, b), (c, d) = arms[:, 0].T, arms[:, 1].T
     return float(np.arctan2(a * d - b * c, a * c + b * d).sum() / (2.0 * np.pi))
 
 
 def _space(points: FloatArray, facets: IntArray, p: FloatArray) -> float:
-    """Return the winding of facets (f, 4) around a point; sums of parts are added in order."""
+    """Return the winding number of facets (f, 4) around a point ``p`` (3,).
+
+    The same to the bit for any number of threads: the sums of their parts are added in order.
+    """
     sums = np.zeros(-(-len(facets) // PART))
 
     def add(part: slice) -> None:

@@ -23,30 +23,31 @@ from slideviz.mesh.skin import Index, index_of
 from slideviz.terms import Metric
 
 READ = 1 << 20
-"""Points that are read in one piece."""
+"""Points that are read from a file at a time, at most."""
 PIECE = 1 << 22
-"""Numbers of all cells that are looked at in one piece."""
+"""Values of cells that are summed up at a time, at most."""
 SPARSE = 8
-"""A block of cells whose nodes lie within so many times their number is read with all between."""
+"""All points between the lowest and highest node of a block of cells are read, used or not, where
+they are at most so many times as many as its cells."""
 
 
 @dataclass(frozen=True, eq=False)
 class PointFiles:
-    """The points of a mesh in its file and in that of the deformed one."""
+    """The undeformed and the deformed points of a mesh, in two files with the same layout."""
 
     before: BinaryFile
     after: BinaryFile
     place: ZonePlace
 
     def cells_of(self, block: ElementBlock) -> tuple[Mesh, Mesh]:
-        """Return the cells of a block as a mesh, before and after."""
+        """Return the cells of a block as two meshes, undeformed and deformed."""
         nodes, flat = nodes_of(block)
         cells = Cells.from_types(block.types, flat)
         base = Mesh(self.points(self.before, nodes), cells, name=self.before.name)
         return base, base.with_points(self.points(self.after, nodes))
 
     def points(self, source: BinaryFile, nodes: IntArray) -> FloatArray:
-        """Return the points of nodes (k,), ascending; those close to each other in one piece."""
+        """Return the points (k, d) of ascending nodes (k,); neighbours are read in one piece."""
         kind = source.point(self.place.dim)
         out = np.empty((len(nodes), self.place.dim))
         a = 0
@@ -63,7 +64,10 @@ class PointFiles:
 
 
 def nodes_of(block: ElementBlock) -> tuple[IntArray, IntArray]:
-    """Return numbers of points (k,), ascending, among them those of a block, and their places."""
+    """Return ascending node numbers (k,), with all that a block has, and its nodes as places there.
+
+    Where they lie close to each other, the numbers between are among them (`SPARSE`).
+    """
     low, high = int(block.nodes.min()), int(block.nodes.max()) + 1
     if high - low <= SPARSE * len(block.types):
         return np.arange(low, high), block.nodes - low
@@ -72,26 +76,26 @@ def nodes_of(block: ElementBlock) -> tuple[IntArray, IntArray]:
 
 
 def ways_of(signs: NDArray[np.int8]) -> NDArray[np.int8]:
-    """Return those of 1 and -1 that stand in signs (k,), ascending: (1,) or (2,)."""
+    """Return which of -1 and 1 occur in ``signs`` (k,): (1,), or both, (2,)."""
     return np.unique([signs.min(), signs.max()])
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredBlock:
-    """The quality of a block of cells, before and after.
+    """The quality of a block of cells, undeformed and deformed.
 
     Attributes
     ----------
-    ids : index of (k,)
+    ids : (k,) int64 or slice
         The numbers of the cells.
     values, before : (k,) float64
-        Quality of the deformed and the undeformed cells.
+        Quality of the deformed and of the undeformed cells.
     status, old : (k,) uint8
-        Their states.
-    signs : (s,) int8
-        Which ways round they are numbered.
+        Status (``Quality.status``) of the deformed and of the undeformed cells.
+    signs : (1,) or (2,) int8
+        Orientations that occur: 1, -1 (numbered the other way round), or both.
     inverted : dict of int to (int, (n,) int64)
-        Type and nodes of the inverted cells with the lowest numbers.
+        VTK type and nodes of inverted cells, by their number: those with the lowest numbers.
     """
 
     ids: Index
@@ -106,7 +110,10 @@ class MeasuredBlock:
 def measured(
     block: ElementBlock, base: Mesh, moved: Mesh, metric: Metric, listed: int
 ) -> MeasuredBlock:
-    """Return the quality of a block; of inverted cells the ``listed`` with the lowest numbers."""
+    """Return the quality of a block, given as meshes ``base`` (undeformed) and ``moved``.
+
+    At most ``listed`` inverted cells are in it, those with the lowest numbers.
+    """
     one, other = quality(base, metric=metric), quality(moved, base, metric)
     ends, inverted = moved.cells.offsets, np.flatnonzero(other.status == INVERTED)
     lowest = inverted[np.argsort(block.ids[inverted])][:listed].tolist()
@@ -125,12 +132,14 @@ def measured(
 
 
 class QualityCollector:
-    """The quality of all cells, block by block; it is kept in files, which end with ``stack``.
+    """The quality of all cells before and after, added block by block.
+
+    It is kept in scratch files in ``folder``, which are removed when ``stack`` closes.
 
     Attributes
     ----------
     inverted : dict of int to (int, (n,) int64)
-        Type and nodes of the inverted cells with the lowest numbers.
+        VTK type and nodes of inverted cells, by their number: those with the lowest numbers.
     """
 
     def __init__(self, stack: ExitStack, folder: Path, count: int, metric: Metric) -> None:
@@ -142,7 +151,7 @@ class QualityCollector:
         self.inverted: dict[int, tuple[int, IntArray]] = {}
 
     def add(self, found: MeasuredBlock, listed: int) -> None:
-        """Keep a block; of inverted cells the ``listed`` with the lowest numbers."""
+        """Add a block; the ``listed`` inverted cells with the lowest numbers so far are kept."""
         self._signs = ways_of(np.concatenate([self._signs, found.signs]))
         ids = found.ids
         self._values[ids], self._status[ids] = found.values, found.status
@@ -152,7 +161,7 @@ class QualityCollector:
 
     @property
     def is_both_ways(self) -> bool:
-        """Return whether cells are numbered in both directions, as their volumes have it."""
+        """Return whether both orientations occur: cells numbered in both directions, or folded."""
         return len(self._signs) > 1
 
     def quality(self) -> Quality:
@@ -187,10 +196,10 @@ class QualityCollector:
 def summed(
     values: FloatArray, look: Callable[[slice], object], first: int = 0, last: int | None = None
 ) -> float:
-    """Return the sum of numbers (k,) from the ``first`` to before the ``last``, piece by piece.
+    """Return the sum of ``values[first:last]``, piece by piece, with the bits of ``numpy.sum``.
 
-    With the bits of ``numpy.sum``, which adds up halves of halves, each of a multiple of 8; after
-    each piece ``look`` is called with its place.
+    NumPy sums up halves of halves, the first of each a multiple of 8 long, and so does this.
+    ``look`` is called with the slice of each piece after it was read.
     """
     last = len(values) if last is None else last
     half = (last - first) // 2 // 8 * 8
@@ -203,7 +212,7 @@ def summed(
 
 
 class Scratch:
-    """An array in a file, which is removed with ``stack``; what was looked at can be let go."""
+    """An array (count,) in a temporary file, which is removed when ``stack`` closes."""
 
     def __init__(self, stack: ExitStack, folder: Path, count: int, kind: type) -> None:
         path = stack.enter_context(draft(folder))
@@ -216,7 +225,7 @@ class Scratch:
         self.array: NDArray = np.frombuffer(self._map, kind, count)
 
     def release(self) -> None:
-        """Give the memory back; the numbers stay in the file."""
+        """Give the memory of the array back to the system; its values stay in the file."""
         if hasattr(mmap, "MADV_DONTNEED"):  # other systems than Linux do it in their own time
             self._map.madvise(mmap.MADV_DONTNEED)
 
@@ -224,7 +233,13 @@ class Scratch:
 def folded_steps(
     rest: Rest, files: PointFiles, cells: Mapping[int, tuple[int, IntArray]]
 ) -> dict[int, tuple[int, int]]:
-    """Return the type of each cell, and after which step it is inverted for the first time."""
+    """Return VTK type and first step with an inverted cell, by cell number.
+
+    Parameters
+    ----------
+    cells : mapping of int to (int, (n,) int64)
+        VTK type and nodes of each cell to follow, by its number.
+    """
     if not cells:
         return {}
     types = [vtk for vtk, _ in cells.values()]

@@ -1,4 +1,4 @@
-"""Whether a mesh needs more memory than is free."""
+"""Whether a mesh needs more memory than is free, so that it should be streamed."""
 
 from __future__ import annotations
 
@@ -11,11 +11,15 @@ from slideviz.mesh.io.su2.text import find_text
 from slideviz.terms import FileFormat
 
 NEEDED: dict[FileFormat, float] = {"su2b": 5.0, "su2": 4.0}
-"""Memory of a run that is not streamed over the size of its file: 4.2 and 3.1 on hexahedra."""
+"""Memory of a run that is not streamed, over the size of the mesh file, with some reserve: measured
+4.2 and 3.1 on hexahedra."""
 
 
 def missing_memory(case: Case) -> str:
-    """Return in words that a mesh that can be streamed needs more memory than is free, or nothing.
+    """Return the sentence that the mesh of a case needs more memory than is free; "" if it fits.
+
+    Also "" where streaming would not help: it can stream neither this format, nor a mesh with
+    a halo, nor linear elasticity.
 
     Raises
     ------
@@ -33,7 +37,7 @@ def missing_memory(case: Case) -> str:
 
 
 def missing_memory_of(path: Path, kind: FileFormat) -> str:
-    """Return in words that an SU2 mesh needs more memory than is free, or nothing."""
+    """Return the sentence that an SU2 mesh needs more memory than is free; "" if it fits."""
     needed, free = NEEDED[kind] * path.stat().st_size, free_memory()
     if needed <= free:
         return ""

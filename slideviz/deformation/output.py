@@ -1,9 +1,9 @@
-"""The deformed mesh of a streamed run in the making: points are written, and cells measured.
+"""The deformed mesh of a streamed run: its points are written, the quality of its cells measured.
 
-Ranks write the parts of one file, each of them to the disk before it is noted as done. That is
-``pwrite`` and not MPI-IO, whose promise that others see what was written is one of all ranks
-together (``MPI_File_sync``): no rank could vouch for its part alone, as going on after a stop
-needs. Parts are long and next to each other, so there is nothing to gather before writing either.
+All ranks write parts of one file with ``pwrite``. Each part is on the disk before it is noted as
+done, so that a stopped run can go on from there. MPI-IO would not do: its ``MPI_File_sync``, after
+which others see what was written, is a call of all ranks together, while a part is done by one.
+Nor is its gathering of small writes needed: parts are long.
 """
 
 from __future__ import annotations
@@ -33,22 +33,24 @@ from slideviz.rbf.problem import Watch
 from slideviz.terms import Metric
 
 CHUNK = 1 << 20
-"""Nodes, or cells, that are in memory at a time, at most."""
+"""Most nodes or cells of a part: one part is in memory at a time."""
 FEWEST = 1 << 16
-"""Nodes or cells of a part, at least."""
+"""Fewest nodes or cells of a part, but for the last."""
 PARTS = 1024
-"""Parts of a file, so that many ranks have some; their number must not depend on that of ranks."""
+"""Parts of a file, within the two limits above: enough for many ranks. It does not depend on the
+number of ranks, for a stopped run may go on with another number of them."""
 Part = tuple[int, int]
-"""The first of some nodes or cells, and the one after the last."""
+"""A range of nodes or cells: the first, and the one after the last."""
 
 
 class Output:
-    """The deformed mesh in the making, and the quality of its cells.
+    """Writes the deformed mesh of a streamed run, and measures the quality of its cells.
 
     Attributes
     ----------
     files : PointFiles
-        The points before and after.
+        The undeformed and the deformed points. Before the first call of a method that writes or
+        measures, the deformed ones are the undeformed.
     """
 
     def __init__(
@@ -90,9 +92,9 @@ class Output:
         self._rating: QualityCollector | None = None
 
     def _opened(self) -> Partial:
-        """Return the file of the points that is changed, when it is there.
+        """Return the file for the deformed points, after waiting until it can be written.
 
-        That is a copy of the mesh, or has nothing but points where the output is a text.
+        It is a copy of the mesh file; where the output is a text, it has only points.
         """
         if not self._is_ready:
             with self._watch.phase("write") as tick:
@@ -104,7 +106,7 @@ class Output:
         return self._partial
 
     def _check(self, partial: Partial, tick: Callable[[float], object]) -> None:
-        """Forget the parts from the first one on that is not as it was written."""
+        """Take the parts as not done from the first one on whose bytes do not have its checksum."""
         done = parts(self._place.n_points)[: partial.done]
         given = self._mesh_file, self._zone, partial.path
         with self._ranks.sharing(checking, *given) as do:
@@ -115,7 +117,7 @@ class Output:
                 tick((k + 1) / len(done))
 
     def found(self) -> str:
-        """Return in words what a stopped run has left to go on with."""
+        """Return a sentence on how much a stopped run has left to go on with."""
         done, total = self._opened().done, len(parts(self._place.n_points))
         if done:
             return f"{self._path.name}: goes on after {done} of {total} parts"
@@ -129,14 +131,15 @@ class Output:
         )
 
     def displace(self, rest: Rest, *, final: bool) -> None:
-        """Write all points after the last step; parts that a stopped run has made are left out.
+        """Write all points after the last step, but for parts that a stopped run has written.
 
-        Points that are not ``final`` are those of a trial, and none to go on with.
+        Points that are not ``final`` are those of a trial number of steps: all are written, and a
+        stopped run does not go on with them.
         """
         partial, total = self._opened(), self._place.n_points
         if not final and partial.done:
             partial.note([])
-        # What others write must be seen by all, and no page be written that has old bytes of it.
+        # Ranks must see what others write, and none write a page back with old bytes of others.
         synced = final or self._ranks.size > 1
         given = self._mesh_file, self._zone, partial.path, rest.bare(), synced
         with self._watch.phase("evaluate") as tick, self._ranks.sharing(moving, *given) as do:
@@ -147,7 +150,13 @@ class Output:
                 tick(end / total)
 
     def rating(self, listed: int) -> QualityCollector:
-        """Return the quality of all cells; of inverted ones ``listed`` are kept."""
+        """Return the quality of all cells, before and after, with ``listed`` inverted ones.
+
+        Raises
+        ------
+        MeshError
+            Cells are numbered in both directions, and some are folded.
+        """
         partial, count = self._opened(), self._place.cells.count
         metric = self._metric
         if self._rating is None:
@@ -165,7 +174,10 @@ class Output:
         return self._rating
 
     def finish(self, ffd: bytes | None) -> None:
-        """Write the text, where the output is one; with other boxes where ``ffd`` has some."""
+        """Write the output where it is a text; ``ffd`` are its boxes, None: those of the mesh.
+
+        A binary output is complete already.
+        """
         if not self._is_text:
             return
         partial, written = self._opened(), 0
@@ -186,7 +198,7 @@ class Output:
 
 
 def parts(count: int, done: int = 0) -> list[Part]:
-    """Return the parts of so many nodes or cells, without the first that are done."""
+    """Return the parts of ``count`` nodes or cells, without the first ``done`` parts."""
     size = min(CHUNK, max(FEWEST, -(-count // PARTS)))
     return [(first, min(first + size, count)) for first in range(done * size, count, size)]
 
@@ -195,7 +207,7 @@ def parts(count: int, done: int = 0) -> list[Part]:
 def moving(
     path: Path, zone: int | None, partial: Path, rest: Rest, synced: bool
 ) -> Iterator[Callable[[Part], int]]:
-    """Return what writes the points of a part, and returns the checksum of its bytes."""
+    """Context with a function that writes the deformed points of a part, as `move` does."""
     with path.open("rb") as file:
         source, place = _zone(path, file, zone)
         out = os.open(partial, os.O_WRONLY | (os.O_DSYNC if synced else 0))
@@ -206,7 +218,7 @@ def moving(
 
 
 def move(source: BinaryFile, place: ZonePlace, rest: Rest, out: int, part: Part) -> int:
-    """Write the points of a part to an open file, and return the checksum of its bytes."""
+    """Write the deformed points of a part to a file descriptor; return the CRC-32 of its bytes."""
     at = _byte(source, place, part[0])
     rows = source.array(at, part[1] - part[0], source.point(place.dim), "the points")
     points = rows["x"].astype(np.float64)
@@ -223,7 +235,7 @@ def move(source: BinaryFile, place: ZonePlace, rest: Rest, out: int, part: Part)
 
 @contextmanager
 def checking(path: Path, zone: int | None, partial: Path) -> Iterator[Callable[[Part], int]]:
-    """Return what finds the checksum of a part that was written."""
+    """Context with a function that returns the CRC-32 of a part as it is in the file."""
     with path.open("rb") as file, partial.open("rb") as other:
         source, place = _zone(path, file, zone)
         kind, written = source.point(place.dim), source.of(other)
@@ -240,7 +252,7 @@ def checking(path: Path, zone: int | None, partial: Path) -> Iterator[Callable[[
 def measuring(
     path: Path, zone: int | None, partial: Path, metric: Metric, listed: int
 ) -> Iterator[Callable[[Part], MeasuredBlock]]:
-    """Return what measures the cells of a part."""
+    """Context with a function that measures the quality of the cells of a part."""
     with path.open("rb") as file, partial.open("rb") as other:
         source, place = _zone(path, file, zone)
         files = PointFiles(source, source.of(other), place)

@@ -23,21 +23,24 @@ from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import Spread, require_free
 
 APART = 100.0
-"""How much more images may differ in their displacement than in their place, both relative."""
+"""Allowed difference of the displacements of images over the largest displacement, divided by their
+mismatch in place over the mesh's extent."""
 
 
 def displaced(moved: Displacements, mesh: Mesh) -> Displacements:
-    """Return what moving nodes are asked for, with copies in the domain, and none beyond its sides.
+    """Return the prescribed displacements, made to fit the halo of the mesh, if it has one.
+
+    Copies of moving nodes follow these; nodes beyond the sides of the domain are left out.
 
     Parameters
     ----------
     moved : Displacements
-        Of all nodes of the moving markers.
+        The displacements of all nodes of the moving markers.
 
     Raises
     ------
     CaseError
-        A copy is asked to move otherwise than the node that it is a copy of.
+        A copy and the node that it is a copy of have different prescribed displacements.
     """
     halo = mesh.halo
     if halo is None:
@@ -61,9 +64,10 @@ def displaced(moved: Displacements, mesh: Mesh) -> Displacements:
 
 
 def image_tolerance(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> float:
-    """Return by which part of the largest displacement those of periodic images may differ.
+    """Return the allowed difference of the displacements of images, over the largest displacement.
 
-    Motions displace images alike but for what these are apart; files have few digits.
+    Formulas displace images alike, but for the mismatch of their places; displacements from files
+    or given as arrays may be rounded to few digits.
     """
     if any(isinstance(motion, FromFile | Prescribed) for motion in case.motions):
         return TOLERANCE
@@ -82,12 +86,21 @@ def prescribed(
     classes: Classes,
     frame: Frame,
 ) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
-    """Return the known nodes, their displacement in the frame, and warnings.
+    """Return moving and fixed nodes (a,), their displacement (a, d) in the frame, and warnings.
 
     Parameters
     ----------
+    moved : Displacements
+        What moving nodes are asked for, as `displaced` returns it.
     tolerance
-        By which part of the largest displacement those of images may differ.
+        Allowed difference of the displacements of images, over the largest displacement.
+
+    Raises
+    ------
+    CaseError
+        The motion puts a boundary through another one, or out of the mesh.
+    DeformError
+        No node is moving or fixed, or images are asked to move differently.
     """
     problem = intersection_message(case, mesh, moved.nodes, moved.vectors)
     if problem:

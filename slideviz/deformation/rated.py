@@ -22,25 +22,25 @@ from slideviz.mesh.threads import Tick
 from slideviz.terms import Metric
 
 CELLS = 1 << 17
-"""Cells that are in memory at a time."""
+"""Cells of a block: one block is in memory at a time."""
 Zone = tuple[Path, int | None]
 """A file and the number of a zone in it, the first where it is None."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rated:
-    """Some cells of a mesh.
+    """A block of cells of a mesh, with their quality.
 
     Attributes
     ----------
     ids : (k,) int64
-        Their numbers.
+        The numbers of the cells in the whole mesh.
     nodes : (n,) int64
-        The numbers of the points, ascending.
+        The numbers of the block's points in the whole mesh, ascending.
     mesh : Mesh
-        Points and cells, without boundaries.
+        These points and cells, without boundaries.
     base : Mesh or None
-        Undeformed, where there is a reference.
+        The same cells in the undeformed mesh; None where there is no reference.
     quality : Quality
     """
 
@@ -89,7 +89,17 @@ def rated_blocks(
 
 
 def _require_right(mesh: Zone, name: str, count: int, alone: bool) -> None:
-    """Raise where cells that are numbered in both directions may be folded."""
+    """Raise where cells of a mesh with volumes of both signs may be folded.
+
+    Parameters
+    ----------
+    name : str
+        The mesh, for the message.
+    count : int
+        Its cells.
+    alone : bool
+        Whether there is no undeformed mesh to compare it with.
+    """
     also = "rate a deformed mesh with --reference UNDEFORMED, " if alone else ""
     parts = [(first, min(first + CELLS, count)) for first in range(0, count, CELLS)]
     with ALONE.sharing(facing, *mesh) as do:
@@ -97,12 +107,12 @@ def _require_right(mesh: Zone, name: str, count: int, alone: bool) -> None:
 
 
 def has_cells_of(mesh: Zone, other: Zone) -> bool:
-    """Tell whether two SU2 binary meshes have the same cells.
+    """Return whether two SU2 binary meshes have the same cells, by types and nodes.
 
     Raises
     ------
     MeshError
-        They have, in another order of the file.
+        Their cells are in different orders in the files, so they cannot be compared.
     """
     with ExitStack() as stack:
         (one, place), (two, there) = _opened(stack, mesh), _opened(stack, other)
@@ -126,18 +136,18 @@ def has_cells_of(mesh: Zone, other: Zone) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Whole:
-    """What all cells of a mesh gave.
+    """The quality and the counts of all cells of a mesh.
 
     Attributes
     ----------
     quality : Quality
-        Without size and skew; its numbers are in files.
+        Without size and skew; its arrays are in scratch files.
     worst : list of (int, int)
-        Numbers and types of the cells of lowest quality, worst first, ties by number.
+        Numbers and VTK types of the cells of lowest quality, worst first, ties by number.
     types : dict of int to int
-        Cells of each type.
+        The number of cells of each VTK type.
     points, unused : int
-        All points, and those that no cell uses.
+        The number of points, and of those that no cell uses.
     """
 
     quality: Quality
@@ -157,14 +167,23 @@ def rated_whole(
     listed: int = 10,
     tick: Tick = lambda _: None,
 ) -> Whole:
-    """Return the quality of all cells of an SU2 binary mesh.
+    """Return the quality and the counts of all cells of an SU2 binary mesh.
 
     Parameters
     ----------
     stack : ExitStack
-        With it the files end that hold the numbers, in ``folder``: 9 bytes for each cell.
+        Removes the scratch files of the quality when it closes.
+    folder : Path
+        Where these files are made: 9 bytes for each cell.
+    reference : file and zone, optional
+        The undeformed mesh, as for `rated_blocks`.
     listed : int
         How many of the worst cells are wanted.
+
+    Raises
+    ------
+    MeshError
+        As by `rated_blocks`.
     """
     with ExitStack() as here:
         place = _opened(here, mesh)[1]

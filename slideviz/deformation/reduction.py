@@ -1,4 +1,7 @@
-"""The data reduction that a case asks for, in the solver's terms, and a warning of a loose one."""
+"""Data reduction: from the settings of a case to those of the solver; warnings of loose tolerances.
+
+The text on DATA_REDUCTION in `slideviz.case.reduction_keys` has the two numbers of AUTO in words.
+"""
 
 from __future__ import annotations
 
@@ -9,24 +12,24 @@ from slideviz.case.model import Case
 from slideviz.rbf.problem import GreedySettings
 
 EXACT_NODES = 2000
-"""Control candidates up to which DATA_REDUCTION= AUTO takes them all."""
+"""Most candidates with which DATA_REDUCTION= AUTO makes all of them control nodes."""
 
 AUTO_TOLERANCE = 1e-3
 """The tolerance of DATA_REDUCTION= AUTO, as a part of the largest displacement."""
 
 LOOSE = 0.1
-"""A tolerance above this part of the largest displacement leaves much to the correction."""
+"""A tolerance above this part of the largest displacement gets a warning."""
 
 
 def find_reduction(
     case: Case, extent: float, largest: float, candidates: int
 ) -> GreedySettings | None:
-    """Return the settings of the selection in the solver's terms; None for the exact method.
+    """Return the settings of the selection of control nodes; None where all candidates are taken.
 
     Parameters
     ----------
     extent, largest : float
-        Of the mesh, and the largest displacement.
+        The extent of the mesh, and the largest displacement.
     candidates : int
         Nodes that could be control nodes.
     """
@@ -54,7 +57,7 @@ def find_reduction(
 def loose_warnings(
     case: Case, reduction: GreedySettings | None, largest: float, extent: float
 ) -> list[str]:
-    """Return a warning about a tolerance that is not far below the largest displacement."""
+    """Return a warning where the tolerance is not far below the largest displacement; else []."""
     if reduction is None or not largest > 0.0 or reduction.tolerance <= LOOSE * largest:
         return []
     assert case.reduction is not None

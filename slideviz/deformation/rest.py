@@ -1,4 +1,7 @@
-"""The rest of a mesh: nodes that are no boundary, displaced by the fields of all steps."""
+"""The rest of a streamed mesh: the nodes outside of its skin, displaced by the fields of all steps.
+
+The skin is the boundary and the cells at it: the only part of the mesh that is in memory.
+"""
 
 from __future__ import annotations
 
@@ -19,16 +22,16 @@ from slideviz.rbf.axis import on_axis
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """What moves nodes of a mesh of which only the skin is in memory.
+    """Displaces any nodes of a mesh, by the steps of its skin.
 
     Attributes
     ----------
     skin : Mesh
-        Undeformed.
+        The undeformed skin.
     setup : Setup
-        That of the skin.
+        The setup of the skin.
     steps : sequence of Step
-        Those of the skin, deformed, with their fields.
+        The steps of the skin, with their ``field``.
     """
 
     skin: Mesh
@@ -36,21 +39,28 @@ class Rest:
     steps: Sequence[Step]
 
     def bare(self) -> Rest:
-        """Return the same without cells, boundaries and all else that no node needs to move."""
+        """Return the same without the skin's cells and markers, which no displacement needs."""
         none = Cells.from_blocks([])
         skin = replace(self.skin, cells=none, markers=())
         steps = [replace(step, mesh=skin.with_points(step.mesh.points)) for step in self.steps]
         return replace(self, skin=skin, steps=steps)
 
     def after_steps(self, nodes: IntArray, points: FloatArray) -> Iterator[FloatArray]:
-        """Yield the points (m, d) of nodes (m,), by their numbers and ascending, after each step.
+        """Yield the points (m, d) of some nodes after each step.
+
+        Parameters
+        ----------
+        nodes : (m,)
+            Their numbers in the whole mesh, ascending.
+        points : (m, d)
+            Their undeformed points.
 
         Raises
         ------
         DeformError
             Coordinates became infinite, or a node would go far beyond the motion.
         MeshError
-            A node lies where no boundary encloses it.
+            A node is outside of the sector that the skin spans in a cylindrical frame.
         """
         frame = self.setup.frame
         start = frame.coords(points)
@@ -73,7 +83,10 @@ class Rest:
             yield out
 
     def _in_skin(self, nodes: IntArray) -> tuple[IntArray, IntArray]:
-        """Return which of some nodes, ascending, are in the skin, and their places there."""
+        """Return the places (b,) in ``nodes`` of those that are in the skin, and in the skin (b,).
+
+        ``nodes`` (m,) are ascending numbers in the whole mesh.
+        """
         assert self.skin.part is not None
         low, high = np.searchsorted(self.skin.part.points, [nodes[0], nodes[-1] + 1])
         numbers = self.skin.part.points[low:high]
@@ -83,16 +96,23 @@ class Rest:
 
     @cached_property
     def _sector(self) -> tuple[float, float]:
-        """Return the least and the largest second coordinate of the skin: an angle as a length."""
+        """Return the range of the skin's second coordinate: in a cylindrical frame its angles."""
         angles = self.setup.coords[:, 1]
         return float(angles.min()), float(angles.max())
 
     def _require_enclosed(
         self, nodes: IntArray, points: FloatArray, start: FloatArray, inner: np.ndarray
     ) -> None:
-        """Raise where a node is farther from the axis, or in another sector, than any in the skin.
+        """Raise where a node is farther from the axis than the skin, or outside of its sector.
 
-        The frame of the whole mesh would be another one then.
+        The largest radius and the sector of the whole mesh would give another frame then.
+
+        Parameters
+        ----------
+        start : (m, d)
+            Coordinates of the nodes in the frame.
+        inner : (m,) bool
+            Nodes that are not in the skin.
         """
         frame = self.setup.frame
         if not frame.cylindrical:
@@ -112,7 +132,7 @@ class Rest:
     def _require_sound(
         self, step: Step, nodes: IntArray, points: FloatArray, shift: FloatArray, at: IntArray
     ) -> None:
-        """Raise where nodes, but for those ``at`` (b,) that are in the skin, went too far."""
+        """Raise where a node overshoots, but for those ``at`` (b,), which are in the skin."""
         squared = np.einsum("nd,nd->n", shift, shift)
         squared[at] = 0.0
         k = int(np.argmax(squared))

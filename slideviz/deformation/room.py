@@ -1,4 +1,4 @@
-"""Whether the disk has room for what a mesh larger than memory is made of, before the work."""
+"""Whether the disk has room for the files of a streamed run, found out before it begins."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.mesh.io.su2b.partial import names_of
 
 RATED = 18
-"""Bytes of disk for each cell while a run lasts."""
+"""Bytes of disk for each cell during a run: quality and status, before and after, twice 8 + 1."""
 
 
 def require_room(place: Path, path: Path, size: int) -> None:
-    """Raise where the disk has no room for so many bytes.
+    """Raise where the disk of the file ``place`` has no room for ``size`` more bytes.
 
     Raises
     ------
     MeshError
-        It has not, or there is no such folder; it is said of ``path``.
+        It has not, or the folder of ``place`` does not exist; the message names ``path``.
     """
     folder = Path(os.path.realpath(place)).parent
     try:
@@ -42,7 +42,15 @@ def text_size(place: ZonePlace) -> int:
 
 
 def bytes_of_text(plan: Plan, is_text: bool, later: int) -> int:
-    """Return how many bytes the run of a text mesh needs on the disk, at most at a time."""
+    """Return the most bytes on the disk at a time in the run of a text mesh.
+
+    Parameters
+    ----------
+    is_text : bool
+        Whether the output is a text.
+    later : int
+        Bytes for each cell that the caller writes afterwards.
+    """
     result = plan.text.lines.raw.size if is_text else plan.size
     points = plan.markers - plan.points if is_text else 0
     cells = plan.text.n_cells
@@ -50,7 +58,7 @@ def bytes_of_text(plan: Plan, is_text: bool, later: int) -> int:
 
 
 def bytes_of_binary(path: Path, zone: int | None, *, is_text: bool, later: int) -> int:
-    """Return how many bytes the run of a binary mesh needs on the disk, at most at a time."""
+    """Return the most bytes on the disk at a time in the run of a binary mesh (`bytes_of_text`)."""
     with path.open("rb") as file:
         source = BinaryFile(path, file)
         place = find_zone(source, zone)
@@ -61,6 +69,6 @@ def bytes_of_binary(path: Path, zone: int | None, *, is_text: bool, later: int) 
 
 
 def bytes_left(output: Path) -> int:
-    """Return how many bytes a stopped run has left on the disk, which this one replaces."""
+    """Return how many bytes on the disk a stopped run has left, which this run will replace."""
     files = (names_of(output, more)[0] for more in ("", ".binary"))
     return sum(file.stat().st_blocks * 512 for file in files if file.exists())

@@ -40,12 +40,13 @@ if TYPE_CHECKING:
     from slideviz.baselines.idw import Weights
 
 REACH = 1.5
-"""How far surfaces are continued at moving boundaries, in largest displacements."""
+"""How far surfaces are continued beyond moving boundaries, over the largest displacement: nodes
+that slide past the end of their surface have something to slide on."""
 
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """The arrays of a deformation, made of case and mesh, that stay the same over its steps.
+    """Everything made of a case and a mesh that stays the same over the steps of a deformation.
 
     Attributes
     ----------
@@ -59,9 +60,9 @@ class Setup:
     target : (a, d) float64
         Their displacement in the frame after the last step.
     same_as : (n,) int64
-        The node that stands for all that coincide with it.
+        For each node the one that represents all that coincide with it.
     images : (p, 2) int64
-        Nodes that stand for their periodic images, and these: they move alike.
+        Pairs of periodic images, which move alike; the first represents the second.
     candidates : int
         Nodes that could be control nodes; periodic images count as one.
     reduction : GreedySettings or None
@@ -69,15 +70,19 @@ class Setup:
     axis : (n,) bool
         Nodes on the axis of a cylindrical frame.
     held : (h,) int64
-        Sliding nodes on the axis that cannot move.
-    boundary, fans, tracks
-        Topology, and where sliding nodes slide.
+        Sliding nodes on the axis that stay in place.
+    boundary, fans
+        Facets of the boundary, and their fans around each node.
+    tracks : Tracks
+        The edges and surfaces along which nodes slide.
     pairs : tuple of Pair
+        Periodic pairs of markers.
     solve : callable
-        The method on one step.
+        Solves one step by the method of the case.
     halo : Halo or None
         Copies that follow their donors.
     warnings : tuple of str
+        What the user should know of case and mesh.
     """
 
     frame: Frame
@@ -106,14 +111,15 @@ class Setup:
         return float(np.linalg.norm(self.target, axis=1).max(initial=0.0))
 
     def once(self, nodes: IntArray) -> np.ndarray:
-        """Tell which nodes stand for themselves and all their periodic images."""
+        """Return a mask (k,) of the nodes (k,) that represent their images, or have none."""
         return np.asarray(self.classes.stands[nodes] == nodes)
 
     def constraints(self, coords: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Return nodes (q,) and unit normals (q, d) of the sliding nodes at these positions.
+        """Return nodes (q,) and unit normals (q, d) along which sliding nodes may not move.
 
-        Of periodic images only the one that stands for them is there. On flat boundaries the
-        undeformed normals are kept, so that they stay flat to the bit.
+        A node has a row for each of its normals. Of periodic images only the representative has
+        any. Where no boundary is curved, the normals are those of the undeformed mesh, so that
+        flat boundaries stay flat to the bit; else those at ``coords`` (n, d).
         """
         at = coords if self.tracks.curved else self.coords
         corners = corners_of(at, self.boundary.facets, self.axis)
@@ -124,9 +130,18 @@ class Setup:
         return hold_on_axis(nodes[once], normals[once], self.axis)[:2]
 
     def project(self, coords: FloatArray, nodes: IntArray, free: FloatArray) -> FloatArray:
-        """Return the displacements (m, d) of nodes brought back on their boundary.
+        """Return the displacements (m, d) after which nodes are on their edge or surface.
 
         Nodes on the axis stay on it, and in place where another surface meets it.
+
+        Parameters
+        ----------
+        coords : (n, d)
+            Coordinates of all nodes before the step.
+        nodes : (m,)
+            Sliding nodes.
+        free : (m, d)
+            Their displacements in the step, which may lead off the boundary.
         """
         out = self.tracks.project(coords, nodes, free)
         self._tie(nodes, out)
@@ -135,7 +150,10 @@ class Setup:
         return out
 
     def _tie(self, nodes: IntArray, slid: FloatArray) -> None:
-        """Let copies within the domain slide as the nodes do that a halo ties them to, in place."""
+        """Overwrite displacements ``slid`` (m, d) of halo copies among ``nodes`` by their donors'.
+
+        Only where both slide; turned as the halo turns them.
+        """
         if self.halo is None:
             return
         row = np.full(len(self.coords), -1)
@@ -149,12 +167,12 @@ class Setup:
 
 
 def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Setup:
-    """Return what stays the same over the steps of a deformation.
+    """Return the setup of a deformation: all that stays the same over its steps.
 
     Parameters
     ----------
     moved : Displacements, optional
-        What moving nodes are asked for, as ``displaced`` returns it; None: by the case's motions.
+        Displacements of moving nodes, as ``displaced`` returns them; None: by the case's motions.
 
     Raises
     ------
@@ -164,7 +182,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
         Periodic markers do not match, a marker element is no side of a cell, or a coordinate is
         not finite, or too large to compute with.
     DeformError
-        Nothing is known: no node has a prescribed displacement.
+        No node is moving or fixed, or periodic images are asked to move differently.
     """
     require_valid(case, mesh)
     _require_finite(mesh)
@@ -226,7 +244,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
 def _method(
     case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray
 ) -> Callable[[Problem, Watch], Solution]:
-    """Return what METHOD and SLIDING_MODE choose."""
+    """Return the function that solves one step, by METHOD and SLIDING_MODE of the case."""
     if case.method == "idw":
         from slideviz.baselines.idw import deform_idw
 
@@ -247,7 +265,7 @@ def elastic_body(mesh: Mesh, frame: Frame, axis: np.ndarray) -> Body:
 
 
 def idw_weights(case: Case, dim: int) -> Weights:
-    """Return the settings of inverse distance weighting."""
+    """Return the settings of inverse distance weighting; its power is ``dim`` if none is given."""
     from slideviz.baselines.idw import Weights
 
     return Weights(case.idw_power or float(dim), case.idw_fixed_weight)
@@ -266,10 +284,17 @@ def _require_finite(mesh: Mesh) -> None:
 
 
 def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntArray:
-    """Return for each node the first node by position that coincides with it, (n,).
+    """Return for each node the one that represents all that coincide with it, (n,); images count.
 
-    By position, because it stands for all of them in the selection of control nodes, which
-    must not depend on the numbers of nodes.
+    It is the first of them by position and not by number, because the selection of control nodes,
+    where it represents all of them, must not depend on how nodes are numbered.
+
+    Parameters
+    ----------
+    boundary_nodes : (b,)
+        The nodes that are compared.
+    images : (p, 2)
+        Pairs of periodic images, which are taken to coincide.
     """
     apart = COINCIDENT * mesh.extent
     some, links = boundary_nodes[crowded(mesh.points[boundary_nodes], apart)], images
@@ -288,6 +313,9 @@ def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntAr
 
 
 def _candidates(classes: Classes, known: IntArray) -> int:
-    """Return how many nodes could be control nodes."""
+    """Return the number of nodes that could be control nodes; periodic images count as one.
+
+    ``known`` (a,) are the moving and fixed nodes.
+    """
     nodes = np.concatenate([known, classes.edge, classes.surface])
     return int((classes.stands[nodes] == nodes).sum())

@@ -26,8 +26,8 @@ COUNTS = (1, 2, 3, 5, 8, 13, 21, 34)
 """Numbers of steps that STEPS= auto tries, in this order."""
 
 ELASTIC_BYTES = {2: 2_000, 3: 8_000}
-"""Memory that linear elasticity takes for each node, by dimension: measured on quadrilaterals and
-hexahedra, whose matrix has the most entries."""
+"""Bytes of memory that linear elasticity takes for each node, by dimension: measured on
+quadrilaterals and hexahedra, whose matrix has the most entries."""
 
 
 @takes(case=Case, mesh=Mesh)
@@ -37,7 +37,7 @@ def deform(
     progress: Callable[[Progress], None] | None = None,
     setup: Setup | None = None,
 ) -> Iterator[Step]:
-    """Yield the deformed mesh of each step.
+    """Yield the deformed mesh of each step, with numbers on how it was made.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def deform(
     -----
     Thesis chapters 2 and 3: the displacement is divided by the number of steps, in the working
     frame, and every step solves at the positions the one before it left. With ``steps`` 0
-    (STEPS= auto) they come only when their number is settled.
+    (STEPS= auto) no step is yielded before their number is found.
 
     Examples
     --------
@@ -93,23 +93,27 @@ def deform(
 
 
 def all_steps(stepping: Stepping) -> Iterator[Step]:
-    """Yield the steps that the case asks for."""
+    """Yield the steps of a case: as many as it asks for, or as STEPS= auto finds best."""
     count = stepping.case.steps
     yield from stepping.steps(count) if count else _automatic(stepping)
 
 
 def _automatic(stepping: Stepping) -> Iterator[Step]:
-    """Yield the steps of the smallest number of them that is enough.
+    """Yield the steps of the best number of steps (STEPS= auto).
 
-    Enough: no cell is inverted, and the next number does not raise the minimum quality by more
-    than the part ``steps_gain``. Where folding steps were halved, two numbers must fail to raise
-    it: such steps are small just where it matters, and even ones catch up later. If none is free
-    of inverted cells, the one with fewest.
+    Numbers are tried in the order of ``COUNTS``, without those up to the number that the trial
+    before came to by halving steps that fold cells. Better means fewer inverted cells, then a
+    higher minimum quality. The search ends
+
+    * when the best trial has no inverted cell and no halved step, and the next one has inverted
+      cells, or raises the minimum quality by at most the part ``steps_gain`` of it;
+    * after two trials in a row that are no better or have no sound result. Two, because halved
+      steps are small just where it matters: equal steps catch up only with a larger number.
 
     Raises
     ------
     DeformError
-        A step cannot be solved, or with two numbers in a row one gives no sound result.
+        A step cannot be solved, or no trial before the end of the search has a sound result.
     """
     tried: list[Trial] = []
     best: tuple[Trial, list[Step]] | None = None
@@ -144,16 +148,16 @@ def _automatic(stepping: Stepping) -> Iterator[Step]:
 
 
 def folded_at(steps: Sequence[Step], mesh: Mesh, cells: IntArray) -> IntArray:
-    """Return the number of the step in which each cell was first inverted, (k,).
+    """Return the number of the step after which each cell is first inverted, (k,); 0 where never.
 
     Parameters
     ----------
     steps
-        Those of a run, all with their meshes.
+        All steps of a run, with their meshes.
     mesh
         The undeformed mesh.
     cells : (k,)
-        Cells to follow, such as those inverted in the end. 0 where one never is.
+        Cells to follow, such as those inverted in the end.
     """
     first = np.zeros(len(cells), np.int64)
     if not len(cells):
@@ -166,7 +170,7 @@ def folded_at(steps: Sequence[Step], mesh: Mesh, cells: IntArray) -> IntArray:
 
 
 def require_memory(setup: Setup, case: Case) -> None:
-    """Raise DeformError when the system would not fit into memory."""
+    """Raise DeformError when the system of a step would not fit into free memory."""
     if case.method == "elastic":
         _require_free(
             ELASTIC_BYTES[setup.coords.shape[1]] * len(setup.coords),
@@ -185,10 +189,10 @@ def require_memory(setup: Setup, case: Case) -> None:
 
 
 def _systems(setup: Setup, case: Case) -> list[int]:
-    """Return the unknowns of the systems whose factors are kept together.
+    """Return the number of unknowns of each dense system whose factors are in memory together.
 
-    Direct sliding falls apart into one system for each axis where normals lie along axes, and
-    solves for all boundary nodes again where boundaries are curved.
+    Direct sliding has one system for each axis where normals lie along axes. Where boundaries are
+    curved, it solves a further one, for all boundary nodes.
     """
     counts = setup.classes.counts()
     known = counts["moving"] + counts["fixed"]
@@ -204,7 +208,7 @@ def _systems(setup: Setup, case: Case) -> list[int]:
 
 
 def _require_free(needed: float, what: str, remedy: str) -> None:
-    """Raise DeformError when so many bytes are not free."""
+    """Raise DeformError when fewer than ``needed`` bytes of memory are free."""
     free = free_memory()
     if needed > free:
         raise DeformError(

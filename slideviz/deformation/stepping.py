@@ -1,4 +1,4 @@
-"""Stepping: one deformation in a number of steps, each from where the one before ended."""
+"""Stepping: a deformation in a number of steps, each from the positions that the last one left."""
 
 from __future__ import annotations
 
@@ -26,24 +26,25 @@ from slideviz.rbf.problem import Problem, Solution, Watch
 from slideviz.rbf.refine import TRUSTED
 
 HALVINGS = 3
-"""How often a step that folds a cell is halved."""
+"""How often at most a step that folds a cell is halved: into eighths."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stepping:
-    """One deformation, ready to be made in any number of steps.
+    """A deformation that can be made in any number of steps.
 
     Attributes
     ----------
     case, mesh, setup
         What is asked, the undeformed mesh, and the arrays made of both.
     tell : callable
-        Receives ``Progress``; may raise to stop.
-    seconds : dict
-        Spent before the first step.
+        Called with each ``Progress``; an exception it raises ends the run.
+    seconds : dict of str to float
+        Spent before the first step, by phase; added to those of the first step.
     rate : callable or None
-        Returns the quality after steps, given all of them; that of the last one's mesh where it is
-        None. With it, steps keep their field.
+        Returns the quality of all cells after the last of the steps it is given, where ``mesh`` is
+        only the skin of a streamed mesh; the steps then have a ``field``. None: the quality of
+        the last step's mesh.
     """
 
     case: Case
@@ -59,7 +60,8 @@ class Stepping:
         Parameters
         ----------
         halve : bool
-            Whether a step that folds a cell or is unsound is made in two, up to ``HALVINGS`` times.
+            Whether a step that folds more cells or is unsound is replaced by two of half the
+            length, and these again, up to ``HALVINGS`` times.
 
         Raises
         ------
@@ -126,7 +128,7 @@ class Stepping:
         Raises
         ------
         UnsoundError
-            A node that is not in ``mesh`` would go far beyond the motion.
+            A node outside of the skin of a streamed mesh would go far beyond the motion.
         """
         if self.rate is not None:
             return self.rate(steps)
@@ -164,7 +166,7 @@ class Stepping:
 
 
 def renumbered(steps: list[Step], tried: tuple[Trial, ...]) -> Iterator[Step]:
-    """Yield the steps with their final number, and the trials in the last."""
+    """Yield the steps with their final ``total``, the last one with the trials as ``tried``."""
     for step in steps:
         last = step is steps[-1]
         yield replace(step, total=len(steps), tried=tried if last else ())
@@ -177,10 +179,17 @@ def one_step(
     watch: Watch,
     before: Solution | None,
 ) -> Solution:
-    """Return the displacement of all nodes from ``coords`` to the next step.
+    """Return the solution of one step from ``coords`` (n, d), with the displacement of all nodes.
 
-    Of periodic images only the one that stands for them is in the problem, and it is copied to
-    the others.
+    Of periodic images only the representative is in the problem; its displacement is copied to the
+    others.
+
+    Parameters
+    ----------
+    goal : (a, d)
+        Coordinates of the known nodes after the step.
+    before : Solution or None
+        The solution of the step before.
     """
     found = setup.solve(problem_at(setup, coords, goal, before), watch)
     first, second = setup.images.T
@@ -191,7 +200,7 @@ def one_step(
 def problem_at(
     setup: Setup, coords: FloatArray, goal: FloatArray, before: Solution | None = None
 ) -> Problem:
-    """Return what a step at ``coords`` (n, d) solves, with known nodes at ``goal`` (a, d) after."""
+    """Return the problem of the step from ``coords`` (n, d) with known nodes at ``goal`` (a, d)."""
     once = setup.once(setup.known)
     known, classes = setup.known[once], setup.classes
     normal_nodes, normals = setup.constraints(coords)
@@ -218,7 +227,10 @@ def problem_at(
 def moved_by(
     setup: Setup, coords: FloatArray, displacement: FloatArray, goal: FloatArray
 ) -> FloatArray:
-    """Return the new coordinates, in the place of the displacement; known nodes are as given."""
+    """Return the coordinates (n, d) after a displacement, which they overwrite.
+
+    Known nodes are exactly at their ``goal`` (a, d).
+    """
     moved = shifted(coords, displacement, setup.axis)
     moved[setup.known] = np.where(
         goal == setup.coords[setup.known], setup.coords[setup.known], goal
@@ -227,9 +239,9 @@ def moved_by(
 
 
 def shifted(coords: FloatArray, displacement: FloatArray, axis: np.ndarray) -> FloatArray:
-    """Return the coordinates (n, d) after a displacement, in its place.
+    """Return the coordinates (n, d) after a displacement, which they overwrite.
 
-    Nodes on the ``axis`` (n,) stay on it.
+    Nodes on the ``axis``, a mask (n,), stay on it.
     """
     displacement[axis, :2] = 0.0
 
@@ -245,9 +257,10 @@ def shifted(coords: FloatArray, displacement: FloatArray, axis: np.ndarray) -> F
 def cartesian(
     frame: Frame, points: FloatArray, start: FloatArray, coords: FloatArray
 ) -> FloatArray:
-    """Return the Cartesian points of coordinates (n, d) that were ``start`` at ``points``.
+    """Return the Cartesian points (n, d) of coordinates ``coords`` (n, d) in the frame.
 
-    Nodes whose coordinates did not change keep every bit.
+    Nodes whose coordinates still are their undeformed ones, ``start`` (n, d), get their undeformed
+    ``points`` (n, d), to the bit.
     """
     if not frame.cylindrical:
         return coords
@@ -262,9 +275,9 @@ def cartesian(
 
 
 def followed(setup: Setup, halo: Halo, points: FloatArray, moved: FloatArray) -> FloatArray:
-    """Return the coordinates with those of copies where their donors put them.
+    """Return coordinates ``moved`` (n, d) with those of halo copies made anew from ``points``.
 
-    Periodic images are in place already, to the bit, and stay.
+    Periodic images are left as they are: they have moved alike to the bit already.
     """
     copies = np.setdiff1d(halo.receivers, setup.images)
     out = moved.copy()
@@ -273,7 +286,7 @@ def followed(setup: Setup, halo: Halo, points: FloatArray, moved: FloatArray) ->
 
 
 def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
-    """Return the sentence about a selection that ended above its tolerance."""
+    """Return the warning that the selection of control nodes ended above its tolerance."""
     assert setup.reduction is not None
     return (
         f"step {index}: the data reduction ended with {solution.control_nodes} control nodes at "
@@ -284,7 +297,7 @@ def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
 
 
 def _doubt_warning(doubt: float, refined: float, index: int, condition: float) -> list[str]:
-    """Return the sentence about a system whose solution cannot be trusted, or was refined."""
+    """Return the warning that a solution cannot be trusted, the note that it was refined, or []."""
     nearly = f"the system is nearly singular (condition number {condition:.0e})"
     if doubt > TRUSTED:
         sentence = (
@@ -305,7 +318,10 @@ def _doubt_warning(doubt: float, refined: float, index: int, condition: float) -
 
 
 def _dropped_warning(setup: Setup, solution: Solution, index: int, mesh: Mesh) -> list[str]:
-    """Return the sentence about nodes that the pivot guard left out, or of a singular system."""
+    """Return the warning that the system is singular, or the pivot guard left out nodes; or [].
+
+    Only a note where the misfit at these nodes is negligible.
+    """
     if not len(solution.dropped):
         return []
     if KERNELS[setup.basis.kernel].polynomial:

@@ -1,4 +1,7 @@
-"""What a run gives: its progress, its steps, and the numbers of steps that it tried."""
+"""The results of a run: its progress, its steps, and the numbers of steps that STEPS= auto tried.
+
+Steps are made in `slideviz.deformation.stepping`, their number is chosen in `.solver`.
+"""
 
 from __future__ import annotations
 
@@ -15,18 +18,19 @@ from slideviz.rbf.problem import Cycle
 
 @dataclass(frozen=True)
 class Progress:
-    """How far the work is.
+    """How far a run is.
 
     Attributes
     ----------
     step, total : int
-        The step in work (from 1), and all steps.
+        The number of the current step, from 1, and of all steps.
     phase : str
-        ``classify``, ``select``, ``solve``, ``evaluate``, ``project`` or ``correct``.
+        ``classify``, ``select``, ``solve``, ``evaluate``, ``project`` or ``correct``; in a streamed
+        run also ``read``, ``quality`` and ``write``.
     fraction : float
-        Of the phase, 0 to 1.
+        The part of the phase that is done, 0 to 1.
     left : float or None
-        Seconds that all the work may still take, where that is known.
+        Estimate of the seconds that the whole run will still take; None where there is none.
     """
 
     step: int
@@ -38,14 +42,14 @@ class Progress:
 
 @dataclass(frozen=True)
 class Trial:
-    """A number of steps that STEPS= auto tried.
+    """A trial of STEPS= auto: a number of steps, and the quality it gave.
 
     Attributes
     ----------
     planned, steps : int
-        Steps asked for, and made: more where folding steps were halved.
+        Steps planned, and made: more where steps that folded cells were halved.
     min, mean : float
-        Quality of the result.
+        Minimum and mean quality of the result.
     inverted : int
         Inverted cells of the result.
     """
@@ -70,8 +74,8 @@ class Step:
     control_nodes : int
         Nodes in the interpolation system of this step.
     max_error : float
-        Largest misfit at nodes of known displacement before they are set exactly, in the mesh's
-        length unit.
+        Largest misfit at nodes of known displacement before the correction sets them exactly, in
+        the mesh's length unit.
     condition : float
         Estimated condition number of the interpolation system.
     node_counts : Mapping of str to int
@@ -79,24 +83,24 @@ class Step:
     seconds : Mapping of str to float
         Spent in this step, by phase; ``classify`` only in the first.
     warnings : tuple of str
-        What the user should know; those of all steps so far.
+        What the user should know of case, mesh and all steps so far.
     history : tuple of Cycle
         Convergence of the greedy selection in this step; empty without data reduction.
     tried : tuple of Trial
-        The numbers of steps tried by STEPS= auto, in the last step of the run.
+        The numbers of steps tried by STEPS= auto; empty but in the last step of such a run.
     control : (c,) int64
         The control nodes of this step; empty where a method has none.
     candidates : int
         Nodes that could have been control nodes; periodic images count as one.
     tolerance : float or None
-        Of the data reduction, in the mesh's length unit; None where there was none.
+        The tolerance of the data reduction, in the mesh's length unit; None where there was none.
     periodic_misfit : float or None
         Largest difference of the displacements of periodic images so far, in the mesh's length
-        unit: rounding, for more is an error. None where images need not move alike.
+        unit. It is rounding only, since more raises. None where images need not move alike.
     part : float
-        Of the whole displacement, after this step.
+        The part of the whole displacement that is reached after this step, 0 to 1.
     field : Field or None
-        What displaced the nodes that are no boundary, where a run keeps it.
+        The function that displaced the nodes off the boundary in this step; kept in streamed runs.
     """
 
     index: int

@@ -1,8 +1,9 @@
 """Streaming: a mesh larger than memory is deformed from file to file.
 
-The skin is deformed as any mesh. What its steps found displaces all other nodes, block by block,
-in a copy of the file; the same functions as of a mesh in memory are called for each block, and no
-number depends on where a block ends. Last, cells are measured block by block.
+The skin (the boundary and the cells at it) is deformed as any mesh in memory. The fields of its
+steps then displace all other nodes, block by block, in a copy of the file: by the functions that
+displace a mesh in memory, so that no number depends on the blocks. Last, the quality of the cells
+is measured block by block.
 """
 
 from __future__ import annotations
@@ -49,15 +50,16 @@ class StreamedRun:
     Attributes
     ----------
     skin : Mesh
-        Undeformed, without cells and those of its markers.
+        The undeformed points of the skin; it has no cells, and its markers have no elements.
     steps : tuple of Step
-        With the skin as mesh, and the counts of the whole.
+        Their meshes are the deformed skin, their ``node_counts`` those of the whole mesh.
     quality, undeformed : Quality
-        Of all cells; without ``size`` and ``skew``.
+        Quality of all cells after and before the run; without ``size`` and ``skew``.
     folded : dict of int to (int, int)
-        For cells that are inverted, those with the lowest numbers: type and the step after which.
-    seconds : dict
-        Spent by phase, beside those of the steps.
+        VTK type of inverted cells, and the step after which they are first inverted, by cell
+        number; at most ``listed``, those with the lowest numbers.
+    seconds : dict of str to float
+        Spent by phase, besides those of the steps.
     """
 
     skin: Mesh
@@ -82,26 +84,26 @@ def stream(
     later: int = 0,
     ranks: Alone = ALONE,
 ) -> StreamedRun:
-    """Deform the mesh of a case from file to file; what is in memory is its boundary.
+    """Deform the mesh of a case from file to file, with only its skin in memory; return numbers.
 
     Parameters
     ----------
     output : Path
-        Where the deformed mesh goes: whole or not at all.
+        The file of the deformed mesh, written whole or not at all.
     file_format : {"su2", "su2b"}, optional
-        Its format, whatever its ending.
+        The format of ``output``; None: by its ending.
     tell : callable
         Called often with a ``Progress``; an exception it raises ends the run at once.
     note : callable
         Called with a sentence on what ``resume`` found.
     warn : callable
-        Called with a sentence on what the output will not have of the mesh; "" for nothing.
+        Called with a sentence on what of the mesh the output will lack; with "" if nothing.
     resume : bool
-        Whether to go on where a run that was ended did.
+        Whether to go on where a run was stopped.
     replaces : Path, optional
-        The input that may be written over.
+        An input file that the output may overwrite.
     listed : int
-        Inverted cells that are followed through the steps.
+        Most inverted cells whose first inverted step is found.
     later : int
         Bytes for each cell that the caller writes beside the output afterwards: the disk must
         have room for them, too.
@@ -183,7 +185,10 @@ def stream(
 
 
 def _solved(case: Case, read: Callable[[], Mesh], out: Output, tell: Tell) -> Rest:
-    """Return what displaces the rest of a mesh, after all steps of its skin, which is read."""
+    """Read and deform the skin; return what displaces the rest of the mesh.
+
+    With STEPS= auto, trials write the points of the whole mesh to ``out`` to rate it.
+    """
     watch = Watch(lambda phase, part: tell(Progress(1, max(1, case.steps), phase, part)))
     skin = read()
     assert skin.part is not None
@@ -192,7 +197,7 @@ def _solved(case: Case, read: Callable[[], Mesh], out: Output, tell: Tell) -> Re
         with watch.phase("classify"):
             setup = make_setup(case, skin)
         require_memory(setup, case)
-        # No memory for what is not needed any more: cells and joints, and after the steps tracks.
+        # Let go of what is not needed any more: cells and joints, and after the steps the tracks.
         none = Cells.from_blocks([])
         markers = tuple(Marker(marker.name, none) for marker in skin.markers)
         skin = replace(skin, cells=none, markers=markers)
@@ -212,7 +217,7 @@ def _solved(case: Case, read: Callable[[], Mesh], out: Output, tell: Tell) -> Re
 
 @contextmanager
 def _numbered(numbers: IntArray) -> Iterator[None]:
-    """Return a context whose errors have the numbers (n,) that nodes have in the file."""
+    """Context whose NodeErrors name nodes by ``numbers`` (n,): of the skin's nodes in the file."""
     try:
         yield
     except NodeError as problem:
@@ -220,12 +225,14 @@ def _numbered(numbers: IntArray) -> Iterator[None]:
 
 
 def require_stream(case: Case) -> None:
-    """Raise where a case needs more of a mesh than can be streamed.
+    """Raise where a case cannot be streamed.
 
     Raises
     ------
-    CaseError, MeshError
-        For its method, or its mesh is of no format that can be streamed.
+    CaseError
+        Its method, linear elasticity, needs the whole mesh at once.
+    MeshError
+        Its mesh is of no format that can be streamed.
     """
     path = case.mesh_file
     assert path is not None
@@ -238,7 +245,10 @@ def require_stream(case: Case) -> None:
 
 
 def about_run(case: Case) -> str:
-    """Return what tells apart runs that give other points: case, files and program."""
+    """Return a hash of all that the deformed points depend on: case, input files and version.
+
+    The mesh file counts by its size and its time of change, other files by their bytes.
+    """
     path = case.mesh_file
     assert path is not None
     text = repr(
@@ -255,7 +265,7 @@ def about_run(case: Case) -> str:
 
 
 def _of_whole(steps: Sequence[Step], skin: Mesh) -> tuple[Step, ...]:
-    """Return the steps with the counts of nodes of the whole mesh."""
+    """Return the steps of the skin, with the ``node_counts`` of the whole mesh."""
     assert skin.part is not None
     more = skin.part.n_points - len(skin.points)
     return tuple(

@@ -1,4 +1,4 @@
-"""A text made of an SU2 binary mesh and other points, without the whole of it in memory."""
+"""The SU2 text of an SU2 binary mesh with other points, made without the whole mesh in memory."""
 
 from __future__ import annotations
 
@@ -17,18 +17,22 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker
 from slideviz.mesh.skin import index_of
 
 NEAR = 256
-"""Elements between two that are read with them, rather than apart."""
+"""Elements with at most so many others between them are read in one piece."""
 
 
 def text_of_binary(
     source: BinaryFile, place: ZonePlace, after: BinaryFile, folder: Path
 ) -> Iterator[bytes]:
-    """Yield the zone of a binary mesh as a text of its own, with the points of ``after``.
+    """Yield one zone of an SU2 binary mesh as an SU2 text, with the points in ``after``.
 
     Parameters
     ----------
+    source, place
+        The binary mesh, and the zone in it.
+    after : BinaryFile
+        A file with the new points where ``source`` has the old ones.
     folder : Path
-        Where the places of the elements are kept meanwhile, if these stand in another order.
+        Where a scratch file is made if the cells are not in order in the binary file.
     """
     kind = source.point(place.dim)
 
@@ -59,7 +63,10 @@ def text_of_binary(
 def _places(
     stack: ExitStack, source: BinaryFile, place: ZonePlace, folder: Path
 ) -> IntArray | None:
-    """Return where each cell stands among the elements of a file (m,); None where in order."""
+    """Return the place of each cell among the elements of a file (m,); None where all are in order.
+
+    They are in a scratch file in ``folder``, removed when ``stack`` closes.
+    """
     scratch: Scratch | None = None
     for block in element_blocks(source, place, place.cells, place.dim):
         here = slice(block.first, block.first + len(block.ids))
@@ -74,7 +81,7 @@ def _places(
 
 
 def _gathered(source: BinaryFile, place: ZonePlace, where: IntArray) -> Cells:
-    """Return the elements at some places (k,), in that order; those near each other in one go."""
+    """Return the elements at the places ``where`` (k,), in that order."""
     ordered = np.sort(where)
     cuts = np.flatnonzero(np.diff(ordered) > NEAR) + 1
     types, flats = [], []
