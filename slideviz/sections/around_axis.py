@@ -1,7 +1,7 @@
-"""The common part of shapes about an axis: straight lines turned about it, so they lie flat.
+"""What cylinder and cone have in common: surfaces of revolution of a straight line about an axis.
 
-Such a shape is known by one of its lines: how far it is from the axis, and how it leans. The angle
-around the axis is unrolled, and torn where there is most room.
+They can be unrolled without stretching. The seam, at which they are cut open, lies in the largest
+gap between the angles of the points.
 """
 
 from __future__ import annotations
@@ -23,26 +23,28 @@ if TYPE_CHECKING:
 
 TURN = 2.0 * np.pi
 _WHOLE = np.radians(300.0)
-"""What is cut over more than this is a whole ring."""
+"""A cut over more than this angle, in radians, is taken as a whole ring."""
 _HOLE = 0.1
-"""What is held lies so near to the cut, as a part of its diagonal."""
+"""The handle is in the middle of a patch where the cut comes as near to that as this part of the
+patch's diagonal; else there is a hole, and it is at the nearest place of the cut."""
 _MOST = 400
-"""Other places to hold it by: enough for one of them to be in any detail that is looked at."""
+"""About how many places of a cut are kept for its handle: enough for one to be in any close-up."""
 
 
 class Unrolled(NamedTuple):
-    """Polygons around an axis, opened at the seam: the points on each side of it.
+    """Polygons around an axis, cut open at the seam: a point on it is there once for each side.
 
     Attributes
     ----------
     local : (p, 3) float64
         The points in the section's frame.
     angle : (p,) float64
-        Around its axis in radians; none of the polygons is torn.
-    corners : (q,) int64
-        The point of each corner.
+        Their angles around the axis in radians, within one turn but for polygons on the seam,
+        which stay whole.
+    corners : (k,) int64
+        The point of each corner of the polygons.
     middle : float
-        That of the angles.
+        The middle of the range of angles, in radians.
     """
 
     local: FloatArray
@@ -52,10 +54,10 @@ class Unrolled(NamedTuple):
 
 
 def unrolled(section: Section, polygons: Polygons, near: float | None) -> Unrolled:
-    """Return polygons about the axis of a section, of which there are some, opened.
+    """Return polygons around the axis of a section, at least one, cut open at the seam.
 
-    Their middle is nearest to the angle ``near`` or, left out, within half a turn of 0; the seam
-    lies in the middle of the largest angle without points.
+    The seam lies in the middle of the largest range of angles without points. Whole turns are
+    added so that the middle of all angles is nearest to ``near``, in radians; None: to 0.
     """
     local = section.frame(polygons.points)
     angle = np.arctan2(local[:, 1], local[:, 0])
@@ -78,12 +80,12 @@ def unrolled(section: Section, polygons: Polygons, near: float | None) -> Unroll
 
 
 def _wrapped(angle: FloatArray) -> FloatArray:
-    """Return angles in -pi to pi."""
+    """Return angles (n,) in radians brought into -pi to pi by whole turns."""
     return angle - TURN * np.round(angle / TURN)
 
 
 def _seam(angle: FloatArray) -> float:
-    """Return the middle of the largest gap between angles on the circle."""
+    """Return the middle of the largest gap between angles (n,) on the circle, in radians."""
     turned = np.sort(angle)
     gaps = np.diff(turned, append=turned[0] + TURN)
     widest = int(np.argmax(gaps))
@@ -91,21 +93,23 @@ def _seam(angle: FloatArray) -> float:
 
 
 PlaceOnSection = tuple[float, float]
-"""A place on a section of any size: its angle in radians, and how far along its lines it is."""
+"""A place on a section about an axis, whatever its size: the angle in radians, and the length along
+the straight line of the surface at that angle."""
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """The part of a section about an axis in a mesh, or beside the mesh where nothing is cut.
+    """The part of a section about an axis that lies in a mesh (beside it where nothing is cut).
 
     Attributes
     ----------
     angles, along : (float, float)
-        From where to where it reaches, in radians and in the length unit; angles rise.
+        Lowest and highest angle in radians, and length along the lines in the mesh's length unit.
     middle : (float, float)
-        Where it is held: in its middle or, where a hole is there, at the cut nearest to that.
+        The place of the handle: the middle of the patch or, where that is in a hole, the place of
+        the cut nearest to it.
     places : (k, 2) float64
-        Places of the cut, with angles as those of the patch.
+        Some places of the cut, with angles in the range of ``angles``.
     """
 
     angles: tuple[float, float]
@@ -115,7 +119,7 @@ class Patch:
 
     @property
     def whole(self) -> bool:
-        """Tell whether the part goes all the way round."""
+        """Return whether the patch goes all the way round the axis."""
         return self.angles[1] - self.angles[0] > _WHOLE
 
 
@@ -124,23 +128,23 @@ class AboutAxis(Shape):
 
     handle = "pull"
 
-    # What differs, beside what `Shape` leaves open ------------------------------------
+    # What each shape defines, besides the functions of `Shape` ------------------------
 
     @abstractmethod
     def quadric(self, section: Section) -> tuple[FloatArray, float]:
-        """Return w (3,) and c: the surface is where w · (x², y², z²) = c in its frame."""
+        """Return w (3,) and c: in the section's frame the surface is w · (x², y², z²) = c."""
 
     @abstractmethod
     def laid(self, section: Section, opened: Unrolled, ahead: float | None) -> FloatArray:
-        """Return points (p, 3) laid flat (see `slideviz.sections.shape.Shape.flatten`)."""
+        """Return unrolled points (p, 3) laid flat (see `slideviz.sections.shape.Shape.flatten`)."""
 
     @abstractmethod
     def places(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the places of points (n, 3): angle in radians and length, (n, 2)."""
+        """Return unrolled points (p, 3) laid flat; see `slideviz.sections.shape.Shape.flatten`."""
 
     @abstractmethod
     def surface(self, section: Section, places: FloatArray, size: float) -> FloatArray:
-        """Return places (k, 2) of a section with another size, in space (k, 3)."""
+        """Return the points (k, 3) at places (k, 2) of the section with the size ``size``."""
 
     @abstractmethod
     def lean(self, section: Section) -> float:
@@ -148,13 +152,13 @@ class AboutAxis(Shape):
 
     @abstractmethod
     def lever(self, section: Section, along: float) -> float:
-        """Return how far a place at a length along the surface moves for one unit of size."""
+        """Return how far a place at a length along the surface moves if the size grows by 1."""
 
     @abstractmethod
     def girth(self, section: Section, along: float) -> float:
-        """Return the radius at a length along the surface."""
+        """Return the distance from the axis at a length along the surface."""
 
-    # What follows ----------------------------------------------------------------------
+    # What follows from these ------------------------------------------------------------
 
     @property
     def size(self) -> Size:
@@ -165,10 +169,10 @@ class AboutAxis(Shape):
     def crossings(
         self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
     ) -> FloatArray:
-        """Return where edges cross the surface, (k,).
+        """Return where edges cross the surface, as parts of the edge (k,), exactly.
 
-        Along an edge the weighted squares are a parabola, so the crossing is known exactly. Of
-        its two roots, the distance changes its sign at one as it does from end to end.
+        Along an edge the weighted squares of `quadric` are a parabola with two roots: taken is the
+        one at which the distance changes its sign as it does from end to end of the edge.
         """
         weights, total = self.quadric(section)
         used = weights != 0.0
@@ -179,30 +183,30 @@ class AboutAxis(Shape):
         root = np.sqrt(np.maximum(slope**2 - square * rest, 0.0))
         before, after = level
         sign = np.where(after > before, 1.0, -1.0)
-        # Of the two forms of the root, the one that does not subtract like numbers.
+        # Of the two formulas of a root, the one without cancellation.
         stable = sign * slope > 0
         with np.errstate(divide="ignore", invalid="ignore"):
             found = np.where(stable, -rest / (slope + sign * root), (sign * root - slope) / square)
         return np.asarray(np.clip(np.nan_to_num(found), 0.0, 1.0))
 
     def position(self, section: Section) -> float:
-        """Return the size: a radius, or a half angle."""
+        """Return the size: a radius, or a half angle in degrees."""
         return section.size
 
     def at_position(self, section: Section, value: float) -> Section:
-        """Return the section with another size; CaseError where there is no such size."""
+        """Return the section with another size; raise CaseError where the shape cannot have it."""
         return section.sized(value)
 
     def first(self, section: Section, points: FloatArray) -> Section:
-        """Return a section of a round size, through about the middle of points (n, 3)."""
+        """Return the section of a round size, about through the middle of points (n, 3)."""
         return section.sized(round_middle(self.positions(section, points)) or self.size.usual)
 
     def flatten(
         self, section: Section, polygons: Polygons, near: float | None, ahead: float | None
     ) -> Polygons:
-        """Return polygons laid flat; none is torn apart.
+        """Return the polygons laid flat, in the same order and each of them whole.
 
-        The same polygons in the same order; a point may occur once on each side of the seam.
+        A point on the seam may be there twice, once for each side.
         """
         if not len(polygons):
             return polygons
@@ -213,11 +217,11 @@ class AboutAxis(Shape):
     def middle(
         self, section: Section, polygons: Polygons, near: float | None = None
     ) -> float | None:
-        """Return the middle angle of polygons, in radians."""
+        """Return the middle of the range of angles of polygons, in radians; None without any."""
         return unrolled(section, polygons, near).middle if len(polygons) else None
 
     def ways(self, section: Section, angle: float) -> FloatArray:
-        """Return unit vectors outwards, around and along the surface at an angle, (3, 3)."""
+        """Return unit vectors (3, 3) at an angle: outwards, around, and along the surface."""
         cos, sin, lean = np.cos(angle), np.sin(angle), self.lean(section)
         side, high = np.array([cos, sin, 0.0]), np.array([0.0, 0.0, 1.0])
         outwards = np.cos(lean) * side - np.sin(lean) * high
@@ -225,20 +229,20 @@ class AboutAxis(Shape):
         return np.asarray(np.stack([outwards, [-sin, cos, 0.0], along]) @ section.basis)
 
     def facing(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the camera's axes for a look from outside at the middle of points (n, 3).
+        """Return the camera's axes (3, 3) to look from outside at the middle of points (n, 3).
 
-        Its lines are to the right, as where it lies flat.
+        The line of the surface there goes to the right, as in the flat view.
         """
         to_eye, _, right = self.ways(section, patch_of(section, points).middle[0])
         return np.stack([right, np.cross(to_eye, right), to_eye])
 
     def aslant(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the directions to the middle of points (n, 3) from the axis; see `Shape`."""
+        """Return the camera's axes (3, 3) from the normal at the middle of points; see `Shape`."""
         axis = section.basis[2]
         middle = points.mean(axis=0) - np.asarray(section.origin)
         middle = middle - (middle @ axis) * axis
         size = np.linalg.norm(middle)
-        # Around a whole wheel there is no middle.
+        # Points all around the axis have no middle: take any direction.
         around = self.girth(section, float(self.places(section, points)[:, 1].mean()))
         straight = middle / size if size > 1e-3 * around else section.basis[0]
         lean = self.lean(section)
@@ -248,18 +252,18 @@ class AboutAxis(Shape):
 
 
 def axis_shape(section: Section) -> AboutAxis:
-    """Return the shape of a section about an axis."""
+    """Return the shape of a section, which must be one about an axis."""
     assert isinstance(section.shape, AboutAxis)
     return section.shape
 
 
 def patch_of(section: Section, points: FloatArray) -> Patch:
-    """Return the part of a section that has these points (n, 3): of its cut, or of a mesh."""
+    """Return the part of a section at points (n, 3): those of its cut or, if none, of the mesh."""
     shape = axis_shape(section)
     angle, along = shape.places(section, points).T
     turned = np.sort(angle)
     gaps = np.diff(turned, append=turned[0] + TURN)
-    # From the end of the widest gap on, there is no seam.
+    # Angles count from the end of the widest gap, so that no seam is between them.
     start = float(turned[(int(np.argmax(gaps)) + 1) % len(turned)])
     angle = start + (angle - start) % TURN
     low, high = (float(angle.min()), float(angle.max())), (float(along.min()), float(along.max()))

@@ -1,6 +1,10 @@
-"""The cone, a shape of sections: it opens along its axis from its apex."""
+"""The cone, a shape of sections: it opens from its apex in the direction of its axis.
 
-# ruff: noqa: ARG002  (every shape takes what any of them needs)
+The first line of a function says what it is for a cone; shapes of arrays are in
+`slideviz.sections.shape.Shape` and `slideviz.sections.around_axis.AboutAxis`.
+"""
+
+# ruff: noqa: ARG002  (all shapes have functions with the same arguments)
 
 from __future__ import annotations
 
@@ -27,52 +31,55 @@ if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
 _ENDS = 0.01, 89.99
-"""Half angles in degrees that a slider reaches."""
+"""Smallest and largest half angle of a slider, in degrees."""
 _NEAR = 0.03
-"""The apex of one to start from may be so far from where it is wanted, as a part of the length."""
+"""The apex of a new cone may be moved to a round number by this part of the mesh's extent."""
 
 
 def _lines(section: Section) -> tuple[float, float]:
-    """Return sine and cosine of the half angle."""
+    """Return sine and cosine of the half angle of a section."""
     angle = np.radians(section.half_angle_deg)
     return float(np.sin(angle)), float(np.cos(angle))
 
 
 class Cone(AboutAxis):
-    """The half of a cone along its axis; see `slideviz.sections.shape.Shape`."""
+    """The half of a double cone in the direction of its axis."""
 
     terms = SECTION_SHAPES["cone"]
     in_plane = None
     directed = True
 
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
-        """Return distances of points outwards from the cone, (n,); behind the apex, from it."""
+        """Return signed distances (n,), positive outside; behind the apex those from the apex."""
         sin, cos = _lines(section)
         radius, height = np.hypot(along(0), along(1)), along(2)
         gap = radius * cos - height * sin
         return np.where(height * cos + radius * sin < 0.0, np.hypot(radius, height), gap)
 
     def quadric(self, section: Section) -> tuple[FloatArray, float]:
-        """Return the weights w (3,) and c of the cone: radius and height are in one ratio.
+        """Return w (3,) and c of the double cone: radius over height is the tangent of the angle.
 
-        So they are on its other half, behind the apex; but along no line has the distance from
-        this half more than one minimum, and its sign says which root is this half's.
+        It has the other half, behind the apex, too. But the distance from this half has only one
+        minimum along any line, so that its sign tells which root belongs to this half.
         """
         sin, cos = _lines(section)
         return np.array([cos * cos, cos * cos, -sin * sin]), 0.0
 
     def positions(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the half angles (n,) in degrees under which the apex sees points."""
+        """Return the half angles (n,) in degrees of the cones through points."""
         radius = np.hypot(section.along(points, 0), section.along(points, 1))
         angle = np.degrees(np.arctan2(radius, section.along(points, 2)))
         return np.asarray(np.clip(angle, *_ENDS))
 
     def first(self, section: Section, points: FloatArray) -> Section:
-        """Return a cone through the middle of points (n, 3), from one end of them to the other."""
+        """Return a cone through the middle of points, of the usual half angle or a smaller one.
+
+        Smaller where it would not stay between inner and outer radius over the whole length.
+        """
         local = section.frame(points)
         radius, height = np.hypot(local[:, 0], local[:, 1]), local[:, 2]
         length = float(np.ptp(height))
-        # Between inner and outer radius all along, where it can be.
+        # Between the inner and the outer radius over the whole length, where possible.
         steep = np.degrees(np.arctan2(np.ptp(radius) / 2.0, length)) if length > 0 else 45.0
         angle = roundest(steep / 2.0, min(steep, self.size.usual), self.size.usual)
         middle = round_middle(radius) or float(radius.mean())
@@ -83,7 +90,7 @@ class Cone(AboutAxis):
         return replace(section, origin=triple(apex), half_angle_deg=angle)
 
     def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
-        """Return how far the apex is moved; infinity where the cone then opens backwards."""
+        """Return how far the apex moves; infinity where the cone opens the other way after it."""
         return float(np.linalg.norm(step)) if turned @ section.basis[2] > 0 else np.inf
 
     def describe(self, section: Section) -> str:
@@ -102,7 +109,7 @@ class Cone(AboutAxis):
         return f"cone {section.half_angle_deg:.6g}° about {where} {apex} {at}"
 
     def miss(self, section: Section, points: FloatArray) -> str:
-        """Return between which half angles a cone would cut."""
+        """Return that the cone misses the mesh, and between which half angles it would cut."""
         angles = self.positions(section, points)
         return (
             f"misses the mesh, which its apex sees at {angles.min():.4g} to {angles.max():.4g} "
@@ -110,10 +117,10 @@ class Cone(AboutAxis):
         )
 
     def laid(self, section: Section, opened: Unrolled, ahead: float | None) -> FloatArray:
-        """Return the developed cone, the apex at 0; and the distance outwards.
+        """Return the developed cone with the apex at 0, and as z the distance from it, outwards.
 
-        Lengths s from the apex are kept, and angles theta around the axis become theta sin(half
-        angle) around the apex; that at ``ahead`` is to the right.
+        Lengths s from the apex are kept. An angle theta around the axis becomes theta sin(half
+        angle) around the apex, counted from the line at ``ahead``, which goes to the right.
         """
         sin, cos = _lines(section)
         local = opened.local
@@ -124,15 +131,18 @@ class Cone(AboutAxis):
         return np.stack([length * np.cos(angle), length * np.sin(angle), outwards], axis=1)
 
     def ahead(self, section: Section, points: FloatArray) -> float | None:
-        """Return the middle angle of points."""
+        """Return the middle of the range of angles of points, in radians."""
         return float(np.mean(patch_of(section, points).angles))
 
     def flat_labels(self, section: Section) -> tuple[Label, Label]:
-        """Return the labels of the developed coordinates, by s (length from the apex) and theta."""
+        """Return the labels of the coordinates of the developed cone.
+
+        s is the length from the apex, theta the angle around the axis, alpha the half angle.
+        """
         return Label("s cos(θ sin α)", "s cos"), Label("s sin(θ sin α)", "s sin")
 
     def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
-        """Return a turn about the apex."""
+        """Return the matrix of a rotation about the apex."""
         sin, _ = _lines(section)
         flat = np.eye(4)
         c, s = np.cos(angle * sin), np.sin(angle * sin)
@@ -140,27 +150,27 @@ class Cone(AboutAxis):
         return flat
 
     def places(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return angles, and lengths from the apex along the cone."""
+        """Return angles in radians, and lengths from the apex along the cone."""
         sin, cos = _lines(section)
         local = section.frame(points)
         length = local[:, 2] * cos + np.hypot(local[:, 0], local[:, 1]) * sin
         return np.column_stack([np.arctan2(local[:, 1], local[:, 0]), length])
 
     def surface(self, section: Section, places: FloatArray, size: float) -> FloatArray:
-        """Return places of a cone with another half angle, as far from the apex."""
+        """Return points at places of the cone with the half angle ``size``, in degrees."""
         turn, length, lean = places[:, 0], np.maximum(places[:, 1], 0.0), np.radians(size)
         radius = length * np.sin(lean)
         local = [radius * np.cos(turn), radius * np.sin(turn), length * np.cos(lean)]
         return np.asarray(np.asarray(section.origin) + np.column_stack(local) @ section.basis)
 
     def lean(self, section: Section) -> float:
-        """Return the half angle."""
+        """Return the half angle, in radians."""
         return float(np.radians(section.half_angle_deg))
 
     def lever(self, section: Section, along: float) -> float:
-        """Return the arc for a degree."""
+        """Return the arc of a place about the apex for one degree; 1 at the apex itself."""
         return float(np.radians(abs(along))) or 1.0
 
     def girth(self, section: Section, along: float) -> float:
-        """Return the radius at a length from the apex."""
+        """Return the distance from the axis at a length from the apex."""
         return abs(along) * _lines(section)[0]

@@ -1,4 +1,4 @@
-"""The cells that a section cuts: their cuts as polygons, or the cells whole."""
+"""The cells that a section cuts: as polygons, the cut cells or the sides of the whole cells."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from slideviz.sections.threshold import CellsInRange
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """Cells of one type: VTK identifier, ids (m,) and nodes (m, k)."""
+    """Cells of one type: VTK identifier, numbers (m,) and nodes (m, k)."""
 
     vtk: int
     ids: IntArray
@@ -48,7 +48,7 @@ class Cutter:
 
     @property
     def used(self) -> IntArray:
-        """Return the nodes of the cells, sorted, each once, which a section can reach."""
+        """Return the nodes that cells use, sorted, each once."""
         return self._cells.nodes
 
     def cut(self, points: FloatArray, section: Section) -> Polygons:
@@ -59,20 +59,21 @@ class Cutter:
         points : (n, d) float64
             The nodes of the mesh.
         section : Section
-            Its ``whole`` is not looked at; see `show`.
+            Its ``whole`` has no effect here; see `show`.
 
         Returns
         -------
         Polygons
             Convex cells give one polygon, folded ones perhaps more. Corners lie on the edges of
-            the cells and on the section, to rounding also on a cylinder. A side of cells that
-            lies in the section is shown by the cell on its negative side; where that leaves
-            nothing, the section is the rim of the mesh, by the other.
+            the cells and, up to rounding, on the section, a curved one too. A side of a cell that
+            lies in the section belongs to the cell where the distance from the section is
+            negative; where no cell is cut so, to the other, since the section is at the rim of
+            the mesh.
 
         Raises
         ------
         CaseError
-            A cylinder is to cut a 2D mesh, and its axis is not z; or it is another shape in 2D.
+            The mesh is 2D, and the section is neither a plane nor a cylinder about z.
         """
         level = self._level(points, section)
         owners, low, high = self._corners(level)
@@ -88,26 +89,26 @@ class Cutter:
         return found.take(np.argsort(owners, kind="stable"))
 
     def which_cells(self, points: FloatArray, section: Section) -> IntArray:
-        """Return the sorted ids of the cells that the section cuts (see `cut`).
+        """Return the sorted numbers of the cells that the section cuts (see `cut`).
 
-        These have nodes on both sides, or a side in the section. For a cylinder, sides are those
-        of the nodes: one that bulges into a cell between its nodes does not count.
+        They have nodes on both sides of the section, or a side in it. A curved section that enters
+        a cell between its nodes, all of which are on one side, does not cut it.
         """
         return self.cut(points, section).cell_ids
 
     def all_cells(self, points: FloatArray) -> Polygons:
-        """Return the surface of all cells; in 2D the cells."""
+        """Return the surface of the mesh as polygons; in 2D all cells."""
         return self.surface(points, np.concatenate([block.ids for block in self._blocks]))
 
     def show(
         self, points: FloatArray, section: Section, only: CellsInRange | None = None
     ) -> Polygons:
-        """Return the cut cells, whole or cut as the section says; some of them if not all."""
+        """Return the cut cells, whole or cut as the section says; with ``only``, some of them."""
         if not section.whole:
             found = self.cut(points, section)
             return found if only is None else only.among(found)
         ids = self.which_cells(points, section)
-        # What is beside cells that are left out is a side that was between cells before.
+        # Sides beside cells that are left out are shown, too.
         return self.surface(points, ids if only is None else ids[only.mask[ids]])
 
     def surface(self, points: FloatArray, ids: IntArray) -> Polygons:
@@ -142,9 +143,9 @@ class Cutter:
         return section.distance(points)
 
     def _corners(self, level: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
-        """Return owners (q,) and both ends (q, c) of the edge of every corner, -1 for none.
+        """Return the polygons' cells (q,), and both ends (q, c) of each corner's edge, -1 for none.
 
-        A corner at a node has this node as both ends.
+        A corner at a node has this node as both ends. ``level`` (n,) are distances of the nodes.
         """
         negative = level < 0
         parts = []
@@ -171,7 +172,7 @@ class Cutter:
 
 
 def sides_of(cells: Cells, level: FloatArray) -> np.ndarray:
-    """Tell which cells have a negative node and one that is not, (m,); ``level`` (n,) of nodes."""
+    """Return a mask (m,) of the cells that have nodes with ``level`` (n,) below 0, and others."""
     found, negative = np.zeros(len(cells), bool), level < 0
     for ids, nodes in cells.by_type.values():
         found[ids] = _patterns(nodes, negative) > 0
@@ -179,7 +180,10 @@ def sides_of(cells: Cells, level: FloatArray) -> np.ndarray:
 
 
 def _patterns(nodes: IntArray, negative: np.ndarray) -> np.ndarray:
-    """Return which nodes of each cell (m, k) are negative, a bit each (m,); 0 where all are."""
+    """Return (m,) for cells (m, k) a number with bit k set where node k is negative; 0 if all are.
+
+    ``negative`` is a mask (n,) of nodes.
+    """
     found = np.empty(len(nodes), np.uint8)
     in_parts(lambda part: _write_patterns(nodes[part], negative, found[part]), len(nodes))
     return found
@@ -204,7 +208,7 @@ def _wide(table: IntArray, width: int) -> IntArray:
 
 
 def _single(facets: IntArray, n_points: int) -> np.ndarray:
-    """Tell which of the facets (f, 4) no other has the nodes of, (f,)."""
+    """Return a mask (f,) of the facets (f, 4) whose nodes no other facet has."""
     nodes = np.sort(facets, axis=1)
     keys = nodes[:, 0] * n_points + nodes[:, 1], nodes[:, 2] * n_points + nodes[:, 3]
     order = np.lexsort(keys)
@@ -216,7 +220,10 @@ def _single(facets: IntArray, n_points: int) -> np.ndarray:
 
 
 def _distinct(low: IntArray, high: IntArray) -> np.ndarray:
-    """Tell which corners (q, c) there are and differ from the one before, round the loop."""
+    """Return a mask (q, c) of the corners that differ from the one before in their polygon.
+
+    ``low`` and ``high`` (q, c) are the ends of their edges, -1 where a polygon has no more corners.
+    """
     there = low >= 0
     last = np.maximum(there.sum(axis=1) - 1, 0)
     rows = np.arange(len(low))
@@ -229,11 +236,11 @@ def _distinct(low: IntArray, high: IntArray) -> np.ndarray:
 def _crossings(
     points: FloatArray, a: IntArray, b: IntArray, level: FloatArray, section: Section
 ) -> FloatArray:
-    """Return the points (k, 3) where the section meets the edges from a to b (k,) each."""
+    """Return the points (k, 3) where the section crosses the edges from nodes a (k,) to b (k,)."""
     start = padded(points[a])
     way = padded(points[b]) - start
     share, levels = np.zeros(len(a)), (level[a], level[b])
-    # Mostly no corner is at a node, and nothing has to be copied.
+    # Mostly no corner is at a node, and a slice copies nothing.
     between = slice(None) if (a != b).all() else np.flatnonzero(a != b)
     edges = start[between], way[between]
     share[between] = section.shape.crossings(section, edges, tuple(one[between] for one in levels))
@@ -242,10 +249,10 @@ def _crossings(
 
 @cache
 def cut_cases(vtk: int) -> IntArray:
-    """Return the loops of each pattern of signs: (2 ** nodes, loops, corners), -1 is no corner.
+    """Return the polygons of each pattern of signs: (2 ** nodes, polygons, corners).
 
-    Bit k of a pattern is set where node k is negative; corners are indices into the edges of
-    the element type. A 2D element has loops of two corners: the ends of a line.
+    Bit k of a pattern is set where node k is negative. Corners are indices into the edges of the
+    element type, -1 where there are no more. A 2D element has lines instead, of two corners.
     """
     row = ELEMENTS[vtk]
     found = [_loops(row, pattern) for pattern in range(2**row.n_nodes)]
@@ -260,7 +267,7 @@ def cut_cases(vtk: int) -> IntArray:
 
 
 def _loops(row: ElementType, pattern: int) -> list[list[int]]:
-    """Return the loops of one pattern, each a list of edges."""
+    """Return the polygons of one pattern, each a list of edges by number."""
     edge_of = {frozenset(edge): index for index, edge in enumerate(row.edges)}
     sides = row.facets if row.dim == 3 else (tuple(range(row.n_nodes)),)
     joints = [joint for side in sides for joint in _joints(side, pattern, edge_of)]
@@ -281,7 +288,7 @@ def _loops(row: ElementType, pattern: int) -> list[list[int]]:
 def _joints(
     side: tuple[int, ...], pattern: int, edge_of: dict[frozenset[int], int]
 ) -> list[tuple[int, int]]:
-    """Return the pairs of edges between which the negative nodes of a side lie."""
+    """Return the edges before and after each run of negative nodes round a side, by number."""
     negative = [bool(pattern >> node & 1) for node in side]
     size = len(side)
     joints = []

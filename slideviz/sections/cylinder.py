@@ -1,6 +1,10 @@
-"""The cylinder, a shape of sections: the distance from its axis; in 2D it is a circle."""
+"""The cylinder, a shape of sections, of infinite length; in 2D it is a circle.
 
-# ruff: noqa: ARG002  (every shape takes what any of them needs)
+The first line of a function says what it is for a cylinder or circle; shapes of arrays are in
+`slideviz.sections.shape` and `slideviz.sections.around_axis.AboutAxis`.
+"""
+
+# ruff: noqa: ARG002  (all shapes have functions with the same arguments)
 
 from __future__ import annotations
 
@@ -29,18 +33,18 @@ if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
 _CHORDS = 720
-"""Of a circle."""
+"""Number of chords that a circle is drawn with."""
 
 
 class Circle(InPlane):
     """A cylinder in 2D; see `slideviz.sections.shape.InPlane`."""
 
     def can_cut(self, section: Section) -> bool:
-        """Tell whether the axis is z."""
+        """Return whether the axis is z."""
         return axis_word(section.direction) == "z"
 
     def describe(self, section: Section) -> str:
-        """Return radius and centre in words."""
+        """Return radius and centre in words; "" where the axis is not z."""
         at = triple_words(section.origin[:2])
         return f"circle r = {section.radius:.6g} about {at}" if self.can_cut(section) else ""
 
@@ -67,7 +71,7 @@ class Circle(InPlane):
     def dragged(
         self, section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box
     ) -> Section:
-        """Return the circle moved by its centre, or with another radius by the rest."""
+        """Return the circle moved, if dragged by its centre; else with another radius."""
         start, now = way
         size = float((box[1] - box[0]).max())
         if part == "middle":
@@ -76,10 +80,9 @@ class Circle(InPlane):
         return replace(section, radius=rounded(max(radius, 1e-4 * size), size))
 
     def positions(self, section: Section, corners: FloatArray) -> FloatArray:
-        """Return angles in degrees.
+        """Return the angles of both ends of lines, in degrees.
 
-        The middle of each line is in -180 to 180, always: curves of several meshes are above
-        each other.
+        The middle of each line is within -180 to 180, so that curves of several meshes coincide.
         """
         corners = corners - np.asarray(section.origin[:2])
         start, end = np.degrees(np.arctan2(corners[..., 1], corners[..., 0])).T
@@ -93,26 +96,26 @@ class Circle(InPlane):
 
 
 class Cylinder(AboutAxis):
-    """The cylinder; see `slideviz.sections.shape.Shape` for the results of its functions."""
+    """The cylinder; its direction has no sign."""
 
     terms = SECTION_SHAPES["cylinder"]
     in_plane = Circle()
     directed = False
 
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
-        """Return the distances of points outwards from the cylinder, (n,)."""
+        """Return signed distances (n,) of points from the cylinder, positive outside."""
         return np.asarray(np.hypot(along(0), along(1)) - section.radius)
 
     def quadric(self, section: Section) -> tuple[FloatArray, float]:
-        """Return the weights of the squared radius, and the squared radius of the cylinder."""
+        """Return w = (1, 1, 0) and the squared radius."""
         return np.array([1.0, 1.0, 0.0]), section.radius**2
 
     def positions(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the radii (n,) of points."""
+        """Return the distances (n,) of points from the axis."""
         return np.asarray(np.hypot(section.along(points, 0), section.along(points, 1)))
 
     def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
-        """Return how far a transformation moves the axis sideways."""
+        """Return how far the axis moves sideways."""
         return float(np.linalg.norm(np.cross(step, section.basis[2])))
 
     def describe(self, section: Section) -> str:
@@ -129,7 +132,7 @@ class Cylinder(AboutAxis):
         return f"cylinder r = {section.radius:.6g} about {where}{at}"
 
     def miss(self, section: Section, points: FloatArray) -> str:
-        """Return between which radii a cylinder would cut."""
+        """Return that the cylinder misses the mesh, and between which radii it would cut."""
         radii = self.positions(section, points)
         return (
             f"misses the mesh, which has radii {radii.min():.6g} to {radii.max():.6g} about this "
@@ -137,14 +140,14 @@ class Cylinder(AboutAxis):
         )
 
     def laid(self, section: Section, opened: Unrolled, ahead: float | None) -> FloatArray:
-        """Return position along the axis; radius times the angle; and distance outwards."""
+        """Return position along the axis, radius times angle, and distance outwards."""
         local = opened.local
         along = local[:, 2] + np.asarray(section.origin) @ section.basis[2]
         outwards = np.hypot(local[:, 0], local[:, 1]) - section.radius
         return np.stack([along, section.radius * opened.angle, outwards], axis=1)
 
     def ahead(self, section: Section, points: FloatArray) -> float | None:
-        """Return None: its axis is to the right at every angle."""
+        """Return None: all its lines go to the right in the flat view."""
         return None
 
     def flat_labels(self, section: Section) -> tuple[Label, Label]:
@@ -152,7 +155,7 @@ class Cylinder(AboutAxis):
         return direction_label(section.basis[2]), Label("r θ", "r θ")
 
     def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
-        """Return a shift along the axis and around it."""
+        """Return the matrix of a shift: along the axis, and by radius times angle."""
         origin, flat = np.asarray(section.origin), np.eye(4)
         step = matrix[:3, :3] @ origin + matrix[:3, 3] - origin
         flat[0, 3] = step @ section.basis[2]
@@ -160,12 +163,12 @@ class Cylinder(AboutAxis):
         return flat
 
     def places(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return angles, and positions along the axis from the centre."""
+        """Return angles in radians, and positions along the axis from the section's point."""
         local = section.frame(points)
         return np.column_stack([np.arctan2(local[:, 1], local[:, 0]), local[:, 2]])
 
     def surface(self, section: Section, places: FloatArray, size: float) -> FloatArray:
-        """Return places at a radius."""
+        """Return points at places of the cylinder with the radius ``size``."""
         angle, along = places[:, 0], places[:, 1]
         local = np.column_stack([size * np.cos(angle), size * np.sin(angle), along])
         return np.asarray(np.asarray(section.origin) + local @ section.basis)
@@ -175,7 +178,7 @@ class Cylinder(AboutAxis):
         return 0.0
 
     def lever(self, section: Section, along: float) -> float:
-        """Return 1: a place goes as far as the radius grows."""
+        """Return 1: a place moves as far as the radius grows."""
         return 1.0
 
     def girth(self, section: Section, along: float) -> float:

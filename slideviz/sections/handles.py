@@ -14,24 +14,25 @@ if TYPE_CHECKING:
     from slideviz.sections.model import Section, Triple
 
 Part = Literal["middle", "end", "line"]
-"""What is held: the middle, an end of a line, or the line or circle itself anywhere."""
+"""The part of a handle that is dragged: the middle, an end of a line (or the point on a circle), or
+the line or circle itself anywhere."""
 
 _DIGITS = 4
-"""More digits of a place, beside the size of the view, than anybody can aim for."""
+"""Digits of a place relative to the size of the view: more than a mouse can aim for."""
 
 
 @dataclass(frozen=True, eq=False)
 class HandleParts:
-    """The handle points of a section, and its lines that can be seen.
+    """The handle of a section in a 2D mesh: what of it can be seen and dragged.
 
     Attributes
     ----------
     middle : (m, 2) float64
-        One point, or none where it is not seen.
+        One point; none where it is out of view.
     ends : (e, 2) float64
-        Two of a line; one of a circle.
+        The two ends of a line, or one point on a circle.
     lines : list of (k, 2) float64
-        The section itself.
+        The section itself, as polylines.
     """
 
     middle: FloatArray
@@ -40,21 +41,23 @@ class HandleParts:
 
 
 def handle_parts(section: Section, box: Box) -> HandleParts | None:
-    """Return the handle of a section within a box that is seen; None where none of it is."""
+    """Return the handle of a section in the visible ``box``; None where none of it is in there."""
     parts = section.in_plane.trace(section, box)
     return section.in_plane.handle_parts(section, parts, box) if parts else None
 
 
 def nearest(shown: list[tuple[Part, FloatArray]], at: FloatArray, reach: float) -> Part | None:
-    """Return the part of a handle at a pixel: the first whose points or lines are in reach.
+    """Return the first part of a handle within reach of a pixel, or None.
 
     Parameters
     ----------
     shown : list of (part, (k, 2) float64)
-        Points of middle and ends, each by itself, and polylines, in pixels.
+        The parts, the preferred one first: points of the middle or the ends, or one polyline, in
+        pixels.
     at : (2,) float64
+        The pixel.
     reach : float
-        In pixels; of lines, half as much.
+        In pixels; for lines it is half of that.
     """
     for part, points in shown:
         if part == "line":
@@ -71,14 +74,14 @@ def dragged(section: Section, part: Part, way: tuple[FloatArray, FloatArray], bo
     Parameters
     ----------
     section : Section
-        As it was at the start.
+        The section before the drag.
     part : {"middle", "end", "line"}
-        A line turns by its ends and moves by the rest; a circle moves by its middle and takes
-        another radius by the rest.
+        The part that was dragged. A line is turned by its ends, and moved by the other parts; a
+        circle is moved by its middle, and gets another radius by the other parts.
     way : (2,), (2,) float64
-        From where to where the mouse went, in the mesh's length unit.
+        Where the mouse began and where it is now, in coordinates of the mesh.
     box : (2,), (2,) float64
-        What was seen at the start.
+        The visible box before the drag.
     """
     return section.in_plane.dragged(section, part, way, box)
 
@@ -89,17 +92,17 @@ def within(points: FloatArray, box: Box) -> FloatArray:
 
 
 def rounded_place(point: FloatArray, size: float) -> Triple:
-    """Return a point (2,) without digits that are nothing beside a size, in z = 0."""
+    """Return a point (2,) rounded as by `rounded`, with z = 0."""
     return rounded(float(point[0]), size), rounded(float(point[1]), size), 0.0
 
 
 def rounded(value: float, size: float) -> float:
-    """Return a number without digits that are nothing beside a size."""
+    """Return a number rounded to `_DIGITS` digits of the view's ``size``."""
     return round(value, _DIGITS - int(np.floor(np.log10(max(size, 1e-300))))) + 0.0
 
 
 def _distance(line: FloatArray, at: FloatArray) -> float:
-    """Return how far a point (2,) is from a polyline (k, 2)."""
+    """Return the distance of a point (2,) from a polyline (k, 2)."""
     start, way = line[:-1], np.diff(line, axis=0)
     length2 = np.maximum(np.einsum("ij,ij->i", way, way), 1e-30)
     share = np.clip(np.einsum("ij,ij->i", at - start, way) / length2, 0.0, 1.0)

@@ -1,6 +1,6 @@
-"""The line of a plane in a 2D mesh: its trace, its handle, and positions along it."""
+"""The line that a plane is in a 2D mesh: its trace, its handle, and positions along it."""
 
-# ruff: noqa: ARG002  (every shape takes what any of them needs)
+# ruff: noqa: ARG002  (all shapes have functions with the same arguments)
 
 from __future__ import annotations
 
@@ -24,33 +24,33 @@ if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
 MARGIN = 0.03
-"""A line ends this part of the longest extent of a mesh outside of it."""
+"""Margin of the box around a mesh, at which lines end, over the mesh's longest extent."""
 
 Box = tuple[FloatArray, FloatArray]
 """Lowest and highest coordinates, (2,) each."""
 
 
 def box_around(points: FloatArray) -> Box:
-    """Return the box around points (n, 2 or 3), with a margin."""
+    """Return the box around points (n, 2 or 3) in x and y, with a margin."""
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     room = MARGIN * float((high - low).max())
     return low - room, high + room
 
 
 def trace(section: Section, box: Box) -> list[FloatArray]:
-    """Return the parts of a line or circle that are in a box, as polylines (k, 2) each.
+    """Return the parts of a line or circle inside a box, as polylines (k, 2) each.
 
     Parameters
     ----------
     section : Section
-        One that cuts 2D meshes.
+        A section that can cut 2D meshes.
     box : (2,), (2,) float64
     """
     return section.in_plane.trace(section, box)
 
 
 def line_ends(section: Section, box: Box) -> FloatArray | None:
-    """Return where a line enters and leaves a box, (2, 2), along `along`; None beside it."""
+    """Return where a line enters and leaves a box, (2, 2), in the direction of `along`; or None."""
     way = along(section)
     if way is None:
         return None
@@ -67,7 +67,10 @@ def line_ends(section: Section, box: Box) -> FloatArray | None:
 
 
 def along(section: Section) -> FloatArray | None:
-    """Return the direction of a line, (2,), its largest component positive; None: no line."""
+    """Return the unit direction of a section's line, (2,), its largest component positive.
+
+    None where the plane is parallel to the mesh, so that there is no line.
+    """
     normal = np.asarray(section.direction, float)[:2]
     size = float(np.linalg.norm(normal))
     if not size > 0:
@@ -77,14 +80,14 @@ def along(section: Section) -> FloatArray | None:
 
 
 class Line(InPlane):
-    """A plane in 2D; see `slideviz.sections.shape.InPlane` for the results of its functions."""
+    """A plane in 2D; shapes of arrays are in `slideviz.sections.shape.InPlane`."""
 
     def can_cut(self, section: Section) -> bool:
-        """Return yes; one along the mesh cuts nothing, but is a plane."""
+        """Return True, even for a plane parallel to the mesh, which cuts nothing."""
         return True
 
     def describe(self, section: Section) -> str:
-        """Return the line in words: its place on an axis, or slope and point."""
+        """Return the line in words: its x or y, or slope and point; "" for a normal along z."""
         where = axis_word(section.direction)
         if where == "z":
             return ""
@@ -95,7 +98,7 @@ class Line(InPlane):
         return f"line at {(slope + 90.0) % 180.0 - 90.0:.4g}° through {at}"
 
     def trace(self, section: Section, box: Box) -> list[FloatArray]:
-        """Return the part of the line inside a box, a list of one (2, 2) array; empty beside it."""
+        """Return a list with the part of the line inside a box, (2, 2); or an empty list."""
         ends = line_ends(section, box)
         return [] if ends is None else [ends]
 
@@ -105,17 +108,17 @@ class Line(InPlane):
         flat = normal[:2] @ normal[:2]
         if not flat > 0:
             return origin[:2]
-        # A plane that leans in z meets the mesh beside the foot of its origin.
+        # A plane oblique to z meets z = 0 beside the projection of its point.
         return np.asarray(origin[:2] + origin[2] * normal[2] / flat * normal[:2])
 
     def handle_parts(self, section: Section, parts: list[FloatArray], box: Box) -> HandleParts:
-        """Return the handle points of a line: its ends, and the point it turns about."""
+        """Return the handle of a line: its ends, the point it turns about, and itself."""
         return HandleParts(self._pivot(section, box)[None], parts[0], parts)
 
     def dragged(
         self, section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box
     ) -> Section:
-        """Return the line turned by an end, or moved by the rest."""
+        """Return the line turned, if dragged by an end; else moved."""
         start, now = way
         if part == "end":
             centre = self._pivot(section, box)
@@ -128,7 +131,7 @@ class Line(InPlane):
         return replace(section, origin=rounded_place(self.middle(section) + shift, size))
 
     def positions(self, section: Section, corners: FloatArray) -> FloatArray:
-        """Return coordinates along the line."""
+        """Return the coordinates along the line of both ends of lines."""
         way = along(section)
         assert way is not None
         return np.asarray(corners @ way)
@@ -140,7 +143,10 @@ class Line(InPlane):
         return direction_label(np.append(way, 0.0))
 
     def _pivot(self, section: Section, box: Box) -> FloatArray:
-        """Return the point (2,) about which the line turns: its own, or the middle of the trace."""
+        """Return the point (2,) about which the line turns.
+
+        That is `middle` or, where it is not in the box, the middle of the line in the box.
+        """
         own = within(self.middle(section)[None], box)
         if len(own):
             return np.asarray(own[0])
@@ -152,7 +158,10 @@ LINE = Line()
 
 
 def _turned(section: Section, centre: FloatArray, way: FloatArray) -> Section:
-    """Return a line along ``way`` (2,) through its centre."""
+    """Return the section with its line through ``centre`` (2,) in the direction ``way`` (2,).
+
+    The normal stays on its side; the section is unchanged where ``way`` is zero.
+    """
     length = float(np.linalg.norm(way))
     if not length > 0:
         return section

@@ -20,13 +20,13 @@ from slideviz.sections.plane import Plane
 from slideviz.sections.shape import InPlane, Shape
 
 SHAPES: dict[str, Shape] = {shape.terms.value: shape for shape in (Plane(), Cylinder(), Cone())}
-"""By name."""
+"""The shapes by name; their words are in `slideviz.case.section_shapes.SECTION_SHAPES`."""
 
 Triple = tuple[float, float, float]
 
 ON_SECTION = 1e-9
-"""Nodes nearer than this part of the largest distance are on the section: a layer of nodes that
-lies in it up to rounding gives one layer of cells, not a random mix of both."""
+"""Nodes nearer to a section than this part of the largest distance are taken as on it: where a
+layer of nodes lies in it up to rounding, one layer of cells is cut, and not some of each side."""
 
 
 @dataclass(frozen=True)
@@ -38,26 +38,28 @@ class Section:
     kind : str
         Its shape: a key of `SHAPES`.
     origin : (3,) tuple of float
-        A point of the plane or of the cylinder's axis, in the mesh's length unit.
+        A point of the plane or of the cylinder's axis, or the apex of the cone, in the mesh's
+        length unit.
     direction : (3,) tuple of float
         The plane's normal, or the direction of the axis; any length but zero.
     radius : float
-        Of the cylinder.
+        The radius of the cylinder; 0 for others.
     whole : bool
-        Show the cells it cuts whole, instead of cut.
+        Whether the cells it cuts are shown whole, instead of cut.
     name : str
-        What people call it; empty: see `describe`.
+        The user's name for it; empty: the words of `describe`.
     shown : bool
-        Whether a view draws it.
+        Whether the view draws it.
     flat : bool
-        Whether it is laid flat beside the view: a cylinder unrolled, a plane along its normal.
+        Whether it has a flat view beside the 3D view: a plane seen along its normal, others
+        unrolled.
     half_angle_deg : float
-        Of the cone.
+        The half angle of the cone; 0 for others.
 
     Raises
     ------
     CaseError
-        A number is not finite, the direction has length zero, or the size cannot be one.
+        A number is not finite, the direction has length zero, or the shape cannot have the size.
     """
 
     kind: str
@@ -89,7 +91,7 @@ class Section:
 
     @classmethod
     def of(cls, kind: str, origin: Triple, direction: Triple, size: float) -> Section:
-        """Return the section of a shape with these numbers; a plane has no size."""
+        """Return the section of the shape ``kind`` with these numbers; a plane ignores ``size``."""
         own = SHAPES[kind].terms.size
         sizes: dict[str, Any] = {} if own is None else {own.field: size}
         return cls(kind, origin, direction, **sizes)
@@ -101,14 +103,14 @@ class Section:
 
     @property
     def in_plane(self) -> InPlane:
-        """Return the line or circle that the section is in a 2D mesh."""
+        """Return the shape in a 2D mesh, line or circle, which the section's shape must have."""
         seen = self.shape.in_plane
         assert seen is not None
         return seen
 
     @property
     def size(self) -> float:
-        """Return the number beside a point and a direction; 0 for shapes without one."""
+        """Return the radius or half angle in degrees; 0 for a plane."""
         size = self.shape.terms.size
         return 0.0 if size is None else float(getattr(self, size.field))
 
@@ -126,9 +128,9 @@ class Section:
 
     @cached_property
     def basis(self) -> FloatArray:
-        """Return rows e1, e2, e3 (3, 3), right-handed, e3 along the normal or the axis.
+        """Return unit vectors as rows (3, 3), right-handed, the third along the normal or axis.
 
-        An axis that has no sign points to the positive side of its largest component.
+        Where the shape's direction has no sign (a cylinder), its largest component is positive.
         """
         base = axis_basis(self.direction)
         if not self.shape.directed and base[2, np.argmax(np.abs(base[2]))] < 0:
@@ -136,19 +138,19 @@ class Section:
         return base
 
     def frame(self, points: FloatArray) -> FloatArray:
-        """Return points (n, 2 or 3) as coordinates (n, 3) along e1, e2, e3 from the origin."""
+        """Return the coordinates (n, 3) of points (n, 2 or 3) in ``basis``, from ``origin``."""
         return (padded(points) - np.asarray(self.origin)) @ self.basis.T
 
     def along(self, points: FloatArray, row: int) -> FloatArray:
-        """Return the coordinates (n,) of points (n, 2 or 3) along e1, e2 or e3 (row 0, 1, 2)."""
+        """Return the coordinates (n,) of points (n, 2 or 3) along a row of ``basis``: 0, 1 or 2."""
         found = np.empty(len(points))
         _project(points, self.basis[row], float(np.asarray(self.origin) @ self.basis[row]), found)
         return found
 
     def distance(self, points: FloatArray) -> FloatArray:
-        """Return signed distances (n,): along the normal, or outwards from the axis.
+        """Return signed distances (n,) of points (n, 2 or 3), along the normal or outwards.
 
-        What is on the section up to rounding is at 0 exactly (see `ON_SECTION`).
+        Exactly 0 for points that are on the section up to rounding (`ON_SECTION`).
         """
         gap = np.empty(len(points))
 
@@ -161,27 +163,27 @@ class Section:
         return gap
 
     def can_cut(self, dim: int) -> bool:
-        """Tell whether the section can cut meshes of 2 or 3 dimensions at all.
+        """Return whether the section can cut meshes of ``dim`` dimensions at all.
 
-        A cylinder meets the plane of a 2D mesh in a circle where its axis is z.
+        2D meshes are cut by planes, and by cylinders about z, which are circles there.
         """
         seen = self.shape.in_plane
         return dim == 3 or (seen is not None and seen.can_cut(self))
 
     def describe(self, dim: int = 3) -> str:
-        """Return the section in words, for people; in 2D it is a line or a circle."""
+        """Return the section in words: in 2D as a line or a circle."""
         seen = self.shape.in_plane
         words = seen.describe(self) if dim == 2 and seen is not None else ""
         return words or self.shape.describe(self)
 
     def brief(self, dim: int = 3) -> str:
-        """Return the section in few words, for a list with `describe` beside them."""
+        """Return the section in few words, for a list; `describe` has more digits."""
         return self.describe(dim) if dim == 2 else self.shape.brief(self)
 
 
 @njit(nogil=True, cache=True)
 def _project(points, direction, start, found):  # type: ignore[no-untyped-def]
-    """Write how far points (n, d) are along a direction (3,), counted from ``start``."""
+    """Write coordinates of points (n, d) along a direction, less ``start``, to ``found`` (n,)."""
     for i in range(len(points)):
         total = 0.0
         for axis in range(points.shape[1]):

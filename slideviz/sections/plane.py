@@ -1,6 +1,10 @@
-"""The plane, a shape of sections: the coordinate along its normal; in 2D it is a line."""
+"""The plane, a shape of sections; in 2D it is a line.
 
-# ruff: noqa: ARG002  (every shape takes what any of them needs)
+The first line of a function says what it is for a plane; shapes of arrays are in
+`slideviz.sections.shape.Shape`.
+"""
+
+# ruff: noqa: ARG002  (all shapes have functions with the same arguments)
 
 from __future__ import annotations
 
@@ -29,19 +33,19 @@ if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
 _STEEP = 0.8
-"""Planes whose normal has this component along z are seen from above."""
+"""Planes whose unit normal has a larger z component than this are drawn with y up, not z."""
 
 
 @dataclass(frozen=True, eq=False)
 class Axes:
-    """The camera's axes for a look at a plane.
+    """The camera's axes for looking straight at a plane.
 
     Attributes
     ----------
     rows : (3, 3) float64
         Unit vectors to the right, up, and towards the camera.
     labels : (Label, Label)
-        Of the first two.
+        The axis labels for the right and for up.
     """
 
     rows: FloatArray
@@ -49,7 +53,10 @@ class Axes:
 
 
 def plane_axes(section: Section) -> Axes:
-    """Return the camera's axes: z up, or y where z points to the camera; x to the right."""
+    """Return the camera's axes for a plane: z up, or y where z points to the camera.
+
+    The largest component of the axis to the right is positive.
+    """
     normal = section.basis[2]
     up = np.eye(3)[1 if abs(normal[2]) > _STEEP else 2]
     up = up - (up @ normal) * normal
@@ -62,7 +69,7 @@ def plane_axes(section: Section) -> Axes:
 
 
 class Plane(Shape):
-    """The plane; see `slideviz.sections.shape.Shape` for the results of its functions."""
+    """The plane; its position is that of its point along its normal."""
 
     terms = SECTION_SHAPES["plane"]
     in_plane = LINE
@@ -76,12 +83,12 @@ class Plane(Shape):
     def crossings(
         self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
     ) -> FloatArray:
-        """Return where edges cross the plane, (k,): the distance is linear along them."""
+        """Return where edges cross the plane, as parts of the edge (k,)."""
         before, after = level
         return np.asarray(before / (before - after))
 
     def position(self, section: Section) -> float:
-        """Return the distance of the plane from the origin, along its normal."""
+        """Return the signed distance of the plane from the origin, along its normal."""
         return float(np.asarray(section.origin) @ section.basis[2])
 
     def at_position(self, section: Section, value: float) -> Section:
@@ -90,8 +97,7 @@ class Plane(Shape):
         return replace(section, origin=triple(np.asarray(section.origin) + shift))
 
     def positions(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the distances of points from the origin along the normal, (n,)."""
-        # Measured along the basis, whose normal has no other sign than the section's.
+        """Return the signed distances (n,) of points from the origin, along the normal."""
         return section.along(points, 2) + self.position(section)
 
     def first(self, section: Section, points: FloatArray) -> Section:
@@ -103,11 +109,11 @@ class Plane(Shape):
         return replace(section, origin=triple(origin), direction=triple(np.eye(3)[axis]))
 
     def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
-        """Return how far a transformation moves the plane along its normal."""
+        """Return how far the plane moves along its normal."""
         return float(abs(step @ section.basis[2]))
 
     def describe(self, section: Section) -> str:
-        """Return the plane in words: its place on an axis, or normal and point."""
+        """Return the plane in words: its x, y or z, or normal and point."""
         where = axis_word(section.direction)
         if where in "xyz":
             return f"plane {where} = {section.origin['xyz'.index(where)]:.6g}"
@@ -121,7 +127,7 @@ class Plane(Shape):
         return f"plane ⊥ {where} at {self.position(section):.3g}"
 
     def miss(self, section: Section, points: FloatArray) -> str:
-        """Return between which coordinates or shifts the plane would cut."""
+        """Return that the plane misses the mesh, and between which coordinates it would cut."""
         normal = np.abs(section.basis[2])
         if not normal[: points.shape[1]].any():
             return "does not cut this 2D mesh; give a normal in x and y, as in y=0"
@@ -147,11 +153,11 @@ class Plane(Shape):
     def middle(
         self, section: Section, polygons: Polygons, near: float | None = None
     ) -> float | None:
-        """Return None: a plane has no seam."""
+        """Return None: only shapes about an axis have a middle angle."""
         return None
 
     def ahead(self, section: Section, points: FloatArray) -> float | None:
-        """Return None: a plane needs no turn to lie level."""
+        """Return None: only a cone needs an angle to be drawn level at."""
         return None
 
     def flat_labels(self, section: Section) -> tuple[Label, Label]:
@@ -171,5 +177,5 @@ class Plane(Shape):
         return plane_axes(section).rows
 
     def aslant(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the axes of `facing`: a plane is looked at straight in space, too."""
+        """Return the axes of `facing`: a plane is looked at straight, in 3D views too."""
         return plane_axes(section).rows

@@ -22,7 +22,7 @@ class Polygons:
     connectivity : (k,) int64
         Indices into ``points``.
     cells : (q,) int64
-        The cell of the mesh that each polygon is a part of; colour it by that cell's value.
+        The cell of the mesh that each polygon is a part of.
     """
 
     points: FloatArray
@@ -40,7 +40,7 @@ class Polygons:
 
     @property
     def cell_ids(self) -> IntArray:
-        """Return the cells that occur, sorted, each once."""
+        """Return the numbers of the cells that have polygons, sorted, each once."""
         return np.unique(self.cells)
 
     def with_points(self, points: FloatArray) -> Polygons:
@@ -48,23 +48,23 @@ class Polygons:
         return replace(self, points=points)
 
     def take(self, order: IntArray) -> Polygons:
-        """Return some of the polygons, or all in another order, (t,)."""
+        """Return the polygons with the numbers ``order`` (t,), in that order; all points stay."""
         sizes = self.sizes[order]
         corners = self.connectivity[np.repeat(self.offsets[order], sizes) + _ramps(sizes)]
         return Polygons(self.points, offsets_of(sizes), corners, self.cells[order])
 
     def with_last(self, chosen: np.ndarray) -> Polygons:
-        """Return the polygons with the chosen ones (q,) last: drawn above others in their plane."""
+        """Return all polygons, those of the mask ``chosen`` (q,) last: they are drawn on top."""
         return self.take(np.argsort(chosen, kind="stable")) if chosen.any() else self
 
     def by_depth(self) -> Polygons:
-        """Return the polygons in the order of the z of their middles, the nearest last."""
+        """Return all polygons by the mean z of their corners, ascending: the nearest is last."""
         depth = np.add.reduceat(self.points[self.connectivity, 2], self.offsets[:-1]) / self.sizes
         return self.take(np.argsort(depth, kind="stable"))
 
 
 def joined(pieces: Sequence[Polygons]) -> Polygons:
-    """Return several sets of polygons as one; their points stay apart."""
+    """Return several sets of polygons as one; coinciding points are not merged."""
     starts = np.cumsum([0, *(len(piece.points) for piece in pieces)])
     corners = [piece.connectivity + start for piece, start in zip(pieces, starts, strict=False)]
     return Polygons(
@@ -76,10 +76,10 @@ def joined(pieces: Sequence[Polygons]) -> Polygons:
 
 
 def offsets_of(sizes: IntArray) -> IntArray:
-    """Return where each polygon begins, and the end, (q + 1,), of numbers of corners (q,)."""
+    """Return the offsets (q + 1,) of polygons with ``sizes`` (q,) corners."""
     return np.concatenate([[0], np.cumsum(sizes)])
 
 
 def _ramps(sizes: IntArray) -> IntArray:
-    """Return 0, 1, ... size - 1 of every size, one after the other."""
+    """Return 0, 1, ... size - 1 for every size in ``sizes`` (q,), one after the other."""
     return np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)

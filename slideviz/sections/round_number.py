@@ -1,4 +1,4 @@
-"""Round numbers in the middle of many, clear of layers of nodes: where sections start."""
+"""Round numbers near the middle of a mesh, between layers of nodes: positions of new sections."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ import numpy as np
 from slideviz.mesh.model import FloatArray
 
 _LAYER = 1e-4
-"""Part of the span of a mesh within which nodes are on one layer."""
+"""Nodes whose values differ by less than this part of the span are on one layer."""
 _NEAR = 0.03
-"""Where no layer is, a round number may be so far from the middle, as a part of the span."""
+"""Where no layer is at the middle, a round number may be this far from it, over the span."""
 
 
 def round_middle(values: FloatArray) -> float:
-    """Return a round number about in the middle of values (n,), well between layers of nodes.
+    """Return a round number near the middle of the nodes' ``values`` (n,), between their layers.
 
-    On a layer rounding decides which cells are cut: those on one side, on the other, or both.
+    A section in a layer of nodes would cut the cells of one side or the other, by rounding.
     """
     low, high = float(values.min()), float(values.max())
     middle, span = (low + high) / 2.0, high - low
     if not span > 0:
         return middle
     below, above = _layers_around(values, middle)
-    # Cells are cut in their middle half: those that the middle is in, or beyond a layer there.
+    # In the middle half of the cells at the middle (of those above it, where a layer is there).
     room = (above - below) / 4.0
     first, last = below + room, above - room
     near = max(middle - _NEAR * span, first), min(middle + _NEAR * span, last)
@@ -32,10 +32,13 @@ def round_middle(values: FloatArray) -> float:
 
 
 def _layers_around(values: FloatArray, middle: float) -> tuple[float, float]:
-    """Return the layers of nodes that are next to a number; that above, where it is on one."""
+    """Return the layers of nodes next below and above ``middle``; below includes one at it.
+
+    A layer is a value that many more nodes have than by chance; the ends of the values are two.
+    """
     low, high = float(values.min()), float(values.max())
     near = _LAYER * (high - low)
-    # Scattered nodes are that near to each other by chance, but only so many of them.
+    # Of scattered nodes, about so many are as near to each other as those of a layer.
     chance = 2.0 * _LAYER * len(values)
     least = chance + 6.0 * np.sqrt(chance) + 6.0
     rising = np.sort(values)
@@ -50,7 +53,7 @@ def _layers_around(values: FloatArray, middle: float) -> tuple[float, float]:
 
 
 def roundest(first: float, last: float, wanted: float) -> float:
-    """Return the number of fewest digits from ``first`` to ``last``; of several, the nearest."""
+    """Return the number with fewest digits from ``first`` to ``last``, nearest to ``wanted``."""
     digits = -int(np.floor(np.log10(max(abs(first), abs(last), 1e-300)))) - 1
     while True:
         unit = 10.0**-digits

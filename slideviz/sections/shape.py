@@ -1,4 +1,4 @@
-"""The protocol of the shapes of sections, and words that shapes share."""
+"""The protocols of the shapes of sections, in 3D and in 2D, and words that shapes share."""
 
 from __future__ import annotations
 
@@ -17,27 +17,30 @@ if TYPE_CHECKING:
     from slideviz.sections.model import Section, Triple
 
 DIGITS, FEW = 4, 2
-"""Digits of each number of a direction or point in words, and where there is little room."""
+"""Significant digits of the numbers of a direction or point: in full words, and in few words."""
 
 
 class Label(NamedTuple):
-    """The label of an axis: in full, and for where there is no room."""
+    """The label of a plot's axis: in full, and in short where there is little room."""
 
     full: str
     short: str
 
 
 class Shape(Protocol):
-    """A kind of surface that cuts 3D meshes; its sections have point, direction and size.
+    """A kind of surface that cuts 3D meshes: the functions of its sections.
+
+    A section (`slideviz.sections.model.Section`) has the numbers: point, direction and size. Where
+    the length unit is meant, it is that of the mesh.
 
     Attributes
     ----------
     terms : ShapeTerms
-        How it is called and written.
+        Its names, numbers and words.
     in_plane : InPlane or None
-        What it is in the plane of a 2D mesh.
+        Its functions in 2D meshes; None where it cannot cut these.
     directed : bool
-        Whether the opposite direction makes another section.
+        Whether the sign of the direction matters, for signed distances at least.
     """
 
     terms: ShapeTerms
@@ -47,42 +50,43 @@ class Shape(Protocol):
     # What it cuts ----------------------------------------------------------------------
 
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
-        """Return signed distances (n,); ``along(i)`` has coordinates (n,) in the section's frame.
+        """Return signed distances (n,) of points; their sign changes at the section only.
 
-        The sign changes where the section is, and nowhere else.
+        ``along(i)`` returns the coordinates (n,) of the points along row i of the section's basis.
         """
 
     def crossings(
         self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
     ) -> FloatArray:
-        """Return the places on edges, (k,) as parts of the edge, where they cross, exactly.
+        """Return where edges cross the section exactly, (k,), as parts of the edge from 0 to 1.
 
-        They start at points (k, 3) and go ways (k, 3); ``level`` has the signed distances (k,) of
-        both ends.
+        ``edges`` are start points (k, 3) and vectors to the end points (k, 3); ``level`` has the
+        signed distances (k,) of start and end.
         """
 
     # Its numbers -----------------------------------------------------------------------
 
     def position(self, section: Section) -> float:
-        """Return the number that a slider moves: a distance, a radius, an angle."""
+        """Return the number that a slider moves: position along the normal, radius, half angle."""
 
     def at_position(self, section: Section, value: float) -> Section:
-        """Return the section at another position; CaseError where there is no such section."""
+        """Return the section at another position; raises CaseError where there is none."""
 
     def positions(self, section: Section, points: FloatArray) -> FloatArray:
         """Return the positions (n,) at which the section would go through points (n, 3)."""
 
     def first(self, section: Section, points: FloatArray) -> Section:
-        """Return a section to start from, about through the middle of points (n, 3).
+        """Return the section that a new one starts as, about through the middle of points (n, 3).
 
-        That given goes through the middle, or is about the axis of the machine.
+        ``section`` has the point and direction to begin with: the middle of the points, or the
+        axis of the machine.
         """
 
     def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
-        """Return how far a transformation moves the section off itself, in the length unit.
+        """Return how far a rigid motion moves the section off itself, a length; 0: onto itself.
 
-        ``turned`` (3,) is what becomes of its unit direction, which is the same or the opposite;
-        ``step`` (3,) how far its point goes.
+        ``turned`` (3,) is its unit direction after the motion, the same or the opposite one;
+        ``step`` (3,) is the displacement of its point.
         """
 
     # Words -----------------------------------------------------------------------------
@@ -94,7 +98,7 @@ class Shape(Protocol):
         """Return the section in few words."""
 
     def miss(self, section: Section, points: FloatArray) -> str:
-        """Return why a section misses points (n, d), and between which positions it would cut."""
+        """Return a sentence that the section misses points (n, d), and where it would cut them."""
 
     # Laid flat, and looked at ----------------------------------------------------------
 
@@ -103,66 +107,72 @@ class Shape(Protocol):
     ) -> Polygons:
         """Return polygons laid flat: x right, y up, z towards the camera; lengths are kept.
 
-        What goes around an axis lies about the angle ``near``, and that at the angle ``ahead``
-        has its axis to the right, in radians (see `ahead`).
+        For a shape about an axis, in radians: angles lie around ``near`` (None: 0); the line at the
+        angle ``ahead`` is drawn to the right (None: at the middle angle).
         """
 
     def middle(
         self, section: Section, polygons: Polygons, near: float | None = None
     ) -> float | None:
-        """Return the middle angle of polygons, in radians; None for a shape without a seam."""
+        """Return the middle of the angles of polygons, in radians, nearest ``near``; or None.
+
+        None for a plane, which has no angles, and without polygons.
+        """
 
     def ahead(self, section: Section, points: FloatArray) -> float | None:
-        """Return the angle, in radians, whose line is drawn level; None where any will do."""
+        """Return the angle, in radians, at which a flat view of points (n, 3) is drawn level.
+
+        None where the shape is drawn level at any angle.
+        """
 
     def flat_labels(self, section: Section) -> tuple[Label, Label]:
         """Return the axis labels of the section laid flat: to the right, and up."""
 
     def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
-        """Return the matrix that moves the flat section as ``matrix`` does in space, (4, 4).
+        """Return the matrix (4, 4) that moves the flat section as ``matrix`` (4, 4) does in space.
 
-        ``angle`` is the turn about the section's direction, in radians; ``matrix`` takes the
-        section onto itself.
+        ``matrix`` takes the section onto itself; ``angle`` is its rotation about the section's
+        direction, in radians.
         """
 
     def facing(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the camera's axes for a straight look, (3, 3): right, up, to the camera.
+        """Return the camera's axes (3, 3) to look straight at a section: right, up, to the camera.
 
         ``points`` (n, 3) are those of the cut.
         """
 
     def aslant(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the camera's axes for a look from aside, (3, 3), in the same order."""
+        """Return the camera's axes (3, 3) to look at a section in a 3D view, in the same order."""
 
     handle: Literal["push", "pull"]
-    """Whether it is pushed and turned as a plane, or a ball on it pulls its size."""
+    """The kind of 3D handle: a plane to push and turn, or a ball that pulls the size."""
 
 
 class InPlane(Protocol):
     """A shape in the plane of a 2D mesh: a line or a circle."""
 
     def can_cut(self, section: Section) -> bool:
-        """Tell whether a section can cut 2D meshes."""
+        """Return whether a section of the shape can cut 2D meshes."""
 
     def describe(self, section: Section) -> str:
-        """Return the section in words; empty where it is no line or circle."""
+        """Return the section in words; "" where it is no line or circle in 2D."""
 
     def trace(self, section: Section, box: Box) -> list[FloatArray]:
         """Return the parts of the line or circle inside a box, as polylines (k, 2) each."""
 
     def middle(self, section: Section) -> FloatArray:
-        """Return the point (2,) by which the mouse moves the section."""
+        """Return the point (2,) of the handle by which the mouse moves the section."""
 
     def handle_parts(self, section: Section, parts: list[FloatArray], box: Box) -> HandleParts:
-        """Return the handle points inside a box; ``parts`` are the section's polylines there."""
+        """Return the handle inside a box; ``parts`` are the section's polylines there (`trace`)."""
 
     def dragged(
         self, section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box
     ) -> Section:
-        """Return the section after its part was dragged (see `slideviz.sections.handles`)."""
+        """Return the section after a part was dragged (see `slideviz.sections.handles.dragged`)."""
 
     def positions(self, section: Section, corners: FloatArray) -> FloatArray:
-        """Return the positions of both ends of lines (q, 2, 2) along the section, (q, 2)."""
+        """Return the positions (q, 2) along the section of both ends of its lines (q, 2, 2)."""
 
     def position_label(self, section: Section) -> Label:
         """Return the axis label of `positions`."""
@@ -172,7 +182,7 @@ class InPlane(Protocol):
 
 
 def axis_word(direction: Triple, digits: int = DIGITS) -> str:
-    """Return x, y or z where the direction is that axis, either way, else its components."""
+    """Return x, y or z for a direction along that axis, either way, else its components."""
     unit = np.asarray(direction) / np.linalg.norm(direction)
     for word, axis in zip("xyz", np.eye(3), strict=True):
         if np.abs(unit @ axis) > 1.0 - 1e-12:
@@ -181,7 +191,7 @@ def axis_word(direction: Triple, digits: int = DIGITS) -> str:
 
 
 def triple_words(values: Sequence[float], digits: int = DIGITS) -> str:
-    """Return numbers in brackets, with few digits."""
+    """Return numbers in brackets, with ``digits`` significant digits."""
     return f"({', '.join(f'{value + 0.0:.{digits}g}' for value in values)})"
 
 
@@ -192,7 +202,10 @@ def triple(values: FloatArray) -> Triple:
 
 
 def direction_label(direction: FloatArray) -> Label:
-    """Return x, y or z, or the direction; in short x′, y′ or z′ by its largest component."""
+    """Return the axis label of a unit direction (3,): x, y or z, or its components.
+
+    The short form of the latter is x′, y′ or z′, by its largest component.
+    """
     word = "xyz"[int(np.argmax(np.abs(direction)))]
     if direction.max() > 1.0 - 1e-12:
         return Label(word, word)

@@ -1,4 +1,4 @@
-"""The cells within the threshold of the view, of a section too."""
+"""The threshold of the view: the cells whose value is in a range, also those of sections."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.sections.polygons import Polygons
 
 ONLY_INVERTED = (-1.0, -0.5)
-"""A range that no value is in: it chooses the inverted cells alone."""
+"""The threshold for inverted cells alone: a range from below 0, which no value is in."""
 
 
 @dataclass(frozen=True)
 class CellsInRange:
-    """The cells of a mesh within a threshold; two of the same cells are equal.
+    """The cells of a mesh within a threshold; instances with the same cells are equal.
 
     Attributes
     ----------
     key : bytes
-        Which they are, packed.
+        The mask, packed to bits, for comparing and hashing.
     mask : (m,) bool
-        The same for every cell.
+        Whether each cell is within.
     words : str
-        Which values they have.
+        The range in words.
     """
 
     key: bytes
@@ -40,19 +40,19 @@ class CellsInRange:
         return cls(np.packbits(mask).tobytes(), mask, range_words(threshold))
 
     def among(self, polygons: Polygons) -> Polygons:
-        """Return the polygons whose cells are in the range; their points stay."""
+        """Return the polygons whose cells are in the range; all points stay."""
         return polygons.take(np.flatnonzero(self.mask[polygons.cells]))
 
 
 def cells_in_range(values: FloatArray, threshold: tuple[float, float]) -> IntArray:
-    """Return the cells whose value is in a closed range, in rising order.
+    """Return the ascending numbers of the cells whose value is in a closed range.
 
     Parameters
     ----------
     values : (m,) float64
-        As ``Frame.shown_values`` gives them: not a number for an inverted cell.
+        Values of the cells, nan for an inverted cell, as of ``Frame.shown_values``.
     threshold : (float, float)
-        Lowest and highest value. From 0 or below, inverted cells are too.
+        Lowest and highest value. Where the lowest is 0 or below, inverted cells are in, too.
     """
     low, high = threshold
     inside = (values >= low) & (values <= high)
@@ -60,7 +60,7 @@ def cells_in_range(values: FloatArray, threshold: tuple[float, float]) -> IntArr
 
 
 def range_words(threshold: tuple[float, float]) -> str:
-    """Return a range in words."""
+    """Return a threshold in words."""
     if threshold[1] < 0.0:
         return "inverted cells"
     return f"{threshold[0]:.3g} to {threshold[1]:.3g}"
