@@ -28,7 +28,7 @@ PART = 4000
 
 
 @dataclass(frozen=True)
-class Form:
+class Columns:
     """The columns of a file with a line for each node, such as displacements or coordinates.
 
     Attributes
@@ -45,12 +45,12 @@ class Form:
     names: tuple[str, str, str]
     flat: bool = False
 
-    def columns(self, dim: int) -> str:
+    def heading(self, dim: int) -> str:
         """Return the names of all columns for a mesh of ``dim`` dimensions, with blanks between."""
         return " ".join(("node", *self.names[:dim]))
 
 
-DISPLACEMENT = Form("displacement", ("dx", "dy", "dz"))
+DISPLACEMENT = Columns("displacement", ("dx", "dy", "dz"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +135,7 @@ def parse_rows(
     nodes: IntArray,
     shape: tuple[int, ...],
     of: str,
-    form: Form = DISPLACEMENT,
+    columns: Columns = DISPLACEMENT,
 ) -> FloatArray:
     """Return the table in a text, (k, 1 + d): a node and its d numbers, by ascending node.
 
@@ -150,14 +150,14 @@ def parse_rows(
     if any(sign in text for sign in COMMENT_SIGNS):
         text = _COMMENT.sub("", text)
     lines = text.translate(_SEPARATORS).split("\n")
-    table = _table(path, lines, shape[1], form)
-    problems = _table_problems(table, lines, nodes, count=shape[0], of=of, what=form.what)
+    table = _table(path, lines, shape[1], columns)
+    problems = _table_problems(table, lines, nodes, count=shape[0], of=of, what=columns.what)
     if problems:
         raise CaseError(listed(path, problems))
     return table[np.unique(table[:, 0], return_index=True)[1]]
 
 
-def _table(path: Path, lines: list[str], dim: int, form: Form) -> FloatArray:
+def _table(path: Path, lines: list[str], dim: int, columns: Columns) -> FloatArray:
     """Return the numbers in the lines, (m, 1 + d), in their order.
 
     Raises
@@ -166,14 +166,14 @@ def _table(path: Path, lines: list[str], dim: int, form: Form) -> FloatArray:
         There are none, or some line is no row of finite numbers.
     """
     if not any(line.strip() for line in lines):
-        raise CaseError(f"{path}: the file lists no node; needed are lines {form.columns(dim)}")
+        raise CaseError(f"{path}: the file lists no node; needed are lines {columns.heading(dim)}")
     try:
         table = _numbers([line for line in lines if line.strip()])
     except ValueError:
         table = np.empty((0, 0))
     if table.shape[1] == 1 + dim and np.isfinite(table).all():
         return table
-    flat = form.flat and dim == 2 and table.shape[1] == 4
+    flat = columns.flat and dim == 2 and table.shape[1] == 4
     if flat and np.isfinite(table).all() and not table[:, 3].any():
         return table[:, :3]
     # Slower, but finds every line that is wrong.
@@ -181,7 +181,7 @@ def _table(path: Path, lines: list[str], dim: int, form: Form) -> FloatArray:
     problems: list[Problem] = []
     for line, content in enumerate(lines, start=1):
         try:
-            rows += _row(content, dim, form)
+            rows += _row(content, dim, columns)
         except CaseError as problem:
             problems.append((line, str(problem)))
     if problems:
@@ -197,7 +197,7 @@ def _numbers(lines: list[str]) -> FloatArray:
     )
 
 
-def _row(content: str, dim: int, form: Form) -> list[list[float]]:
+def _row(content: str, dim: int, columns: Columns) -> list[list[float]]:
     """Return a list with the numbers of a line as its one row; without a row for an empty line.
 
     Raises
@@ -206,7 +206,7 @@ def _row(content: str, dim: int, form: Form) -> list[list[float]]:
         The line has another number of columns, or words that are no numbers.
     """
     words = content.split()
-    if form.flat and dim == 2 and len(words) == 4:
+    if columns.flat and dim == 2 and len(words) == 4:
         if number(words[3]) != 0.0:
             raise CaseError(
                 f"z is {shown(words[3])}, and the mesh has 2 dimensions; write 0 or leave it out"
@@ -214,7 +214,7 @@ def _row(content: str, dim: int, form: Form) -> list[list[float]]:
         words.pop()
     if words and len(words) != 1 + dim:
         sentence = f"{shown(content.strip())} has {len(words)} columns; needed are {1 + dim}"
-        raise CaseError(f"{sentence}: {form.columns(dim)} (put % before a heading)")
+        raise CaseError(f"{sentence}: {columns.heading(dim)} (put % before a heading)")
     return [[number(word) for word in words]] if words else []
 
 

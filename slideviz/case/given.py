@@ -23,7 +23,7 @@ def key_of(motion: FromFile | Ffd) -> object:
     return motion if isinstance(motion, Ffd) else (motion.path, motion.marker)
 
 
-def read_files(case: Case, mesh: Mesh) -> dict[object, Displacements]:
+def given_displacements(case: Case, mesh: Mesh) -> dict[object, Displacements]:
     """Return the displacements that the case's files and FFD boxes give, by `key_of` their motion.
 
     Raises

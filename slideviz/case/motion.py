@@ -21,7 +21,7 @@ from slideviz.case.check import (
     require_valid,
 )
 from slideviz.case.displacement import Displacements
-from slideviz.case.given import Given, key_of, read_files
+from slideviz.case.given import Given, given_displacements, key_of
 from slideviz.case.model import (
     Case,
     Ffd,
@@ -45,9 +45,9 @@ __all__ = [
     "check_case",
     "displacement_of",
     "displacements",
+    "given_displacements",
     "moved_points",
     "moved_together",
-    "read_files",
     "require_valid",
 ]
 
@@ -78,7 +78,7 @@ def displacements(case: Case, mesh: Mesh) -> Displacements:
     raise_all((*marker_problems(case, mesh), *motion_problems(case, mesh)))
     names = case.markers_with("moving")
     on = {name: mesh.marker(name).nodes for name in names}
-    files = read_files(case, mesh)
+    files = given_displacements(case, mesh)
     vectors = list(moved_together(case.motions, mesh.points, on, files).values())
     nodes = np.concatenate(list(on.values()))
     order = np.argsort(nodes, kind="stable")

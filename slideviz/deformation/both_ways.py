@@ -29,7 +29,7 @@ Numbers = NDArray[np.uint64]
 
 
 @contextmanager
-def facing(path: Path, zone: int | None) -> Iterator[Callable[[tuple[int, int]], int]]:
+def facet_sums(path: Path, zone: int | None) -> Iterator[Callable[[tuple[int, int]], int]]:
     """Context with a function that sums the signed hashes of the inner facets of some cells.
 
     Its argument is the first of these cells and the one after the last, by place in the file.
@@ -65,7 +65,7 @@ def require_right(found: Iterable[int], name: str, also: str = "") -> None:
     Parameters
     ----------
     found : iterable of int
-        The sum of each part, of `facing`.
+        The sum of each part, of `facet_sums`.
     name : str
         The mesh, for the message.
     also : str

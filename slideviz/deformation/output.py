@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from slideviz.deformation.both_ways import facing, require_right
+from slideviz.deformation.both_ways import facet_sums, require_right
 from slideviz.deformation.given_mesh import Given, text_blocks
 from slideviz.deformation.measuring import MeasuredBlock, PointFiles, QualityCollector, measured
 from slideviz.deformation.rest import Rest
@@ -168,7 +168,7 @@ class Output:
                 self._rating.add(found, listed)
                 tick(end / count)
         if self._rating.is_both_ways and not self._is_right:
-            with self._ranks.sharing(facing, self._mesh_file, self._zone) as do:
+            with self._ranks.sharing(facet_sums, self._mesh_file, self._zone) as do:
                 require_right(do(parts(count)), self.files.before.name)
             self._is_right = True
         return self._rating

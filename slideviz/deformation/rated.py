@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from slideviz.deformation.both_ways import facing, require_right
+from slideviz.deformation.both_ways import facet_sums, require_right
 from slideviz.deformation.measuring import PointFiles, Scratch, nodes_of, ways_of
 from slideviz.errors import MeshError
 from slideviz.mesh.io.su2b.elements import ElementBlock, element_blocks
@@ -102,7 +102,7 @@ def _require_right(mesh: Zone, name: str, count: int, alone: bool) -> None:
     """
     also = "rate a deformed mesh with --reference UNDEFORMED, " if alone else ""
     parts = [(first, min(first + CELLS, count)) for first in range(0, count, CELLS)]
-    with ALONE.sharing(facing, *mesh) as do:
+    with ALONE.sharing(facet_sums, *mesh) as do:
         require_right(do(parts), name, also)
 
 

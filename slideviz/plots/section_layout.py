@@ -76,7 +76,7 @@ def laid_flat(
         # A 2D mesh, or a plane at z = 0.
         return joined(list(pieces.values())), (Label("x", "x"), Label("y", "y"))
     shape = section.shape
-    own = shape.middle(section, pieces[min(pieces, key=abs)]) if beside is None else beside
+    own = shape.middle_angle(section, pieces[min(pieces, key=abs)]) if beside is None else beside
     middles: dict[int, float | None] = {}
     found: dict[int, Polygons] = {}
     for numbers in (
@@ -87,7 +87,7 @@ def laid_flat(
         near = middles[min(found)] if found else own
         for number in numbers:
             found[number] = shape.flatten(section, pieces[number], near, own)
-            near = middles[number] = shape.middle(section, pieces[number], near)
+            near = middles[number] = shape.middle_angle(section, pieces[number], near)
     flat = joined([found[number] for number in sorted(found)])
     return flat.by_depth(), shape.flat_labels(section)
 

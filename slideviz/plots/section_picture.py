@@ -282,7 +282,7 @@ def _laid_beside(
             continue
         flat, labels = laid_flat(one.drawn, section, style.in_space, near)
         if near is None:
-            near = section.shape.middle(section, one.drawn[min(one.drawn, key=abs)])
+            near = section.shape.middle_angle(section, one.drawn[min(one.drawn, key=abs)])
         if not section.whole or not flat.points[:, 2].any():
             # All is in one plane, where folded cells overlap others: draw them last.
             flat = flat.with_last(one.paint.inverted[flat.cells])

@@ -115,7 +115,7 @@ class FlatScene:
         self._all = flat
         if only is not None and section.whole and len(cut):
             part = self.cuts.of(session.frame.mesh, section, only=only)
-            near = shape.middle(section, cut, ahead)
+            near = shape.middle_angle(section, cut, ahead)
             flat = shape.flatten(section, part, near, ahead) if len(part) else part
         elif only is not None:
             flat = only.among(flat)

@@ -214,7 +214,7 @@ class AboutAxis(Shape):
         points = self.laid(section, opened, ahead)
         return Polygons(points, polygons.offsets, opened.corners, polygons.cells)
 
-    def middle(
+    def middle_angle(
         self, section: Section, polygons: Polygons, near: float | None = None
     ) -> float | None:
         """Return the middle of the range of angles of polygons, in radians; None without any."""

@@ -46,7 +46,7 @@ def handle_parts(section: Section, box: Box) -> HandleParts | None:
     return section.in_plane.handle_parts(section, parts, box) if parts else None
 
 
-def nearest(shown: list[tuple[Part, FloatArray]], at: FloatArray, reach: float) -> Part | None:
+def part_at(shown: list[tuple[Part, FloatArray]], at: FloatArray, reach: float) -> Part | None:
     """Return the first part of a handle within reach of a pixel, or None.
 
     Parameters

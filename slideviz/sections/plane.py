@@ -150,7 +150,7 @@ class Plane(Shape):
         points[:, 2] -= np.asarray(section.origin) @ axes.rows[2]
         return polygons.with_points(points)
 
-    def middle(
+    def middle_angle(
         self, section: Section, polygons: Polygons, near: float | None = None
     ) -> float | None:
         """Return None: only shapes about an axis have a middle angle."""

@@ -111,7 +111,7 @@ class Shape(Protocol):
         angle ``ahead`` is drawn to the right (None: at the middle angle).
         """
 
-    def middle(
+    def middle_angle(
         self, section: Section, polygons: Polygons, near: float | None = None
     ) -> float | None:
         """Return the middle of the angles of polygons, in radians, nearest ``near``; or None.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slideviz.sections.handles import dragged, handle_parts, nearest
+from slideviz.sections.handles import dragged, handle_parts, part_at
 from slideviz.sections.line import along, box_around, line_ends, trace
 from slideviz.sections.model import Section
 
@@ -76,11 +76,11 @@ def test_a_circle_is_held_on_itself_and_in_its_middle_where_that_is_seen():
 def test_the_mouse_takes_points_before_the_line():
     line = np.array([[0.0, 0.0], [100.0, 0.0]])
     shown = [("end", line), ("middle", line[:1] + 50.0 * at(1, 0)), ("line", line)]
-    assert nearest(shown, at(98, 3), 10.0) == "end"
-    assert nearest(shown, at(52, 4), 10.0) == "middle"
-    assert nearest(shown, at(30, 4), 10.0) == "line"
-    assert nearest(shown, at(30, 6), 10.0) is None
-    assert nearest([("middle", np.empty((0, 2)))], at(0, 0), 10.0) is None
+    assert part_at(shown, at(98, 3), 10.0) == "end"
+    assert part_at(shown, at(52, 4), 10.0) == "middle"
+    assert part_at(shown, at(30, 4), 10.0) == "line"
+    assert part_at(shown, at(30, 6), 10.0) is None
+    assert part_at([("middle", np.empty((0, 2)))], at(0, 0), 10.0) is None
 
 
 def test_a_line_moves_by_its_middle_and_across_itself_by_the_rest():

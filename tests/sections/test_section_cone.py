@@ -191,8 +191,8 @@ def test_copies_lie_beside_each_other_and_are_turned_about_the_apex(start):
     assert abs(angles.max() + angles.min()) < 1e-9
     # The window draws its one piece again, turned.
     own, beside = (
-        CUT.shape.flatten(CUT, pieces[n], CUT.shape.middle(CUT, pieces[n], near), ahead)
-        for ahead in [CUT.shape.middle(CUT, pieces[0])]
+        CUT.shape.flatten(CUT, pieces[n], CUT.shape.middle_angle(CUT, pieces[n], near), ahead)
+        for ahead in [CUT.shape.middle_angle(CUT, pieces[0])]
         for n, near in ((0, ahead), (2, ahead + np.radians(60.0)))
     )
     matrix = flat_matrix(CUT, pair, 2, every[2])

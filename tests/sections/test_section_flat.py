@@ -39,7 +39,7 @@ def test_a_sector_unrolls_to_a_rectangle_wherever_it_lies(start, kind):
     assert span == pytest.approx([1.0, 0.7 * np.radians(30), 0.0], abs=1e-12)
     assert areas(flat).sum() == pytest.approx(0.7 * np.radians(30), abs=1e-12)
     wanted = np.radians(start + 15)
-    assert np.cos(section.shape.middle(section, cut) - wanted) == pytest.approx(1.0)
+    assert np.cos(section.shape.middle_angle(section, cut) - wanted) == pytest.approx(1.0)
 
 
 def test_a_whole_ring_is_opened_once_and_no_polygon_is_torn():
@@ -72,7 +72,7 @@ def test_copies_are_laid_beside_each_other():
         points = turned(mesh, 30 * number).points
         cut = cutter.cut(points, section)
         flat = flatten(cut, section, near)
-        near = section.shape.middle(section, cut, near) + np.radians(30)
+        near = section.shape.middle_angle(section, cut, near) + np.radians(30)
         tops.append(flat.points[:, 1].max())
     assert np.diff(tops) == pytest.approx(0.7 * np.radians(30))
 

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from slideviz.case.displacement import Form, parse_rows
+from slideviz.case.displacement import Columns, parse_rows
 from slideviz.case.lines import read_text
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
-POSITION = Form("position", ("x", "y", "z"), flat=True)
-"""The columns of the file after the node."""
+POSITION = Columns("position", ("x", "y", "z"), flat=True)
 
 
 def read_positions(

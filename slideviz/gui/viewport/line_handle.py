@@ -22,7 +22,7 @@ from slideviz.gui.viewport.mouse_handle import (
 )
 from slideviz.mesh.model import FloatArray
 from slideviz.scene.pick import on_plane, to_display
-from slideviz.sections.handles import HandleParts, Part, dragged, handle_parts, nearest
+from slideviz.sections.handles import HandleParts, Part, dragged, handle_parts, part_at
 from slideviz.sections.line import Box
 from slideviz.sections.model import Section
 
@@ -135,7 +135,7 @@ class Handle2D(MouseHandle[tuple[Section, Box]]):
             *(("line", self._pixels(line)) for line in self._handle_parts.lines),
         ]
         reach = REACH_PX * self.view.devicePixelRatioF()
-        return nearest(shown, np.array(self.view.to_pixels(where)), reach)
+        return part_at(shown, np.array(self.view.to_pixels(where)), reach)
 
     def _pixels(self, points: FloatArray) -> FloatArray:
         if not len(points):
