@@ -152,7 +152,7 @@ class Files(QObject):
         """
         window, designs = self.window, self.window.docks_.panel(DesignsPanel)
         unsaved = self._unsaved()
-        if self._answered or not unsaved.what:
+        if self._answered or not unsaved.lost:
             return True
         can_save = unsaved.can_save
         answer = questions.ask_unsaved(

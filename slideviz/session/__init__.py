@@ -1,1 +1,1 @@
-"""The session as frozen values, and the functions that change it; no Qt, no VTK."""
+"""What the window shows, as frozen values, and the functions that change it; no Qt, no VTK."""

@@ -1,4 +1,4 @@
-"""Everything the user can ask for, by one name: functions from one session to the next."""
+"""All changes of a session, imported from one place: functions from one session to the next."""
 
 from __future__ import annotations
 

@@ -17,7 +17,11 @@ from slideviz.terms import Role
 
 @undoable("role")
 def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
-    """Return the session with these boundaries in that role, which confirms it for them."""
+    """Return the session with boundaries in a role, which is no longer a guess.
+
+    Motions lose boundaries that no longer move. Boundaries guessed periodic only because they match
+    one of these become fixed. The first periodic boundary turns periodicity on, the last one off.
+    """
     changed = tuple(names)
     roles = dict(session.case.roles) | dict.fromkeys(changed, role)
     guesses = {name: guess for name, guess in session.guesses.items() if name not in changed}
@@ -37,7 +41,10 @@ def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
 
 
 def _left_alone(session: Session, changed: Sequence[str], role: Role) -> Iterator[str]:
-    """Yield the boundaries guessed periodic for nothing but a match with one that is not."""
+    """Yield the boundaries that match one of ``changed``, and whose names hint at no role.
+
+    None where ``role`` is periodic.
+    """
     for pair in session.pairs if role != "periodic" else ():
         for name, other in ((pair.first, pair.second), (pair.second, pair.first)):
             if other in changed and guess_by_name(name) is None:
@@ -45,7 +52,7 @@ def _left_alone(session: Session, changed: Sequence[str], role: Role) -> Iterato
 
 
 def _of_moving(motion: Motion, roles: Mapping[str, Role]) -> Motion | None:
-    """Return a motion of those of its boundaries that move; None where none of them does."""
+    """Return the motion for those of its boundaries that move; None where none does."""
     names = named(motion.marker)
     moving = tuple(name for name in names if roles.get(name) == "moving")
     if moving == names:
@@ -55,7 +62,7 @@ def _of_moving(motion: Motion, roles: Mapping[str, Role]) -> Motion | None:
 
 @undoable("confirming guesses")
 def confirm(session: Session, names: Iterable[str] | None = None) -> Session:
-    """Return the session with the guesses for these boundaries (default: all) taken as right."""
+    """Return the session with the guesses for some boundaries (default: all) confirmed."""
     gone = set(session.guesses if names is None else names)
     kept = {name: guess for name, guess in session.guesses.items() if name not in gone}
     return replace(session, guesses=kept)
@@ -63,12 +70,12 @@ def confirm(session: Session, names: Iterable[str] | None = None) -> Session:
 
 @undoable("settings")
 def set_case(session: Session, **values: Any) -> Session:
-    """Return the session with other settings of the case."""
+    """Return the session with other values of fields of its case."""
     return replace(session, case=session.case.change(**values))
 
 
 def set_invalid(session: Session, place: PanelPlace, sentences: tuple[str, ...]) -> Session:
-    """Return the session with the fields of a panel that are not valid."""
+    """Return the session with ``sentences`` on the invalid fields of the panel ``place``."""
     others = tuple(each for each in session.invalid if each[0] != place)
     found = (*others, *((place, sentence) for sentence in sentences))
     return session if found == session.invalid else replace(session, invalid=found)
@@ -76,14 +83,14 @@ def set_invalid(session: Session, place: PanelPlace, sentences: tuple[str, ...])
 
 @undoable("new motion")
 def add_motion(session: Session, motion: Motion, index: int | None = None) -> Session:
-    """Return the session with one more motion, performed last or as the one of that index."""
+    """Return the session with one more motion, performed last, or at the place ``index``."""
     motions = list(session.case.motions)
     motions.insert(len(motions) if index is None else index, motion)
     return _with_motions(session, motions)
 
 
 def _with_motions(session: Session, motions: Sequence[Motion]) -> Session:
-    """Return the session with other motions; the first one of a box has the boxes drawn."""
+    """Return the session with other motions; FFD boxes are drawn from the first FFD motion on."""
     found = set_case(session, motions=tuple(motions))
     if has_ffd(found.case) and not has_ffd(session.case):
         return replace(found, view=found.view.with_drawn({"ffd": True}))
@@ -92,19 +99,19 @@ def _with_motions(session: Session, motions: Sequence[Motion]) -> Session:
 
 @undoable("motion")
 def replace_motion(session: Session, index: int, motion: Motion) -> Session:
-    """Return the session with another motion at that place."""
+    """Return the session with another motion at the place ``index``."""
     return _with_motions(session, replaced(session.case.motions, index, motion))
 
 
 @undoable("removing a motion")
 def remove_motion(session: Session, index: int) -> Session:
-    """Return the session without the motion at that place."""
+    """Return the session without the motion at the place ``index``."""
     return set_case(session, motions=without(session.case.motions, index))
 
 
 @undoable("order of motions")
 def move_motion(session: Session, index: int, by: int) -> Session:
-    """Return the session with a motion performed earlier (negative) or later."""
+    """Return the session with a motion performed ``by`` places later (negative: earlier)."""
     motions = list(session.case.motions)
     motion = motions.pop(index)
     motions.insert(max(0, index + by), motion)
@@ -112,7 +119,7 @@ def move_motion(session: Session, index: int, by: int) -> Session:
 
 
 def moved_files(session: Session, moved: Mapping[Path, Path]) -> Session:
-    """Return the session with files at other places: of the mesh, and of displacements."""
+    """Return the session after mesh or displacement files were moved: new paths by old ones."""
 
     def there(case: Case) -> Case:
         motions = tuple(
@@ -131,11 +138,11 @@ def moved_files(session: Session, moved: Mapping[Path, Path]) -> Session:
         session,
         path=moved.get(session.path, session.path) if session.path else None,
         case=there(session.case),
-        # The same files: what ran with them is what the case says.
+        # The files are the same, so that runs stay those of the case.
         runs=tuple(replace(run, case=there(run.case)) for run in session.runs),
     )
 
 
 def saved_case(session: Session, case: Case) -> Session:
-    """Return the session with ``case`` and its sections on disk."""
+    """Return the session after ``case`` was written to disk, with its sections."""
     return replace(session, case=case, saved=case, saved_sections=session.view.sections)

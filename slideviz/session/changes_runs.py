@@ -12,15 +12,15 @@ from slideviz.session.state import Run, Session, StepFrame
 from slideviz.session.undoable import undoable
 
 UNDEFORMED = 0
-"""Stands for the undeformed mesh among the numbers of runs, which begin with 1."""
+"""The number of the undeformed mesh where a run's number is asked for; those begin with 1."""
 MOST_REMOVED = 2
-"""Removed runs that are kept for undo: each may hold hundreds of megabytes."""
+"""Removed runs that undo can bring back: each may take hundreds of megabytes."""
 
 
 def start_run(session: Session, case: Case | None = None, name: str = "") -> Session:
-    """Return the session with a new run of a case, or else of the settings, which is shown.
+    """Return the session with a new run, which is shown: of ``case``, or of the session's case.
 
-    A case with a name is a design. Runs that were cancelled or failed before their first step go.
+    With a ``name`` it is the run of a design. Earlier runs without any step are removed.
     """
     kept = tuple(run for run in session.runs if run.frames)
     number = 1 + max((session.newest, *(run.number for run in session.runs)))
@@ -31,7 +31,7 @@ def start_run(session: Session, case: Case | None = None, name: str = "") -> Ses
 
 
 def add_frames(session: Session, frames: Sequence[StepFrame]) -> Session:
-    """Return the session with steps just computed by the newest run; the last is shown."""
+    """Return the session with further steps of the newest run, the last shown if that run is."""
     newest = session.runs[-1]
     grown = replace(newest, frames=(*newest.frames, *frames), saved=False)
     session = replace(session, runs=(*session.runs[:-1], grown))
@@ -41,7 +41,7 @@ def add_frames(session: Session, frames: Sequence[StepFrame]) -> Session:
 
 
 def end_run(session: Session, end: Literal["done", "cancelled", "failed"]) -> Session:
-    """Return the session with an end for the newest run, if it was going on."""
+    """Return the session with ``end`` as the end of the newest run, if that had none."""
     if not session.runs or session.runs[-1].end:
         return session
     ended = replace(session.runs[-1], end=end)
@@ -49,7 +49,7 @@ def end_run(session: Session, end: Literal["done", "cancelled", "failed"]) -> Se
 
 
 def show_run(session: Session, number: int) -> Session:
-    """Return the session with the last step of that run shown."""
+    """Return the session with the last step of a run shown, if there is the run."""
     run = session.run(number)
     if run is None:
         return session
@@ -59,7 +59,7 @@ def show_run(session: Session, number: int) -> Session:
 
 
 def show_design(session: Session, number: int) -> Session:
-    """Return the session with the last step of the run of a design shown, asked for now."""
+    """Return the session with the last step of a design's run shown, as asked for in this case."""
     asked = (
         replace(one, panels=session.case) if one.number == number else one for one in session.runs
     )
@@ -69,7 +69,7 @@ def show_design(session: Session, number: int) -> Session:
 def show_beside(session: Session, number: int | None) -> Session:
     """Return the session with another run in a second view; None for no second view.
 
-    ``UNDEFORMED`` stands for the undeformed mesh.
+    ``UNDEFORMED`` is the number of the undeformed mesh.
     """
     known = number == UNDEFORMED or session.run(number) is not None
     if number == session.shown or not known:
@@ -79,7 +79,7 @@ def show_beside(session: Session, number: int | None) -> Session:
 
 @undoable("removing a run")
 def remove_run(session: Session, number: int) -> Session:
-    """Return the session without a run, which undo can bring back; one that goes on stays."""
+    """Return the session without a run, which undo can bring back; unchanged while it goes on."""
     run = session.run(number)
     if run is None or not run.end:
         return session
@@ -97,7 +97,7 @@ def remove_run(session: Session, number: int) -> Session:
 
 
 def bring_back(session: Session, number: int) -> Session:
-    """Return the session with a removed run at its old place, if it is still kept."""
+    """Return the session with a removed run back at its place, if it is still in ``removed``."""
     back = [run for run in session.removed if run.number == number]
     if not back:
         return session
@@ -108,7 +108,7 @@ def bring_back(session: Session, number: int) -> Session:
 
 
 def rename_run(session: Session, number: int, name: str) -> Session:
-    """Return the session with another name for a run; an empty one takes the name away."""
+    """Return the session with another name for a run; "" takes its name away."""
     name = " ".join(name.split())
     run = session.run(number)
     if run is None or run.name == name:
@@ -119,7 +119,7 @@ def rename_run(session: Session, number: int, name: str) -> Session:
 
 @undoable("settings of a run")
 def take_settings(session: Session, number: int) -> Session:
-    """Return the session with the roles, motions and method of a run."""
+    """Return the session with the case of a run as its own, and no guesses."""
     run = session.run(number)
     if run is None:
         return session
@@ -127,7 +127,10 @@ def take_settings(session: Session, number: int) -> Session:
 
 
 def seen_beside(session: Session) -> Session:
-    """Return the session as the second view shows it: the other run, at the matching step."""
+    """Return the session that the second view shows: the other run, at the matching step.
+
+    Unchanged where there is no second view.
+    """
     if session.view.beside == UNDEFORMED:
         return show_frame(session, 0)
     run, other = session.run_shown, session.run(session.view.beside)
@@ -135,7 +138,7 @@ def seen_beside(session: Session) -> Session:
         return session
     last = len(run.frames) if run is not None else 0
     at = session.view.frame
-    # Runs of different numbers of steps: the same part of the displacement.
+    # The step at about the same part of the displacement, where numbers of steps differ.
     frame = round(at * len(other.frames) / last) if last else 0
     if at:
         frame = max(frame, 1)
@@ -143,7 +146,7 @@ def seen_beside(session: Session) -> Session:
 
 
 def saved_mesh(session: Session) -> Session:
-    """Return the session with the deformed mesh of the run that is shown on disk."""
+    """Return the session after the deformed mesh of the run that is shown was written to disk."""
     runs = tuple(
         replace(run, saved=True) if run.number == session.shown else run for run in session.runs
     )

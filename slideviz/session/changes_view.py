@@ -25,20 +25,20 @@ UNDO_WORDS: dict[str, str] = {
     "hidden": "hidden boundaries",
     **{name: term.name.lower() for name, term in SHOWN.items()},
 }
-"""What the menu calls a change of one thing in the view; it says "view" of several at once."""
+"""Words after "Undo" for a change of one value of the view, by its name; for others "view"."""
 
 
 def _undo_words(values: Mapping[str, Any]) -> str | None:
     if "colour_by" in values:
-        return None  # who looks at something else does not change it
+        return None  # the quantity that the view is coloured by is not undone
     return UNDO_WORDS.get(next(iter(values)), "view") if len(values) == 1 else "view"
 
 
 @undoable(_undo_words)
 def set_view(session: Session, **values: Any) -> Session:
-    """Return the session with other values of `ViewState`, and of names in `SHOWN`.
+    """Return the session with other values of fields of `ViewState`, or of names in `SHOWN`.
 
-    What the colours say has a range of its own, which is there again when it is coloured by again.
+    Each quantity that the view is coloured by has its own colour range, which comes back with it.
     """
     old = session.view
     what: ColourBy = values.get("colour_by", old.colour_by)
@@ -48,26 +48,26 @@ def set_view(session: Session, **values: Any) -> Session:
             ranges[old.colour_by] = old.colour_range
         values = {"colour_range": ranges.pop(what, None)} | values
         values["ranges"] = tuple(sorted(ranges.items()))
-        # Cells chosen by a quality say nothing of a displacement, and the other way round.
+        # A threshold for a quality means nothing for a displacement, and the other way round.
         if "displacement" in (what, old.colour_by) and old.threshold != ONLY_INVERTED:
             values.setdefault("threshold", None)
     if "sections" in values:
         index = followed(old.section_index, old.sections, values["sections"])
         values.setdefault("section_index", index)
     if session.in_file:
-        values.pop("threshold", None)  # it would choose among all cells
+        values.pop("threshold", None)  # needs the values of all cells
     drawn = {name: values.pop(name) for name in SHOWN if name in values}
     return replace(session, view=replace(old.with_drawn(drawn), **values))
 
 
 def select(session: Session, names: Iterable[str]) -> Session:
-    """Return the session with these boundaries highlighted."""
+    """Return the session with the boundaries ``names`` highlighted, and no others."""
     return set_view(session, selected=tuple(names))
 
 
 @undoable("hidden boundaries")
 def show(session: Session, names: Iterable[str], shown: bool = True) -> Session:
-    """Return the session with these boundaries shown or hidden."""
+    """Return the session with the boundaries ``names`` shown, or hidden."""
     hidden = session.view.hidden
     change = frozenset(names)
     return set_view(session, hidden=hidden - change if shown else hidden | change)
@@ -75,44 +75,44 @@ def show(session: Session, names: Iterable[str], shown: bool = True) -> Session:
 
 @undoable("hidden boundaries")
 def isolate(session: Session, names: Iterable[str]) -> Session:
-    """Return the session with only these boundaries shown."""
+    """Return the session with only the boundaries ``names`` shown."""
     every = session.mesh.marker_names if session.mesh else ()
     return set_view(session, hidden=frozenset(every) - frozenset(names))
 
 
 def show_frame(session: Session, index: int) -> Session:
-    """Return the session at another step, or the nearest there is."""
+    """Return the session with the frame ``index`` shown, or the nearest there is."""
     return set_view(session, frame=min(max(index, 0), max(len(session.frames) - 1, 0)))
 
 
 @undoable("new section")
 def add_section(session: Session, section: Section) -> Session:
-    """Return the session with one more section."""
+    """Return the session with one more section, which is selected."""
     return set_view(session, sections=(*session.view.sections, section))
 
 
 @undoable("section")
 def replace_section(session: Session, index: int, section: Section) -> Session:
-    """Return the session with another section at that place."""
+    """Return the session with another section at the place ``index``."""
     return set_view(session, sections=replaced(session.view.sections, index, section))
 
 
 @undoable("removing a section")
 def remove_section(session: Session, index: int) -> Session:
-    """Return the session without the section at that place."""
+    """Return the session without the section at the place ``index``."""
     return set_view(session, sections=without(session.view.sections, index))
 
 
 @undoable("flat view")
 def lay_flat(session: Session, index: int | None) -> Session:
-    """Return the session with the section at that place laid flat beside the view; None: none."""
+    """Return the session with a flat view of the section at the place ``index``; None: of none."""
     laid = (replace(one, flat=i == index) for i, one in enumerate(session.view.sections))
     return set_view(session, sections=tuple(laid))
 
 
 @undoable("choice of a section")
 def choose_section(session: Session, index: int | None) -> Session:
-    """Return the session with the section at that place selected; None: none."""
+    """Return the session with the section at the place ``index`` selected; None: none."""
     return set_view(session, section_index=index)
 
 
@@ -123,14 +123,15 @@ def show_handle(session: Session, shown: bool) -> Session:
 
 
 def flat_one(sections: Sequence[Section]) -> int | None:
-    """Return the place of the section that is laid flat and shown, or None."""
+    """Return the place of the section that has a flat view and is drawn, or None."""
     return next((index for index, one in enumerate(sections) if one.flat and one.shown), None)
 
 
 def followed(index: int | None, old: Sequence[Section], new: Sequence[Section]) -> int | None:
-    """Return the place of the selected section after one was added, taken away or changed.
+    """Return the place of the selected section after one was added, removed or changed.
 
-    One that was added is selected; after the selected one is gone, its neighbour is.
+    ``index`` is its place among ``old``. A section that was added is selected; where the selected
+    one was removed, its neighbour is.
     """
     if not new:
         return None
@@ -146,14 +147,14 @@ def followed(index: int | None, old: Sequence[Section], new: Sequence[Section]) 
 
 
 def mark_cell(session: Session, cell: int | None) -> Session:
-    """Return the session with that cell marked; None: none."""
+    """Return the session with a cell marked; None: none."""
     return set_view(session, marked_cell=cell)
 
 
 def fresh_view(session: Session, old: ViewState) -> Session:
-    """Return a session just opened with things drawn and colour map of the view before.
+    """Return a session just opened, with the things drawn and the colour map of the view ``old``.
 
-    Its boxes are drawn if it has motions of them.
+    FFD boxes are drawn as ``session`` has them: if it has FFD motions.
     """
     drawn = old.with_drawn({"ffd": "ffd" in session.view.drawn}).drawn
     return set_view(session, drawn=drawn, colour_map=old.colour_map)

@@ -1,4 +1,4 @@
-"""Colour ranges that fit the values of all that is shown."""
+"""The colour range: fitted to the values that are shown, and in words."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from slideviz.session.state import Session
 from slideviz.session.undoable import undoable
 
 _PARTS = 100.0
-"""The range is rounded outwards to about so many parts of it."""
+"""A colour range is rounded outwards to a power of ten, about its length over this number."""
 
 
 @undoable("colour range")
 def fit_colours(session: Session, every: bool = True) -> Session:
     """Return the session with a colour range from the lowest to the highest value.
 
-    Of all steps, so that played a colour says the same, or of the one that is shown, which has
-    more colours then; of both runs where two are compared. Inverted cells have a colour of their
-    own. Unchanged where all values are alike.
+    With ``every``, of all steps, so that a colour means the same throughout; else of the step
+    shown. Of both runs where there are two views. Inverted cells do not count: they have a colour
+    of their own. Unchanged where all values are equal.
     """
     limits = _limits(session, every)
     return session if limits is None else set_view(session, colour_range=limits)
@@ -31,17 +31,17 @@ NO_DISPLACEMENT = "There is no displacement yet: run the case. Until then the ro
 
 
 def unmoved(session: Session) -> bool:
-    """Tell whether the colours are to say the displacement, and nothing has been moved yet."""
+    """Return whether the view is coloured by the displacement, and no run has a step yet."""
     return session.view.colour_by == "displacement" and not any(run.frames for run in session.runs)
 
 
 def as_drawn(session: Session) -> Session:
-    """Return a session as it is drawn: in the colours of roles where nothing has been moved yet."""
+    """Return the session to draw: coloured by roles where there is no displacement yet."""
     return set_view(session, colour_by="role") if unmoved(session) else session
 
 
 def usual_range(session: Session) -> str:
-    """Return in words the colour range that holds where nobody has chosen one."""
+    """Return the default colour range in words."""
     far = session.view.colour_by == "displacement"
     return "0 to the largest of all runs" if far else "0 to 1"
 
@@ -63,20 +63,20 @@ def _limits(session: Session, every: bool) -> tuple[float, float] | None:
 
 
 def _frames(session: Session, every: bool) -> set[StepFrame]:
-    """Return what is seen now, or every step that can be."""
+    """Return the frames that are shown in all views, with ``every`` those of all their steps."""
     shown: set[StepFrame] = set()
     for one in (session, seen_beside(session)):
         if one.frame is not None:
             shown.add(one.frame)
         if every:
-            # Nothing is displaced further than in the last step, and each would take its time.
+            # Displacements are largest in the last step, and measuring each step takes time.
             far = one.view.colour_by == "displacement"
             shown.update((*one.frames[:1], *one.frames[-1:]) if far else one.frames)
     return shown
 
 
 def _outwards(low: float, high: float) -> tuple[float, float]:
-    """Return numbers of few digits around two numbers."""
+    """Return two numbers rounded to few digits, the lower one down and the upper one up."""
     unit = float(10.0 ** np.floor(np.log10((high - low) / _PARTS)))
     first, last = np.floor(low / unit + 1e-6) * unit, np.ceil(high / unit - 1e-6) * unit
     digits = max(0, round(-np.log10(unit))) + 1

@@ -1,4 +1,4 @@
-"""The table of designs as the window has it: texts in columns, and the results that came."""
+"""The table of designs in the window: a text for each value, and the results so far."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from slideviz.errors import CaseError
 from slideviz.mesh.model import Mesh
 
 MOST = 100_000
-"""Designs that a table in the window has room for."""
+"""Most designs of a table in the window."""
 FINE = 1e-5
-"""What values of a range may be off, as a part of the step between them."""
+"""Rounding error allowed for the values of a range, over the step between them."""
 _NAMED = 5
-"""Designs that are named of those that failed for the same reason."""
+"""Most designs that are named of those that failed for the same reason."""
 _RANGE = re.compile(r"(\S+)\s*(?:to|\.\.)\s*(\S+)\s*(?:in|:)\s*(\d+)\Z", re.IGNORECASE)
 
 
@@ -34,6 +34,7 @@ class DesignTable:
     Attributes
     ----------
     columns : tuple of str
+        Their names, as `slideviz.sweep` takes them.
     rows : tuple of tuple of str
         The values of each design, a text for each column.
     results : mapping of int to DesignRow
@@ -45,7 +46,9 @@ class DesignTable:
     results: Mapping[int, DesignRow] = field(default_factory=lambda: MappingProxyType({}))
 
     def crossed(self, column: str, values: Iterable[str]) -> DesignTable:
-        """Return the table in which each design there is has each of these values.
+        """Return the table with each design once for each of ``values`` in a column.
+
+        A column of that name is replaced; there are no results.
 
         Raises
         ------
@@ -61,7 +64,7 @@ class DesignTable:
         return DesignTable((*(self.columns[k] for k in at), column), rows)
 
     def with_cell(self, row: int, column: int, text: str) -> DesignTable:
-        """Return the table with another value; the result of that design goes."""
+        """Return the table with another value in a cell, and without the result of that design."""
         cells = list(self.rows[row])
         cells[column] = text.strip()
         rows = (*self.rows[:row], tuple(cells), *self.rows[row + 1 :])
@@ -81,12 +84,12 @@ class DesignTable:
         return DesignTable(self.columns if kept else (), kept, MappingProxyType(results))
 
     def with_results(self, rows: Iterable[DesignRow]) -> DesignTable:
-        """Return the table with more results."""
+        """Return the table with further results, by the number of their design."""
         more = {row.design: row for row in rows}
         return replace(self, results=MappingProxyType({**self.results, **more}))
 
     def keeping(self, other: DesignTable) -> DesignTable:
-        """Return the table with the results that another one has of the same designs."""
+        """Return the table with the results that ``other`` has of designs with the same values."""
         if sorted(self.columns) != sorted(other.columns):
             return self
         at = [other.columns.index(name) for name in self.columns]
@@ -114,13 +117,14 @@ class DesignTable:
         return replace(self, rows=tuple(tuple(c or texts[name] for name, c in row) for row in rows))
 
     def without_results(self) -> DesignTable:
-        """Return the table as it was before it ran."""
+        """Return the table without any result."""
         return replace(self, results=MappingProxyType({}))
 
     def left(self, case: Case | None, now: Case | None) -> DesignTable:
-        """Return the table with the results that running it on a case would not change.
+        """Return the table without the results that are to be computed again.
 
-        ``case`` is that of the results. What failed is run again.
+        Those of failed designs; all where the case ``now`` would give others than ``case``, with
+        which they were computed.
         """
         if case is None or now is None or _settings(case) != _settings(now):
             return self.without_results()
@@ -128,9 +132,9 @@ class DesignTable:
         return self.without_results().with_results(kept)
 
     def unsaved(self, busy: bool, saved: DesignTable | None) -> str:
-        """Return what would be lost with the table, in a sentence, or nothing.
+        """Return a sentence on what would be lost with the table; "" if nothing.
 
-        ``busy`` tells whether it is being run, ``saved`` is the one that was saved last.
+        ``busy`` is whether the designs are being run, ``saved`` the table that was saved last.
         """
         done, count = len(self.results), len(self.rows)
         if busy:
@@ -145,12 +149,12 @@ class DesignTable:
         return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
 
     def reason(self, number: int, mesh: Mesh | None) -> str:
-        """Return why a design failed, without the name of the mesh at the beginning."""
+        """Return why the design ``number`` failed, without the mesh's name at the beginning."""
         name = mesh.name if mesh is not None else ""
         return self.results[number].problem.removeprefix(f"{name}: ")
 
     def summary(self, mesh: Mesh | None) -> str:
-        """Return in words how the designs went on a mesh, with a line for each reason to fail."""
+        """Return the results in words: counts, and a line for each reason why designs failed."""
         done, bad = self.count_done(), sum(row.inverted > 0 for row in self.results.values())
         reasons: dict[str, list[int]] = {}
         for number in sorted(self.results):
@@ -172,14 +176,14 @@ def _named(numbers: list[int]) -> str:
 
 
 def _settings(case: Case) -> Case:
-    """Return a case without what changes no result: its files, its view."""
+    """Return the case without its output and source file, warnings and view."""
     return case.change(mesh_out=None, source=None, warnings=(), view={})
 
 
 def column_choices(case: Case, dim: int) -> dict[str, str]:
-    """Return the columns that there can be, with what the case has there: numbers, then keys.
+    """Return the possible columns, with their values in the case: numbers of motions, then keys.
 
-    In 2D those numbers are left out that do nothing there: of axes, and along z.
+    In 2D numbers without effect are left out: those of axes, and components along z.
     """
     numbers = {
         name: place
@@ -201,7 +205,7 @@ def values_of(text: str) -> list[str]:
     Raises
     ------
     CaseError
-        It lists none, or the range is none.
+        A value is missing, or the range has wrong numbers.
     """
     match = _RANGE.match(text.strip())
     if match is None:
@@ -214,7 +218,7 @@ def values_of(text: str) -> list[str]:
         raise CaseError("A range has two numbers and how many values it has, as -8 to 0 in 9")
     values = np.linspace(float(first), float(last), int(count))
     step = abs(values[1] - values[0])
-    for decimals in range(18):  # not 0.30000000000000004, nor more than the steps need
+    for decimals in range(18):  # no more digits than needed: not 0.30000000000000004
         texts = [format(round(value, decimals), ".15g") for value in values.tolist()]
         if max(abs(float(text) - v) for text, v in zip(texts, values, strict=True)) <= FINE * step:
             return texts
@@ -222,7 +226,7 @@ def values_of(text: str) -> list[str]:
 
 
 def shown(value: str | float) -> str:
-    """Return a value as people write it, with all its digits."""
+    """Return a value as text, as short as possible without loss."""
     if isinstance(value, str):
         return value
     short = format(value, ".12g")

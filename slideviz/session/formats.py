@@ -12,10 +12,10 @@ from slideviz.mesh.model import Mesh
 
 @dataclass(frozen=True)
 class MeshFormat:
-    """A format: its name, and the parts of a mesh that files of it hold.
+    """A format: its name, and the parts of a mesh that files of it have.
 
-    ``quality`` tells whether cells can have numbers; ``boundaries`` whether these keep their
-    names, or become numbers; ``dims`` the dimensions of meshes that it can hold.
+    ``quality`` is whether cells can have values; ``boundaries`` whether boundaries keep their
+    names or get numbers; ``dims`` are the dimensions of meshes that it can store.
     """
 
     name: str
@@ -39,11 +39,11 @@ MESH_FORMATS: dict[str, MeshFormat] = {
     ".mesh": MeshFormat("Medit", False, "numbers"),
     ".bdf": MeshFormat("Nastran", False, "numbers", (3,)),
 }
-"""By ending; meshio writes more, but hardly any that holds boundaries beside cells."""
+"""Formats by ending; meshio writes more, but hardly any that stores boundaries besides cells."""
 
 
 def formats_for(mesh: Mesh) -> dict[str, MeshFormat]:
-    """Return the formats that can hold a mesh, by ending."""
+    """Return the formats that can store a mesh, by ending; CGNS only if it was read from CGNS."""
     return {
         end: row
         for end, row in MESH_FORMATS.items()
@@ -52,13 +52,13 @@ def formats_for(mesh: Mesh) -> dict[str, MeshFormat]:
 
 
 def holds_quality(path: Path) -> bool:
-    """Tell whether a file of that name can hold values of the cells."""
+    """Return whether a file of that name can have values of the cells."""
     row = MESH_FORMATS.get(path.suffix.lower())
     return row is not None and row.quality
 
 
 def left_out(path: Path, mesh: Mesh) -> str:
-    """Return a sentence on the parts of a mesh that a file of that name leaves out, or nothing."""
+    """Return a sentence on the parts of a mesh that a file of that name leaves out; "" if none."""
     end = path.suffix.lower()
     has_quality = end in (".su2", ".su2b", ".cgns") or holds_quality(path)
     lost = [*([] if has_quality else ["the quality of the cells"]), *lost_in(end, mesh)]

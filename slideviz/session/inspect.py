@@ -1,8 +1,7 @@
 """Facts about cells: those within a threshold, the worst ones, and a single one.
 
-The *measure* of a cell is the quality that the view is coloured by; size-skew where the colours
-say something else. An inverted cell is below every value, so that a choice from 0, where
-qualities and displacements begin, contains it.
+The *measure* of a cell is the quality that the view is coloured by, or size-skew where the view is
+coloured by something else. Inverted cells count as below every value: a threshold from 0 has them.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from slideviz.session.state import StepFrame
 from slideviz.terms import CELL_STATES, CellState, ColourBy
 
 WORST = 100
-"""Cells in the list of the worst."""
+"""Length of the list of the worst cells."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,12 +34,12 @@ class CellInfo:
     cell : int
         Its number in the mesh, from 0, as in an SU2 file.
     kind : str
-        Its element type.
+        The name of its element type.
     state : CellState
     size_skew, size, skew : float
-        Qualities.
+        Its qualities, 0 to 1.
     jacobians : (k,) float64
-        Corner Jacobians, in area or volume; positive where the cell is right.
+        Its corner Jacobians, an area or volume; negative at folded corners.
     position : (d,) float64
         The mean of its nodes, in the mesh's length unit.
     """
@@ -69,13 +68,13 @@ class WorstCells:
     positions : (k, d) float64
         The means of their nodes, in the mesh's length unit.
     steps : (k,) int64
-        The frame at which each was at its worst first; 0 is the undeformed mesh.
+        The first frame at which each was worst; 0 is the undeformed mesh.
     kinds : tuple of str
-        Their element types.
+        The names of their element types.
     measure : str
-        What ``values`` are.
+        The quality in ``values``.
     numbers : (k,) int64 or None
-        The numbers of the cells in the file, where those in memory are others.
+        The numbers of the cells in the file, where only a part of the mesh is in memory.
     """
 
     cells: IntArray
@@ -89,7 +88,7 @@ class WorstCells:
 
     @property
     def known_as(self) -> IntArray:
-        """Return the numbers that the cells have for people, (k,)."""
+        """Return the numbers (k,) of the cells that users see: those in the file."""
         return self.cells if self.numbers is None else self.numbers
 
     def __len__(self) -> int:
@@ -97,17 +96,17 @@ class WorstCells:
 
 
 def measure(colour_by: ColourBy) -> ColourBy:
-    """Return the quality that colours the view, or size-skew."""
+    """Return ``colour_by`` where it is a quality, else size-skew."""
     return colour_by if colour_by in ("size", "skew") else "size-skew"
 
 
 def worst_cells(
     frames: Sequence[StepFrame], at: int, what: ColourBy, count: int = WORST
 ) -> WorstCells:
-    """Return the worst cells of the frame ``at``, and the frame in which each was worst.
+    """Return the worst cells of the frame ``at``, with the frame in which each was worst.
 
-    Only the listed cells are followed through the frames, so that neither time nor memory grows
-    with the number of cells of all frames together. Ties are in the order of the numbers.
+    Only these cells are followed through the frames, to save time and memory. Ties are in the
+    order of the cells' numbers.
     """
     frame, what = frames[at], measure(what)
     if frame.extra is not None:
@@ -133,7 +132,7 @@ def worst_cells(
 
 
 def _listed(frame: StepFrame, extra: StepFrame, at: int, count: int) -> WorstCells:
-    """Return the worst cells of a mesh of which only the boundary is in memory, by size-skew."""
+    """Return the worst cells of a large mesh by size-skew: the first of ``extra`` of the frame."""
     assert extra.mesh.part is not None
     assert extra.base is not None
     assert frame.mesh.part is not None
@@ -156,7 +155,7 @@ def _listed(frame: StepFrame, extra: StepFrame, at: int, count: int) -> WorstCel
 
 
 def inverted_cells(frame: StepFrame) -> IntArray:
-    """Return the inverted cells of a frame, (k,), without those of a halo."""
+    """Return the ascending numbers (k,) of the inverted cells of a frame, without its halo."""
     bad = frame.quality.status == INVERTED
     if frame.quality.halo is not None:
         bad &= ~frame.quality.halo
@@ -164,7 +163,7 @@ def inverted_cells(frame: StepFrame) -> IntArray:
 
 
 def middles(mesh: Mesh, cells: IntArray) -> FloatArray:
-    """Return the means of the nodes of some cells, (k, d)."""
+    """Return the mean (k, d) of the nodes of each of ``cells`` (k,)."""
     return np.array([mesh.points[nodes_of(mesh, int(cell))].mean(axis=0) for cell in cells])
 
 
@@ -207,15 +206,16 @@ def cell_info(frame: StepFrame, cell: int) -> CellInfo:
 
 
 def cell_at(mesh: Mesh, x: float, y: float, values: FloatArray) -> int | None:
-    """Return the cell of a 2D mesh around a point; of several, the one of lowest value.
+    """Return the number of the cell of a 2D mesh around a point, or None.
 
     Parameters
     ----------
     mesh : Mesh
     x, y : float
-        In the mesh's length unit.
+        The point, in the mesh's length unit.
     values : (m,) float64
-        Cells whose value is NaN are passed by.
+        Values of the cells: of several cells around the point, that of the lowest is returned.
+        Cells whose value is nan are ignored.
     """
     at, first = mesh.points[mesh.cells.connectivity], mesh.cells.offsets[:-1]
     low, high = np.minimum.reduceat(at, first), np.maximum.reduceat(at, first)
@@ -226,7 +226,7 @@ def cell_at(mesh: Mesh, x: float, y: float, values: FloatArray) -> int | None:
 
 
 def _inside(mesh: Mesh, cell: int, x: float, y: float) -> bool:
-    """Tell whether a ray from a point crosses the sides of a cell an odd number of times."""
+    """Return whether a point is inside a cell of a 2D mesh, by the even-odd rule."""
     a = mesh.points[nodes_of(mesh, cell)]
     b = np.roll(a, -1, axis=0)
     crosses = (a[:, 1] > y) != (b[:, 1] > y)
@@ -236,7 +236,7 @@ def _inside(mesh: Mesh, cell: int, x: float, y: float) -> bool:
 
 
 def table_rows(worst: WorstCells, header: bool = True) -> list[list[str]]:
-    """Return the worst cells as rows of texts, without loss of digits."""
+    """Return the worst cells as rows of texts, numbers with all digits."""
     names = "xyz"[: worst.positions.shape[1]]
     measured = worst.measure.replace("-", "_")
     rows = [["cell", "type", measured, "inverted", *names, "worst_at_step"]] if header else []

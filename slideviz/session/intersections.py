@@ -1,4 +1,4 @@
-"""The intersection check: motions that put a boundary through another, or have bad files."""
+"""The check of the motions in the window: boundaries that cross, or faulty displacement files."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ from slideviz.session.state import Session
 
 
 def intersection_key(session: Session) -> tuple[object, ...]:
-    """Return what an intersection depends on: the check holds while this is the same."""
+    """Return the values on which the check depends: its result holds while they are the same."""
     case = session.case
     roles = tuple(sorted(case.roles.items()))
     return (session.mesh, case.motions, roles, case.periodic, case.sliding)
 
 
 def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped) -> tuple[str, str]:
-    """Return the sentence about an intersection, or about mistakes in a displacement file.
+    """Return two sentences on boundaries that the motions make cross each other, "" for none.
 
-    It is empty when there is none, or when the case has other problems: they are told elsewhere.
-    The second sentence is about what moves and goes through itself, which keeps nobody from a run.
+    The first keeps a run from starting: a moved boundary crosses another one, or a displacement
+    file has mistakes. The second does not: what moves crosses itself. Both are "" where the case
+    has other problems, which are reported elsewhere.
     """
     files = [motion.path for motion in case.motions if isinstance(motion, FromFile)]
     try:
@@ -44,7 +45,7 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
 
 
 def _first_line(error: SlidevizError, files: list[Path]) -> str:
-    """Return the first mistake, without the folders of files, and how many more there are."""
+    """Return the first line of an error, without folders of files, and how many more there are."""
     first, *others = str(error).splitlines()
     for path in files:
         first = first.replace(str(path), path.name)

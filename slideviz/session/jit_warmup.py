@@ -1,4 +1,4 @@
-"""JIT warm-up: tiny meshes, read and deformed to compile, or load, Numba's loops in advance."""
+"""JIT warm-up: deforms tiny meshes, so that Numba's loops are compiled, or loaded, in advance."""
 
 from __future__ import annotations
 
@@ -28,18 +28,19 @@ _RUNS: tuple[tuple[str, Mapping[str, Any]], ...] = (
     ("square", {"sliding": "ps", "method": "idw"}),
     ("hexahedron", {"sliding": "ds", "method": "elastic"}),
 )
-"""Samples and settings that need every loop between them."""
+"""Samples and settings that together use every compiled loop."""
 
 
 def warm_up(compiling: Callable[[], None], stopped: Stopped) -> None:
-    """Write, read and deform some cells of the samples, in memory.
+    """Write, read, cut and deform samples of few cells in memory, to compile all loops.
 
     Parameters
     ----------
     compiling
-        Called when something is really compiled; never when all comes from the cache on disk.
+        Called when a loop is compiled; never when all come from the cache on disk.
     stopped
-        Asked between and within the deformations; compilation itself cannot be interrupted.
+        Returns whether to stop; called between and during the deformations, for compilation itself
+        cannot be interrupted.
     """
     from numba.core import event
 
@@ -50,7 +51,7 @@ def warm_up(compiling: Callable[[], None], stopped: Stopped) -> None:
         def on_end(self, _: object) -> None:
             pass
 
-    # What fails here fails again in the user's run, with a message there.
+    # An error here is one in the user's run too, where it gets a message.
     with (
         contextlib.suppress(Cancelled, SlidevizError),
         event.install_listener("numba:compile", Listener()),
@@ -63,7 +64,7 @@ def warm_up(compiling: Callable[[], None], stopped: Stopped) -> None:
 
 
 def _write_and_read() -> None:
-    """Print a mesh as the text of an SU2 file, read it, and print it moved, in memory."""
+    """Write a mesh as SU2 text, read it, and write it moved, in memory."""
     mesh = sample("square", size=4).mesh
     text = Source(Path(mesh.name), b"".join(su2_blocks(mesh)))
     read = read_su2(text, None, lambda _: None)

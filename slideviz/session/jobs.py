@@ -1,7 +1,8 @@
 """The long jobs of the window as plain functions: open, compute, save.
 
-Each gets ``report(item)``, which may be called from any thread, and ``stopped()``, and raises
-`slideviz.errors.Cancelled` soon after ``stopped()`` became true. Nothing here draws.
+A job is a function with two arguments for the thread that runs it: it calls ``report(item)``, from
+any thread, with progress and results, and raises `slideviz.errors.Cancelled` soon after
+``stopped()`` returns True. Nothing here draws.
 """
 
 from __future__ import annotations
@@ -39,12 +40,12 @@ PHASES = {
     "project": "projecting onto the boundaries",
     "quality": "quality",
 }
-"""Words for people for the phases of a run."""
+"""Words in the window for the phases of a run (``Progress.phase``)."""
 
 
 @dataclass(frozen=True)
 class Doing:
-    """Progress of a job: words, and a fraction from 0 to 1, or None where nobody knows."""
+    """Progress of a job: words, and the fraction done, 0 to 1, or None where it is unknown."""
 
     text: str
     fraction: float | None = None
@@ -54,8 +55,8 @@ class Doing:
 class Opened:
     """The result of `open_file`: the session, and the boundaries ready to be drawn.
 
-    ``kept`` tells whether the case says how it was looked at; ``camera`` is from where.
-    ``ghosts`` has read the displacement files; ``coarse`` are the boundaries of a large mesh with
+    ``kept`` is whether the case file has a view, ``camera`` the camera in it. ``ghosts`` are the
+    moved boundaries, their displacement files read; ``coarse`` the boundaries of a large mesh with
     fewer facets.
     """
 
@@ -100,7 +101,7 @@ def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) ->
 def prepare(
     mesh: Mesh, path: Path | None, case: Case | None, report: Report, stopped: Stopped
 ) -> Opened:
-    """Return a mesh that was just read, ready to be shown: boundaries, pairs, quality."""
+    """Return a mesh just read, ready to be shown: its boundaries, periodic pairs and quality."""
     require_going(stopped)
     report(Doing("Finding the boundaries"))
     surfaces = find_surfaces(mesh)
@@ -137,14 +138,14 @@ def prepare(
 
 
 def _look_ahead(frame: StepFrame) -> None:
-    """Find what is kept of a frame and asked for at once: of many cells it takes a while."""
+    """Compute cached properties of a frame that drawing needs: in this thread, as it takes time."""
     mesh, measured = frame.mesh, frame.quality
     _ = mesh.bounds, mesh.extent, mesh.cells.nodes, mesh.cells.by_type
     _ = measured.min, measured.mean, measured.inverted, measured.cells
 
 
 def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
-    """Deform the mesh; report every step as a `Frame`, and the progress as `Doing`."""
+    """Deform the mesh; report every step as a `StepFrame`, and the progress as `Doing`."""
     from slideviz.deformation.solver import Progress, deform
 
     furthest = 0.0
@@ -152,7 +153,7 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
     def progress(now: Progress) -> None:
         nonlocal furthest
         require_going(stopped)
-        # Sliding solves more than once in a step; a bar that runs back would look broken.
+        # Sliding has its phases more than once in a step; a bar must not run back.
         furthest = max(furthest, overall(now))
         phase = PHASES.get(now.phase, now.phase)
         if case.steps:
@@ -160,14 +161,14 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         elif now.phase == "classify":
             report(Doing(f"Automatic steps: {phase}"))
         else:
-            # Nobody knows how many numbers will be tried: the bar only says that it goes on.
+            # It is unknown how many numbers of steps will be tried, and so is the fraction.
             tried = f"{now.total} step{'s' if now.total > 1 else ''}"
             report(Doing(f"Trying {tried}: step {now.step}, {phase}"))
 
     unfinished = True
 
     def going_on() -> None:
-        # When the last step is there, nothing is gained by dropping it.
+        # The last step is not dropped, even if the job is asked to stop.
         if unfinished:
             require_going(stopped)
 
@@ -185,7 +186,7 @@ _STARTS = {"classify": 0.0, "solve": 0.1, "evaluate": 0.5, "project": 0.7}
 
 
 def overall(now: object) -> float:
-    """Return the fraction of the whole run that is done, roughly: phases differ in length."""
+    """Return roughly the fraction of a run that is done, from its `Progress`."""
     step, total = getattr(now, "step", 1), getattr(now, "total", 1)
     phase, fraction = getattr(now, "phase", ""), getattr(now, "fraction", 0.0)
     start = _STARTS.get(phase, 0.9)
@@ -202,9 +203,9 @@ def save_mesh(
     stopped: Stopped,
     base: Mesh | None = None,
 ) -> Path:
-    """Write the mesh of a frame, with its quality where the format can hold it.
+    """Write the mesh of a frame, with its quality where the format has values of cells.
 
-    Of the undeformed mesh ``base`` the displacement is written, too.
+    With the undeformed mesh ``base``, the displacement is written, too.
 
     Raises
     ------
@@ -226,19 +227,13 @@ def cell_values(frame: StepFrame) -> dict[str, FloatArray]:
 
 
 def require_going(stopped: Stopped) -> None:
-    """Raise Cancelled if the job was asked to stop.
-
-    Raises
-    ------
-    Cancelled
-        It was.
-    """
+    """Raise Cancelled if ``stopped()`` returns True: the job was asked to stop."""
     if stopped():
         raise Cancelled("stopped, as you asked")
 
 
 SIZES = {"turbine-row": 20_000, "stator": 20_000}
-"""Cells of the samples that are large unless asked for: the first look should be quick."""
+"""Sizes with which large samples are opened where none is given, to open quickly."""
 
 
 def open_sample(

@@ -1,4 +1,4 @@
-"""The job that runs a table of designs, beside the window and in processes of their own."""
+"""The job that runs a table of designs, in processes of their own."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from slideviz.session.jobs import Doing, Report, Stopped, require_going
 def run_designs(
     case: Case, mesh: Mesh, table: DesignTable, report: Report, stopped: Stopped
 ) -> None:
-    """Run the designs that have no result yet; report each `Row`, and the progress as `Doing`.
+    """Run designs without a result; report each one's `DesignRow`, and the progress as `Doing`.
 
     Raises
     ------

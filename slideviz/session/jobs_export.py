@@ -17,11 +17,11 @@ from slideviz.session.state import StepFrame
 from slideviz.terms import CELL_STATES
 
 _ROWS = 5_000
-"""Cells written between two looks at whether to stop."""
+"""Cells that are written before the job looks again whether it is to stop."""
 
 
 def save_quality(path: Path, frame: StepFrame, report: Report, stopped: Stopped) -> Path:
-    """Write a CSV file with a row for every cell: id, type, size, skew, size-skew, status, middle.
+    """Write a CSV file with number, type, qualities, status and middle of every cell.
 
     Raises
     ------
@@ -64,9 +64,9 @@ def centroids(mesh: Mesh) -> FloatArray:
 
 
 def step_paths(path: Path, count: int) -> list[Path]:
-    """Return the files of ``count`` steps: the name of ``path`` with a number before its end.
+    """Return the files of ``count`` steps: the name of ``path`` with a number before its ending.
 
-    A VTKHDF file has them all.
+    Only ``path`` for VTKHDF, where all steps are in one file.
     """
     if path.suffix.lower() == VTKHDF:
         return [path]
@@ -81,9 +81,9 @@ def save_steps(
     stopped: Stopped,
     first: StepFrame | None = None,
 ) -> list[Path]:
-    """Write the mesh of every step, whole files only, and return them.
+    """Write the mesh of every step, whole files only, and return their paths.
 
-    All go into one file, with the undeformed mesh ``first`` before them, where its format can.
+    A VTKHDF file has all steps, and before them the undeformed mesh ``first``.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def save_steps(
 
 
 def _save_series(path: Path, frames: Sequence[StepFrame], report: Report, stopped: Stopped) -> None:
-    """Write all frames into one file, with quality, and displacement from the first of them."""
+    """Write all frames into one VTKHDF file, with quality, and displacement from the first one."""
     start = frames[0].mesh
     with vtkhdf_series(path, start) as series:
         for k, frame in enumerate(frames):

@@ -1,4 +1,4 @@
-"""The run of a mesh that stays in its file, as a job beside the window."""
+"""The run of a mesh too large for memory, from file to file, as a job."""
 
 from __future__ import annotations
 
@@ -17,12 +17,14 @@ from slideviz.session.whole import tally_of
 def compute_in_file(
     case: Case, first: StepFrame, output: Path, report: Report, stopped: Stopped
 ) -> None:
-    """Deform a mesh that is in its file; report the progress, and the last step as a `Frame`.
+    """Deform a mesh from file to file; report the progress, and the last step as a `StepFrame`.
+
+    ``first`` is the undeformed frame, of the boundary.
 
     Raises
     ------
     Cancelled
-        It was stopped; there is no file then, or the one that was there before.
+        It was stopped; a file that was at ``output`` is as before.
     """
     phases = {**PHASES, "read": "reading the boundary", "write": "copying the file"}
 

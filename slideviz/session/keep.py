@@ -1,4 +1,4 @@
-"""The view in a case file, written from a session and read back: a session is a case file."""
+"""The view in a case file: made from a session that is saved, and put into one that is opened."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from slideviz.session.state import Session, ViewState
 from slideviz.terms import SHOWN
 
 Camera = tuple[float, ...]
-"""Position, focal point, direction up, and half the height seen, in parallel projection; then
-perhaps how much wider than high the view was."""
+"""Position, focal point and view-up (3 numbers each), and parallel scale (half the visible height);
+perhaps also width over height of the view."""
 
 
 def keep_view(session: Session, camera: Camera | None = None) -> Case:
-    """Return the case of a session with its view inside; usual values are left out."""
+    """Return the case of a session with its view and camera as keys; defaults are left out."""
     view, first = session.view, ViewState()
     before = _plain(first)
     kept = {key: value for key, value in _plain(view).items() if before[key] != value}
@@ -35,12 +35,12 @@ def keep_view(session: Session, camera: Camera | None = None) -> Case:
 
 
 def kept_view(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
-    """Return the view that a case holds; what the case leaves out is taken from ``view``.
+    """Return the view that a case has; what it leaves out is taken from ``view``.
 
     Parameters
     ----------
     names : tuple of str
-        The boundaries there are; hidden ones of other names are passed by.
+        The boundaries of the mesh; other names of hidden boundaries are ignored.
     """
     kept, values = case.view, dict[str, Any]()
     for key, field in (
@@ -63,18 +63,18 @@ def kept_view(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
 
 
 def restored(session: Session, source: Path | None) -> Session:
-    """Return a session just opened from its recovery file: of ``source``, and unsaved."""
+    """Return a session just opened from its recovery file as unsaved, of case file ``source``."""
     return replace(session, case=session.case.change(source=source), saved=Case())
 
 
 def kept_camera(case: Case) -> Camera | None:
-    """Return the camera that a case holds, or None."""
+    """Return the camera that a case has, or None."""
     camera: Camera | None = case.view.get("VIEW_CAMERA")
     return camera
 
 
 def _plain(view: ViewState) -> dict[str, Any]:
-    """Return the settings that always have a value, by key."""
+    """Return the values of a view that are never None, by key of the case file."""
     return {
         "VIEW_COLOR": view.colour_by,
         "VIEW_MAP": view.colour_map,
@@ -104,7 +104,10 @@ def _section(text: SectionText) -> Section:
 
 
 def files_beside(case: Case, path: Path, folder: Path) -> dict[Path, Path]:
-    """Return where the files of a case that are in a folder go, to be beside it at ``path``."""
+    """Return new paths, beside the case file ``path``, for a case's files that are in ``folder``.
+
+    By old path; none where ``path`` is in that folder, too.
+    """
     if folder in path.parents:
         return {}
     used = [case.mesh_file, *(m.path for m in case.motions if isinstance(m, FromFile))]

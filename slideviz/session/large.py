@@ -1,4 +1,4 @@
-"""Meshes too large for the memory: their boundary is opened, and their cells are measured."""
+"""Meshes too large for memory: only their boundary is read, and their cells measured in blocks."""
 
 from __future__ import annotations
 
@@ -18,11 +18,13 @@ from slideviz.session.whole import PartQuality, Tally, measure_all, worst_frame
 from slideviz.terms import Metric
 
 LARGE_CELLS = 5_000_000
-"""A mesh with more cells is opened as its boundary, if its file can be read in parts."""
+"""Of a mesh with more cells, only the boundary is opened, if its file can be read in parts."""
 
 
 def is_large(path: Path, zone: int | None) -> bool:
-    """Tell whether a mesh is opened as its boundary: a ``.su2b`` of many cells, or little memory.
+    """Return whether only the boundary of a mesh is to be opened.
+
+    That is for a 3D mesh in a ``.su2b`` file, with many cells or more than free memory allows.
 
     Raises
     ------
@@ -42,7 +44,7 @@ def is_large(path: Path, zone: int | None) -> bool:
 
 
 def read_boundary(path: Path, zone: int | None, tick: Callable[[float], object]) -> Mesh:
-    """Return the boundary of a mesh, with a remark on what of it is in memory.
+    """Return the boundary of a mesh, with a remark that its cells stay in the file.
 
     Raises
     ------
@@ -61,14 +63,24 @@ def read_boundary(path: Path, zone: int | None, tick: Callable[[float], object])
 
 
 def first_frame(skin: Mesh, metric: Metric, tick: Callable[[float], object]) -> StepFrame:
-    """Return the undeformed frame of a mesh that is in its file; all of its cells are measured."""
+    """Return the undeformed frame of a mesh by its ``skin``, with the quality of all its cells."""
     assert skin.source is not None
     tally = measure_all(skin.source, skin.zone, metric, tick)
     return frame_of(skin, skin, skin.source, tally, metric)
 
 
 def frame_of(now: Mesh, skin: Mesh, file: Path, tally: Tally, metric: Metric) -> StepFrame:
-    """Return the frame of a boundary, ``skin`` undeformed, with its cells in a file."""
+    """Return the frame of a large mesh: its boundary in memory, its cells in a file.
+
+    Parameters
+    ----------
+    now, skin : Mesh
+        The boundary, deformed and undeformed.
+    file : Path
+        The deformed mesh.
+    tally : Tally
+        The qualities of all its cells.
+    """
     assert skin.source is not None
     extra = worst_frame(skin.source, skin.zone, file, tally.worst, metric)
     found = PartQuality.of(quality(now, skin, metric), tally)

@@ -1,4 +1,4 @@
-"""Places of cells: coordinates about the mesh's axis, and the nearest boundary."""
+"""Where a cell is: its coordinates, about the mesh's axis if it has one, and nearest boundary."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from slideviz.mesh.model import FloatArray, Marker, Mesh
 from slideviz.session.state import Session
 
 NEAR = 4
-"""Nodes of a boundary whose elements are looked at for the nearest point."""
+"""The nearest point of a boundary is looked for in the elements at so many nearest nodes."""
 
 
 @dataclass(frozen=True)
 class Around:
-    """The axis that a mesh repeats about.
+    """The axis of rotational periodicity.
 
     Attributes
     ----------
     axis, origin : (3,) tuple of float
+        Its direction, and a point on it.
     """
 
     axis: tuple[float, float, float]
@@ -28,7 +29,7 @@ class Around:
 
 
 def axis_of(session: Session) -> Around | None:
-    """Return the axis of a session with rotational periodicity, or None."""
+    """Return the axis of a session's rotational periodic pair of boundaries, or None."""
     names = session.case.markers_with("periodic")
     for pair in session.pairs:
         if pair.kind == "rotational" and pair.first in names and pair.second in names:
@@ -37,14 +38,14 @@ def axis_of(session: Session) -> Around | None:
 
 
 def coordinates(positions: FloatArray, around: Around | None) -> tuple[tuple[str, ...], FloatArray]:
-    """Return the names of the coordinates and their values at some places.
+    """Return names and values of coordinates: cylindrical about an axis, or Cartesian.
 
     Parameters
     ----------
     positions : (k, d) float64
         Cartesian, in the mesh's length unit.
     around : Around or None
-        Radius, angle in degrees and height about this axis; None: as they are.
+        The axis for radius, angle in degrees and height; None: Cartesian.
 
     Returns
     -------
@@ -62,7 +63,7 @@ def coordinates(positions: FloatArray, around: Around | None) -> tuple[tuple[str
 
 
 def decimals(values: FloatArray) -> int:
-    """Return the digits after the point with which the largest of some numbers has four."""
+    """Return the decimals that give the largest of some numbers (k,) four significant digits."""
     largest = float(np.abs(values).max(initial=0.0))
     return 0 if not largest > 0 else int(np.clip(3 - np.floor(np.log10(largest)), 0, 12))
 
@@ -75,7 +76,7 @@ def nearest_boundary(mesh: Mesh, point: FloatArray) -> tuple[str, float] | None:
 
 
 def _distance(mesh: Mesh, marker: Marker, point: FloatArray) -> float:
-    """Return the distance from a point to the elements around a boundary's nearest nodes."""
+    """Return the distance from a point (d,) to the elements at a boundary's nearest nodes."""
     nodes, cells = marker.nodes, marker.cells
     if not len(nodes):
         return float("inf")
@@ -94,7 +95,7 @@ def _distance(mesh: Mesh, marker: Marker, point: FloatArray) -> float:
 
 
 def _to_polygon(corners: FloatArray, point: FloatArray) -> float:
-    """Return the distance from a line (2, d), or from the triangles of a face (k, 3)."""
+    """Return the distance of a point (d,) from a line segment (2, d) or a face (k, 3)."""
     start, end = corners, np.roll(corners, -1, axis=0)
     along = end - start
     square = np.maximum(np.einsum("nd,nd->n", along, along), 1e-300)

@@ -1,4 +1,4 @@
-"""A table of displacements as text: checked while it is typed, completed, written."""
+"""A displacement file as a text that the user edits: checked while typed, completed, written."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import IntArray, Mesh
 
 NAMED = Path("table")
+"""Stands for the file in messages of `parse_displacements`; `TableRows.check` replaces it."""
 LARGEST = 5_000_000
-"""Bytes; a larger file is nothing to be edited by hand."""
+"""Most bytes of a file that can be edited by hand."""
 
 
 @dataclass(frozen=True, eq=False)
 class TableRows:
-    """The rows that a table of displacements may have.
+    """The nodes that a table of displacements may list.
 
     Attributes
     ----------
     of : str
-        The boundaries, in words.
+        Their boundaries, in words.
     nodes : (k,) int64
-        Their nodes, sorted.
+        The nodes, sorted.
     shape : (n, d)
         Shape of the points of the mesh.
     """
@@ -39,23 +40,23 @@ class TableRows:
 
     @classmethod
     def on(cls, mesh: Mesh, case: Case, marker: Target) -> TableRows:
-        """Return the rows of some boundaries, or of all that move where ``marker`` is empty."""
+        """Return the rows for the boundaries of a motion; all moving ones where it is empty."""
         names = named(marker) or case.markers_with("moving")
         nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in names]))
         return cls(", ".join(names), nodes, mesh.points.shape)
 
     @property
     def heading(self) -> str:
-        """Return the names of the columns."""
+        """Return the names of the columns, with blanks between."""
         return " ".join(["node", "dx", "dy", "dz"][: 1 + self.shape[1]])
 
     def check(self, text: str) -> str:
-        """Return a sentence that says what a table moves.
+        """Return a sentence on how many nodes a table moves, and how far.
 
         Raises
         ------
         CaseError
-            It has no rows, or mistakes: the first of them.
+            It has no rows, or mistakes; the message has the first one.
         """
         if not text.strip():
             raise CaseError(f"Type or paste rows: {self.heading}")
@@ -86,7 +87,7 @@ class TableRows:
 def write_table(path: Path, text: str, replaces: Path | None = None) -> None:
     """Write a table as a displacement file, whole or not at all.
 
-    ``replaces`` is the input that it may be written over: the file that the table was read from.
+    ``replaces`` is the only input file that may be overwritten: the one the table was read from.
 
     Raises
     ------
@@ -98,7 +99,7 @@ def write_table(path: Path, text: str, replaces: Path | None = None) -> None:
 
 
 def table_text(path: Path) -> str:
-    """Return the text of a displacement file; an empty one where there is no such file.
+    """Return the text of a displacement file; "" where there is no such file.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Motions in a session: where they begin and where they take boundaries; the period in words."""
+"""Motions in the window: what new ones start with, where they take boundaries; periods in words."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from slideviz.mesh.periodic import Pair
 from slideviz.session.state import Session
 
 DIGITS = 12
-"""Of a centroid, counted from the first of the extent of the mesh."""
+"""Significant digits of a centroid, relative to the extent of the mesh, and of a direction."""
 
 Axis = tuple[tuple[float, float, float], tuple[float, float, float]]
-"""Direction, and a point on it."""
+"""An axis: its direction, and a point on it."""
 
 
 def centroid(mesh: Mesh, names: Iterable[str]) -> tuple[float, ...]:
-    """Return the centroid of boundaries together, without the last digits, which are rounding."""
+    """Return the mean of the nodes of some boundaries together, rounded to `DIGITS`."""
     digits = DIGITS - math.ceil(math.log10(mesh.extent)) if mesh.extent > 0.0 else DIGITS
     found = [mesh.marker(name).nodes for name in names if name in mesh.marker_names]
     nodes = np.unique(np.concatenate([*found, np.empty(0, np.int64)]))
@@ -37,7 +37,7 @@ def centroid(mesh: Mesh, names: Iterable[str]) -> tuple[float, ...]:
 
 
 def radial(axis: Axis, point: tuple[float, ...]) -> tuple[float, float, float] | None:
-    """Return the direction from an axis to a point, across the axis; None for points on it."""
+    """Return the unit direction from an axis to a point, perpendicular to it; None on the axis."""
     direction, origin = (np.array(values) for values in axis)
     arm = np.array((*point, 0.0)[:3]) - origin
     arm = arm - direction * (arm @ direction) / (direction @ direction)
@@ -49,7 +49,7 @@ def radial(axis: Axis, point: tuple[float, ...]) -> tuple[float, float, float] |
 
 
 def new_target(session: Session) -> Target:
-    """Return the boundaries of a new motion: selected ones, else those without motion, else all."""
+    """Return the moving boundaries of a new motion: selected, else without motion, else all."""
     case = session.case
     moving = case.markers_with("moving")
     without = [n for n in moving if not any(moves(motion, n) for motion in case.motions)]
@@ -60,7 +60,7 @@ def new_target(session: Session) -> Target:
 
 
 def targets(session: Session) -> tuple[Target, ...]:
-    """Return the choices for what a motion moves: each boundary, selected ones, all."""
+    """Return the targets that a motion can have: each moving boundary, selected ones, all."""
     moving = session.case.markers_with("moving")
     selected = tuple(name for name in moving if name in session.view.selected)
     several = (selected,) if 1 < len(selected) < len(moving) else ()
@@ -68,7 +68,7 @@ def targets(session: Session) -> tuple[Target, ...]:
 
 
 def machine_axis(session: Session) -> Axis | None:
-    """Return the axis about which periodic boundaries repeat, if they do."""
+    """Return the axis of the first rotational pair of periodic boundaries, or None."""
     for pair in session.pairs:
         both = {session.role(pair.first), session.role(pair.second)}
         if pair.kind == "rotational" and both == {"periodic"}:
@@ -77,17 +77,17 @@ def machine_axis(session: Session) -> Axis | None:
 
 
 def box_names(session: Session) -> tuple[str, ...]:
-    """Return the boxes for free-form deformation that motions can use."""
+    """Return the names of the FFD boxes that motions can use; () where boxes have mistakes."""
     if session.mesh is None:
         return ()
     try:
         return tuple(boxes_for(session.case, session.mesh))
-    except SlidevizError:  # told by the checks of a motion that uses one
+    except SlidevizError:  # the checks of a motion that uses one have the message
         return ()
 
 
 def boxes_hint(session: Session) -> str:
-    """Return how the boxes are shown that a mesh has, if they are not."""
+    """Return the hint that there are FFD boxes, and the key that shows them; "" if not needed."""
     count = 0 if "ffd" in session.view.drawn else len(box_names(session))
     if not count:
         return ""
@@ -95,7 +95,10 @@ def boxes_hint(session: Session) -> str:
 
 
 class Ghosts:
-    """The moved boundaries of one mesh; displacement files are read once and when changed."""
+    """Computes where motions take the boundaries of a mesh, to be drawn before a run.
+
+    Displacement files are read once, and again when they have changed.
+    """
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
@@ -103,10 +106,10 @@ class Ghosts:
         self._files: dict[tuple[Path, tuple[str, ...], float], Displacements | None] = {}
 
     def moved(self, case: Case) -> dict[str, FloatArray]:
-        """Return the points (u, d) of the nodes of each boundary that moves.
+        """Return the moved points (u, d) of the nodes of each boundary with motions, by name.
 
-        A displacement file that cannot be read, or a box that is not there, moves nothing here;
-        the run will say why.
+        A displacement file that cannot be read, or a missing box, moves nothing here; the checks
+        before a run report it.
         """
         on = {
             name: self._nodes[name]
@@ -124,7 +127,7 @@ class Ghosts:
         return {name: points[nodes] + moved[name] for name, nodes in on.items()}
 
     def _read(self, motion: FromFile, on: Mapping[str, IntArray]) -> Displacements | None:
-        # A file of several boundaries lists nodes of each.
+        # A file for several boundaries may list the nodes of each of them.
         names = tuple(name for name in on if moves(motion, name))
         if not names:
             return None
@@ -143,19 +146,19 @@ class Ghosts:
 
 
 def period_text(pair: Pair) -> str:
-    """Return the period of a pair in a few words: λ or θ, and along or about what."""
+    """Return the period of a pair in a few words: λ along a direction, or θ about an axis."""
     if pair.kind == "rotational":
         return f"θ = {math.degrees(pair.period):.6g}° about {_axis(pair.axis)}"
     return f"λ = {pair.period:.6g} along {_axis((pair.vector / pair.period).tolist())}"
 
 
 def _axis(direction: Sequence[float]) -> str:
-    """Return an axis in words, the same for both of its directions."""
+    """Return an axis in words: x, y or z without a sign, or its components."""
     return direction_words(direction).removeprefix("-")
 
 
 def found_text(session: Session) -> str:
-    """Return the period of the periodic boundaries that matched, in words."""
+    """Return lines on the periodic boundaries: matching pairs with their period, and the others."""
     names = session.case.markers_with("periodic")
     lines = [
         f"Found: {pair.first} → {pair.second}, {period_text(pair)}"

@@ -17,14 +17,14 @@ from slideviz.terms import NODE_TYPES, NodeType
 
 @dataclass(frozen=True, eq=False)
 class TypedNodes:
-    """Nodes to be drawn as points.
+    """Nodes to be drawn as points, each with its type.
 
     Attributes
     ----------
     nodes : (k,) int64
-        The nodes, rising.
+        The nodes, ascending.
     kinds : (k,) int64
-        The place of each node's type in ``NODE_TYPES``.
+        The types of the nodes, as places in ``NODE_TYPES``.
     """
 
     nodes: IntArray
@@ -37,32 +37,33 @@ class TypedNodes:
         return tuple(kind for place, kind in enumerate(NODE_TYPES) if place in there)
 
     def only(self, nodes: IntArray) -> TypedNodes:
-        """Return the typed nodes that are among ``nodes``."""
+        """Return those of the typed nodes that are among ``nodes``."""
         keep = np.isin(self.nodes, nodes)
         return TypedNodes(self.nodes[keep], self.kinds[keep])
 
 
 NOTHING = TypedNodes(np.empty(0, np.int64), np.empty(0, np.int64))
+"""No nodes."""
 
 
 class NodeTypes:
-    """The types of the boundary nodes of a mesh, found once for each case."""
+    """Finds the types of the boundary nodes of a mesh; those of the last case are cached."""
 
     def __init__(self) -> None:
         self._fans: tuple[Mesh, float, Fans] | None = None
         self._types: tuple[object, TypedNodes] | None = None
 
     def clear(self) -> None:
-        """Forget the mesh."""
+        """Forget mesh and cached types."""
         self.__init__()  # type: ignore[misc]
 
     def of(self, session: Session) -> TypedNodes:
-        """Return the nodes that the view of a session shows as points, whatever is hidden."""
+        """Return the nodes that a session's view shows as points; hidden boundaries count, too."""
         if session.mesh is None or session.view.points == "none":
             return NOTHING
         if session.view.points == "control":
             return control_nodes(session)
-        # Steps were computed with the settings of their run, not with those of now.
+        # A step has the types of its run's case, which the session's may have left since.
         ran = session.frame is not None and session.frame.step is not None
         run = session.run_shown if ran else None
         return self._typed(session.mesh, session.case if run is None else run.case)
@@ -87,12 +88,12 @@ class NodeTypes:
         try:
             try:
                 _, frame, _, stands = find_period(case, mesh, boundary)
-            except MeshError:  # until its markers match, the case is as without periodicity
+            except MeshError:  # markers that do not match (yet) are taken as not periodic
                 alone = case.change(periodic="none", periodic_type="translational")
                 _, frame, _, stands = find_period(alone, mesh, boundary)
             classes = find_classes(case, mesh, boundary, self._fans[2], frame, stands)
         except SlidevizError:
-            return NOTHING  # what is wrong with the case is said beside the Run button
+            return NOTHING  # the message is beside the Run button
         place = {kind: index for index, kind in enumerate(NODE_TYPES)}
         kinds = np.full(len(mesh.points), place["internal"])
         for marker in mesh.markers:
@@ -107,7 +108,7 @@ class NodeTypes:
 
 
 def control_nodes(session: Session) -> TypedNodes:
-    """Return the control nodes of the step that is shown; none before the first step."""
+    """Return the control nodes of the step that is shown; none for the undeformed mesh."""
     step = session.frame.step if session.frame is not None else None
     if step is None:
         return NOTHING

@@ -1,4 +1,4 @@
-"""A session with a mesh just read: its roles guessed, or its case's view put back."""
+"""The session of a mesh just read: its roles are guessed, or it has a case and the view in it."""
 
 from __future__ import annotations
 
@@ -19,16 +19,29 @@ from slideviz.session.state import Guess, Run, Session, StepFrame, ViewState
 from slideviz.terms import ColourBy, Role
 
 RELATIVE_TOLERANCE = 1e-5
+"""Suggested tolerance of data reduction, over the mesh's extent."""
 SQUARE = 1e-6
-"""Cosines up to this, or as near to 1, are of right angles, or of none."""
+"""Directions are perpendicular or parallel where their cosine is this near to 0 or 1."""
 STEPS = 5
-"""Of a mesh whose boundaries slide, until somebody chooses."""
+"""Number of steps of a guessed case with sliding boundaries."""
 
 
 def open_mesh(
     first: StepFrame, path: Path | None, pairs: Sequence[Pair] = (), case: Case | None = None
 ) -> Session:
-    """Return a session with a mesh just read; without a case its roles are guessed."""
+    """Return the session of a mesh just read; without a case its roles are guessed.
+
+    Parameters
+    ----------
+    first : StepFrame
+        The undeformed mesh.
+    path : Path or None
+        The mesh file.
+    pairs : sequence of Pair
+        Boundaries that match each other.
+    case : Case, optional
+        The case of the mesh, which may have a view.
+    """
     mesh = first.mesh
     guesses = {} if case is not None else guess_roles(mesh, pairs)
     chosen = guess_case(mesh, guesses, pairs) if case is None else case
@@ -40,7 +53,7 @@ def open_mesh(
         view = view.with_drawn({"ffd": True})
     flat = flat_one(view.sections)
     if mesh.part is not None:
-        view = replace(view, threshold=None)  # it would choose among all cells
+        view = replace(view, threshold=None)  # needs the values of all cells
     view = replace(view, section_index=flat if flat is not None else 0 if view.sections else None)
     # From here on the view is the session's; it goes back into the case when that is saved.
     chosen = chosen.change(view={})
@@ -49,7 +62,7 @@ def open_mesh(
 
 
 def has_ffd(case: Case) -> bool:
-    """Tell whether a motion moves control points of a box."""
+    """Return whether a case has a motion of an FFD box."""
     return any(isinstance(motion, Ffd) for motion in case.motions)
 
 
@@ -61,16 +74,16 @@ def suggested_reduction(mesh: Mesh) -> Reduction:
 def of_runs(
     first: StepFrame, runs: Sequence[Run] = (), colour_by: ColourBy = "size-skew"
 ) -> Session:
-    """Return a session that shows the last step of a run, and of a second one beside it.
+    """Return a session for a picture: the last step of a run, with that of a second run beside it.
 
     Parameters
     ----------
     first : StepFrame
         The undeformed mesh.
     runs : sequence of Run
-        Of that mesh: none, one or two, each with another number.
+        Runs of that mesh: none, one or two, with different numbers.
     colour_by : {"size-skew", "size", "skew", "displacement"}
-        What the colours say; their range holds all runs.
+        The quantity to colour by, with one colour range for both.
     """
     last, beside = 0, None
     if runs:
@@ -90,7 +103,7 @@ NAMES: tuple[tuple[Role, str], ...] = (
     ("moving", r"rotor|stator"),
     ("fixed", r"walls?|far|farfield|freestream|upper|lower|left|right|top|bottom|front|back"),
 )
-"""A role and the words that hint at it, the first row that fits wins."""
+"""Roles and patterns of words in names that hint at them; the first row with a match counts."""
 
 _WORDS = tuple((role, re.compile(pattern)) for role, pattern in NAMES)
 
@@ -109,10 +122,11 @@ def guess_by_name(name: str) -> Guess | None:
 
 
 def guess_roles(mesh: Mesh, pairs: Sequence[Pair] = ()) -> dict[str, Guess]:
-    """Return a guess for each boundary that gives a hint, in the order of the mesh.
+    """Return a guess for each boundary whose name or match hints at a role, in the mesh's order.
 
-    The name comes first, because the opposite sides of every box match each other; a match
-    decides only where neither name says anything, and not in a box that matches every way.
+    A match makes two boundaries periodic only where neither name hints at another role: opposite
+    sides of every box match each other. It does not where the mesh is a box that matches along all
+    axes.
     """
     guesses = {name: found for name in mesh.marker_names if (found := guess_by_name(name))}
     unnamed = [p for p in pairs if p.first not in guesses and p.second not in guesses]
@@ -139,11 +153,11 @@ def _is_box(mesh: Mesh, pairs: Sequence[Pair]) -> bool:
 
 
 def guess_case(mesh: Mesh, guesses: dict[str, Guess], pairs: Sequence[Pair]) -> Case:
-    """Return a case with the guessed roles, periodic when a pair of periodic boundaries matches."""
+    """Return the case with the guessed roles; periodic where a pair of periodic ones matches."""
     roles = {name: guesses[name].role if name in guesses else "fixed" for name in mesh.marker_names}
     case = Case(roles=roles, zone=mesh.zone if mesh.zones > 1 else None)
     if "sliding" in roles.values():
-        # A role that the method does not use would be no help.
+        # Without a sliding method the role would have no effect.
         case = case.change(sliding="ps", steps=STEPS)
     for pair in pairs:
         if roles[pair.first] == roles[pair.second] == "periodic":
@@ -152,9 +166,9 @@ def guess_case(mesh: Mesh, guesses: dict[str, Guess], pairs: Sequence[Pair]) -> 
 
 
 def with_periodicity(case: Case, pair: Pair | None) -> Case:
-    """Return the case with periodic deformation, about the axis of a pair if there is one.
+    """Return the case with periodic deformation, and the axis of a pair if there is one.
 
-    The corners of the domain slide along where anything slides.
+    PERIODIC_MODE is moving where the case has a sliding method, else fixed.
     """
     case = case.change(periodic="fixed" if case.sliding == "none" else "moving")
     return case if pair is None else case.change(axis=pair.axis, origin=pair.origin)

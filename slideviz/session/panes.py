@@ -1,4 +1,4 @@
-"""Two views side by side: the run that each shows, and those that it could show."""
+"""Two views side by side: which run each shows, and which runs it could show."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from slideviz.session.state import Run, Session
 
 
 def run_title(run: Run, among: Sequence[Run] = ()) -> str:
-    """Return the number of a run and the words that set it apart from those of a list."""
+    """Return number and name of a run, and words that distinguish it from the runs ``among``."""
     return f"Run {run.number}: {run_words(run)} · {brief(run, among)}"
 
 
 def choices(session: Session) -> dict[int, str]:
-    """Return the names of the runs that a view can show, by number."""
+    """Return the titles of the runs that a view can show, by number, and of the undeformed mesh."""
     runs = {run.number: run_title(run, session.runs) for run in session.runs if run.frames}
     return {UNDEFORMED: "Undeformed mesh"} | runs
 
 
 def panes(session: Session) -> tuple[int | None, int | None]:
-    """Return the numbers of the runs to the left and to the right; None: no view."""
+    """Return the numbers of the runs in the left and the right view; None: no run, or no view."""
     first, second = session.shown, session.view.beside
     return (second, first) if session.view.swapped and second is not None else (first, second)
 
 
 def shown_views(session: Session) -> tuple[Session, ...]:
-    """Return the sessions of the views, the left one first."""
+    """Return a session for each view, the left one first: with the view's run and frame shown."""
     other = session.view.beside
     if other is None or (other != UNDEFORMED and session.run(other) is None):
         return (session,)
@@ -45,15 +45,15 @@ def shown_views(session: Session) -> tuple[Session, ...]:
 def show_in(session: Session, pane: int, number: int) -> Session:
     """Return the session with a run (its number, or ``UNDEFORMED``) shown in one view.
 
-    What the other view shows already changes places with what this one showed. The step stays,
-    as a part of the displacement.
+    If the other view shows it already, the two change places. The step shown stays about the same
+    part of the displacement.
 
     Parameters
     ----------
     pane : {0, 1}
         The left or the right view.
     number : int
-        That of a run, or ``UNDEFORMED``.
+        The number of the run, or ``UNDEFORMED``.
     """
     pair = list(panes(session))
     if number not in choices(session) or number == pair[pane]:
@@ -62,14 +62,14 @@ def show_in(session: Session, pane: int, number: int) -> Session:
         pair[1 - pane] = pair[pane]
     pair[pane] = number
     left, right = pair
-    # The steps are those of a run: where one is the undeformed mesh, of the other.
+    # The first view has the steps, so it is not the one with the undeformed mesh.
     swapped = left == UNDEFORMED
     first, second = (right, left) if swapped else (left, right)
     return set_view(show_beside(_lead(session, first), second), swapped=swapped)
 
 
 def close_pane(session: Session, pane: int) -> Session:
-    """Return the session with only the other view."""
+    """Return the session with only one view, the one beside ``pane``."""
     kept = panes(session)[1 - pane]
     alone = show_beside(session, None)
     if kept == UNDEFORMED:
@@ -78,7 +78,7 @@ def close_pane(session: Session, pane: int) -> Session:
 
 
 def _lead(session: Session, number: int | None) -> Session:
-    """Return the session with another run in the first view, as far deformed as the one before."""
+    """Return the session with another run in the first view, at the step that matches best."""
     if number is None or number == session.shown:
         return session
     steps, at = len(session.frames) - 1, session.view.frame

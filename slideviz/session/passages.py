@@ -1,4 +1,4 @@
-"""Neighbouring passages: the images of a mesh under its period."""
+"""Neighbouring passages: copies of a periodic mesh, shifted or turned by whole periods."""
 
 from __future__ import annotations
 
@@ -21,12 +21,13 @@ from slideviz.sections.threshold import CellsInRange
 from slideviz.session.opening import guess_by_name
 
 WHOLE_NUMBER = 1e-3
-"""A wheel may miss a whole number of passages by this much."""
+"""Largest difference of the number of passages of a wheel from a whole number, over that number."""
 
 _SAME = 1e-9
+"""A section is taken onto itself where it moves by less than this, over its size or distance."""
 
 _PERIODS: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Pair]] = WeakKeyDictionary()
-"""Periods that cases have asked for, kept as long as the mesh lives."""
+"""Periodic pairs found before, by mesh, and by the settings of the case that they depend on."""
 
 
 def find_period(
@@ -34,9 +35,9 @@ def find_period(
 ) -> Pair | None:
     """Return the pair of boundaries whose transformation repeats the mesh, or None.
 
-    A case with periodic boundaries says which. Otherwise it is a guess among the boundaries that
-    match: names that say so come first, then rotations; the ends of every straight duct match.
-    ``pairs`` has those that match, when they are known already.
+    Of a case with periodic boundaries it is their first pair. Otherwise it is guessed among the
+    boundaries that match (``pairs``, if known already): those with names that hint at periodicity
+    come first, then rotations; the ends of every straight duct match, too.
 
     Raises
     ------
@@ -60,7 +61,7 @@ def find_period(
 
 
 def passages_around(pair: Pair) -> int | None:
-    """Return the number of passages of the whole wheel; None if there is no whole number."""
+    """Return the number of passages of the whole wheel; None if it is not whole, or no wheel."""
     if pair.kind != "rotational":
         return None
     number = 2.0 * np.pi / pair.period
@@ -76,7 +77,7 @@ def passages(pair: Pair, count: int | Literal["wheel"]) -> dict[int, FloatArray]
     pair : Pair
         The period, from its first marker to its second.
     count : int or "wheel"
-        Neighbours on each side, or all around. On a wheel no passage comes twice.
+        Neighbours on each side, or all around. On a wheel each passage is there once at most.
 
     Raises
     ------
@@ -99,12 +100,12 @@ def passages(pair: Pair, count: int | Literal["wheel"]) -> dict[int, FloatArray]
 
 
 def _power(pair: Pair, number: int) -> FloatArray:
-    """Return the transformation (4, 4) by so many periods."""
+    """Return the transformation (4, 4) by ``number`` periods."""
     matrix = np.eye(4)
     if pair.kind == "translational":
         matrix[: len(pair.vector), 3] = number * pair.vector
         return matrix
-    # The exact part of a turn, where there is one, so that a wheel closes.
+    # A full turn over the number of passages, where it is whole, so that a wheel closes exactly.
     around = passages_around(pair)
     angle = pair.angle if around is None else np.copysign(2.0 * np.pi / around, pair.angle)
     cos, sin = np.cos(number * angle), np.sin(number * angle)
@@ -121,7 +122,7 @@ def moved(points: FloatArray, matrix: FloatArray) -> FloatArray:
 
 
 def keeps(section: Section, matrix: FloatArray) -> bool:
-    """Tell whether a transformation (4, 4) takes a section onto itself."""
+    """Return whether a transformation (4, 4) takes a section onto itself."""
     axis, origin = section.basis[2], np.asarray(section.origin)
     turned = matrix[:3, :3] @ axis
     step = moved(origin[None], matrix)[0] - origin
@@ -137,9 +138,9 @@ def show_passages(
     matrices: Mapping[int, FloatArray],
     only: CellsInRange | None = None,
 ) -> dict[int, Polygons]:
-    """Return the cut of a section through every passage (see `Cutter.show`), by number.
+    """Return the cut of a section through each passage (see `Cutter.show`), by number.
 
-    Where the period takes the section onto itself, the mesh is cut once.
+    Passages whose transformation takes the section onto itself share one cut, transformed.
     """
     base: Polygons | None = None
     found = {}

@@ -1,8 +1,9 @@
-"""Long work in pieces, so that a window can answer between them.
+"""Long work in pieces, so that a window stays responsive.
 
-It is a generator that yields between two pieces: None, or how far it is. What draws is done in
-the thread that pulls it. What does not is yielded as `Beside` and may be done in any other: the
-generator is sent what came of it, or thrown what went wrong.
+The work is a generator that yields between two pieces: None, or its progress. Pieces that draw run
+in the generator, in the thread that pulls it. A piece that does not draw is yielded as `Beside`:
+who pulls the generator may run it in another thread, and sends back its result, or throws its
+error.
 """
 
 from __future__ import annotations
@@ -12,22 +13,25 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 GoingOn = Callable[[], None]
-"""Called often; raises `slideviz.errors.Cancelled` when the work is to end."""
+"""A function that is called often, and raises `slideviz.errors.Cancelled` to end the work."""
 Result = TypeVar("Result")
 
 PART_CELLS = 10_000
-"""Faces that are handed to the graphics in one piece."""
+"""Faces that are sent to the graphics card in one piece."""
 
 
 @dataclass(frozen=True)
 class Beside:
-    """A piece of work that draws nothing: a call that may be slow and returns something."""
+    """A piece of work that draws nothing: any thread may do it, by ``call``, which has a result."""
 
     call: Callable[[GoingOn], Any]
 
 
 def here(pieces: Generator[object, Any, Result]) -> Generator[object, None, Result]:
-    """Yield the pieces of some work; those that draw nothing are done at once."""
+    """Yield what some work yields, but do its `Beside` pieces at once, in this thread.
+
+    Returns the result of the work.
+    """
     try:
         piece = next(pieces)
         while True:
@@ -49,7 +53,7 @@ def here(pieces: Generator[object, Any, Result]) -> Generator[object, None, Resu
 
 
 def whole(pieces: Generator[object, Any, Result]) -> Result:
-    """Return the result of some work, all of its pieces done here and now."""
+    """Return the result of some work, after doing all its pieces in this thread."""
     run = here(pieces)
     while True:
         try:
@@ -60,7 +64,7 @@ def whole(pieces: Generator[object, Any, Result]) -> Result:
 
 
 def portions(actors: Iterable[Any], cells: int = PART_CELLS) -> list[list[Any]]:
-    """Return the actors that are visible in groups of not much more than so many faces."""
+    """Return the visible actors in groups of at most ``cells`` faces, or of one larger actor."""
     parts: list[list[Any]] = [[]]
     count = 0
     for actor in actors:
@@ -76,9 +80,9 @@ def portions(actors: Iterable[Any], cells: int = PART_CELLS) -> list[list[Any]]:
 
 
 def appearing(plotter: Any) -> Iterator[None]:
-    """Draw the new actors of an off-screen plotter part by part, and yield after each.
+    """Render the actors of an off-screen plotter for the first time, group by group.
 
-    To hand a large mesh to the graphics takes longer than to draw it.
+    Yields after each group, since sending a large mesh to the graphics card takes long.
     """
     parts = portions(plotter.renderer.actors.values())
     hidden = [actor for part in parts[1:] for actor in part]
@@ -98,10 +102,10 @@ def _show(actors: Iterable[Any], shown: bool) -> None:
 
 
 def _faces(actor: Any) -> int:
-    """Return how many faces an actor draws; 0 for letters and the like."""
+    """Return the number of faces of an actor; 0 for text and others without a mesh."""
     data = getattr(getattr(actor, "mapper", None), "dataset", None)
     return 0 if data is None else int(data.GetNumberOfCells())
 
 
 def never() -> None:
-    """Return without a check, for work that nobody can stop."""
+    """Do nothing: the `GoingOn` of work that cannot be stopped."""

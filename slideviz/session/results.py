@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 LABEL = 20
-"""Letters of the name of a run that a plot has room for."""
+"""Most characters of a run's name in a plot."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,16 +30,17 @@ class StepFrame:
     Attributes
     ----------
     mesh : Mesh
-        Of one that is larger than memory, its boundary (see `slideviz.mesh.skin`).
+        The mesh, or the skin of one that is larger than memory (see `slideviz.mesh.skin`).
     quality : Quality
     step : Step or None
+        The step; None for the undeformed mesh.
     extra : StepFrame or None
-        The worst cells of a mesh of which only the boundary is in memory, worst first. Where one
-        cell is meant, they are counted on after those of the boundary (see `place_of`).
+        The worst cells of a mesh of which only the skin is in memory, worst first. As numbers of
+        cells of this frame, they follow those of the skin (see `place_of`).
     base : Mesh or None
         The undeformed mesh of this frame, where it is not that of the session.
     file : Path or None
-        Where the whole mesh is, if only the boundary is in memory.
+        The file of the whole mesh, if only the skin is in memory.
     """
 
     mesh: Mesh
@@ -50,19 +51,19 @@ class StepFrame:
     file: Path | None = None
 
     def has(self, cell: int | None) -> bool:
-        """Tell whether there is a cell of that number in memory."""
+        """Return whether the frame has a cell of that number, its own or of ``extra``."""
         more = 0 if self.extra is None else len(self.extra.mesh.cells)
         return cell is not None and 0 <= cell < len(self.mesh.cells) + more
 
     def place_of(self, cell: int) -> tuple[StepFrame, int]:
-        """Return the frame that has a cell, this one or `extra`, and its number there."""
+        """Return the frame that a cell belongs to, this one or ``extra``, and its number there."""
         own = len(self.mesh.cells)
         return (self, cell) if self.extra is None or cell < own else (self.extra, cell - own)
 
     def values(
         self, what: ColourBy, undeformed: Mesh | None = None, cells: IntArray | None = None
     ) -> FloatArray:
-        """Return the value of every cell (m,), or of some cells (k,), in a quantity.
+        """Return the values of a quantity ``what`` in all cells (m,), or in ``cells`` (k,).
 
         Quality is in 0 to 1. The displacement of a cell is the mean distance of its nodes from
         where they are in ``undeformed``, in the mesh's length unit.
@@ -76,7 +77,7 @@ class StepFrame:
     def shown_values(
         self, what: ColourBy, undeformed: Mesh | None = None, cells: IntArray | None = None
     ) -> FloatArray:
-        """Return `values` for colours: not a number where a cell is inverted."""
+        """Return `values` for colours: nan where a cell is inverted."""
         status = self.quality.status if cells is None else self.quality.status[cells]
         return np.where(status == INVERTED, np.nan, self.values(what, undeformed, cells))
 
@@ -100,13 +101,13 @@ class Run:
     end : {"", "done", "cancelled", "failed"}
         How it ended; empty while it goes on.
     saved : bool
-        Whether the mesh of its last step was written.
+        Whether the mesh of its last step was written to a file.
     name : str
-        What the user calls it; empty as long as nobody did.
+        The user's name for it, or "".
     undeformed : StepFrame or None
-        The undeformed mesh, where the metric of this run judges it otherwise than the session's.
+        The undeformed mesh with its quality, where this run has another metric than the session.
     panels : Case or None
-        Of a design, what the panels had when it was asked for: settings of another deformation.
+        For the run of a design: the session's case when it was asked for.
     """
 
     number: int
@@ -120,7 +121,7 @@ class Run:
 
     @property
     def label(self) -> str:
-        """Return the name of the run in plots: its number, and the begin of its own name."""
+        """Return the name of the run in plots: its number, and the beginning of ``name``."""
         if not self.name:
             return f"run {self.number}"
         short = self.name if len(self.name) <= LABEL else f"{self.name[: LABEL - 1].rstrip()}…"
@@ -128,7 +129,7 @@ class Run:
 
     @property
     def last(self) -> StepFrame | None:
-        """Return the frame of the last step."""
+        """Return the frame of the last step, or None."""
         return self.frames[-1] if self.frames else None
 
     @property
@@ -138,9 +139,9 @@ class Run:
 
 
 def cell_displacement(mesh: Mesh, undeformed: Mesh, cells: IntArray | None = None) -> FloatArray:
-    """Return the mean distance of the nodes of cells (k,), or of all, from where they were, (k,).
+    """Return the mean displacement (k,) of the nodes of each of ``cells`` (k,); None: of all.
 
-    Neither time nor memory is spent on other cells.
+    In the mesh's length unit. Only these cells take time and memory.
     """
     every, count = mesh.cells, len(mesh.cells) if cells is None else len(cells)
     found = np.zeros(count)
@@ -158,7 +159,7 @@ def cell_displacement(mesh: Mesh, undeformed: Mesh, cells: IntArray | None = Non
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _mean_distances(now, before, nodes, offsets, cells, found):  # type: ignore[no-untyped-def]
-    """Write the mean distances of the nodes of ``cells`` (k,) between two states (n, d)."""
+    """Write to ``found`` (k,) the mean distances of cells' nodes between two states (n, d)."""
     for i in range(len(cells)):
         begin, end = offsets[cells[i]], offsets[cells[i] + 1]
         total = 0.0
@@ -171,7 +172,7 @@ def _mean_distances(now, before, nodes, offsets, cells, found):  # type: ignore[
 
 
 def furthest(now: FloatArray, before: FloatArray) -> float:
-    """Return the largest distance between points (n, d) and where they were (n, d)."""
+    """Return the largest distance of a point ``now`` (n, d) from where it was ``before`` (n, d)."""
     if now is before or not len(now):
         return 0.0
     found: list[float] = []

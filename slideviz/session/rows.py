@@ -1,4 +1,4 @@
-"""Rows of a list that does not change: the same list with another row, or with one less."""
+"""Changes of a list given as a tuple: the list with another row, or with one less."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ Row = TypeVar("Row")
 
 
 def replaced(rows: tuple[Row, ...], index: int, row: Row) -> tuple[Row, ...]:
-    """Return the rows with another one at that place."""
+    """Return the rows with another one at the place ``index``."""
     changed = list(rows)
     changed[index] = row
     return tuple(changed)
 
 
 def without(rows: tuple[Row, ...], index: int) -> tuple[Row, ...]:
-    """Return the rows without the one at that place."""
+    """Return the rows without the one at the place ``index``."""
     return rows[:index] + rows[index + 1 :]

@@ -14,15 +14,15 @@ from slideviz.mesh.model import Mesh
 from slideviz.session.state import PanelPlace, Run, Session
 
 LARGE = 1e9
-"""Bytes from which on a message says beforehand what a run takes."""
+"""Bytes of memory from which on there is a message before a run on what it takes."""
 MOST_NAMES = 2
-"""Boundaries that a hint names; of more it tells the number."""
+"""Most boundaries that a hint names; of more it has the number."""
 RATE = 2e10
-"""Operations a second of a machine with few cores, when it factors a large matrix."""
+"""Floating-point operations a second of a machine with few cores in factoring a large matrix."""
 
 
 def exact_cost(case: Case, mesh: Mesh) -> str:
-    """Return a sentence on the cost of a large run without data reduction, or nothing.
+    """Return a sentence on memory and time of a large run without data reduction; else "".
 
     All boundary nodes are control nodes then: memory grows with the square of their number, and
     time with the cube.
@@ -58,18 +58,18 @@ def ended(run: Run) -> str:
 
 
 def inverted_words(run: Run) -> str:
-    """Return the number of inverted cells after the last step in words, or nothing."""
+    """Return the number of inverted cells after the last step in words; "" for none."""
     count = run.last.quality.inverted if run.last is not None else 0
     return f"{count:,} inverted cell{'' if count == 1 else 's'}" if count else ""
 
 
 def help_for(case: Case, folding: str = "") -> str:
-    """Return the remedies against inverted cells, most promising first, in a sentence.
+    """Return a sentence with remedies against inverted cells, the most promising first.
 
     Parameters
     ----------
     folding : str
-        What the motions of the case put through itself, as `Session.folding`.
+        ``Session.folding``: where what moves crosses itself, which only another motion can mend.
     """
     if folding:
         crossed = folding.partition("; ")[0]
@@ -90,14 +90,14 @@ def help_for(case: Case, folding: str = "") -> str:
 
 
 def warnings_of(run: Run) -> tuple[str, ...]:
-    """Return the warnings of a run that are not harmless."""
+    """Return the warnings of a run, without its notes."""
     step = run.last.step if run.last is not None else None
     found = () if step is None else step.warnings
     return tuple(in_window_words(text) for text in found if not isinstance(text, Note))
 
 
 def notes_of(run: Run) -> tuple[str, ...]:
-    """Return the remarks of a run that are harmless."""
+    """Return the notes of a run: remarks that are harmless."""
     step = run.last.step if run.last is not None else None
     found = () if step is None else step.warnings
     return tuple(in_window_words(text) for text in found if isinstance(text, Note))
@@ -105,14 +105,18 @@ def notes_of(run: Run) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Requirement:
-    """A requirement of a run that is not met: a sentence, and the panel that mends it.
+    """A requirement of a run that is not met.
 
     Attributes
     ----------
+    text : str
+        A sentence for the user.
+    place : str
+        The panel in which it can be met.
     marker : str
-        The boundary that wants a motion; empty where that is not what is missing.
+        The boundary that lacks a motion; empty for other requirements.
     motion : int
-        The motion that it is about, from 0.
+        The place of the motion that the requirement is about, from 0.
     """
 
     text: str
@@ -126,7 +130,7 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
     if session.mesh is None:
         return (Requirement("Open a mesh first.", "open"),)
     case = session.case
-    # What is typed comes first: the rest looks at the case, which still has the number before it.
+    # Invalid fields come first: the case, which the rest is about, has their last valid values.
     found = [Requirement(text, place) for place, text in session.invalid]
     moving = case.markers_with("moving")
     if not moving:
@@ -156,7 +160,7 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
 
 
 def moves_nothing(motion: Motion) -> bool:
-    """Tell whether a motion leaves its boundary in place; of a file nobody knows."""
+    """Return whether a motion leaves its boundary in place; False for displacement files."""
     if isinstance(motion, Translate | Ffd):
         return not any(motion.vector)
     if isinstance(motion, Rotate):
@@ -167,7 +171,7 @@ def moves_nothing(motion: Motion) -> bool:
 
 
 def _problems(session: Session) -> list[str]:
-    """Return the faults that the case itself finds with the mesh."""
+    """Return the problems of the session's case with its mesh (`check_case`) as sentences."""
     from slideviz.case.motion import check_case
 
     assert session.mesh is not None
@@ -176,12 +180,12 @@ def _problems(session: Session) -> list[str]:
 
 
 _LABELLED = sorted((name for name, key in KEYS.items() if key.label), key=len, reverse=True)
-# A key, and its value where one follows; of a file, "DATA_REDUCTION= YES" is one thing.
+# A key with a label, and its value where one follows, as in "DATA_REDUCTION= YES".
 _KEY = re.compile(rf"\b({'|'.join(_LABELLED)})\b(?:=(?:\s?([\w.+-]*\w))?)?")
 
 
 def idle_words(case: Case) -> tuple[str, ...]:
-    """Return sentences about roles that the settings do not use, which is seldom meant."""
+    """Return a sentence for each role without effect in the case's modes, seldom on purpose."""
     found: list[str] = []
     for names, mode, title, verb in (
         (case.markers_with("periodic"), case.periodic, "Periodicity", "repeat"),
@@ -194,7 +198,7 @@ def idle_words(case: Case) -> tuple[str, ...]:
 
 
 def in_window_words(text: str) -> str:
-    """Return a message with the window's words instead of the keys of a case file."""
+    """Return a message with keys of the case file replaced by their labels in the window."""
     return _KEY.sub(_words, text)
 
 

@@ -1,4 +1,4 @@
-"""The table of runs, for people and for a file, and the best of the runs."""
+"""The table of runs: its columns as text in the window and as CSV, and which runs are best."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ from slideviz.session.state import Run
 from slideviz.terms import PERIODIC_MODES
 
 DIGITS = 4
+"""Decimals of qualities in the window."""
 QUALITY = f".{DIGITS}f"
-"""How qualities are written for people."""
+"""Format of qualities in the window."""
 
 
 def _of_last(run: Run, name: str) -> float | None:
@@ -46,14 +47,14 @@ def _misfit(run: Run) -> float | None:
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the table: its title, its value of a run, and that value for people."""
+    """A column of the table: title, function from a run to its value, and format of the value."""
 
     title: str
     value: Callable[[Run], str | float | None]
     form: str = ""
 
     def text(self, run: Run) -> str:
-        """Return the value of a run, for people; a dash where nothing is known."""
+        """Return the formatted value of a run; a dash where it has none."""
         value = self.value(run)
         return "–" if value is None else format(value, self.form)
 
@@ -77,14 +78,14 @@ COLUMNS: tuple[Column, ...] = (
     Column("seconds", lambda run: run.seconds, ".3f"),
     Column("end", end_words),
 )
-"""What a table of runs has; qualities and control nodes are those of the last step."""
+"""The columns of the table; qualities and control nodes are those of a run's last step."""
 
 
 def best(runs: Sequence[Run]) -> frozenset[int]:
-    """Return the numbers of the runs of highest minimum quality among those of the same motion.
+    """Return the numbers of the runs with the highest minimum quality for their motion.
 
-    Runs of different motions cannot be compared, nor those that did not come to their end; of runs
-    whose minima read alike, all are best, or none where all are.
+    Runs of different motions cannot be compared, nor runs that did not come to their end. Minima
+    that are equal when rounded count as equal; where those of all runs are, none is best.
     """
     alike: dict[object, dict[int, float]] = {}
     for run in runs:
@@ -99,7 +100,7 @@ def best(runs: Sequence[Run]) -> frozenset[int]:
 
 
 def described(run: Run) -> str:
-    """Return a line for each column with its value of a run, and the remarks of the run."""
+    """Return a line for each column with a run's value, and lines with its warnings and notes."""
     shown = [column for column in COLUMNS if column.title != "name" or run.name]
     lines = [f"{column.title}: {column.text(run)}" for column in shown]
     step = run.last.step if run.last is not None else None
@@ -109,7 +110,7 @@ def described(run: Run) -> str:
 
 
 def table_text(runs: Sequence[Run], delimiter: str = ",") -> str:
-    """Return the table with a line of titles; numbers keep every digit."""
+    """Return the table as CSV, with a line of titles; numbers have all digits."""
     out = io.StringIO()
     rows = csv.writer(out, delimiter=delimiter, lineterminator="\n")
     rows.writerow([column.title for column in COLUMNS])
@@ -125,7 +126,7 @@ def write_table(path: Path, runs: Sequence[Run]) -> None:
     Raises
     ------
     SlidevizError
-        It cannot be written.
+        The file cannot be written.
     """
     with atomic_write(path, SlidevizError) as file:
         file.write(table_text(runs).encode())

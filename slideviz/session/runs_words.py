@@ -1,4 +1,4 @@
-"""Runs in words: the name of each, and the settings that set it apart from others."""
+"""Runs in words: their names, and the settings that distinguish them from other runs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from slideviz.session.state import Run
 from slideviz.terms import METHODS, PERIODIC_MODES, SLIDING
 
 WORDED = {METHOD: 0, REDUCTION: 0, QUALITY: 0, PERIODICITY: 1}
-"""Groups of keys whose values are said of a run, the more telling ones first."""
+"""Groups of keys whose values are named in the words on a run, with their rank: lowest first."""
 
 
 def method_words(case: Case) -> str:
@@ -26,7 +26,7 @@ def run_words(run: Run) -> str:
 
 
 def _number_words(value: float) -> str:
-    """Return a number as short as it can be without losing a digit."""
+    """Return a number as text, as short as possible without loss."""
     return repr(float(value)).removesuffix(".0")
 
 
@@ -45,7 +45,7 @@ def reduction_words(case: Case) -> str:
 
 
 def steps_words(run: Run) -> str:
-    """Return the number of steps that a run made, or has made of how many."""
+    """Return the number of steps of a run in words; of a run not done, how many of all it made."""
     made = len(run.frames)
     step = run.last.step if run.last is not None else None
     total = step.total if step is not None else run.case.steps
@@ -56,14 +56,14 @@ def steps_words(run: Run) -> str:
 
 
 def seconds_words(seconds: float) -> str:
-    """Return a time in words, as exact as it matters."""
+    """Return a time in words: in seconds, with few digits; from 100 s on in minutes and seconds."""
     if seconds < 100:
         return f"{seconds:.3g} s" if seconds >= 0.1 else f"{seconds:.2f} s"
     return f"{int(seconds // 60)} min {seconds % 60:.0f} s"
 
 
 def end_words(run: Run) -> str:
-    """Return the end of a run in a word, or that it goes on."""
+    """Return how a run ended, in a word; "running" while it goes on."""
     return run.end or "running"
 
 
@@ -79,11 +79,11 @@ SETTINGS: tuple[Key, ...] = tuple(
         key=lambda key: WORDED[key.group],
     )
 )
-"""Settings that tell runs apart; the motions, roles and others have their own words."""
+"""Keys that distinguish runs, in the order of their words; motions and roles are not among them."""
 
 
 def _setting_words(key: Key, case: Case) -> str:
-    """Return a setting in words; nothing where it is as usual, or does nothing."""
+    """Return a setting in words; "" where it is at its default, or has no effect."""
     value = key.get(case)
     if value is None or key.kind.write(value) == key.default or key.idle(case):
         return ""
@@ -99,14 +99,14 @@ def _setting_words(key: Key, case: Case) -> str:
 
 
 def _roles_words(case: Case, others: Sequence[Case]) -> str:
-    """Return the roles of the boundaries whose role differs among cases."""
+    """Return a case's roles in words, of the boundaries whose role differs among ``others``."""
     names = dict.fromkeys(name for other in others for name in other.roles)
     differ = [n for n in names if len({one.roles.get(n, "fixed") for one in others}) > 1]
     return ", ".join(f"{name} {case.roles.get(name, 'fixed')}" for name in differ)
 
 
 def _settings_words(run: Run, cases: Sequence[Case]) -> Iterator[tuple[str, bool]]:
-    """Yield the words for each setting of a run, and whether it differs among cases."""
+    """Yield the words for each setting of a run, and whether it differs in any of ``cases``."""
     case = run.case
 
     def differs(name: str) -> bool:
@@ -116,7 +116,7 @@ def _settings_words(run: Run, cases: Sequence[Case]) -> Iterator[tuple[str, bool
         yield PERIODIC_MODES[case.periodic].name.removeprefix("periodic, "), differs("periodic")
     yield steps_words(run), differs("steps")
     for key in SETTINGS:
-        # What is as usual needs no words: the other runs say that they are not.
+        # A setting at its default has no words: those of the other runs are enough.
         words = _setting_words(key, case)
         of = reduction_words if key.field == "reduction" else key.get
         apart = bool(words) and any(of(other) != of(case) for other in cases)
@@ -128,9 +128,9 @@ def _settings_words(run: Run, cases: Sequence[Case]) -> Iterator[tuple[str, bool
 
 
 def apart(run: Run, among: Sequence[Run]) -> str:
-    """Return the words that set a run apart from those of a list, beside its name.
+    """Return words that distinguish a run from the runs ``among``, to be put beside its name.
 
-    Nothing where no other is called as it is: its name or method says enough.
+    "" where no other has the same name or, without names, the same method.
     """
     if not any(other is not run and run_words(other) == run_words(run) for other in among):
         return ""
@@ -139,7 +139,10 @@ def apart(run: Run, among: Sequence[Run]) -> str:
 
 
 def differing(run: Run, among: Sequence[Run]) -> str:
-    """Return the settings of a run that differ among a list with it, but for its method."""
+    """Return in words the settings of a run that differ among ``among``, which has it, too.
+
+    The method is not among them.
+    """
     cases = [other.case for other in among]
     words = [motion_labels(cases)[among.index(run)], _roles_words(run.case, cases)]
     words += [text for text, differs in _settings_words(run, cases) if differs]
@@ -147,9 +150,9 @@ def differing(run: Run, among: Sequence[Run]) -> str:
 
 
 def brief(run: Run, among: Sequence[Run] = ()) -> str:
-    """Return a short line that sets a run apart, beside its method.
+    """Return a line on a run's settings, to be put beside its name.
 
-    What differs among the runs of a list, which has it, comes first: the rest may be cut off.
+    Settings that differ in the runs ``among`` come first, since the end of the line may be cut off.
     """
     cases = [other.case for other in among]
     words = [] if run.end == "done" else [end_words(run)]

@@ -1,4 +1,4 @@
-"""Cuts of the frame that is shown, made once for all views of them."""
+"""The cuts of sections through the frame that is shown: made once, and shared by all views."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from slideviz.session.slabs import slab_of
 NOTHING = Polygons(np.empty((0, 3)), *(np.zeros(n, np.int64) for n in (1, 0, 0)))
 """No polygons."""
 KEPT = 24
-"""Cuts of one frame that are remembered: a slider leaves many behind that nobody asks for."""
+"""Most cuts that are cached: dragging a section makes many that are not needed again."""
 
 
 class Cuts:
-    """The cuts of a mesh that is deformed, with a memory of the last ones.
+    """Cuts sections through a mesh, and caches the last cuts.
 
-    The 3D view and a flat one show the same section, so that the second need not cut again.
+    So the flat view of a section need not cut again what the 3D view has cut.
     """
 
     def __init__(self) -> None:
@@ -48,9 +48,10 @@ class Cuts:
         matrix: FloatArray | None = None,
         only: CellsInRange | None = None,
     ) -> Polygons:
-        """Return the cut of a section through a mesh, or its image under a matrix (4, 4).
+        """Return the cut of a section through a mesh, which ``matrix`` (4, 4) moves before.
 
-        ``only`` says which cells are shown at all; left out, every one.
+        ``only`` are the cells that are shown at all; None: all of them. Empty for a mesh in its
+        file until the cells of the section were read.
         """
         if mesh.part is not None:
             return self._of_slab(mesh, section, matrix)
@@ -68,7 +69,7 @@ class Cuts:
         return self._found[key]
 
     def _of_slab(self, mesh: Mesh, section: Section, matrix: FloatArray | None) -> Polygons:
-        """Return the cut through a mesh in its file; nothing until its cells were read."""
+        """Return the cut through a mesh in its file; empty until its cells were read."""
         slab = slab_of(mesh, section)
         if slab is None or matrix is not None or not len(slab.mesh.cells):
             return NOTHING
@@ -81,19 +82,19 @@ class Cuts:
 
 
 def cut_frame(frame: StepFrame, section: Section) -> StepFrame:
-    """Return the frame that the cells of a section's polygons belong to.
+    """Return the frame in which a section's polygons have their cells.
 
-    That is the frame itself, or the cells that were read for the section from the mesh's file.
+    That is ``frame`` or, for a mesh in its file, the slab of cells that was read for the section.
     """
     slab = slab_of(frame.mesh, section) if frame.mesh.part is not None else None
     return frame if slab is None else slab
 
 
 def is_awaited(mesh: Mesh, section: Section) -> bool:
-    """Tell whether the cells of a section are still to be read from the mesh's file."""
+    """Return whether the cells of a section are still to be read from the mesh's file."""
     return mesh.part is not None and slab_of(mesh, section) is None
 
 
 def can_cut(mesh: Mesh | None, section: Section) -> bool:
-    """Tell whether a section can cut a mesh at all (see `Section.can_cut`)."""
+    """Return whether a section can cut a mesh at all (see `Section.can_cut`)."""
     return mesh is not None and section.can_cut(mesh.dim)

@@ -1,4 +1,4 @@
-"""Sections to start from, and the number of each that a slider moves."""
+"""New sections: their point, direction and size; and the range of a section's slider."""
 
 from __future__ import annotations
 
@@ -17,18 +17,17 @@ from slideviz.session.state import Session
 
 
 def cell_points(mesh: Mesh) -> FloatArray:
-    """Return the nodes (u, 3) of the cells, which a section can reach."""
+    """Return the points (u, 3) of the nodes that cells use."""
     nodes = mesh.cells.nodes
-    # Mostly cells have all nodes, and nothing has to be copied.
+    # Mostly cells use all nodes, and nothing has to be copied.
     return padded(mesh.points if len(nodes) == len(mesh.points) else mesh.points[nodes])
 
 
 def first_section(kind: str, session: Session, pair: Pair | None = None) -> Section:
-    """Return a section of a shape to start from, about through the middle of the mesh shown.
+    """Return a new section of the shape ``kind``, about through the middle of the mesh shown.
 
-    What has an axis is about that of the machine: that of the period, where it is a rotation, and
-    otherwise that of the case. In 2D it is about the middle of what moves where no rotation has
-    an axis in the mesh's plane.
+    Shapes with an axis get that of the rotational ``pair``, else in 3D that of the case, and in 2D
+    a centre in the middle of the moving boundaries.
     """
     mesh, case, shape = session.mesh, session.case, SHAPES[kind]
     assert mesh is not None
@@ -45,14 +44,14 @@ def first_section(kind: str, session: Session, pair: Pair | None = None) -> Sect
 
 
 def _shown_points(session: Session) -> FloatArray:
-    """Return the nodes (u, 3) of the cells at the step that is shown."""
+    """Return the points (u, 3) of the nodes that cells use, in the frame that is shown."""
     shown = session.mesh if session.frame is None else session.frame.mesh
     assert shown is not None
     return cell_points(shown)
 
 
 def _middle_of_moving(session: Session) -> FloatArray:
-    """Return the middle (3,) of the box around all moving boundaries; of the mesh without them."""
+    """Return the middle (3,) of the box around the moving boundaries; around the mesh if none."""
     mesh = session.mesh
     assert mesh is not None
     names = [name for name in mesh.marker_names if session.role(name) == "moving"]
@@ -62,7 +61,7 @@ def _middle_of_moving(session: Session) -> FloatArray:
 
 
 def span(section: Section, points: FloatArray) -> tuple[float, float]:
-    """Return the range of positions at which a section cuts cells with these nodes (n, 3)."""
+    """Return the lowest and highest position at which a section goes through points (n, 3)."""
     ends: list[float] = []
 
     def of_part(part: slice) -> None:
@@ -74,10 +73,10 @@ def span(section: Section, points: FloatArray) -> tuple[float, float]:
 
 
 def turned(section: Section, direction: Triple, points: FloatArray) -> Section:
-    """Return the section with another normal or axis.
+    """Return the section with another normal or axis, ``direction``.
 
-    It stays where it is, or keeps its size, if it cuts cells with these nodes (n, 3) so; else it
-    goes through their middle.
+    It keeps its position (place or size) if it goes through points (n, 3) there; else it gets one
+    through their middle.
     """
     new = replace(section, direction=direction)
     found = new.shape.positions(new, points)

@@ -1,7 +1,8 @@
-"""Sections of a mesh that is in its file: the cells that a section cuts, read without the rest.
+"""Sections of a mesh too large for memory: only the cells that a section cuts (a slab) are read.
 
-The cells of a file are taken in small groups, each with a ball around it that is found once. Of
-another section only those groups are read whose balls it meets.
+The cells are divided into groups in the order of the file. When the first section is cut, the whole
+file is read to find a bounding ball of each group. After that, only the groups are read whose balls
+the section meets.
 """
 
 from __future__ import annotations
@@ -25,23 +26,23 @@ from slideviz.session.whole import measured_part, open_points
 from slideviz.terms import Metric
 
 GROUP = 4096
-"""Cells of a group."""
+"""Number of cells of a group."""
 MOST = 1 << 18
-"""Cells that are read at a time."""
+"""Most cells that are read at a time."""
 KEPT = 8
-"""Sections of one frame that are remembered."""
+"""Most slabs of a frame that are cached."""
 
 
 @dataclass(frozen=True, eq=False)
 class Groups:
-    """Balls around groups of `GROUP` cells, in the order of the file.
+    """Bounding balls of groups of `GROUP` cells, in the order of the file.
 
     Attributes
     ----------
     centres : (g, 3) float64
     radii : (g,) float64
     scale : float
-        The length of the mesh.
+        The diagonal of the mesh's bounding box.
     """
 
     centres: FloatArray
@@ -50,7 +51,7 @@ class Groups:
 
     @classmethod
     def of(cls, files: PointFiles, tick: Tick) -> Groups:
-        """Return the balls of a mesh after its deformation; all of the file is read once."""
+        """Return the balls of a deformed mesh; the whole file is read."""
         lows, highs = [], []
         place = files.place
         for block in element_blocks(files.before, place, place.cells, place.dim, MOST):
@@ -64,15 +65,15 @@ class Groups:
         return cls((low + high) / 2.0, np.linalg.norm(high - low, axis=1) / 2.0, scale)
 
     def met_by(self, section: Section) -> IntArray:
-        """Return the groups (k,) that a section may meet."""
-        # Distances change by no more than the way between two places.
+        """Return the numbers (k,) of the groups that a section may cut."""
+        # The distance from the section changes at most as much as one moves.
         reach = self.radii * (1.0 + 1e-9) + ON_SECTION * self.scale
         return np.flatnonzero(np.abs(section.distance(self.centres)) <= reach)
 
 
 @dataclass(frozen=True, eq=False)
 class FramePlace:
-    """Where a frame of a large mesh is: its file, zone, and that of the deformed points."""
+    """The files of a frame of a large mesh: that of its cells, with the zone, and of its points."""
 
     path: Path
     zone: int | None
@@ -80,7 +81,7 @@ class FramePlace:
 
     @classmethod
     def of(cls, frame: StepFrame) -> FramePlace:
-        """Return the place of a frame."""
+        """Return the files of a frame."""
         assert frame.mesh.source is not None
         return cls(frame.mesh.source, frame.mesh.zone, frame.file or frame.mesh.source)
 
@@ -90,17 +91,17 @@ _SLABS: WeakKeyDictionary[Mesh, dict[Section, StepFrame]] = WeakKeyDictionary()
 
 
 def plain(section: Section) -> Section:
-    """Return a section without what does not change which cells it cuts."""
+    """Return a section with defaults for all that does not change which cells it cuts."""
     return replace(section, name="", shown=True, flat=False, whole=False)
 
 
 def slab_of(mesh: Mesh, section: Section) -> StepFrame | None:
-    """Return the cells that a section cuts, if they were read, of a mesh that is in its file."""
+    """Return the slab of cells of a large mesh that a section cuts; None until it was read."""
     return _SLABS.get(mesh, {}).get(plain(section))
 
 
 def keep_slab(mesh: Mesh, section: Section, slab: StepFrame) -> None:
-    """Keep the cells that a section cuts, for all that show it."""
+    """Cache the slab of cells that a section cuts, for `slab_of`."""
     kept = _SLABS.setdefault(mesh, {})
     while len(kept) >= KEPT:
         kept.pop(next(iter(kept)))
@@ -110,12 +111,12 @@ def keep_slab(mesh: Mesh, section: Section, slab: StepFrame) -> None:
 def read_slab(
     frame: StepFrame, section: Section, report: Tick, going_on: Callable[[], object]
 ) -> StepFrame:
-    """Return the cells that a section cuts as a frame of their own, with their quality.
+    """Return the slab of cells that a section cuts: a frame of its own, with their quality.
 
     Raises
     ------
     MeshError
-        A file is not as it was.
+        A file has changed, and has mistakes.
     OSError
         It cannot be read.
     """
@@ -132,7 +133,7 @@ def read_slab(
             groups = _GROUPS[frame.mesh] = Groups.of(files, tick)
         found = _cut_cells(files, groups, section, going_on, 1.0)
         if found is None:
-            # A side of cells that lies in the section, with nothing on its negative side.
+            # The section is at the rim of the mesh, with all cells on its positive side.
             found = _cut_cells(files, groups, section, going_on, -1.0)
         if found is None:
             return _nothing(files, metric)
@@ -146,7 +147,12 @@ def _cut_cells(
     going_on: Callable[[], object],
     sign: float,
 ) -> tuple[Mesh, Mesh, IntArray, IntArray] | None:
-    """Return the cells with nodes on both sides, before and after, their nodes and numbers."""
+    """Return the cells that a section cuts, or None if there are none.
+
+    As a mesh before and after the deformation, with the numbers of its nodes and of its cells in
+    the whole mesh. Cut are cells with nodes at negative distances and others; ``sign`` -1 turns the
+    sign of distances round.
+    """
     types, flat, ids, points = [], [], [], []
     near = ON_SECTION * groups.scale
     for first, count in _runs(groups.met_by(section), files.place.cells.count):
@@ -175,7 +181,7 @@ def _cut_cells(
 
 
 def _runs(groups: IntArray, cells: int) -> Iterator[tuple[int, int]]:
-    """Yield the first cell and the number of cells of groups that follow each other."""
+    """Yield first cell and number of cells of each run of consecutive groups, of `MOST` cells."""
     most = MOST // GROUP
     breaks = np.flatnonzero(np.diff(groups) != 1) + 1
     for run in np.split(groups, breaks):
@@ -186,7 +192,7 @@ def _runs(groups: IntArray, cells: int) -> Iterator[tuple[int, int]]:
 
 
 def _nothing(files: PointFiles, metric: Metric) -> StepFrame:
-    """Return a frame without cells."""
+    """Return the slab of a section that cuts no cell."""
     from slideviz.mesh.quality import Quality
 
     none, dim = np.empty(0), files.place.dim

@@ -1,4 +1,4 @@
-"""The session as frozen values: mesh, case, guesses, frames of the runs, view."""
+"""The session, all that the window shows, as a frozen value: mesh, case, guesses, runs, view."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class ViewState:
     Attributes
     ----------
     colour_by : ColourBy
-        What the colours say.
+        The quantity that cells are coloured by.
     colour_range : (float, float) or None
         Values at the ends of the colour bar; None: 0 to 1 for quality, and 0 to a round number
         above the largest of all runs for the displacement.
@@ -37,11 +37,11 @@ class ViewState:
     threshold : (float, float) or None
         Draw only the cells whose value is in this range; None draws all.
     points : PointsShown
-        Nodes drawn as points.
+        Which nodes are drawn as points.
     drawn : frozenset of Shown
-        What is drawn of that which can be left out.
+        Which things are drawn of those that the user can switch off.
     sections : tuple of Section
-        What cuts the mesh.
+        The sections of the mesh.
     passages : int
         Passages drawn on each side of a periodic mesh; -1 draws all there are.
     hidden : frozenset of str
@@ -49,19 +49,19 @@ class ViewState:
     selected : tuple of str
         Boundaries that are highlighted.
     frame : int
-        Which frame is shown, 0 is the undeformed mesh.
+        The number of the frame that is shown; 0 is the undeformed mesh.
     marked_cell : int or None
-        The cell that is marked, by its number in the mesh.
+        The number of the cell that is marked, as of ``StepFrame.place_of``.
     beside : int or None
         The number of a run shown in a second view beside the first; 0 is the undeformed mesh.
     swapped : bool
-        Whether the second view stands to the left of the first.
+        Whether the second view is to the left of the first.
     ranges : tuple of (str, (float, float))
-        The colour ranges of what else the view was coloured by.
+        The colour ranges of other quantities that the view was coloured by before.
     section_index : int or None
-        The place of the section that is selected, to be worked on.
+        The place in ``sections`` of the one that is selected.
     handle : bool
-        Whether it shows its handle, to be dragged.
+        Whether the selected section has its handle drawn.
     """
 
     colour_by: ColourBy = "role"
@@ -84,11 +84,11 @@ class ViewState:
 
     @property
     def style(self) -> ViewState:
-        """Return the view without what passes: step, selections, second view."""
+        """Return the view with defaults for step, selection, marked cell and second view."""
         return ViewState().in_style(self)
 
     def in_style(self, style: ViewState) -> ViewState:
-        """Return another view with what passes of this one: step, selections, second view."""
+        """Return ``style`` with step, selection, marked cell and second view of this view."""
         return replace(
             style,
             selected=self.selected,
@@ -99,7 +99,7 @@ class ViewState:
         )
 
     def with_drawn(self, drawn: Mapping[Shown, bool]) -> ViewState:
-        """Return the view with some things drawn, or not."""
+        """Return the view with things drawn (True) or not (False), by name."""
         on = frozenset(name for name, wanted in drawn.items() if wanted)
         return replace(self, drawn=self.drawn - drawn.keys() | on)
 
@@ -128,15 +128,15 @@ IN_FILE = (
     "Not for this mesh, which stays in its file: in memory are only its boundary, its worst cells "
     "and those of sections."
 )
-"""Why something cannot be done with a large mesh."""
+"""The message where something cannot be done with a mesh too large for memory."""
 
 PanelPlace = Literal["open", "boundaries", "motion", "method"]
-"""Where something is put right before a run: a panel, or the choice of a file."""
+"""The panel where a requirement of a run is met; "open" is the dialog that opens a file."""
 
 
 @dataclass(frozen=True)
 class Guess:
-    """A guessed role, and the reason: the boundary's name, or a match."""
+    """A guessed role, and its reason in words: the boundary's name, or a match."""
 
     role: Role
     reason: str
@@ -153,32 +153,34 @@ class Session:
     path : Path or None
         The mesh file.
     case : Case
-        What is asked, guesses included.
+        The case in the panels, with guessed roles.
     guesses : mapping of str to Guess
-        The boundaries whose role nobody has confirmed yet.
+        Guesses that the user has not confirmed, by boundary.
     pairs : tuple of Pair
         Boundaries that match each other.
     first : StepFrame or None
         The undeformed mesh with its quality.
     runs : tuple of Run
-        What was computed, in the order of the starts.
+        The runs, in the order of their starts.
     shown : int or None
         The number of the run whose steps are shown.
-    removed : tuple of Run
-        Those taken out of ``runs`` last, which undo brings back.
-    newest : int
-        The highest number that a run was given, removed ones too.
     saved : Case or None
-        What is on disk, or what was there at the start, without its view.
+        The case as it was saved or opened last, without its view.
     saved_sections : tuple of Section
-        Those of that view.
+        The sections in the view of that case.
+    view : ViewState
     intersection : str
-        What the motions put through what, in a sentence; empty as far as is known.
+        A sentence on boundaries that the motions put through each other, which keeps a run from
+        starting; empty if none are known.
     folding : str
-        What the motions put through itself; a run can start all the same.
-    invalid : tuple of (Place, str)
-        The fields that show something else than the case has, because it is not valid: the panel,
-        and a sentence. No run starts meanwhile.
+        A sentence on moving boundaries that cross themselves, with which a run can start; or empty.
+    invalid : tuple of (PanelPlace, str)
+        Fields whose text is not valid, so that the case still has the value before: the panel, and
+        a sentence. No run starts meanwhile.
+    removed : tuple of Run
+        The last runs removed from ``runs``, which undo can bring back.
+    newest : int
+        The highest number that a run had so far, removed ones too.
     """
 
     mesh: Mesh | None = None
@@ -200,63 +202,63 @@ class Session:
 
     @property
     def in_file(self) -> bool:
-        """Tell whether only the boundary of the mesh is in memory, and its cells in their file."""
+        """Return whether only the boundary of the mesh is in memory, and its cells in the file."""
         return self.mesh is not None and self.mesh.part is not None
 
     def inputs(self) -> dict[Path, str]:
-        """Return the files that the session was read from, and their roles in words."""
+        """Return the files that the session was read from, with words for what each is."""
         found = self.case.inputs()
         return found if self.path is None else found | {self.path: "the mesh that is open"}
 
     def run(self, number: int | None) -> Run | None:
-        """Return the run of that number, or None."""
+        """Return the run with a number, or None."""
         return next((run for run in self.runs if run.number == number), None)
 
     @property
     def run_shown(self) -> Run | None:
-        """Return the run whose steps are shown."""
+        """Return the run whose steps are shown, or None."""
         return self.run(self.shown)
 
     @property
     def frames(self) -> tuple[StepFrame, ...]:
-        """Return the undeformed mesh and every step of the run that is shown."""
+        """Return the frames that can be shown: the undeformed mesh, the steps of the run shown."""
         run = self.run_shown
         first = (run and run.undeformed) or self.first
         return (() if first is None else (first,)) + (() if run is None else run.frames)
 
     @property
     def frame(self) -> StepFrame | None:
-        """Return the frame that is shown."""
+        """Return the frame that is shown; None before a mesh is open."""
         frames = self.frames
         return frames[min(self.view.frame, len(frames) - 1)] if frames else None
 
     @property
     def deformed(self) -> StepFrame | None:
-        """Return the last step of the run that is shown."""
+        """Return the last step of the run that is shown, or None."""
         run = self.run_shown
         return run.last if run is not None else None
 
     @property
     def unsaved_mesh(self) -> bool:
-        """Tell whether steps are shown whose mesh has not been written."""
+        """Return whether the run that is shown has steps, and its last mesh was not written."""
         run = self.run_shown
         return run is not None and bool(run.frames) and not run.saved
 
     @property
     def unsaved_case(self) -> bool:
-        """Tell whether the case differs from what was saved or opened."""
+        """Return whether the case differs from the one that was saved or opened last."""
         return self.mesh is not None and self.saved is not None and self.case != self.saved
 
     @property
     def repeatable(self) -> bool:
-        """Tell whether the case file on disk gives the run that is shown once more."""
+        """Return whether running the case file on disk would repeat the run that is shown."""
         run = self.run_shown
         kept = self.case.source is not None and not self.unsaved_case
         return kept and run is not None and run.end == "done" and not self.outdated
 
     @property
     def outdated(self) -> bool:
-        """Tell whether the case differs from that of the run shown, for its result."""
+        """Return whether the case would give another result than the run that is shown."""
         run = self.run_shown
         return run is not None and bool(run.frames) and essence(run.case) != essence(self.case)
 
@@ -271,7 +273,7 @@ class Session:
 
     @cached_property
     def largest_displacement(self) -> float:
-        """Return the largest displacement of a node in the last steps of all runs."""
+        """Return the largest displacement of a node after all runs, in the mesh's length unit."""
         if self.mesh is None:
             return 0.0
         lasts = (run.last for run in self.runs if run.last is not None)
@@ -283,7 +285,10 @@ class Session:
 
 
 def round_above(value: float) -> float:
-    """Return a number of few digits that is at least ``value``, also after division by five."""
+    """Return a round number that is at least ``value``, for a colour bar; 0 for no positive value.
+
+    Its fifths, at which the bar has labels, have few digits, too.
+    """
     if not value > 0:
         return 0.0
     power = float(10.0 ** np.floor(np.log10(value)))
@@ -292,6 +297,6 @@ def round_above(value: float) -> float:
 
 
 def essence(case: Case) -> Case:
-    """Return the case with only what changes the result: no file names, no order of roles."""
+    """Return the case with defaults for all that does not change the result, and sorted roles."""
     roles = {name: role for name, role in sorted(case.roles.items()) if role != "fixed"}
     return replace(effective(case), roles=roles, mesh_out=None, source=None, warnings=(), view={})

@@ -1,4 +1,4 @@
-"""The store: the one place that holds and changes the session, tells listeners, and undoes."""
+"""The store: has the current session, replaces it on each change, calls listeners, and undoes."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ Listener = Callable[[Session, Session], None]
 Failed = Callable[[Exception], None]
 
 TOGETHER_S = 1.0
-"""Changes of one kind that follow each other so closely are undone as one."""
+"""Changes of one kind with less than so many seconds between them are undone as one."""
 DEEPEST = 200
-"""Changes that can be undone."""
+"""Most changes that can be undone."""
 
 
 def tell_all(
     functions: Iterable[Callable[..., object]], *values: Any, failed: Failed | None = None
 ) -> None:
-    """Call every function with the values, also those after one that raises.
+    """Call every function with the values, even after one has raised an error.
 
-    Its error goes to ``failed``; without that, the first one is raised when all were called.
+    ``failed`` is called with each error; where it is None, the first error is raised after all
+    functions were called.
     """
     first: Exception | None = None
     for function in tuple(functions):
@@ -44,15 +45,15 @@ def tell_all(
 
 @dataclass(frozen=True)
 class Memento:
-    """The part of a session that undo brings back: case, style of the view, removed runs.
+    """The state that undo brings back: case, guesses, style of the view, removed runs.
 
     Attributes
     ----------
     removed : frozenset of int
-        The numbers of the runs that were removed then. Those that came later are in none, so
-        that no run is lost by undoing what was done before it.
+        The numbers of the runs that were removed at that time. Undo removes these alone: later
+        runs stay.
     shown : int or None
-        The run that was shown then; it is again if it comes back.
+        The number of the run that was shown; it is shown again if undo brings it back.
     """
 
     case: Case
@@ -73,21 +74,21 @@ class Memento:
         )
 
     def put_into(self, session: Session) -> Session:
-        """Return the session with the memento's values; the step that is shown stays."""
+        """Return the session with the memento's state; the step that is shown stays."""
         session = self._put_runs(session)
         coloured_by, view = session.view.colour_by, session.view.in_style(self.style)
-        # Where the case was saved to does not come back: it is on disk, undone or not.
+        # File names of the case are not undone: it was saved there, undone or not.
         case = self.case.change(
             source=session.case.source,
             mesh_out=session.case.mesh_out,
             warnings=session.case.warnings,
         )
         session = replace(session, case=case, guesses=self.guesses, view=view)
-        # What the view is coloured by is not undone.
+        # The quantity that the view is coloured by is not undone.
         return set_view(session, colour_by=coloured_by)
 
     def _put_runs(self, session: Session) -> Session:
-        """Return the session with the runs back that were there, and without removed ones."""
+        """Return the session with the memento's removed runs removed, and all others back."""
         for number in sorted({run.number for run in session.removed} - self.removed):
             session = bring_back(session, number)
             if number == self.shown:
@@ -100,7 +101,20 @@ class Memento:
 
 @dataclass(frozen=True)
 class _Done:
-    """A change that can be undone: what was before, what it was, and when."""
+    """A change that can be undone.
+
+    Attributes
+    ----------
+    before : Memento
+        The state before the change (in the list for redo: after it).
+    words : str
+        Words for the menu.
+    kind : tuple
+        The function, what it changed, and names of values: changes with the same are undone as one.
+    at_s : float
+        When it was made, in seconds: infinity while the mouse drags, so that what follows belongs
+        to it; minus infinity where nothing more can.
+    """
 
     before: Memento
     words: str
@@ -111,17 +125,17 @@ class _Done:
 class Store:
     """The session of a window, with its listeners and its undo.
 
-    Listeners are called with the old and the new session, in the order in which they came.
-    A change made by a listener is passed on after the present one has reached everybody, so
-    that nobody hears of the newer one first. One that raises keeps nobody from hearing: its
-    error goes to ``failed`` or, where that is None, is raised when everybody was called.
+    Listeners are called with the old and the new session, in the order in which they were added.
+    Where a listener changes the session, all listeners are called for the first change before the
+    second. An error in a listener does not keep the others from being called (`tell_all`): it goes
+    to the attribute ``failed`` or, where that is None, is raised afterwards.
 
     Parameters
     ----------
     session : Session, optional
-        The first one.
+        The first session.
     clock : callable
-        Tells the seconds, for the changes that are undone together.
+        Returns the time in seconds, by which changes are undone together.
     """
 
     def __init__(
@@ -141,25 +155,28 @@ class Store:
         self._listeners.append(listener)
 
     def change(self, function: Callable[..., Session], *values: Any, **named: Any) -> None:
-        """Replace the session by ``function(session, ...)`` and tell the listeners."""
+        """Replace the session by ``function(session, ...)``, and call the listeners.
+
+        It can be undone if the function is `undoable` for these values.
+        """
         old = self.session
         new = function(old, *values, **named)
         words = undo_words(function, named)
         if words is not None:
-            # The first value says which boundary or motion it is, where there are several.
+            # The first value is the boundary, motion or run that is changed.
             which = values[0] if values and isinstance(values[0], (int, str, tuple)) else None
             self._remember(old, new, words, (function, which, *sorted(named)))
         self.put(new)
 
     @property
     def dragging(self) -> bool:
-        """Tell whether the mouse drags something that changes the session."""
+        """Return whether the mouse drags something that changes the session."""
         return self._dragging
 
     def set_dragging(self, dragging: bool) -> None:
-        """Note that the mouse begins to drag something, or ends it.
+        """Set whether the mouse drags something that changes the session.
 
-        What changes meanwhile is undone as one, however long it takes, and apart from the rest.
+        Changes meanwhile are undone as one, however long it takes; none before or after with them.
         """
         self._dragging = dragging
         if self._undo:
@@ -168,9 +185,9 @@ class Store:
                 self._undo[-1] = replace(last, at_s=float("-inf"))
 
     def put(self, session: Session) -> None:
-        """Replace the session and tell the listeners, unless it is the same one.
+        """Replace the session, and call the listeners; nothing if it is the same object.
 
-        Another mesh cannot be undone: what was done before is forgotten.
+        With another mesh, all changes before can no longer be undone.
         """
         if session is self.session:
             return
@@ -198,12 +215,12 @@ class Store:
 
     @property
     def can_undo(self) -> str:
-        """Return the words for the change that `undo` takes back; empty where there is none."""
+        """Return the words for the change that `undo` takes back; "" where there is none."""
         return self._undo[-1].words if self._undo else ""
 
     @property
     def can_redo(self) -> str:
-        """Return the words for the change that `redo` makes; empty where there is none."""
+        """Return the words for the change that `redo` makes again; "" where there is none."""
         return self._redo[-1].words if self._redo else ""
 
     def undo(self) -> None:
@@ -230,7 +247,7 @@ class Store:
         self._redo.clear()
         now = self._clock()
         last = self._undo[-1] if self._undo else None
-        # Nothing is later than what the mouse still holds, so that it goes with the rest of it.
+        # Infinity: a change during a drag is undone with the others of the drag.
         at_s = float("inf") if self._dragging else now
         if last is not None and last.kind == kind and now - last.at_s < TOGETHER_S:
             self._undo.pop()
@@ -238,7 +255,7 @@ class Store:
                 self._undo.append(replace(last, at_s=at_s))
             return
         self._undo.append(_Done(before, words, kind, at_s))
-        # A run that is no longer kept cannot be brought back.
+        # The removal of a run that is no longer in `removed` cannot be undone.
         there = {run.number for run in new.removed}
         self._undo = [d for d in self._undo if d.kind[0] is not remove_run or d.kind[1] in there]
         del self._undo[:-DEEPEST]

@@ -1,4 +1,4 @@
-"""The decorator of changes that can be undone, with their words in the menu."""
+"""The decorator of changes that can be undone, which has their words in the menu."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ _WORDS: dict[Callable[..., Any], Words] = {}
 
 
 def undoable(words: Words) -> Callable[[Change], Change]:
-    """Return a decorator of changes that `slideviz.session.store.Store` undoes.
+    """Return a decorator that lets `slideviz.session.store.Store` undo a change.
 
     Parameters
     ----------
     words : str or callable
-        What stands after "Undo" in the menu, or what returns it for the named values; None where
-        these are not undone.
+        The words after "Undo" in the menu; or a function that returns them for the change's
+        keyword arguments, or None if such a change is not to be undone.
     """
 
     def mark(change: Change) -> Change:
@@ -29,6 +29,6 @@ def undoable(words: Words) -> Callable[[Change], Change]:
 
 
 def undo_words(change: Callable[..., Any], named: Mapping[str, Any]) -> str | None:
-    """Return the words in the menu for a change with these named values; None: no undo."""
+    """Return the words in the menu for a change with keyword arguments ``named``; None: no undo."""
     words = _WORDS.get(change)
     return words if words is None or isinstance(words, str) else words(named)

@@ -1,4 +1,8 @@
-"""Unsaved work, which closing or opening another mesh would lose, and the question about it."""
+"""Unsaved work, which closing or opening another mesh would lose, and the question about it.
+
+`slideviz.gui.files` looks for unsaved work, and `ask_unsaved` of `slideviz.gui.widgets.questions`
+asks the question.
+"""
 
 from __future__ import annotations
 
@@ -15,64 +19,72 @@ class Unsaved:
     Attributes
     ----------
     session : Session
-    what : mapping
-        The words for what would be lost: of a case, of a mesh, of a run that goes on; of designs,
-        as ``table``, a sentence.
+    lost : mapping of str to str
+        The words for what would be lost, by its kind: ``case``; ``mesh``, the deformed mesh of the
+        run shown, or ``run`` while that goes on; ``table``, a sentence on the table of designs.
     """
 
     session: Session
-    what: Mapping[str, str]
+    lost: Mapping[str, str]
 
     @classmethod
     def of(cls, session: Session, busy: bool, designs: str = "") -> Unsaved:
-        """Return the unsaved work of a session, while a job runs or none does, and of designs."""
-        what = {}
+        """Return the unsaved work of a session.
+
+        Parameters
+        ----------
+        busy : bool
+            Whether a job is running.
+        designs : str
+            A sentence on a table of designs that would be lost; "" for none.
+        """
+        lost = {}
         cut, source = unsaved_sections(session), session.case.source
         if session.unsaved_case or cut:
-            last = ", method and sections" if session.view.sections else " and method"
-            new = f"roles, motions{last} as a case"
-            what["case"] = f"the changes to {source.name}" if source else new
+            words = "roles, motions, method and sections" if cut else "roles, motions and method"
+            new = f"{words if session.unsaved_case else 'the sections'} as a case"
+            lost["case"] = f"the changes to {source.name}" if source else new
         run = session.run_shown
-        # The mesh of a design comes again at a click.
+        # The mesh of a design is computed again at a click.
         if session.unsaved_mesh and run is not None and run.panels is None:
-            # While it goes on there is no last step to save.
+            # A run that goes on has no last step to save.
             name = "mesh" if run.end and not busy else "run"
-            what[name] = f"the deformed mesh of run {run.number}"
+            lost[name] = f"the deformed mesh of run {run.number}"
         if designs:
-            what["table"] = designs
-        return cls(session, what)
+            lost["table"] = designs
+        return cls(session, lost)
 
     @property
     def can_save(self) -> list[str]:
-        """Return what can be saved now: ``case``, ``mesh`` and ``table``."""
-        return [name for name in self.what if name != "run"]
+        """Return the kinds of lost work that can be saved now: ``case``, ``mesh``, ``table``."""
+        return [name for name in self.lost if name != "run"]
 
     def question(self, before: str) -> str:
-        """Return the question to the user; a second line says what saving is good for.
+        """Return the question to the user, with what else to know in further lines.
 
         Parameters
         ----------
         before : str
-            What the work would be lost by, as ``closing``.
+            The action that would lose the work, such as "closing".
         """
         number = self.session.shown
-        if "table" in self.what:
+        if "table" in self.lost:
             rest = self._without("table")
             what = "Save the table of designs"
-            question = rest.question(before) if rest.what else f"{what} before {before}?"
-            return f"{question}\n{self.what['table']}"
-        if "run" in self.what:
-            if len(self.what) == 1:
+            question = rest.question(before) if rest.lost else f"{what} before {before}?"
+            return f"{question}\n{self.lost['table']}"
+        if "run" in self.lost:
+            if len(self.lost) == 1:
                 return f"Run {number} goes on. Lose its steps?"
             lost = "Its steps are lost, for it goes on; cancel it to save what there is."
             return f"{self._without('run').question(before)}\nRun {number} goes on. {lost}"
-        text = f"Save {' and '.join(self.what.values())} before {before}?"
+        text = f"Save {' and '.join(self.lost.values())} before {before}?"
         more = " ".join(filter(None, (self._repeats(), self._others())))
         return f"{text}\n{more}" if more else text
 
     def _without(self, gone: str) -> Unsaved:
-        """Return the work but for one part of it."""
-        return replace(self, what={name: self.what[name] for name in self.what if name != gone})
+        """Return the unsaved work without that of the kind ``gone``."""
+        return replace(self, lost={name: self.lost[name] for name in self.lost if name != gone})
 
     def _repeats(self) -> str:
         run = self.session.run_shown
@@ -110,8 +122,7 @@ def unsaved_sections(session: Session) -> bool:
 def title_of(session: Session) -> str:
     """Return the title of the window that shows a session, with a star if something is unsaved."""
     file = session.case.source or session.path
-    # The mesh of a run that the case on disk repeats is not what is unsaved of it, nor is that of
-    # a design.
+    # No star for the mesh of a run that the case on disk repeats, nor for that of a design.
     run = session.run_shown
     comes_again = session.repeatable or (run is not None and run.panels is not None)
     lost = session.unsaved_mesh and not comes_again

@@ -1,4 +1,4 @@
-"""Numbers of all cells of a mesh of which only the boundary is in memory, and its worst cells."""
+"""Counts and qualities of all cells of a mesh too large for memory, and its worst cells."""
 
 from __future__ import annotations
 
@@ -23,20 +23,21 @@ from slideviz.session.results import StepFrame
 from slideviz.terms import Metric
 
 FINE = 10_000
-"""Intervals of 0 to 1 in which cells are counted; a histogram puts some of them together."""
+"""Intervals of 0 to 1 in which cells are counted by quality; bars of a histogram join some."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tally:
-    """Numbers of all cells of a mesh.
+    """Counts and size-skew qualities of all cells of a mesh, summed up.
 
     Attributes
     ----------
     cells, inverted, unproven : int
+        The number of all cells, and of those with these statuses.
     min, mean : float
-        Of the size-skew quality.
+        Lowest and mean quality.
     counts : (FINE,) int64
-        Cells that are not inverted, by their value, in equal intervals of 0 to 1.
+        The number of cells, without inverted ones, in equal intervals of their quality from 0 to 1.
     worst : (k,) int64
         The numbers in the file of the cells of lowest value, worst first.
     """
@@ -52,24 +53,25 @@ class Tally:
 
 @dataclass(frozen=True, eq=False)
 class PartQuality(Quality):
-    """Quality of the cells in memory, whose numbers are those of all cells of the mesh.
+    """A quality with the arrays of the cells in memory, but counts, minimum and mean of all cells.
 
     Attributes
     ----------
     tally : Tally
+        The counts and qualities of all cells of the mesh.
     """
 
     tally: Tally | None = None
 
     @classmethod
     def of(cls, found: Quality, tally: Tally) -> PartQuality:
-        """Return the quality of cells in memory with the numbers of all."""
+        """Return the quality ``found`` of the cells in memory, with the tally of all cells."""
         own = (found.values, found.size, found.skew, found.status, found.signs, found.metric)
         return cls(*own, tally=tally)
 
     @property
     def all(self) -> Tally:
-        """Return the numbers of all cells."""
+        """Return the tally of all cells."""
         assert self.tally is not None
         return self.tally
 
@@ -101,7 +103,7 @@ class PartQuality(Quality):
 
 
 class Tallying:
-    """Counts cells that come block by block, in any order."""
+    """Makes a `Tally` of cells that are added block by block, in any order."""
 
     def __init__(self) -> None:
         self._counts = np.zeros(FINE, np.int64)
@@ -110,7 +112,7 @@ class Tallying:
         self._worst = np.empty(0, np.int64), np.empty(0)
 
     def add(self, ids: IntArray, values: FloatArray, status: NDArray[np.uint8]) -> None:
-        """Count cells: their numbers, size-skew quality and status, (k,) each."""
+        """Add cells by their numbers, size-skew qualities and statuses, (k,) each."""
         right = values[status != INVERTED]
         places = np.minimum((right * FINE).astype(np.int64), FINE - 1)
         self._counts += np.bincount(places, minlength=FINE)
@@ -128,7 +130,7 @@ class Tallying:
         self._worst = ids[order], values[order]
 
     def tally(self) -> Tally:
-        """Return the numbers of all cells that were added."""
+        """Return the tally of all cells that were added; there must be one at least."""
         ids, values = self._worst
         return Tally(
             self._cells,
@@ -142,7 +144,7 @@ class Tallying:
 
 
 def tally_of(found: Quality) -> Tally:
-    """Return the numbers of cells that are all measured, but may be larger than memory."""
+    """Return the tally of a quality, counted block by block: its arrays may not fit into memory."""
     made, step = Tallying(), 1 << 20
     for first in range(0, len(found.values), step):
         part = slice(first, first + step)
@@ -152,7 +154,7 @@ def tally_of(found: Quality) -> Tally:
 
 
 def measure_all(path: Path, zone: int | None, metric: Metric, tick: Tick) -> Tally:
-    """Return the numbers of all cells of an undeformed mesh, read block by block.
+    """Return the tally of an undeformed mesh, whose cells are read and measured block by block.
 
     Raises
     ------
@@ -173,7 +175,7 @@ def measure_all(path: Path, zone: int | None, metric: Metric, tick: Tick) -> Tal
 
 
 def open_points(stack: ExitStack, path: Path, zone: int | None, moved: Path) -> PointFiles:
-    """Return the points of a mesh in its file and in that of the deformed one, both opened."""
+    """Return the points in the files of a mesh and of the deformed one; ``stack`` closes both."""
     before, after = (BinaryFile(one, stack.enter_context(one.open("rb"))) for one in (path, moved))
     return PointFiles(before, after, find_zone(before, zone))
 
@@ -181,7 +183,7 @@ def open_points(stack: ExitStack, path: Path, zone: int | None, moved: Path) -> 
 def worst_frame(
     path: Path, zone: int | None, moved: Path, ids: IntArray, metric: Metric
 ) -> StepFrame:
-    """Return some cells (k,) of a mesh in files as a frame of their own, in that order."""
+    """Return the cells ``ids`` (k,) of a mesh in files as a frame of their own, in that order."""
     with ExitStack() as stack:
         files = open_points(stack, path, zone, moved)
         rows = _elements(files, ids)
@@ -190,7 +192,7 @@ def worst_frame(
         used = np.unique(nodes)
         base, now = files.cells_of(ElementBlock(0, types, nodes, ids))
         low = int(used[0])
-        # A block of cells close to each other has the nodes between theirs, too.
+        # Where nodes are close to each other, the points between are there, too (`nodes_of`).
         numbers = np.arange(low, low + len(base.points)) if len(base.points) > len(used) else used
     return measured_part(base, now, numbers, ids, files, metric)
 
@@ -198,7 +200,17 @@ def worst_frame(
 def measured_part(
     base: Mesh, now: Mesh, nodes: IntArray, ids: IntArray, files: PointFiles, metric: Metric
 ) -> StepFrame:
-    """Return some cells of a mesh, before and after, as a frame with their quality."""
+    """Return some cells of a mesh in files as a frame, with their quality.
+
+    Parameters
+    ----------
+    base, now : Mesh
+        The cells, undeformed and deformed.
+    nodes, ids : (n,), (k,)
+        Numbers of their nodes and of the cells in the whole mesh.
+    files : PointFiles
+        The files of the whole mesh.
+    """
     place = files.place
     part = Part(
         frozen_array(nodes, np.int64), frozen_array(ids, np.int64), place.n_points, len(ids)
@@ -208,12 +220,12 @@ def measured_part(
 
 
 def _elements(files: PointFiles, ids: IntArray) -> list[tuple[int, IntArray]]:
-    """Return type and nodes of cells (k,), by their numbers in the mesh."""
+    """Return VTK type and nodes of each of the cells with the numbers ``ids`` (k,)."""
     source, place = files.before, files.place
     found = [element_at(source, place, place.cells, int(cell)) for cell in ids]
     if all(at == cell for (_, _, at), cell in zip(found, ids, strict=True)):
         return [(vtk, nodes) for vtk, nodes, _ in found]
-    # Elements stand in another order than their indices.
+    # Cells are not in order in the file: read all of it.
     kept: dict[int, tuple[int, IntArray]] = {}
     for block in element_blocks(source, place, place.cells, place.dim):
         ends = np.concatenate([[0], np.cumsum(SIZES[block.types])])

@@ -29,7 +29,7 @@ def saved(session, *numbers):
 
 def test_where_all_is_saved_nothing_is_asked(session):
     unsaved = Unsaved.of(saved(session, 1, 2), busy=False)
-    assert not unsaved.what
+    assert not unsaved.lost
     assert not unsaved.can_save
 
 
@@ -78,8 +78,8 @@ def test_a_design_that_is_looked_at_makes_no_star(session):
 def test_the_mesh_of_a_design_that_is_looked_at_is_not_asked_about(session):
     design = replace(session.runs[0], name="design 1", panels=session.case)
     looked_at = replace(session, runs=(design,), shown=1)
-    assert not Unsaved.of(looked_at, busy=False).what
-    assert not Unsaved.of(looked_at, busy=True).what
+    assert not Unsaved.of(looked_at, busy=False).lost
+    assert not Unsaved.of(looked_at, busy=True).lost
     # Nor is it among the others, beside the mesh of a run.
     beside = replace(session, runs=(design, session.runs[1]))
     assert "either" not in Unsaved.of(beside, busy=False).question("closing")
@@ -113,14 +113,14 @@ def test_sections_are_part_of_what_a_case_keeps(session):
     named = replace(cut, case=replace(cut.case, source=Path("a.cfg")))
     assert title_of(named).startswith("*")
     assert "the changes to a.cfg" in Unsaved.of(named, busy=False).question("closing")
-    written = changes.saved_case(named, named.case)
-    assert not Unsaved.of(written, busy=False).what
+    written = changes.saved_case(cut, cut.case)
+    assert not Unsaved.of(written, busy=False).lost
     # How they are shown is not asked about; that they are gone is.
     hidden = changes.set_view(written, sections=(replace(written.view.section, shown=False),))
-    assert not Unsaved.of(hidden, busy=False).what
+    assert not Unsaved.of(hidden, busy=False).lost
     assert Unsaved.of(changes.set_view(written, sections=()), busy=False).can_save == ["case"]
     # A case that is opened with sections has them.
     kept = keep_view(written)
     again = changes.open_mesh(session.first, None, (), kept)
     assert len(again.view.sections) == 1
-    assert not Unsaved.of(again, busy=False).what
+    assert not Unsaved.of(again, busy=False).lost
