@@ -1,7 +1,7 @@
-"""The command line: the only room that prints or chooses an exit code.
+"""The command line: the only package that prints or chooses an exit code.
 
-0 done; 1 the mesh or case is wrong; 2 wrong usage; 3 done, but cells are inverted; 130 cancelled;
-143 ended by SIGTERM.
+Exit codes: 0 done; 1 the mesh or case is wrong; 2 wrong usage; 3 done, but cells are inverted; 130
+cancelled; 143 ended by SIGTERM.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def run(argv: Sequence[str]) -> int:
-    """Run one command and return its exit code; errors become one clear message."""
+    """Run one command and return its exit code; an error is printed as a message."""
     with terminal():
         variable = launched()
         code = _shared(argv, variable) if variable else _run(argv, None)
@@ -44,7 +44,7 @@ def _shared(argv: Sequence[str], variable: str) -> int:
 
 
 def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
-    # It reports fonts for formulas that it replaces, a line for each, where its cache is new.
+    # With a new cache, Matplotlib logs a line for each font that it replaces in formulas.
     logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
     try:  # also around the imports, which take long enough to be interrupted
         from slideviz.cli.parser import parse
@@ -70,7 +70,7 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
     except MemoryError:
         return _fail("out of memory; use a coarser mesh or close other programs", WRONG_INPUT)
     except BrokenPipeError:
-        # The reader of our output is gone (`slideviz info MESH | head`): nothing to tell it.
+        # The reader of the output has ended (`slideviz info MESH | head`): that is no error.
         return DONE
     except OSError as problem:
         return _fail(str(problem), WRONG_INPUT)

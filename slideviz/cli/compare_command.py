@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 STEPS = (1, 5, 20)
 TABLE, HISTORY = "compare.csv", "convergence.csv"
 KEPT_BYTES = 1_500_000_000
-"""Deformed meshes are kept for the pictures up to this size together."""
+"""Most bytes of deformed meshes that are kept in memory, for the pictures."""
 
 
 def add_compare(calls: argparse._SubParsersAction) -> None:
@@ -63,7 +63,7 @@ def add_compare(calls: argparse._SubParsersAction) -> None:
 
 
 def compare(arguments: argparse.Namespace) -> int:
-    """Compare methods on a case, and write table, plots and pictures."""
+    """Deform a mesh by several methods, write table, plots and pictures; return the exit code."""
     from slideviz import read
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import OutputPath, make_folder, require_places
@@ -100,18 +100,18 @@ def compare(arguments: argparse.Namespace) -> int:
 
 
 def _say(arguments: argparse.Namespace, text: str) -> None:
-    """Print a text at once, unless ``--quiet`` was asked for."""
+    """Print a text and flush it, unless ``--quiet`` was given."""
     if not arguments.quiet:
         print(text, flush=True)
 
 
 def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...]:
-    """Return the combinations that the arguments name.
+    """Return the combinations of methods, periodic modes and steps that the arguments ask for.
 
     Raises
     ------
     CaseError
-        A name is unknown, or a number of steps is none.
+        A name is unknown, a list is empty, or a number of steps is not valid.
     """
     from slideviz.errors import CaseError
     from slideviz.study.combinations import AUTO, COMPARED_METHODS
@@ -145,7 +145,7 @@ def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...
 
 
 def _items(text: str) -> list[str]:
-    """Return the words of a list with commas, each once."""
+    """Return the words of a list with commas, in lower case, each once."""
     return list(dict.fromkeys(word.strip().lower() for word in text.split(",") if word.strip()))
 
 
@@ -157,7 +157,10 @@ def _computed(
     cannot: Mapping[Combination, str],
     folder: Path,
 ) -> tuple[list[CombinationRow], list[Path]]:
-    """Return all rows and the tables written; after each row they have what was finished."""
+    """Compute all combinations; return their rows, and the tables, written anew after each row.
+
+    ``cannot`` has the reasons for those that cannot be computed.
+    """
     from slideviz.study.combinations import bounded, compare
     from slideviz.study.table import csv_text, history_text, save_text, terminal_line
 
@@ -186,7 +189,7 @@ def _computed(
 
 
 def _expected(rows: Sequence[CombinationRow], tried: Combination) -> float | None:
-    """Return the seconds that a combination may take, by what the same method took before."""
+    """Return the seconds that a combination may take, by earlier rows of its method; or None."""
     known = [row for row in rows if row.result and row.combination.method == tried.method]
     alike = [row for row in known if row.combination.periodic == tried.periodic] or known
     if not alike or not tried.steps:
@@ -202,7 +205,7 @@ def _drawn(
     rows: Sequence[CombinationRow],
     folder: Path,
 ) -> list[Path]:
-    """Return the plots and pictures written."""
+    """Write plots and pictures, and return their paths."""
     from slideviz.study.facets import profiler
     from slideviz.study.montage import DPI, montage
     from slideviz.study.plots import figures, save_figure, steps_name

@@ -24,7 +24,7 @@ def add_convert(calls: argparse._SubParsersAction) -> None:
 
 
 def convert(arguments: argparse.Namespace) -> int:
-    """Write a mesh in another format, and say what the format does not hold."""
+    """Write a mesh in another format, with notes on what that leaves out; return the exit code."""
     from dataclasses import replace
 
     from slideviz import quality, read
@@ -58,12 +58,12 @@ def convert(arguments: argparse.Namespace) -> int:
 
 
 def _is_to_be_streamed(arguments: argparse.Namespace) -> bool:
-    """Tell whether a mesh is converted piece by piece: as asked for, or for want of memory.
+    """Return whether to convert piece by piece: with ``--stream``, or if memory is too small.
 
     Raises
     ------
     SlidevizError
-        It is asked for and cannot be, or the mesh cannot be read.
+        ``--stream`` is given for other formats, or the mesh cannot be read.
     """
     from slideviz.deformation.converting import streamed_kind
     from slideviz.deformation.memory import missing_memory_of
@@ -84,7 +84,7 @@ def _is_to_be_streamed(arguments: argparse.Namespace) -> bool:
 
 
 def _convert_streamed(arguments: argparse.Namespace) -> int:
-    """Convert a mesh piece by piece."""
+    """Convert a mesh piece by piece; return the exit code."""
     from functools import partial
 
     from slideviz.cli.exit_codes import DONE

@@ -1,4 +1,4 @@
-"""``slideviz def``: deforms a mesh as a configuration of SU2 says, in place of SU2_DEF."""
+"""``slideviz def``: deforms a mesh by a configuration file of SU2, instead of SU2_DEF."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import Mesh
 
 _OF_A_RUN = ("history", "picture", "steps_dir", "steps_file")
-"""What a run can write besides, which SU2's commands do not."""
+"""Options of ``slideviz run`` that `tell` reads, and this command does not have: set to None."""
 
 
 def add_def(calls: argparse._SubParsersAction) -> None:
@@ -38,7 +38,7 @@ def add_config(call: argparse.ArgumentParser) -> None:
 
 
 def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
-    """Return the configuration, with the changes of ``--set``, as it fits its mesh, and that."""
+    """Return the configuration, with the changes of ``--set``, and its mesh, which it must fit."""
     from slideviz import read
     from slideviz.cli.places import note_case
     from slideviz.design.su2.config import own_changes, read_config
@@ -67,7 +67,7 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
 
 
 def run_def(arguments: argparse.Namespace) -> int:
-    """Deform a mesh as a configuration of SU2 says, and write it with its boxes."""
+    """Deform a mesh by a configuration of SU2, write it with its boxes; return the exit code."""
     from slideviz import quality, write
     from slideviz.cli.places import OutputPath, require_places, tell_lost
     from slideviz.cli.report import folded_cells, run_report
@@ -121,7 +121,7 @@ def run_def(arguments: argparse.Namespace) -> int:
 
 
 def variable_rows(surface: MovingSurface) -> list[dict[str, Any]]:
-    """Return what a report says of each design variable."""
+    """Return the entry of the report for each design variable."""
     return [
         {"kind": variable.kind, "value": variable.value, "idle": idle}
         for variable, idle in zip(surface.config.variables, surface.idle, strict=True)
@@ -129,7 +129,7 @@ def variable_rows(surface: MovingSurface) -> list[dict[str, Any]]:
 
 
 def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, begin: float) -> int:
-    """Write the mesh with the boxes that the configuration defines; nothing moves."""
+    """Write the undeformed mesh with the boxes that the configuration defines; return the code."""
     from slideviz import write
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import tell_lost

@@ -1,4 +1,4 @@
-"""``slideviz dot``: gradients for the design variables of SU2, in place of SU2_DOT_AD."""
+"""``slideviz dot``: gradients for the design variables of SU2, instead of SU2_DOT_AD."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def add_dot(calls: argparse._SubParsersAction) -> None:
 
 
 def run_dot(arguments: argparse.Namespace) -> int:
-    """Write the gradients for moving nodes and for design variables."""
+    """Write the gradients for moving nodes and for design variables; return the exit code."""
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import OutputPath, require_places
     from slideviz.cli.progress import Bar
@@ -85,7 +85,7 @@ def _print(report: dict, sensitivities: Path, gradient: Path | None) -> None:
 
 
 def _write_surface(path: Path, found: Gradients) -> None:
-    """Write ``x, y, z, dJ/dx, dJ/dy, dJ/dz`` of each moving node, in 2D with zeros."""
+    """Write a line ``x, y, z, dJ/dx, dJ/dy, dJ/dz`` for each moving node; in 2D z's are 0."""
     import numpy as np
 
     from slideviz.errors import CaseError
@@ -100,7 +100,7 @@ def _write_surface(path: Path, found: Gradients) -> None:
 
 
 def _write_gradient(path: Path, config: Su2Config, found: Gradients) -> None:
-    """Write a line that names the objective, and a number for each design variable."""
+    """Write a line with the name of the objective, and one with the gradient of each variable."""
     from slideviz.errors import CaseError
     from slideviz.mesh.io.atomic import atomic_write
 

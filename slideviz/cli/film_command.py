@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from slideviz.session.state import Run, StepFrame
 
 SMOOTH = 4
-"""Films of fewer steps get a hint at images in between."""
+"""Films of fewer steps get a hint on ``--between``."""
 
 
 def add_film(calls: argparse._SubParsersAction) -> None:
@@ -85,7 +85,7 @@ def add_film(calls: argparse._SubParsersAction) -> None:
 
 
 def film(arguments: argparse.Namespace) -> int:
-    """Deform a mesh as a case says, and write its steps as a film."""
+    """Deform a mesh as a case says, and write its steps as a film; return the exit code."""
     from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.places import OutputPath, require_places
     from slideviz.cli.progress import Bar
@@ -147,7 +147,7 @@ def _runs(arguments: argparse.Namespace, case: Case) -> tuple[StepFrame, list[Ru
 
 
 def _words(case: Case, keys: list[str]) -> str:
-    """Return the values that a case has for some keys, as they stand in a case file."""
+    """Return the values of some keys in a case, as in a case file, but shortened."""
     from textwrap import shorten
 
     from slideviz.case.keys import KEYS
@@ -161,7 +161,7 @@ def _words(case: Case, keys: list[str]) -> str:
 
 
 def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[StepFrame, ...]:
-    """Return every step with its quality."""
+    """Deform a mesh, and return every step with its quality."""
     from slideviz import deform, quality
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import print_remarks

@@ -26,7 +26,7 @@ def add_info(calls: argparse._SubParsersAction) -> None:
 
 
 def info(arguments: argparse.Namespace) -> int:
-    """Print the content of a mesh file."""
+    """Print what is in a mesh file, or write it as JSON; return the exit code."""
     from slideviz.cli.places import OutputPath, require_places
 
     require_places(arguments, OutputPath(arguments.json, "--json"))
@@ -45,7 +45,15 @@ def info(arguments: argparse.Namespace) -> int:
 
 
 def _told(arguments: argparse.Namespace, mesh: Mesh, counts: MeshCounts, found: Quality) -> int:
-    """Print or write what is in a mesh, of which the boundaries at least are there."""
+    """Print or write what is in a mesh, and return the exit code.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh, or only its skin.
+    counts, found
+        Counts and quality of the whole mesh.
+    """
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.report import info_report, save_json, table
     from slideviz.mesh.periodic import find_pairs
@@ -91,7 +99,7 @@ def _told(arguments: argparse.Namespace, mesh: Mesh, counts: MeshCounts, found: 
 
 
 def _boxes(mesh: Mesh) -> tuple[tuple[Box, ...], str]:
-    """Return the boxes for free-form deformation, or what is wrong with them."""
+    """Return the FFD boxes of a mesh, and what is wrong with them, or ""."""
     from slideviz.errors import MeshError
     from slideviz.ffd.section import boxes_of
 

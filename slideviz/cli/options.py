@@ -1,4 +1,4 @@
-"""Arguments that several commands share, and the values that they stand for."""
+"""Arguments that several commands share, and the values that their texts mean."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ if TYPE_CHECKING:
     from slideviz.scene.moved import Zoom
 
 NONE = "no reference: relative to itself"
-"""Stands in pictures; sizes of cells are not rated then, only their shapes."""
+"""The remark, in pictures too, where there is no undeformed mesh to compare cells with: size is
+rated 1 then."""
 REMEDY = "give --reference UNDEFORMED"
+"""The advice after that remark."""
 
 
 def add_reference(call: argparse.ArgumentParser, case_help: str) -> None:
@@ -33,10 +35,10 @@ def add_reference(call: argparse.ArgumentParser, case_help: str) -> None:
 def reference_of(
     arguments: argparse.Namespace, mesh: Mesh, case: Case | None
 ) -> tuple[Path, Mesh] | None:
-    """Return the undeformed mesh and its file: ``--reference``, or else that of ``--case``.
+    """Return the undeformed mesh and its file, of ``--reference`` or else of ``--case``; or None.
 
-    The mesh of a case is taken only where it has the cells of ``mesh``: the case may have been
-    given for its periodic boundaries alone.
+    The mesh of a case is used only where it has the same cells as ``mesh``: the case may have been
+    given only for its periodic boundaries.
     """
     from slideviz import read
 
@@ -51,7 +53,7 @@ def reference_of(
 
 
 def words_of(reference: Path | None) -> str:
-    """Return the line about what the quality is measured against."""
+    """Return the line on the undeformed mesh that the quality refers to, or that there is none."""
     return f"{NONE}; {REMEDY}" if reference is None else f"reference: {reference}"
 
 
@@ -81,11 +83,11 @@ SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
         },
     ),
 }
-"""Arguments that several commands have: their flags, and what ``add_argument`` takes."""
+"""Arguments that several commands have, by name: flags and keywords for ``add_argument``."""
 
 
 def add_shared(call: argparse.ArgumentParser, name: str, **other: Any) -> None:
-    """Add an argument of `SHARED`, in some of what ``add_argument`` takes another one."""
+    """Add an argument of `SHARED`; ``other`` replaces some of its keywords."""
     flags, usual = SHARED[name]
     call.add_argument(*flags, **usual | other)
 
@@ -104,7 +106,10 @@ def add_changes(call: argparse.ArgumentParser) -> None:
 
 
 def read_case(arguments: argparse.Namespace) -> Case:
-    """Return the case of the file with the changes of ``--set``, ``--steps`` and ``--zone``."""
+    """Return the case of the argument ``case``, changed by ``--set``, ``--steps`` and ``--zone``.
+
+    Its files are added to the inputs, which must not be written over.
+    """
     from slideviz import Case
     from slideviz.cli.places import note_case
 
@@ -122,7 +127,7 @@ def require_mesh_file(arguments: argparse.Namespace, case: Case) -> Path:
     Raises
     ------
     CaseError
-        The case names none.
+        The case has none.
     """
     from slideviz.errors import CaseError
 
@@ -144,12 +149,14 @@ def given_case(arguments: argparse.Namespace) -> Case | None:
 
 
 def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
-    """Return the case with other values of some keys, each as KEY=VALUE.
+    """Return the case with other values of some keys, given as texts KEY=VALUE.
+
+    ``option`` is what messages call the texts.
 
     Raises
     ------
     CaseError
-        One is not of that form, there is no such key, or the value is wrong.
+        A text has another form, there is no such key, or the value is wrong.
     """
     from slideviz.case.cfg import set_key
     from slideviz.case.check import idle_roles
@@ -169,7 +176,7 @@ def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
 
 
 def add_zoom(call: argparse.ArgumentParser) -> None:
-    """Add the option ``--zoom``, which is the same for pictures and films."""
+    """Add the option ``--zoom`` of pictures and films."""
     call.add_argument(
         "--zoom",
         type=zoom,
@@ -181,7 +188,7 @@ def add_zoom(call: argparse.ArgumentParser) -> None:
 
 
 def zoom(text: str) -> Zoom:
-    """Return the detail of ``X,Y,WIDTH`` or ``X,Y,Z,WIDTH``, or the words themselves."""
+    """Return the detail for ``X,Y,WIDTH`` or ``X,Y,Z,WIDTH``; ``auto`` and ``all`` as they are."""
     if text == "auto":
         return "auto"
     if text == "all":
@@ -200,7 +207,7 @@ def zoom(text: str) -> Zoom:
 
 
 def count(text: str) -> int:
-    """Return a whole number, which may be written as 1e8."""
+    """Return the whole number that a text like ``20000`` or ``1e8`` is."""
     try:
         number = float(text)
     except ValueError:
@@ -211,7 +218,7 @@ def count(text: str) -> int:
 
 
 def size(text: str) -> tuple[int, int]:
-    """Return width and height of ``1280x800``."""
+    """Return width and height of a text like ``1280x800``."""
     width, sign, height = text.lower().partition("x")
     if not (sign and width.isdecimal() and height.isdecimal()):
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form WIDTHxHEIGHT, as 1280x800")

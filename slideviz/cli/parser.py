@@ -1,4 +1,4 @@
-"""The arguments of the command line: a row of ``COMMANDS`` for each command, and the window's."""
+"""Parses the command line: by a parser for each command of ``COMMANDS``, and one for the window."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ COMMANDS = {
     "keys": "keys_command",
     "shots": "window_command",
 }
-"""The module of each command, whose ``add_NAME`` adds its arguments, in the order of the help."""
+"""The module of each command, in the order of the help; its function ``add_NAME`` adds a parser."""
 
 _DESCRIPTION = """\
 Deform CFD meshes with radial basis functions.
@@ -55,7 +55,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
         return _window_parser().parse_args(argv)
     from slideviz.cli.section_options import glued
 
-    # Only the command that is called, where it is the first word: it is loaded faster alone.
+    # Load only the module of the command that is called, where it is the first word.
     called = argv[:1] if argv[0] in COMMANDS else COMMANDS
     return _parser(called).parse_args(glued(argv))
 
@@ -65,13 +65,13 @@ def _asks_help(argv: Sequence[str]) -> bool:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose options are written in full: ``--steps`` is not ``--steps-dir``."""
+    """A parser that accepts options in full only: ``--steps`` is not short for ``--steps-dir``."""
 
     def __init__(self, **options: object) -> None:
         super().__init__(allow_abbrev=False, **options)  # type: ignore[arg-type]
 
     def error(self, message: str) -> NoReturn:
-        """Leave with code 2 and a sentence, instead of all options."""
+        """Exit with code 2 and one sentence, without the list of options."""
         self.exit(2, f"{self.prog}: {message}; see `{self.prog} --help`\n")
 
 

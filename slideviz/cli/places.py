@@ -1,6 +1,6 @@
-"""Checks, before the work, of the files that a command reads and writes.
+"""Checks the files that a command will read and write, before the work begins.
 
-No file that is read is written over, and no two results go to one file.
+No input file must be overwritten, and no two results be written to one file.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _READ = {
     "reference": "the reference mesh",
     "table": "the table of designs",
 }
-"""What the files are that a command line names to be read, by the name of their argument."""
+"""Words for the input files of a command line, by the name of their argument."""
 
 
 @dataclass(frozen=True)
@@ -38,19 +38,19 @@ class OutputPath:
     Attributes
     ----------
     path : Path or None
-        None, or ``-`` (the terminal), where nothing is written.
+        None, or ``-`` for the terminal, where no file is written.
     option : str
-        What names it: an option, or a key of the case.
+        The option or the key of the case that gives it, for messages.
     named : bool
-        Whether it stands on the command line; if not, a note says that an older file is replaced.
+        Whether it is on the command line; if not, there is a note where an older file is replaced.
     files : str
-        Of a folder: the regular expression of the names of the files in it.
+        For a folder: a regular expression for the names of the files in it; else empty.
     is_mesh : bool
         Whether its ending must be that of a mesh.
     replaces : Path or None
-        The input that it may be.
+        The only input file that it may overwrite.
     remedy : str
-        What helps where it is an input.
+        The advice in the message where it is an input file.
     """
 
     path: Path | None
@@ -63,25 +63,27 @@ class OutputPath:
 
 
 def inputs_of(arguments: argparse.Namespace) -> dict[Path, str]:
-    """Return the files that the command line names to be read, and what they are in words."""
+    """Return the input files of a command line, with words for what each is."""
     found = {what: getattr(arguments, name, None) for name, what in _READ.items()}
     return {path: what for what, path in found.items() if path is not None}
 
 
 def note_case(arguments: argparse.Namespace, case: Case) -> None:
-    """Add the files that a case names to be read to those of the command line."""
+    """Add the input files of a case to those of the command line, ``arguments.inputs``."""
     for path, what in case.inputs().items():
         arguments.inputs.setdefault(path, what)
 
 
 def require_places(arguments: argparse.Namespace, *outputs: OutputPath) -> None:
-    """Raise where a result must not be written, or cannot; tell which older files are replaced.
+    """Raise where a result must not or cannot be written; print which older files are replaced.
+
+    Folders for results are made where they are missing.
 
     Raises
     ------
     SlidevizError
-        It is a file that is read, or two results go to one file, or the folder is missing, there
-        is no permission, a folder has that name, or no mesh format has that ending.
+        A result is an input file, or two results are one file; the folder is missing, there is no
+        permission, a folder has that name, or no mesh format has that ending.
     """
     from slideviz.errors import CaseError
     from slideviz.mesh.io.atomic import require_writable
@@ -90,7 +92,7 @@ def require_places(arguments: argparse.Namespace, *outputs: OutputPath) -> None:
     there = [one for one in outputs if one.path is not None and str(one.path) != "-"]
     for one in there:
         assert one.path is not None
-        # An input, before all else: that is the worst.
+        # First of all, whether an input would be overwritten: the worst mistake.
         for path in _paths(one):
             require_no_input(path, CaseError, one.replaces, one.remedy)
     for one, other in combinations(there, 2):
@@ -112,7 +114,7 @@ def require_places(arguments: argparse.Namespace, *outputs: OutputPath) -> None:
 
 
 def _print_replaced(unnamed: list[OutputPath]) -> None:
-    """Say before the work which older files it will replace, in one line."""
+    """Print in one line which older files will be replaced by ``unnamed`` results."""
     old_files = []
     for one in unnamed:
         old = [path for path in _paths(one) if path.exists()]
@@ -125,7 +127,7 @@ def _print_replaced(unnamed: list[OutputPath]) -> None:
 
 
 def _paths(one: OutputPath) -> Iterator[Path]:
-    """Yield the file, or those of the folder that are there."""
+    """Yield the path of a file, or the existing files of a folder."""
     assert one.path is not None
     if not one.files:
         yield one.path
@@ -134,7 +136,10 @@ def _paths(one: OutputPath) -> Iterator[Path]:
 
 
 def _meet(one: OutputPath, other: OutputPath) -> bool:
-    """Tell whether two results would go to one file; the other is a file."""
+    """Return whether ``other``, a file, is the same file as ``one`` or would be one in that folder.
+
+    False where ``other`` is a folder.
+    """
     from slideviz.mesh.io.file_checks import same_file
 
     assert one.path is not None
@@ -158,14 +163,14 @@ def _require_mesh_ending(file: Path) -> None:
 def tell_lost(
     output: Path, mesh: Mesh, file_format: FileFormat | None = None, *, alone: bool = False
 ) -> None:
-    """Warn before the work of what a file will not keep of a mesh; ask for the source of CGNS.
+    """Print a warning on what a file will lack of a mesh.
 
-    ``alone`` tells whether one of several zones is converted.
+    ``alone`` is whether one of several zones is converted.
 
     Raises
     ------
     MeshError
-        It cannot hold the mesh at all.
+        The format cannot store the mesh, or it is CGNS and the mesh was not read from CGNS.
     """
     from slideviz.mesh.io.files import usual_ending
     from slideviz.mesh.io.su2b.write import OTHER_ZONES, require_binary, sentence_of_lost
@@ -185,7 +190,7 @@ def tell_lost(
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, and those it is in, where there is none.
+    """Make a folder and its parents where they are missing.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Several processes of one command, as mpirun or srun start them: one of them speaks for all."""
+"""Several processes of one command, started by mpirun or srun: only rank 0 prints."""
 
 from __future__ import annotations
 
@@ -19,14 +19,12 @@ _LAUNCHERS = (
     ("PMI_SIZE", "PMI_RANK"),
     ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
 )
-"""What Open MPI, MPICH and its relatives, and srun tell each process: how many, and which."""
+"""Variables with the number of processes, and the rank of this one: of Open MPI, MPICH (and those
+made from it), and srun."""
 
 
 def launched() -> str:
-    """Return the variable that says how many processes were started, nothing where one was.
-
-    A single one needs no MPI at all.
-    """
+    """Return the name of the variable with the number of processes; "" where it is one or none."""
     for size, rank in _LAUNCHERS:
         if _number(size) > 1 and os.environ.get(rank):
             return size
@@ -34,19 +32,28 @@ def launched() -> str:
 
 
 def run_shared(argv: Sequence[str], variable: str, run: Callable[[Ranks], int]) -> int:
-    """Return the exit code of a command that several processes share: ``run`` is for rank 0.
+    """Run a command that several processes share, and return its exit code.
+
+    Parameters
+    ----------
+    argv : sequence of str
+        The words of the command line.
+    variable : str
+        The variable with the number of processes, of `launched`.
+    run : callable
+        Runs the command; called on rank 0 only, while the others serve it.
 
     Raises
     ------
     SlidevizError
-        It is none that they can share, or MPI does not connect them.
+        Processes cannot share this command, or MPI does not connect them.
     """
     count, rank = _number(variable), _number(dict(_LAUNCHERS)[variable])
     if rank:
         _silence()
     if argv[:1] != ["run"] or not {"--stream", "--resume"} & set(argv):
         if rank:
-            return DONE  # mpirun ends all at the first error: rank 0 must have said why
+            return DONE  # no error here: mpirun would end rank 0 before it has printed why
         raise SlidevizError(
             f"{count} processes of one command were started, but only `slideviz run` with --stream "
             "(for SU2 meshes) shares its work among several; add --stream, or start one "
@@ -76,7 +83,7 @@ def _number(variable: str) -> int:
 
 
 def _silence() -> None:
-    """Let this process print nothing, libraries and signals included."""
+    """Send all output of this process to the null device, that of libraries, too."""
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
     if not os.environ.get("SLIDEVIZ_DEBUG"):

@@ -1,4 +1,4 @@
-"""Progress on the terminal: a bar, and a line when loops are compiled."""
+"""Progress on the terminal: a progress bar, and a line when Numba compiles loops."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _PHASES = {
 }
 _EVERY = 0.1
 _WIPE = "\r\033[K"
-"""Takes a bar away from its line."""
+"""Control sequence that clears the line of a bar."""
 
 
 @contextmanager
 def note_compilation(quiet: bool) -> Iterator[None]:
-    """Say on stderr when Numba begins to compile, once; never where its cache has everything."""
+    """Context that prints one line to stderr when Numba begins to compile; none if ``quiet``."""
     if quiet:
         yield
         return
@@ -54,21 +54,23 @@ def note_compilation(quiet: bool) -> Iterator[None]:
 
 
 def say_compiling() -> None:
-    """Say on stderr why the first run takes longer."""
+    """Print to stderr that loops are being compiled."""
     words = "compiling loops that are used for the first time: some seconds, once"
     control(f"{_WIPE if sys.stderr.isatty() else ''}slideviz: {words}\n")
 
 
 class Bar:
-    """``with Bar() as bar: deform(case, mesh, bar)``; wipes itself away at the end.
+    """A progress bar on stderr: ``with Bar() as bar: deform(case, mesh, bar)``.
+
+    It is drawn only where stderr is a terminal, and cleared at the end.
 
     Parameters
     ----------
     enabled : bool
     head : str
-        Stands before the words of the bar.
+        Text before the words of the bar.
     expected : float, optional
-        Seconds that all of it is likely to take, where that is known; later the steps tell.
+        Estimate of all seconds, where known; used until the first step is done.
     """
 
     def __init__(self, enabled: bool = True, head: str = "", expected: float | None = None) -> None:
@@ -91,7 +93,7 @@ class Bar:
             control(_WIPE)
 
     def __call__(self, progress: Progress) -> None:
-        """Draw the bar, at most ten times a second."""
+        """Draw the bar by the steps that are done, at most ten times a second."""
         now = time.monotonic()
         if not self.enabled or now < self._next:
             return
@@ -108,7 +110,7 @@ class Bar:
         self._draw(done, f"{self._head}{steps}")
 
     def phase(self, progress: Progress) -> None:
-        """Draw the bar for the phase in work, with the time that is left of all, or else of it."""
+        """Draw the bar for the current phase, with the seconds left of all or, else, of it."""
         now = time.monotonic()
         self._first = self._first or now
         if progress.phase != self._phase or not progress.fraction:
@@ -126,7 +128,7 @@ class Bar:
         self._draw(filled, f"{self._head}{word}: {100 * done:.0f} %{left}")
 
     def count(self, done: int, total: int, what: str, rest: float | None = None) -> None:
-        """Draw the bar for ``done`` of ``total`` things, with the seconds that the rest takes."""
+        """Draw the bar for ``done`` of ``total`` things; ``rest`` is the seconds left, if known."""
         if self.enabled:
             left = "" if rest is None else f", about {rest:.0f} s left"
             self._draw(done / total, f"{what} {done} of {total}{left}")

@@ -40,7 +40,10 @@ def add_quality(calls: argparse._SubParsersAction) -> None:
 
 
 def quality(arguments: argparse.Namespace) -> int:
-    """Print the quality of a mesh, compared with the undeformed one if it is given."""
+    """Print or write the quality of a mesh, relative to the undeformed one if it is given.
+
+    Returns the exit code.
+    """
     from slideviz import quality as rate
     from slideviz import read, write
     from slideviz.cli.places import OutputPath, require_places
@@ -77,7 +80,10 @@ def _told(
     worst: Sequence[tuple[int, int]],
     reference: Path | None,
 ) -> int:
-    """Write or print the quality of a mesh, and return the exit code."""
+    """Print the quality of a mesh or write it as JSON, and return the exit code.
+
+    ``worst`` are numbers and VTK types of the worst cells, ``reference`` is the undeformed mesh.
+    """
     from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.report import (
         histogram_lines,
@@ -101,7 +107,7 @@ def _told(
 
 
 def _write_csv(path: Path, found: Quality) -> None:
-    """Write id, size-skew, size, skew and status of each cell."""
+    """Write number, size-skew, size, skew and status of each cell as CSV."""
     from slideviz.errors import CaseError
     from slideviz.mesh.io.atomic import atomic_write
     from slideviz.terms import CELL_STATES

@@ -22,9 +22,9 @@ from slideviz.mesh.quality import Quality
 from slideviz.session.formats import holds_quality
 
 LISTED = 100
-"""Inverted cells named in a report."""
+"""Most inverted cells listed in a report."""
 WORST = 10
-"""Cells of lowest quality named in a report."""
+"""Cells of lowest quality listed in a report."""
 
 PHASES = (
     *("read", "classify", "select", "solve", "evaluate", "project", "correct"),
@@ -46,9 +46,16 @@ def run_report(
     undeformed: Quality,
     folded: Mapping[int, tuple[int, int]],
 ) -> dict[str, Any]:
-    """Return the JSON object of ``run --json``; ``quality`` is that of the last step.
+    """Return the JSON object of ``run --json``.
 
-    ``folded`` has type and first step of the inverted cells with the lowest numbers.
+    Parameters
+    ----------
+    seconds : mapping of str to float
+        Seconds by phase, besides those of the steps.
+    quality, undeformed : Quality
+        Quality after the last step, and before the run.
+    folded : mapping of int to (int, int)
+        VTK type and first inverted step of the inverted cells with the lowest numbers.
     """
     last = steps[-1]
     spent = dict.fromkeys(PHASES, 0.0) | dict(seconds)
@@ -97,7 +104,7 @@ def run_report(
 
 
 def folded_cells(steps: Sequence[Step], mesh: Mesh, quality: Quality) -> dict[int, tuple[int, int]]:
-    """Return type and first step of the first ``LISTED`` inverted cells, by number."""
+    """Return VTK type and first inverted step of the first ``LISTED`` inverted cells, by number."""
     cells = quality.inverted_cells(LISTED)
     types, when = mesh.cells.types[cells].tolist(), folded_at(steps, mesh, cells).tolist()
     return dict(zip(cells.tolist(), zip(types, when, strict=True), strict=True))
@@ -108,12 +115,12 @@ def _fields(value: object, keys: Iterable[str]) -> dict[str, Any]:
 
 
 def inverted_cells(quality: Quality) -> list[int]:
-    """Return the ids of the first ``LISTED`` inverted cells."""
+    """Return the numbers of the first ``LISTED`` inverted cells."""
     return [int(i) for i in quality.inverted_cells(LISTED)]
 
 
 def quality_report(name: str, quality: Quality, worst: Sequence[tuple[int, int]]) -> dict[str, Any]:
-    """Return the JSON object of ``quality --json``; ``worst`` are cells and their types."""
+    """Return the JSON object of ``quality --json``; ``worst`` has numbers and types of cells."""
     counts, edges = quality.histogram()
     return {
         "mesh": name,
@@ -129,13 +136,13 @@ def quality_report(name: str, quality: Quality, worst: Sequence[tuple[int, int]]
 
 
 def worst_cells(mesh: Mesh, quality: Quality, count: int = WORST) -> list[tuple[int, int]]:
-    """Return numbers and types of the cells of lowest quality."""
+    """Return numbers and VTK types of the cells of lowest quality, worst first."""
     return [(int(cell), int(mesh.cells.types[cell])) for cell in quality.worst(count)]
 
 
 @dataclass(frozen=True)
 class MeshCounts:
-    """How many points a mesh has, and points that no cell uses, and cells of each type."""
+    """The number of points of a mesh, of those that no cell uses, and of cells by VTK type."""
 
     points: int
     unused: int
@@ -143,7 +150,7 @@ class MeshCounts:
 
     @classmethod
     def of(cls, mesh: Mesh) -> MeshCounts:
-        """Return those of a mesh in memory."""
+        """Return the counts of a mesh in memory."""
         types = {vtk: len(ids) for vtk, (ids, _) in mesh.cells.by_type.items()}
         return cls(len(mesh.points), len(unused_nodes(mesh)), types)
 
@@ -151,7 +158,7 @@ class MeshCounts:
 def info_report(
     mesh: Mesh, pairs: Sequence[Any], counts: MeshCounts, quality: Quality
 ) -> dict[str, Any]:
-    """Return the JSON object of ``info --json``; of ``mesh`` its boundaries are looked at."""
+    """Return the JSON object of ``info --json``; ``mesh`` may be only the skin of the mesh."""
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     halo = mesh.halo
     return {
@@ -189,7 +196,7 @@ def info_report(
 
 
 def print_remarks(remarks: Iterable[str], *, quiet: bool) -> None:
-    """Print warnings, and what is harmless as notes unless ``quiet``, where errors go."""
+    """Print warnings to stderr, and notes too unless ``quiet``."""
     for text in remarks:
         if quiet and isinstance(text, Note):
             continue
@@ -198,7 +205,10 @@ def print_remarks(remarks: Iterable[str], *, quiet: bool) -> None:
 
 
 def save_json(path: Path | None, report: Mapping[str, Any]) -> bool:
-    """Write a report where one is asked for; ``-`` prints it. Tell whether it was printed."""
+    """Write a report to a file, or print it where ``path`` is ``-``; return if it was printed.
+
+    Neither where ``path`` is None.
+    """
     if path is None:
         return False
     text = json.dumps(report, indent=2) + "\n"
@@ -211,7 +221,7 @@ def save_json(path: Path | None, report: Mapping[str, Any]) -> bool:
 
 
 def save_history(path: Path, report: Mapping[str, Any]) -> None:
-    """Write the convergence of the data reduction, a row for each cycle."""
+    """Write the convergence of the data reduction as CSV, a row for each cycle."""
     columns = ("step", *CYCLE_KEYS)
     rows = [",".join(columns)]
     rows += [",".join(repr(row[name]) for name in columns) for row in report["convergence"]]
@@ -220,7 +230,7 @@ def save_history(path: Path, report: Mapping[str, Any]) -> None:
 
 
 def table(rows: Sequence[Sequence[object]], indent: int = 2) -> str:
-    """Return rows as aligned columns; numbers to the right."""
+    """Return rows as text in aligned columns; numbers are aligned to the right."""
     cells = [[_cell(value) for value in row] for row in rows]
     widths = [max(len(row[i]) for row in cells if i < len(row)) for i in range(len(cells[0]))]
     lines = []
@@ -238,7 +248,7 @@ def _cell(value: object) -> str:
 
 
 def histogram_lines(quality: Quality, bins: int = 10, width: int = 40) -> str:
-    """Return the histogram of qualities as text, worst first."""
+    """Return the histogram of qualities as text, the lowest bin first."""
     counts, edges = quality.histogram(bins)
     top = max(1, int(counts.max()))
     rows = []
@@ -249,7 +259,7 @@ def histogram_lines(quality: Quality, bins: int = 10, width: int = 40) -> str:
 
 
 def quality_lines(quality: Quality, undeformed: Quality | None = None) -> str:
-    """Return minimum, mean and the counts of cells as a table."""
+    """Return minimum, mean and counts of cells as a text table, beside those before if given."""
 
     def beside(value: float) -> tuple[str, ...]:
         return () if undeformed is None else (f"undeformed {_cell(value)}",)
@@ -270,7 +280,7 @@ def quality_lines(quality: Quality, undeformed: Quality | None = None) -> str:
 
 
 def cell_data(path: Path, found: Quality) -> dict | None:
-    """Return the qualities for formats that hold cell data, None for the others."""
+    """Return the qualities as cell data; None where the format of ``path`` has no cell data."""
     if not holds_quality(path):
         return None
     return {"size-skew": found.values, "size": found.size, "skew": found.skew}

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from slideviz.terms import FileFormat, Metric
 
 KEPT_BYTES = 1_000_000_000
-"""Meshes of steps are kept up to this size, to tell when cells were inverted."""
+"""Most bytes of meshes of steps in memory; they are kept to find when cells were inverted."""
 
 
 def add_run(calls: argparse._SubParsersAction) -> None:
@@ -70,7 +70,7 @@ def add_run(calls: argparse._SubParsersAction) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Deform a mesh as a case says, and write mesh, report, steps and picture."""
+    """Deform a mesh as a case says, write mesh, report, steps, picture; return the exit code."""
     from slideviz import quality, read, write
     from slideviz.cli.places import tell_lost
     from slideviz.cli.report import cell_data, folded_cells, run_report
@@ -123,7 +123,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _require_places(
     arguments: argparse.Namespace, case: Case, output: Path, qualities: Path | None
 ) -> None:
-    """Raise where a result could not be written, before the work and not after it."""
+    """Raise where a result could not be written, before the work begins."""
     from slideviz.cli.places import OutputPath, require_places
     from slideviz.mesh.io.file_checks import same_file
 
@@ -164,7 +164,7 @@ def _require_places(
 
 
 def _require_series(path: Path) -> None:
-    """Raise CaseError where the name of the file is not one that all steps can be in."""
+    """Raise CaseError where the file's ending is not that of a format for all steps."""
     from slideviz.errors import CaseError
     from slideviz.mesh.io.vtkhdf import VTKHDF
 
@@ -176,14 +176,17 @@ def _require_series(path: Path) -> None:
 
 
 def _default_output(case: Case) -> Path:
-    """Return ``name_def.su2`` in the current folder for ``.../name.su2``."""
+    """Return the output file where none is given: ``name_def.su2`` for ``.../name.su2``.
+
+    It is in the current folder, and has the ending of MESH_OUT_FORMAT if given.
+    """
     assert case.mesh_file is not None
     ending = f".{case.mesh_out_format}" if case.mesh_out_format else case.mesh_file.suffix
     return Path(f"{case.mesh_file.stem}_def{ending}")
 
 
 def _format_of(output: Path, case: Case) -> FileFormat | None:
-    """Return the format that MESH_OUT_FORMAT asks for; the name of -o must not contradict it."""
+    """Return the format of MESH_OUT_FORMAT, or None; raise CaseError if ``-o`` contradicts it."""
     from slideviz.errors import CaseError
     from slideviz.session.formats import MESH_FORMATS
 
@@ -197,7 +200,11 @@ def _format_of(output: Path, case: Case) -> FileFormat | None:
 
 
 def pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
-    """Return all steps; of very many only the last keeps its mesh."""
+    """Deform a mesh, and return all steps; write each step's mesh where asked for.
+
+    Once meshes take more than `KEPT_BYTES`, only the last step keeps its own; earlier steps have
+    the undeformed mesh instead.
+    """
     from slideviz import deform, write
     from slideviz.cli.progress import Bar
     from slideviz.mesh.io.files import usual_ending
@@ -221,9 +228,10 @@ def pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
 
 @contextmanager
 def _series(path: Path | None, mesh: Mesh, metric: Metric) -> Iterator[Callable[[Mesh], object]]:
-    """Return what takes the mesh of each step, after the undeformed one; nothing without a file.
+    """Context with a function that adds the mesh of a step to the file of all steps.
 
-    Each step has the quality of its cells and the displacement of its points.
+    The undeformed mesh is in it already. Each mesh has the quality of its cells and the
+    displacement of its points. Without a ``path`` the function does nothing.
 
     Raises
     ------

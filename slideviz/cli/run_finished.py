@@ -1,7 +1,7 @@
-"""What a streamed run leaves beside its mesh when it has finished, so that it is not done twice.
+"""The note that a finished streamed run leaves, so that ``--resume`` does not run it again.
 
-A hidden note has the report, and the size and time of each file: a file that is another by now, or
-another case, mesh or version, is not what the run has made.
+It is a hidden file beside the mesh, with the report, and size and time of each file written. It
+counts only if these files have not changed since, and case, mesh and version are the same.
 """
 
 from __future__ import annotations
@@ -16,11 +16,14 @@ from slideviz.errors import Note, SlidevizError
 from slideviz.mesh.io.atomic import atomic_write
 
 Folded = Mapping[int, tuple[int, int]]
-"""Type and first step of the inverted cells with the lowest numbers."""
+"""VTK type and first inverted step of the inverted cells with the lowest numbers, by number."""
 
 
 def note_finished(about: str, files: list[Path], report: dict, folded: Folded) -> None:
-    """Leave a note of a run, beside the first of its files; none where that is not possible."""
+    """Write the note of a finished run beside the first of its files, if it can be written.
+
+    ``about`` is the hash of case, mesh and version (`slideviz.deformation.streaming.about_run`).
+    """
     note = {
         "about": about,
         "files": _states(files),
@@ -33,7 +36,7 @@ def note_finished(about: str, files: list[Path], report: dict, folded: Folded) -
 
 
 def finished(about: str, files: list[Path]) -> tuple[dict, Folded] | None:
-    """Return report and inverted cells of the same run, if its files are as it left them."""
+    """Return report and inverted cells of a finished run; None if there is no valid note of it."""
     try:
         note = json.loads(_note_of(files[0]).read_bytes())
         if note["about"] != about or note["files"] != _states(files):
@@ -51,6 +54,6 @@ def _note_of(output: Path) -> Path:
 
 
 def _states(files: list[Path]) -> list[list[str | int]]:
-    """Return name, bytes and time of each file."""
+    """Return name, size in bytes and time of change of each file."""
     found = [(path.name, path.stat()) for path in files]
     return [[name, state.st_size, state.st_mtime_ns] for name, state in found]

@@ -1,4 +1,4 @@
-"""What a run tells: its report, the quality of each cell as a file, and a summary."""
+"""The outcome of a run: its report, the file of the quality of each cell, the printed summary."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from slideviz.mesh.quality import Quality
 
 CELLS = "quality of each cell"
+"""What the summary calls the file of qualities."""
 QUALITY_BYTES = 20
-"""Of a line of the file of qualities: 16 or 17 digits."""
+"""Most bytes of a line in the file of qualities: 16 or 17 digits."""
 _ROWS = 1 << 18
 
 
@@ -27,7 +28,17 @@ def tell(
     before: Quality,
     folded: Mapping[int, tuple[int, int]],
 ) -> int:
-    """Write and print the report of a run, and return the exit code."""
+    """Write the report of a run, print its summary and warnings, and return the exit code.
+
+    Parameters
+    ----------
+    files : dict of str to Path or None
+        The files written so far, by their words in the summary.
+    found, before : Quality
+        Quality after and before the run.
+    folded : mapping of int to (int, int)
+        VTK type and first inverted step of the inverted cells with the lowest numbers.
+    """
     if not save_report(arguments, report) and not arguments.quiet:
         files |= {"report": arguments.json, "picture": arguments.picture}
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
@@ -37,7 +48,7 @@ def tell(
 
 
 def save_report(arguments: argparse.Namespace, report: dict) -> bool:
-    """Write the report, and the convergence, where asked for; tell whether it was printed."""
+    """Write report and convergence where asked for; return whether the report was printed."""
     from slideviz.cli.report import save_history, save_json
 
     if arguments.history:
@@ -58,7 +69,7 @@ def tell_warnings(report: dict, folded: Mapping[int, tuple[int, int]], *, quiet:
 
 
 def write_qualities(path: Path, found: Quality) -> None:
-    """Write one size-skew value for each cell, as RBF-SliDe's GENERATE_QUALITY does."""
+    """Write a line with the size-skew quality of each cell, as RBF-SliDe's GENERATE_QUALITY."""
     import numpy as np
     import orjson
 
@@ -75,7 +86,7 @@ def write_qualities(path: Path, found: Quality) -> None:
 def _print_run(
     report: dict, found: Quality, before: Quality, files: dict[str, Path | None]
 ) -> None:
-    """Print the summary of a run; ``found`` and ``before`` are the quality after it and before."""
+    """Print the summary of a run; ``found`` and ``before`` are its quality after and before."""
     from slideviz.case.words import counted
     from slideviz.cli.report import quality_lines, table
 
@@ -105,7 +116,7 @@ def _print_run(
 
 
 def _inverted_sentence(report: dict, folded: Mapping[int, tuple[int, int]]) -> str:
-    """Return which cells are inverted, and what helps."""
+    """Return a sentence on how many and which cells are inverted, and what may help."""
     from slideviz.mesh.elements import ELEMENTS
 
     inverted, cells = report["quality"]["inverted"], report["quality"]["cells"]
@@ -121,7 +132,7 @@ def _inverted_sentence(report: dict, folded: Mapping[int, tuple[int, int]]) -> s
 
 
 def _advice(report: dict) -> str:
-    """Return what this case has not tried yet."""
+    """Return the remedies that the case of the report has not tried yet, as words."""
     ideas = ["STEPS= auto" if report["steps"] < 20 else "a smaller motion"]
     if report["method"] != "rbf":
         ideas.append("METHOD= rbf")

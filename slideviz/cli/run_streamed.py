@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 def require_streamable(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> None:
-    """Raise where a run is to be streamed and cannot be, before anything is made for it.
+    """Raise where ``--stream`` or ``--resume`` is given for a run that cannot be streamed.
 
     Raises
     ------
     CaseError, MeshError
-        It needs the mesh in memory, or mesh or result are no SU2 meshes.
+        An option or the method needs the mesh in memory, or mesh or output are no SU2 meshes.
     """
     if not (arguments.stream or arguments.resume):
         return
@@ -54,7 +54,7 @@ def require_streamable(
 def is_to_be_streamed(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> bool:
-    """Tell whether a run is streamed: as asked for, or as the mesh is too large for the memory."""
+    """Return whether to stream a run: if asked for, or possible and memory is too small for it."""
     from slideviz.deformation.memory import missing_memory
 
     if arguments.stream:
@@ -84,7 +84,10 @@ def run_streamed(
     qualities: Path | None,
     kind: FileFormat | None,
 ) -> int:
-    """Deform a mesh from file to file, with the same report as ``run``."""
+    """Deform a mesh from file to file, with the same report as ``run``; return the exit code.
+
+    ``begin`` is the time of ``time.perf_counter`` when the command began.
+    """
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import LISTED, run_report
     from slideviz.cli.run_finished import finished, note_finished

@@ -28,7 +28,7 @@ def add_sample(calls: argparse._SubParsersAction) -> None:
 
 
 def sample(arguments: argparse.Namespace) -> int:
-    """Write a sample case, or list the samples."""
+    """Write a sample case, or list the samples; return the exit code."""
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.report import table
     from slideviz.samples.table import SAMPLES, write_sample

@@ -91,11 +91,22 @@ def add_section(calls: argparse._SubParsersAction) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """What a section is cut of.
+    """A mesh to be cut, and the section.
 
-    ``mesh`` and ``base`` (undeformed, where there is a reference) may be parts: the cells that the
-    section can cut. ``outer`` has points (n, d) that tell how far the whole reaches, ``reference``
-    is the file of the undeformed mesh.
+    Attributes
+    ----------
+    mesh, base : Mesh
+        The mesh and, where there is a reference, the undeformed one; with ``--stream`` only the
+        cells that the section can cut.
+    found : Quality
+        Quality of the cells of ``mesh``.
+    chosen : Section
+    matrices : dict of int to (4, 4) float64
+        The transformation of each passage, by number.
+    outer : (n, d) float64
+        Points that have the extent of the whole mesh.
+    reference : Path or None
+        The file of the undeformed mesh.
     """
 
     mesh: Mesh
@@ -108,7 +119,7 @@ class _Scene:
 
 
 def section(arguments: argparse.Namespace) -> int:
-    """Draw a section of a mesh."""
+    """Draw a section of a mesh to a file; return the exit code."""
     from slideviz.cli.places import OutputPath, require_places
     from slideviz.errors import CaseError
     from slideviz.plots.around import surroundings
@@ -183,7 +194,7 @@ def _streamed(arguments: argparse.Namespace, case: Case | None) -> _Scene:
 
 
 def _report(arguments: argparse.Namespace, scene: _Scene, shown: SectionInRun) -> int:
-    """Write or print the numbers of the cut, and return the exit code."""
+    """Print the numbers of the cut or write them as JSON, and return the exit code."""
     from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.report import save_json
 
@@ -210,7 +221,7 @@ def _report(arguments: argparse.Namespace, scene: _Scene, shown: SectionInRun) -
 
 
 def _check_usage(arguments: argparse.Namespace) -> None:
-    """Leave with code 2 where options contradict each other."""
+    """Exit with code 2 where options contradict each other."""
     if arguments.color == "displacement" and not (arguments.reference or arguments.case):
         arguments.wrong_usage("--color displacement needs --reference UNDEFORMED")
     if arguments.unrolled and arguments.asked.section.shape.terms.flat != "unrolled":
@@ -221,7 +232,10 @@ def _check_usage(arguments: argparse.Namespace) -> None:
 def _section_and_passages(
     arguments: argparse.Namespace, mesh: Mesh, base: Mesh | None, case: Case | None
 ) -> tuple[Section, dict[int, FloatArray]]:
-    """Return the section that is asked for, and the transformation of each passage."""
+    """Return the section that is asked for, and the transformation (4, 4) of each passage.
+
+    A section without an axis gets that of the case, or of the rotational period.
+    """
     import numpy as np
 
     from slideviz.errors import CaseError
@@ -233,7 +247,7 @@ def _section_and_passages(
     )
     pair: Pair | None = None
     if not asked.axis or arguments.copies:
-        # The undeformed mesh, for a deformed one need not repeat exactly.
+        # Of the undeformed mesh: a deformed one need not be exactly periodic.
         pair = find_period(base or mesh, case)
     if not asked.axis and case is not None:
         chosen = replace(chosen, direction=case.axis, origin=case.origin)

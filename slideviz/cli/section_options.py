@@ -1,4 +1,4 @@
-"""The texts of sections, sizes and limits in the options of ``slideviz section``."""
+"""Reads the texts of sections, sizes and limits in the options of ``slideviz section``."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
 
 MOST_COPIES = 100
-"""On each side: more could neither be told apart nor be drawn in reasonable time."""
+"""Most passages on each side: more could not be seen, and take too long to draw."""
 
 
 def glued(argv: Sequence[str]) -> list[str]:
-    """Return the words with lists that begin with a minus sign tied to their option.
+    """Return the words, with values that begin with a minus sign joined to their option by ``=``.
 
-    argparse takes ``-1,0,0`` for an option of its own.
+    argparse would take ``-1,0,0`` as an option.
     """
     words: list[str] = []
     for word in argv:
@@ -41,19 +41,19 @@ def glued(argv: Sequence[str]) -> list[str]:
 
 @dataclass(frozen=True)
 class Asked:
-    """The section of an option; ``axis`` is false where its axis was left out."""
+    """The section of an option; ``axis`` is whether the option has its axis or normal."""
 
     section: Section
     axis: bool = True
 
 
 def reader(row: ShapeTerms) -> Callable[[str], Asked]:
-    """Return the function that reads the sections of a shape."""
+    """Return the function that reads the option's text for a shape."""
     return partial(about_axis, row) if row.size is not None else plane
 
 
 def plane(text: str) -> Asked:
-    """Return the plane that a text like ``0,0,1,0,0,0.5`` or ``z=0.5`` means."""
+    """Return the plane of a text like ``0,0,1,0,0,0.5`` (normal, point) or ``z=0.5``."""
     word, sign, value = text.partition("=")
     if sign:
         if word.strip() not in AXES:
@@ -67,7 +67,10 @@ def plane(text: str) -> Asked:
 
 
 def about_axis(row: ShapeTerms, text: str) -> Asked:
-    """Return the section that a text like ``0.25``, ``r=0.25,x`` or ``0.25,0,0,1`` means."""
+    """Return the cylinder or cone of a text like ``0.25``, ``r=0.25,x`` or ``0.25,0,0,1``.
+
+    That is its size, then its axis, if given, and a point on it; the axis is z where it is not.
+    """
     assert row.size is not None
     number, _, axis = text.partition(",")
     word, sign, value = number.partition("=")
@@ -119,7 +122,7 @@ def neighbours(text: str) -> int | Literal["wheel"]:
 def _section(
     kind: str, origin: Sequence[float], direction: Sequence[float], size: float = 0.0
 ) -> Section:
-    """Return a section, whose mistakes are those of the command line."""
+    """Return a section; its CaseError becomes an ArgumentTypeError. Missing numbers are 0."""
     from slideviz.errors import CaseError
     from slideviz.sections.model import Section
 
@@ -132,7 +135,10 @@ def _section(
 
 
 def _numbers(text: str, counts: tuple[int, ...], form: str) -> list[float]:
-    """Return the numbers of a list with commas."""
+    """Return the numbers of a list with commas; there must be as many as one of ``counts``.
+
+    ``form`` is the form of the list, for messages.
+    """
     try:
         values = [float(word) for word in text.split(",")]
     except ValueError:

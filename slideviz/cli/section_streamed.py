@@ -1,4 +1,4 @@
-"""``slideviz section --stream``: of a mesh larger than memory, the cells that a section can cut."""
+"""``slideviz section --stream``: finds the cells that a section can cut, block by block."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 
 @contextmanager
 def skins(arguments: argparse.Namespace, case: Case | None) -> Iterator[tuple[Looked, Mesh | None]]:
-    """Return a mesh to be looked at, and the skin of the undeformed one where there is one.
+    """Context with a mesh to be read block by block, and the skin of the undeformed one or None.
 
     Raises
     ------
     CaseError
         The mesh is 2D.
     MeshError
-        As of `slideviz.cli.streamed.looked`.
+        As by `slideviz.cli.streamed.looked`.
     """
     with looked(arguments, case) as seen:
         if seen.skin.dim == 2:
@@ -47,7 +47,21 @@ def skins(arguments: argparse.Namespace, case: Case | None) -> Iterator[tuple[Lo
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """Some cells: their numbers (k,), types (k,), nodes and quality; points (n,) by number."""
+    """Cells that a section can cut.
+
+    Attributes
+    ----------
+    ids, types : (k,)
+        Their numbers in the whole mesh, and VTK types.
+    flat : (c,) int64
+        The nodes of all cells, one cell after the other, by their numbers in the whole mesh.
+    values, size, skew, status, signs : (k,)
+        Their quality.
+    nodes : (n,) int64
+        The numbers of their points in the whole mesh.
+    points, before : (n, d) float64
+        Their points now, and undeformed (where there is a reference).
+    """
 
     ids: IntArray
     types: np.ndarray
@@ -63,7 +77,7 @@ class _Kept:
 
     @classmethod
     def of(cls, part: Rated, chosen: IntArray) -> _Kept:
-        """Return the chosen cells (k,) of a block."""
+        """Return the cells of a block with the places ``chosen`` (k,) in it."""
         cells, found = part.mesh.cells.take(chosen), part.quality
         base = part.mesh if part.base is None else part.base
         return cls(
@@ -89,22 +103,24 @@ def cells_near(
     section: Section,
     matrices: Mapping[int, FloatArray],
 ) -> tuple[Mesh, Mesh | None, Quality]:
-    """Return the cells that a section can cut in any passage, and no others.
+    """Return the cells of a mesh that a section can cut in any passage.
 
     Parameters
     ----------
     skin : Mesh
-        That of the mesh.
+        The skin of the mesh.
     mesh, reference : file and zone
+        The cells of the mesh, and of the undeformed one.
     matrices : Mapping of int to (4, 4)
         The transformation of each passage.
 
     Returns
     -------
     mesh, base : Mesh
-        The cells now and, where there is a reference, undeformed, in the order of the whole.
+        A mesh of these cells and, where there is a reference, the undeformed one; by ascending
+        number of the cells.
     quality : Quality
-        Theirs, as in the whole mesh.
+        The quality of these cells.
     """
     ways = [matrix for matrix in matrices.values() if not keeps(section, matrix)]
     if len(ways) < len(matrices):
@@ -121,7 +137,7 @@ def cells_near(
 
 
 def _meets(section: Section, points: FloatArray, cells: Cells) -> np.ndarray:
-    """Tell which cells have nodes on both sides of a section, or on it, (m,)."""
+    """Return a mask (m,) of the cells with nodes on both sides of a section, or on it."""
     level = np.nan_to_num(section.distance(points), nan=np.inf)[cells.connectivity]
     starts = cells.offsets[:-1]
     low, high = np.minimum.reduceat(level, starts), np.maximum.reduceat(level, starts)

@@ -1,4 +1,4 @@
-"""``--stream`` of the commands that look at a mesh: it is read block by block."""
+"""``--stream`` of info, quality and section: the mesh is read block by block."""
 
 from __future__ import annotations
 
@@ -20,9 +20,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Looked:
-    """A mesh that is looked at block by block: its skin, and the file and zone of its cells.
+    """A mesh that is read block by block.
 
-    Where there is a reference, ``base`` is the same of it, and ``reference`` its file as given.
+    Attributes
+    ----------
+    skin : Mesh
+        Its boundary and the cells at it.
+    mesh : (Path, int or None)
+        File and zone of all its cells.
+    base : Given or None
+        The undeformed mesh, if there is a reference.
+    reference : Path or None
+        The file of the reference, as the user gave it.
     """
 
     skin: Mesh
@@ -32,18 +41,22 @@ class Looked:
 
     @property
     def base_zone(self) -> Zone | None:
-        """Return file and zone of the cells of the reference."""
+        """Return file and zone of the cells of the reference, or None."""
         return None if self.base is None else (self.base.path, self.base.zone)
 
 
 @contextmanager
 def looked(arguments: argparse.Namespace, case: Case | None) -> Iterator[Looked]:
-    """Return a mesh to be looked at; its reference is as of `slideviz.cli.options.reference_of`.
+    """Context with the mesh of a command, and its reference.
+
+    The reference is found as by `slideviz.cli.options.reference_of`. Binary copies of texts are in
+    the folder for temporary files until the context ends.
 
     Raises
     ------
     MeshError
-        It is of no format that can be streamed, or has a mistake, or the reference has other cells.
+        The mesh is of no format that can be streamed, or has a mistake; or ``--reference`` has
+        other cells.
     """
     from slideviz.cli.progress import Bar
     from slideviz.deformation.given_mesh import given_mesh
@@ -83,12 +96,12 @@ def looked(arguments: argparse.Namespace, case: Case | None) -> Iterator[Looked]
 def rated(
     arguments: argparse.Namespace, case: Case | None = None
 ) -> Iterator[tuple[Mesh, Whole, Path | None]]:
-    """Return the skin of a mesh, what all its cells gave, and the file of the reference.
+    """Context with the skin of a mesh, quality and counts of all cells, and the reference's file.
 
     Raises
     ------
     MeshError
-        As of `looked`.
+        As by `looked`.
     """
     from slideviz.cli.progress import Bar
     from slideviz.deformation.rated import rated_whole
@@ -109,13 +122,7 @@ def rated(
 
 
 def require_no_file(arguments: argparse.Namespace) -> None:
-    """Raise where all cells are to be written.
-
-    Raises
-    ------
-    CaseError
-        There is an ``-o``.
-    """
+    """Raise CaseError where ``-o`` is given with ``--stream``: writing needs the whole mesh."""
     from slideviz.errors import CaseError
 
     if arguments.output is not None:

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from slideviz.design.sweeps.row import DesignRow
 
 _LISTED = 5
-"""Designs that are named, of those with inverted cells, and reasons of those that failed."""
+"""Most designs that are listed in one line, and most reasons of failed designs that are printed."""
 _CONNECTING = 10.0
-"""Seconds to wait for a scheduler."""
+"""Seconds to wait for a connection to a scheduler."""
 
 
 def add_sweep(calls: argparse._SubParsersAction) -> None:
@@ -62,7 +62,7 @@ def add_sweep(calls: argparse._SubParsersAction) -> None:
 
 
 def sweep(arguments: argparse.Namespace) -> int:
-    """Deform a mesh by many designs, and write the table of results."""
+    """Deform a mesh by many designs, and write the table of results; return the exit code."""
     from slideviz import read
     from slideviz import sweep as sweep_of
     from slideviz.case.words import counted
@@ -112,7 +112,7 @@ def sweep(arguments: argparse.Namespace) -> int:
 
 
 def _print_columns(case: Any) -> int:
-    """Print the columns that a table of designs can have, with the values of the case."""
+    """Print the possible columns of a table of designs, with the case's values; return the code."""
     from slideviz.case.key import FILES, VIEW
     from slideviz.case.keys import KEYS
     from slideviz.cli.exit_codes import DONE
@@ -130,12 +130,12 @@ def _print_columns(case: Any) -> int:
 
 @contextmanager
 def _executor(arguments: argparse.Namespace) -> Iterator[Executor | None]:
-    """Return a context with the executor of ``--scheduler``; None where there is none.
+    """Context with the executor of ``--scheduler``; with None where the option is not given.
 
     Raises
     ------
     CaseError
-        Dask is not installed, or no scheduler answers.
+        Dask is not installed, no scheduler answers, or ``--workers`` is given, too.
     """
     from slideviz.errors import CaseError
 
@@ -166,7 +166,7 @@ def _executor(arguments: argparse.Namespace) -> Iterator[Executor | None]:
 def _pulled(
     arguments: argparse.Namespace, rows: Iterator[DesignRow], total: int, results: Path
 ) -> list[DesignRow]:
-    """Return all rows; a bar tells how many there are and how long the rest will take."""
+    """Run all designs and return their rows, with a progress bar."""
     from slideviz.case.words import counted
     from slideviz.mesh.io.cleanup import keep
 
@@ -211,7 +211,7 @@ def _number(row: DesignRow) -> int:
 
 
 def _named(row: DesignRow) -> dict[str, Any]:
-    """Return a design with its values and quality."""
+    """Return the entry of a report for a design: number, quality and values."""
     return {"design": row.design, "min": row.min, "mean": row.mean, "values": dict(row.values)}
 
 
@@ -242,7 +242,7 @@ def _print_sweep(report: dict[str, Any]) -> None:
 
 
 def _warn(warnings: Sequence[str], rows: Sequence[DesignRow], quiet: bool) -> None:
-    """Print the warnings of the case, and why designs failed, each reason once."""
+    """Print the warnings of the case, and why designs failed, each reason with its designs."""
     from slideviz.cli.report import print_remarks
 
     print_remarks(warnings, quiet=quiet)

@@ -1,7 +1,7 @@
-"""Output to the terminal, with control characters shown as text.
+r"""Output to the terminal, in which control characters are escaped, as ``\x1b``.
 
-Names of boundaries and files, and what libraries say, may hold control characters, which would
-clear the screen, change its colours or pretend to be another line.
+Names of boundaries and files, and messages of libraries, may have control characters, which would
+clear the screen, change its colours or imitate another line.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from typing import Any, TextIO
 from slideviz.errors import SlidevizError
 
 _SIMPLER = str.maketrans({"█": "#", "▏": "|", "…": "...", "’": "'", "“": '"', "”": '"'})
-"""What is shown where the encoding of the terminal has no such character."""
+"""Replacements for characters that the encoding of the terminal does not have."""
 
 
 class Terminal:
-    r"""A stream that shows control characters as ``\x1b``, and others it cannot encode likewise.
+    r"""A stream that escapes control characters, as ``\x1b``, and others that it cannot encode.
 
     Parameters
     ----------
     stream : file of text
-        Where it goes.
+        The stream that is written to.
     needed : bool
-        Whether it is an error that it cannot be written to.
+        Whether it is an error if it cannot be written to; else the output is dropped.
     """
 
     def __init__(self, stream: TextIO, needed: bool) -> None:
@@ -38,7 +38,7 @@ class Terminal:
         return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
-        """Write text; returns its length."""
+        """Write text, control characters escaped; return its length."""
         self.control(plain(text))
         return len(text)
 
@@ -57,7 +57,7 @@ class Terminal:
         try:
             yield
         except OSError as problem:
-            # What is left in it would be written again, in vain, when the program ends.
+            # Else the buffer would be written once more, in vain, when the program ends.
             with suppress(OSError, ValueError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
             if not self._needed:
@@ -70,14 +70,14 @@ class Terminal:
 
 
 def plain(text: str) -> str:
-    """Return a text with its control characters shown; line breaks and tabs stay."""
+    """Return a text with its control characters escaped, but for line breaks and tabs."""
     if text.isprintable():
         return text
     return "".join(sign if _is_plain(sign) else _shown(sign) for sign in text)
 
 
 def _is_plain(sign: str) -> bool:
-    # Spaces of other widths count as not printable.
+    # Other kinds of spaces count as not printable.
     return sign.isprintable() or sign in "\n\t" or unicodedata.category(sign) == "Zs"
 
 
@@ -96,7 +96,7 @@ def _encodable(text: str, encoding: str) -> str:
 
 @contextmanager
 def terminal() -> Iterator[None]:
-    """Return a context in which all that is printed goes through `Terminal`."""
+    """Context in which stdout and stderr are each a `Terminal`."""
     out, err = Terminal(sys.stdout, needed=True), Terminal(sys.stderr, needed=False)
     with redirect_stdout(out), redirect_stderr(err):
         yield
@@ -109,6 +109,6 @@ def control(text: str) -> None:
 
 
 def say(what: str, text: str) -> None:
-    """Print a note or warning where errors go; nothing where the text is empty."""
+    """Print a text to stderr as a ``what`` (note or warning); nothing where it is empty."""
     if text:
         print(f"slideviz: {what}: {text}", file=sys.stderr, flush=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def window(arguments: argparse.Namespace) -> int:
-    """Open the window, with a file if one is given."""
+    """Open the window, with a file if one is given; return the exit code."""
     from slideviz.errors import CaseError
     from slideviz.export.offscreen import missing_screen
 
@@ -39,7 +39,7 @@ def add_shots(calls: argparse._SubParsersAction) -> None:
 
 
 def shots(arguments: argparse.Namespace) -> int:
-    """Draw the window in typical states."""
+    """Draw the window in typical states as pictures; return the exit code."""
     from slideviz.cli.exit_codes import DONE
     from slideviz.gui.shots import shots as draw
 
@@ -58,7 +58,7 @@ def shots(arguments: argparse.Namespace) -> int:
 
 
 def _is_checkout(folder: Path) -> bool:
-    """Tell whether a folder has slideviz's own sources, and so the pictures of its README."""
+    """Return whether a folder has slideviz's own sources, and so the pictures of its README."""
     try:
         return 'name = "slideviz"' in (folder / "pyproject.toml").read_text(encoding="utf-8")
     except (OSError, ValueError):
