@@ -1,4 +1,4 @@
-"""slideviz: deform CFD meshes with radial basis functions, see and keep their quality.
+"""slideviz: deform CFD meshes with radial basis functions, and measure and preserve their quality.
 
 The public names are loaded when first used, so that ``slideviz --version`` is quick.
 """

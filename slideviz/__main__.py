@@ -12,13 +12,14 @@ _ENDS = {
     signal.SIGINT: "cancelled",
     signal.SIGTERM: "ended by SIGTERM",
 }
-"""The signals that end any command at any moment: code 128 and the number of the signal."""
+"""Signals that end any command at any moment, with words for a message; the exit code is 128 plus
+the number of the signal."""
 if hasattr(signal, "SIGHUP"):  # Windows has none
     _ENDS[signal.SIGHUP] = "ended by SIGHUP"
 
 
 def main() -> int:
-    """Run the command line and return its exit code; ``--version`` loads nothing heavy."""
+    """Run the command line and return its exit code; ``--version`` loads no heavy library."""
     _hold_streams()
     _heed_signals()
     if sys.argv[1:] in (["--version"], ["-V"]):
@@ -32,7 +33,10 @@ def main() -> int:
 
 
 def _hold_streams() -> None:
-    """Open what the caller closed (``>&-``); else the next file that is opened would be it."""
+    """Open standard streams that the caller closed (``>&-``), as the null device.
+
+    Else the next file that is opened would take the place of such a stream.
+    """
     for number in range(3):
         try:
             os.fstat(number)
@@ -44,10 +48,11 @@ def _hold_streams() -> None:
 
 
 def _heed_signals() -> None:
-    """Let a thread wait for the signals that end a command; those that are ignored stay so.
+    """Start a thread that ends the process at a signal of `_ENDS`; ignored signals stay ignored.
 
-    Python would raise an error wherever it is: in the middle of an import of VTK or Matplotlib,
-    which then crash, or where a library swallows it; and not at all while one computes.
+    Python's own handlers raise an error in the main thread at any place: also in the middle of the
+    import of VTK or Matplotlib, which crash then, or where a library swallows it. And they do not
+    run while compiled code computes.
     """
     heeded = [number for number in _ENDS if signal.getsignal(number) != signal.SIG_IGN]
     read, write = os.pipe()
@@ -56,30 +61,30 @@ def _heed_signals() -> None:
     signal.set_wakeup_fd(write, warn_on_full_buffer=False)
     for number in heeded:
         signal.signal(number, lambda *_: None)
-    # Of all that is done at the end this comes last, as nothing was registered before.
+    # Functions registered first are called last: signals count until all others are done.
     atexit.register(_ignore, heeded)
 
 
 def _ignore(numbers: list[signal.Signals]) -> None:
-    """Ignore signals while Python ends: it would let them kill a command that is done."""
+    """Ignore signals, while Python ends: else they could still kill a command that is done."""
     for number in numbers:
         signal.signal(number, signal.SIG_IGN)
 
 
 def _wait(read: int) -> None:
-    """End the process when a signal comes."""
+    """Wait for a signal at the pipe ``read``, then clean up and end the process with a message."""
     number = 0
     while number not in _ENDS:
         number = os.read(read, 1)[0]
     try:
-        # Nothing is to be cleaned up as long as this is not loaded.
+        # As long as this module is not loaded, there is nothing to clean up.
         cleanup, left = sys.modules.get("slideviz.mesh.io.cleanup"), "nothing half-written is left"
         if cleanup is not None and hasattr(cleanup, "left"):  # it may be being loaded
             left = cleanup.left()
             cleanup.clean_up()
         wipe = "\r\033[K" if os.isatty(2) else ""  # there may be a progress bar
         words = f"{wipe}slideviz: {_ENDS[signal.Signals(number)]}; {left}\n"
-        # Past Python's streams, which another thread may hold.
+        # Not by Python's streams, which another thread may have locked.
         os.write(2, words.encode())
     finally:
         os._exit(128 + number)

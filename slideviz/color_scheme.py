@@ -1,4 +1,4 @@
-"""Color schemes of light and dark views and of paper, and colours that are alike in all."""
+"""Color schemes of light and dark views and of paper, and colours that are the same in all."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from slideviz.terms import COLOUR_MAPS
 
 COLOUR_MAP = next(iter(COLOUR_MAPS))
-"""Perceptually even, and the same for colour-blind people and on paper."""
+"""The default colour map: perceptually uniform, and readable for colour-blind people."""
 
 INVERTED_COLOUR = "#e8112d"
 SELECTED_COLOUR = "#ffb000"
 VALUE_EDGE = "#000000"
-"""Lines between cells in the colours of values or roles: what all maps are seen best under."""
+"""Edges of cells that are coloured by values or roles: it differs from all colours of maps."""
 INTERSECTION_COLOUR = "#e8112d"
-"""The motion ghost where it runs into another boundary."""
+"""The motion ghost of a boundary that crosses another one."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class ColorScheme:
     ----------
     name : str
     background, background_top : str
-        Bottom and top of the background.
+        Colours of the bottom and the top of the background, as ``#rrggbb``.
     text, edge, cell, ghost : str
-        Letters, edges of cells, faces without a value, undeformed boundaries.
+        Colours of letters, of edges of cells, of faces without a value, of undeformed boundaries.
     """
 
     name: str

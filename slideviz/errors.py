@@ -1,7 +1,7 @@
 """Every error that slideviz raises on purpose.
 
-A message has the value, the rule and the remedy, and where there is one the place
-(``file:line:``), so that the command line and the window can show it as it is.
+A message has the wrong value, the rule and the remedy, and for a file its place (``file:line:``).
+The command line and the window show it as it is.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _NEEDED = {
 
 
 class SlidevizError(Exception):
-    """Something that the user can put right: the message says what and how."""
+    """An error that the user can correct; the base of all others."""
 
 
 class MeshError(SlidevizError):
@@ -33,7 +33,7 @@ class MeshError(SlidevizError):
 
 
 class CaseError(SlidevizError):
-    """What is asked of the mesh is wrong: case file, role, motion or displacement file."""
+    """The case is wrong: its file, a role, a motion, a setting or a displacement file."""
 
 
 class DeformError(SlidevizError):
@@ -41,7 +41,11 @@ class DeformError(SlidevizError):
 
 
 class NodeError(DeformError):
-    """Some nodes stand in the way; ``sentence`` has a ``{}`` for the number of each."""
+    """Some nodes make the deformation impossible.
+
+    ``sentence`` is the message with a ``{}`` for the number of each of ``nodes``, so that nodes can
+    be renumbered.
+    """
 
     def __init__(self, sentence: str, *nodes: int) -> None:
         super().__init__(sentence.format(*nodes))
@@ -53,7 +57,7 @@ class UnsoundError(DeformError):
 
 
 class ToleranceWarning(UserWarning):
-    """What was chosen for one displacement does not suffice for another."""
+    """Control nodes chosen for one displacement miss the tolerance for another (`Deformer`)."""
 
 
 class ConditionWarning(UserWarning):
@@ -65,13 +69,13 @@ class ArgumentError(SlidevizError, TypeError):
 
 
 class Cancelled(SlidevizError):
-    """The one who pulls the work asked it to stop; nothing is wrong."""
+    """The user stopped the work; nothing is wrong."""
 
 
 class Note(str):
-    """A sentence about a run that is worth knowing but harmless: nothing need be changed.
+    """A harmless remark on a run, which asks for no change.
 
-    It stands among the warnings of a step; a window can put it where it is in nobody's way.
+    It is a string among the warnings of a step; its type tells it from these.
     """
 
     __slots__ = ()

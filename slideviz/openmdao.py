@@ -1,8 +1,9 @@
 """OpenMDAO and MPhys: the deformation of a mesh as a component, with exact derivatives.
 
-`MeshDeformation` stands between what gives the surface (a parametrisation, a structure) and what
-needs the mesh (a flow solver); `MeshDeformationBuilder` puts it into the scenarios of MPhys, alone
-or before the flow solver of another builder. Variables have the names and tags of MPhys 2.
+`MeshDeformation` is the component between one that gives the surface (a parametrisation or a
+structure) and one that needs the mesh (a flow solver). `MeshDeformationBuilder` puts it into the
+scenarios of MPhys, alone or before the flow solver of another builder. Variables have the names and
+tags of MPhys 2.
 """
 
 from __future__ import annotations
@@ -37,21 +38,22 @@ MINIMUM, MEAN = "minimum_quality", "mean_quality"
 
 
 class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
-    """All points of a mesh from those of its moving surface.
+    """OpenMDAO component that computes all points of a mesh from those of its moving surface.
 
-    ``x_aero`` (m d) is the *current* surface, not its displacement: the coordinates of the moving
-    nodes, in the order of ``deformer.nodes``; ``aero_vol_coords`` (n d) are all points; both flat
-    and in units of the mesh. With ``quality=True`` there are also ``minimum_quality``, the smooth
-    minimum (`slideviz.QualityDerivative`), and ``mean_quality``.
+    The input ``x_aero`` (m d,) has the *current* coordinates of the moving nodes, in the order of
+    ``deformer.nodes``, not their displacement. The output ``aero_vol_coords`` (n d,) has all
+    points. Both are flat, and in the mesh's length unit. With ``quality=True`` there are two more
+    outputs, ``minimum_quality``, the smooth minimum (`slideviz.QualityDerivative`), and
+    ``mean_quality``.
 
-    Products with the Jacobian are those of the deformer, forward and reverse: exact for its frozen
-    choices. Those are made for the undeformed mesh, or what the deformer was refreshed at; give the
-    option another deformer of the same mesh, ``deformer.refresh(displacement)``, to renew them.
+    Products with the Jacobian, forward and reverse, are those of the deformer: exact for its frozen
+    choices, such as the control nodes. They are made for the undeformed mesh; to renew them, set
+    the option ``deformer`` to ``deformer.refresh(displacement)``.
 
-    It is made for one process: variables are not distributed.
+    Variables are not distributed: it is made for one process.
 
     Options: ``deformer``, a `slideviz.Deformer`; ``quality``; ``p``, the exponent of the smooth
-    minimum. What the deformer refuses is an `openmdao.api.AnalysisError`, after which an optimiser
+    minimum. Errors of the deformer become an `openmdao.api.AnalysisError`, after which an optimiser
     may try another design.
     """
 
@@ -80,7 +82,7 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
             self.add_output(MEAN, tags=["mphys_result"], desc="mean quality")
 
     def compute(self, inputs: Any, outputs: Any) -> None:
-        """Deform the mesh."""
+        """Deform the mesh, and write points and qualities to ``outputs``."""
         deformer, displacement = self._at(inputs)
         try:
             points = deformer.deform(displacement)
@@ -92,7 +94,7 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
             raise om.AnalysisError(str(problem)) from problem
 
     def compute_jacvec_product(self, inputs: Any, d_inputs: Any, d_outputs: Any, mode: str) -> None:
-        """Add the product of a vector with the Jacobian or with its transpose."""
+        """Add the product with the Jacobian to ``d_outputs``, or its transpose to ``d_inputs``."""
         if SURFACE not in d_inputs:
             return
         deformer, displacement = self._at(inputs)
@@ -125,7 +127,10 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
     def _measure(
         self, displacement: FloatArray, points: FloatArray | None = None
     ) -> QualityDerivative:
-        """Return the quality at a displacement; that of the last one is kept."""
+        """Return the quality and its derivative at a displacement (m, d); the last one is cached.
+
+        ``points`` (n, d) are those of the deformed mesh, if known.
+        """
         deformer, kept = self.options["deformer"], self._measured
         if kept is None or kept[0] is not deformer or not np.array_equal(kept[1], displacement):
             mesh = deformer.mesh
@@ -142,7 +147,7 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
 
 
 class MeshSurface(om.IndepVarComp):  # type: ignore[misc]
-    """The moving surface of the undeformed mesh, ``x_aero0_mesh`` (m d)."""
+    """OpenMDAO component whose output ``x_aero0_mesh`` (m d,) is the undeformed moving surface."""
 
     def initialize(self) -> None:
         """Declare the option."""
@@ -162,13 +167,13 @@ class MeshDeformationBuilder(Builder):  # type: ignore[misc]
     Parameters
     ----------
     deformer : Deformer
-        What deforms the mesh. Scenarios may share it.
+        Deforms the mesh. Scenarios may share it.
     solver : mphys.Builder, optional
         The builder of the flow solver, which takes ``aero_vol_coords``; its subsystems follow the
         deformation.
     in_coupling : bool
-        Deform the mesh within the coupling group, as a structure that deflects needs it; else once
-        before. Without a solver it is always there.
+        Whether to deform the mesh in the coupling group, as needed for a structure that deflects;
+        else once before it. Without a solver it is always in the coupling group.
     quality, p
         As the options of `MeshDeformation`.
     """
@@ -193,22 +198,22 @@ class MeshDeformationBuilder(Builder):  # type: ignore[misc]
             self.solver.initialize(comm)
 
     def get_mesh_coordinate_subsystem(self, scenario_name: str | None = None) -> om.IndepVarComp:
-        """Return what has the undeformed surface as ``x_aero0_mesh``."""
+        """Return the component with the undeformed surface, ``x_aero0_mesh``."""
         del scenario_name
         return MeshSurface(deformer=self.deformer)
 
     def get_pre_coupling_subsystem(self, scenario_name: str | None = None) -> om.Group | None:
-        """Return what comes before the coupling group."""
+        """Return the group before the coupling group: deformation and solver's part; or None."""
         solver = self.solver and self.solver.get_pre_coupling_subsystem(scenario_name)
         return self._group(not self.in_coupling, solver)
 
     def get_coupling_group_subsystem(self, scenario_name: str | None = None) -> om.Group | None:
-        """Return what is coupled."""
+        """Return the coupling group: deformation and solver's part; or None."""
         solver = self.solver and self.solver.get_coupling_group_subsystem(scenario_name)
         return self._group(self.in_coupling, solver)
 
     def get_post_coupling_subsystem(self, scenario_name: str | None = None) -> Any:
-        """Return what the solver has after the coupling group."""
+        """Return the subsystem that the solver has after the coupling group, or None."""
         solver = self.solver
         return None if solver is None else solver.get_post_coupling_subsystem(scenario_name)
 
@@ -217,11 +222,11 @@ class MeshDeformationBuilder(Builder):  # type: ignore[misc]
         return len(self.deformer.nodes)
 
     def get_ndof(self) -> int:
-        """Return the dimension of the mesh; transfer schemes of MPhys want 3."""
+        """Return the dimension of the mesh; transfer schemes of MPhys require 3."""
         return int(self.deformer.mesh.dim)
 
     def get_tagged_indices(self, tags: Sequence[str]) -> IntArray:
-        """Return which of the moving nodes (k,) are on boundaries of these names.
+        """Return the places (k,) in ``deformer.nodes`` of those on boundaries with these names.
 
         Raises
         ------
@@ -234,7 +239,7 @@ class MeshDeformationBuilder(Builder):  # type: ignore[misc]
         return np.flatnonzero(found)
 
     def _group(self, deforms: bool, solver: Any) -> om.Group | None:
-        """Return a group of the deformation, if it ``deforms``, and what the solver has for it."""
+        """Return a group with the deformation, if it ``deforms``, and a solver's part, or None."""
         if not deforms and solver is None:
             return None
         group = MPhysGroup()

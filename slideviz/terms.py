@@ -1,8 +1,9 @@
-"""Every enumeration once: its values, with their labels, tips and colours.
+"""All enumerations: their values, with labels, tips and colours.
 
-The values are those of a case file and of the command line. A type (``Sliding``) says which there
-are; the table beside it (``SLIDING``) has the words, and every list, check, option, legend and tip
-reads the table. This module imports nothing of slideviz and nothing heavy.
+Values are those of case files and of the command line. For each enumeration there is a type, such
+as ``Sliding``, and a table with the words for its values, such as ``SLIDING``. All lists, checks,
+options, legends and tips are made from the tables. This module imports no other module of slideviz
+and no heavy library.
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ class Term:
     Attributes
     ----------
     label : str
-        What it is called in a list whose heading says what the list is of.
+        Its words in a list with a heading.
     tip : str
-        What it means, for who is about to choose it.
+        Its meaning, as a tip.
     colour : str
-        What it is drawn in, ``#rrggbb``.
+        The colour it is drawn in, ``#rrggbb``; empty for none.
     alone : str
-        What it is called where no heading stands above it; the label if empty.
+        Its words without a heading, where they differ from ``label``.
     """
 
     label: str
@@ -35,7 +36,7 @@ class Term:
 
     @property
     def name(self) -> str:
-        """Return the label of the value where no heading stands above it."""
+        """Return the words for the value without a heading."""
         return self.alone or self.label
 
 
@@ -45,7 +46,7 @@ def labels(terms: Mapping[Any, Term]) -> dict[str, str]:
 
 
 def names(terms: Mapping[Any, Term]) -> dict[str, str]:
-    """Return the name of each value, where no heading stands above it."""
+    """Return the words for each value without a heading."""
     return {value: term.name for value, term in terms.items()}
 
 
@@ -64,7 +65,7 @@ PALETTE = {
     "purple": "#cc79a7",
     "black": "#000000",
 }
-"""Okabe and Ito's colours (2008), told apart by colour-blind people."""
+"""Okabe and Ito's colours (2008), which colour-blind people can distinguish."""
 
 # Files -------------------------------------------------------------------------------------
 
@@ -74,7 +75,7 @@ FILE_FORMATS: dict[FileFormat, Term] = {
     "su2": Term("SU2", "SU2’s text"),
     "su2b": Term("SU2B", "SU2’s binary mesh"),
 }
-"""The formats of SU2, by ending; the label is the value of MESH_FORMAT."""
+"""The formats of SU2, by ending; their labels are the values of MESH_FORMAT."""
 
 
 # Boundaries --------------------------------------------------------------------------------
@@ -84,7 +85,7 @@ Role = Literal["moving", "fixed", "sliding", "periodic", "internal"]
 
 @dataclass(frozen=True)
 class RoleTerm(Term):
-    """A role; ``key`` is the key of a case file that lists the boundaries with this role."""
+    """The words for a role; ``key`` is the key of a case file that lists its boundaries."""
 
     key: str = ""
 
@@ -107,7 +108,7 @@ ROLES: dict[Role, RoleTerm] = {
         key="MARKER_INTERNAL",
     ),
 }
-"""Colours of the palette, and a grey for what does nothing."""
+"""The roles of boundaries; fixed ones are grey, others have colours of the palette."""
 
 NodeType = Literal[
     "moving", "fixed", "sliding_surface", "sliding_edge", "periodic", "internal", "control"
@@ -121,7 +122,7 @@ NODE_TYPES: dict[NodeType, Term] = {
     "internal": Term("internal", colour=ROLES["internal"].colour),
     "control": Term("control", colour="#d81b60"),
 }
-"""What boundary nodes may do; the colours of the roles, and two more that differ from them."""
+"""The types of boundary nodes in the view: as the roles, with sliding edges and control nodes."""
 
 MotionKind = Literal["translate", "rotate", "scale", "radial", "ffd", "file"]
 MOTION_KINDS: dict[MotionKind, Term] = {
@@ -138,7 +139,7 @@ FFD_BLENDINGS: dict[FfdBlending, Term] = {
     "BEZIER": Term("Bézier"),
     "BSPLINE_UNIFORM": Term("uniform B-spline"),
 }
-"""How the control points of a box for free-form deformation move what is inside."""
+"""The basis functions by which control points of an FFD box move the nodes inside."""
 
 # Method ------------------------------------------------------------------------------------
 
@@ -157,14 +158,14 @@ SLIDING: dict[Sliding, Term] = {
     ),
 }
 SLIDES = " or ".join(value for value in SLIDING if value != "none")
-"""The values that let nodes slide, for sentences."""
+"""The values of SLIDING_MODE with which nodes slide, for messages."""
 
 Method = Literal["rbf", "idw", "elastic"]
 
 
 @dataclass(frozen=True)
 class MethodTerm(Term):
-    """A method; ``slides_by`` is the value of SLIDING_MODE for its comparison with others."""
+    """The words for a method; with ``slides_by`` as SLIDING_MODE it is compared with others."""
 
     slides_by: Sliding = "ps"
 
@@ -178,14 +179,17 @@ METHODS: dict[Method, MethodTerm] = {
 
 @dataclass(frozen=True)
 class KernelTerm(Term):
-    """A radial function with a ``compact`` or a global reach, with a ``polynomial`` or not."""
+    """The words for a radial function.
+
+    ``compact`` is whether it has compact support, ``polynomial`` whether it needs the polynomial.
+    """
 
     compact: bool = True
     polynomial: bool = False
 
     @property
     def name(self) -> str:
-        """Return its label and its reach."""
+        """Return the label, with "compact" or "global" in brackets."""
         return f"{self.label} ({'compact' if self.compact else 'global'})"
 
 
@@ -205,7 +209,7 @@ KERNELS: dict[str, KernelTerm] = {
     "inverse-quadric": KernelTerm("inverse quadric", compact=False),
     "gaussian": KernelTerm("Gaussian", compact=False),
 }
-"""Those of thesis Tables 2.1 and 2.2; their functions are in `slideviz.rbf.kernels`."""
+"""The radial functions of thesis Tables 2.1 and 2.2, with formulas in `slideviz.rbf.kernels`."""
 
 Selection = Literal["block", "double", "one"]
 SELECTIONS: dict[Selection, Term] = {
@@ -213,7 +217,7 @@ SELECTIONS: dict[Selection, Term] = {
     "double": Term("two at a time"),
     "one": Term("one"),
 }
-"""How many control nodes data reduction takes in a cycle."""
+"""How many control nodes data reduction adds in a cycle."""
 
 DataReduction = Literal["AUTO", "NO", "YES"]
 DATA_REDUCTIONS: dict[DataReduction, Term] = {
@@ -225,7 +229,7 @@ DATA_REDUCTIONS: dict[DataReduction, Term] = {
     "NO": Term("off", "All boundary nodes are control nodes: exact, for up to some thousands."),
     "YES": Term("on", "As many boundary nodes as the tolerance needs; the rest is corrected."),
 }
-"""Whether some of the boundary nodes only are control nodes."""
+"""Whether only some of the boundary nodes are control nodes."""
 
 LevelCriterion = Literal["size", "tol"]
 LEVEL_CRITERIA: dict[LevelCriterion, Term] = {
@@ -260,7 +264,7 @@ PERIODIC_MODES: dict[PeriodicMode, Term] = {
 }
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-"""The directions that have a word."""
+"""The directions that can be given by a letter."""
 
 PeriodicKind = Literal["translational", "rotational"]
 PeriodicType = Literal["auto", "translational", "rotational"]
@@ -280,7 +284,7 @@ PERIODIC_DIRECTIONS: dict[str, tuple[int, PeriodicKind | None]] = {
     "r": (0, "rotational"),
     "theta": (1, "rotational"),
 }
-"""Words for a direction: its number, and the type of periodicity that the word implies."""
+"""Values of PERIODIC_DIRECTION: number of the component, and the type of periodicity implied."""
 
 # Quality -----------------------------------------------------------------------------------
 
@@ -292,7 +296,7 @@ METRICS: dict[Metric, Term] = {
 
 CellState = Literal["valid", "inverted", "unproven"]
 CELL_STATES: tuple[CellState, ...] = ("valid", "inverted", "unproven")
-"""By their codes in `slideviz.mesh.quality.Quality.status`."""
+"""The states of cells: the place of each is its code in `slideviz.mesh.quality.Quality.status`."""
 
 # View --------------------------------------------------------------------------------------
 
@@ -302,13 +306,13 @@ ColourBy = Literal["role", "size-skew", "size", "skew", "displacement"]
 
 @dataclass(frozen=True)
 class ColourByTerm(Term):
-    """A quantity that colours can show; ``unit`` is empty for a number without one."""
+    """The words for a quantity that cells are coloured by; ``unit`` is empty if it has none."""
 
     unit: str = ""
 
     @property
     def axis(self) -> str:
-        """Return the label of an axis of a plot."""
+        """Return the label of a plot's axis: label and unit, [-] without one."""
         return f"{self.label} {self.unit or '[-]'}"
 
 
@@ -319,14 +323,14 @@ COLOUR_BY: dict[ColourBy, ColourByTerm] = {
     "skew": ColourByTerm("skew"),
     "displacement": ColourByTerm("displacement", unit="[mesh units]"),
 }
-"""The first is that of a mesh just opened."""
+"""The quantities to colour by; a mesh just opened has the first."""
 
 QUANTITIES: dict[Quantity, ColourByTerm] = {value: COLOUR_BY[value] for value in get_args(Quantity)}
-"""Those that are numbers of a cell; the first is the usual one."""
+"""The quantities of `COLOUR_BY` that are values of cells; the first is the default."""
 
 
 def quantity_of(colour_by: ColourBy) -> Quantity:
-    """Return the quantity of colours, or size-skew where they show roles."""
+    """Return the quantity that is coloured by, or size-skew for roles."""
     return "size-skew" if colour_by == "role" else colour_by
 
 
@@ -338,7 +342,7 @@ COLOUR_MAPS: dict[ColourMap, Term] = {
     "inferno": Term("inferno"),
     "gray": Term("gray"),
 }
-"""Maps of matplotlib that colour-blind people can read; the first is the usual one."""
+"""Colour maps of matplotlib that colour-blind people can read; the first is the default."""
 
 PointsShown = Literal["none", "types", "control"]
 POINTS_SHOWN: dict[PointsShown, Term] = {
@@ -354,20 +358,20 @@ Shown = Literal[
 
 @dataclass(frozen=True)
 class ShownTerm(Term):
-    """Something that is drawn or not.
+    """The words for a thing in the view that the user can switch on and off.
 
     Attributes
     ----------
     shortcut : str
-        The key of the keyboard that switches it.
+        The key that switches it.
     at_first : bool
-        Whether it is drawn until somebody chooses.
+        Whether it is drawn by default.
     needs : {"", "boxes", "3d"}
-        What a mesh must have for it.
+        What it needs: nothing, FFD boxes, or a 3D mesh.
     why_not : str
-        Why it cannot be chosen for other meshes.
+        The tip where this is missing.
     in_bar : bool
-        Whether the tool bar has a button for it; there is little room.
+        Whether the tool bar has a button for it.
     """
 
     shortcut: str = ""
@@ -425,4 +429,4 @@ SHOWN: dict[Shown, ShownTerm] = {
         why_not="A 2D mesh is always shown in parallel projection.",
     ),
 }
-"""What is drawn or not; a case file writes them with hyphens."""
+"""Things in the view that can be switched on and off; VIEW_SHOW has them with hyphens."""
