@@ -230,7 +230,7 @@ def given_for(
             head = fill(plan, copy.path, part_of(tick, SCANNED, FILLED), ranks)
             finish_head(copy.file, head)
             copy.note(checksums(copy.path, part_of(tick, FILLED, COPIED), ranks))
-        with told_of(text, copy.path):
+        with naming_text(text, copy.path):
             yield Given(copy.path, None, text, is_left)
         copy.remove()
 
