@@ -340,6 +340,32 @@ def test_results_are_not_lost_without_a_question(
     assert (tmp_path / "out.csv").read_text().count("\n") == 3
 
 
+def test_results_can_be_saved_before_a_number_is_added_or_all_is_run_again(
+    window, passage, qtbot, in_a_thread, answers, tmp_path
+):
+    panel = passage
+    fill(panel, "STEPS", "1, 2")
+    run(panel, qtbot)
+    before = panel.table
+    asked = answers("ask_unsaved", "table")
+    answers("ask_save", None)
+    fill(panel, "airfoil.rotate.angle_deg", "-1, -2")
+    assert panel.table is before
+    assert "the results of 2 designs" in asked[0][0]
+    window.store.change(changes.set_case, sliding="ds")
+    answers("ask_unsaved", "cancel")
+    QTest.mouseClick(panel.run, LEFT)
+    assert panel.table is before
+    assert not panel.runner.busy
+    answers("ask_unsaved", "table")
+    answers("ask_save", tmp_path / "out.csv")
+    fill(panel, "airfoil.rotate.angle_deg", "-1, -2")
+    assert len(panel.table.rows) == 4
+    assert not panel.table.results
+    with (tmp_path / "out.csv").open() as file:
+        assert [row["steps"] for row in csv.DictReader(file)] == ["1", "2"]
+
+
 def test_closing_asks_about_designs_that_go_on(
     window, passage, qtbot, in_a_thread, answers, tmp_path
 ):

@@ -102,7 +102,7 @@ def test_sections_are_part_of_what_a_case_keeps(session):
     opened = saved(session, 1, 2)
     cut = changes.add_section(opened, Section("plane", origin=(0.5, 0.0, 0.0)))
     # Who only looks at a mesh is not asked.
-    assert not Unsaved.of(cut, busy=False).what
+    assert not Unsaved.of(cut, busy=False).lost
     assert not title_of(cut).startswith("*")
     both = changes.set_case(cut, steps=7)
     assert (
