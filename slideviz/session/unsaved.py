@@ -41,8 +41,8 @@ class Unsaved:
         lost = {}
         cut, source = unsaved_sections(session), session.case.source
         if session.unsaved_case or cut:
-            words = "roles, motions, method and sections" if cut else "roles, motions and method"
-            new = f"{words if session.unsaved_case else 'the sections'} as a case"
+            last = ", method and sections" if session.view.sections else " and method"
+            new = f"roles, motions{last} as a case"
             lost["case"] = f"the changes to {source.name}" if source else new
         run = session.run_shown
         # The mesh of a design is computed again at a click.
