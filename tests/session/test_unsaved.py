@@ -113,7 +113,7 @@ def test_sections_are_part_of_what_a_case_keeps(session):
     named = replace(cut, case=replace(cut.case, source=Path("a.cfg")))
     assert title_of(named).startswith("*")
     assert "the changes to a.cfg" in Unsaved.of(named, busy=False).question("closing")
-    written = changes.saved_case(cut, cut.case)
+    written = changes.saved_case(named, named.case)
     assert not Unsaved.of(written, busy=False).lost
     # How they are shown is not asked about; that they are gone is.
     hidden = changes.set_view(written, sections=(replace(written.view.section, shown=False),))
