@@ -27,11 +27,12 @@ def blending(count: int, order: int, at: FloatArray) -> tuple[FloatArray, FloatA
     count, order : int
         Control points, and the order of the functions, from 1 to ``count``.
     at : (m,) float64
-        Outside of [0, 1] the outermost polynomials go on.
+        Parametric coordinates; outside of [0, 1] the outermost polynomials are continued.
 
     Returns
     -------
     values, slopes : (m, count) float64
+        The functions, and their derivatives with respect to the coordinate.
     """
     knot, degree = knots(count, order), order - 1
     span = np.clip(np.searchsorted(knot, at, "right") - 1, degree, count - 1)
@@ -57,7 +58,7 @@ def blending(count: int, order: int, at: FloatArray) -> tuple[FloatArray, FloatA
 
 
 def _placed(values: FloatArray, first: np.ndarray, count: int) -> FloatArray:
-    """Return values (m, k) of the functions from ``first`` (m,) on, among all (m, count)."""
+    """Return values (m, k) of the functions from ``first`` (m,) on in (m, count); others are 0."""
     out = np.zeros((len(values), count))
     rows = np.arange(len(values))[:, None]
     out[rows, first[:, None] + np.arange(values.shape[1])] = values

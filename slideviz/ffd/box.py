@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 Index = tuple[int, int, int]
-"""A control point (i, j, k); -1 stands for all of that direction."""
+"""A control point (i, j, k); an index of -1 means all of that direction."""
 
 HALF = 0.5
-"""Half the thickness of a box in 2D."""
+"""Half the thickness of a box in 2D, in the mesh's length unit."""
 CORNERS = np.array(
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
 )
@@ -35,16 +35,16 @@ CORNERS = np.array(
 
 @dataclass(frozen=True, eq=False)
 class Embedding:
-    """Points in a box: what of each control point they take.
+    """Nodes in a box, with their weights of the control points (I, J, K).
 
     Attributes
     ----------
     nodes : (m,) int64
         Sorted.
     uvw : (m, 3) float64
-        Their parametric coordinates.
+        Parametric coordinates of the nodes.
     factors : tuple of (m, I), (m, J), (m, K) float64
-        Their blending functions in each direction.
+        Blending functions at the nodes in each direction; their products are the weights.
     """
 
     nodes: IntArray
@@ -52,16 +52,16 @@ class Embedding:
     factors: tuple[FloatArray, FloatArray, FloatArray]
 
     def sums(self, lattice: FloatArray) -> FloatArray:
-        """Return the sums of values at the control points, (I, J, K, c), for each point, (m, c)."""
+        """Return the weighted sums (m, c), for each node, of values (I, J, K, c)."""
         return _sums(*self.factors, lattice)
 
     def gathered(self, values: FloatArray) -> FloatArray:
-        """Return the transposed: of values at the points, (m, c), those of the lattice."""
+        """Return the transposed product of `sums`: (I, J, K, c) of values (m, c) at the nodes."""
         u, v, w = self.factors
         return np.einsum("mi,mj,mk,mc->ijkc", u, v, w, values, optimize=True)
 
     def matrix(self) -> csr_array:
-        """Return the derivative of the points for control points, (m, I J K): each axis alike."""
+        """Return the weights (m, I J K), also the derivatives of each coordinate of the nodes."""
         from scipy.sparse import csr_array  # takes long to load
 
         u, v, w = self.factors
@@ -80,9 +80,10 @@ class Box:
     orders : (int, int, int) or None
         Orders of the uniform B-splines; None: Bézier.
     corners : (8, 3) float64
-        Of the undeformed box, in SU2's order.
+        Corners of the undeformed box, in SU2's order (`CORNERS`).
     embedded : mapping of str to (nodes, uvw)
-        Nodes (m,) and parametric coordinates (m, 3) on each marker that a mesh file names.
+        For each marker that the mesh file lists for the box, nodes (m,) and parametric
+        coordinates (m, 3).
     """
 
     name: str
@@ -97,12 +98,12 @@ class Box:
 
     @property
     def degrees(self) -> Index:
-        """Return the number of control points of each direction, less one."""
+        """Return the degree of each direction: the number of control points less one."""
         i, j, k = (count - 1 for count in self.points.shape[:3])
         return i, j, k
 
     def describe(self, dim: int) -> str:
-        """Return degrees, blending and the number of surface points in words, of 2D or 3D."""
+        """Return degrees, blending and the number of surface points in words, for 2D or 3D."""
         words = f"degree {' x '.join(map(str, self.degrees[:dim]))}, "
         words += "Bézier" if self.orders is None else "uniform B-splines of order "
         words += " x ".join(map(str, (self.orders or ())[:dim]))
@@ -110,13 +111,13 @@ class Box:
         return words + f", {count:,} surface points of {', '.join(self.embedded)}" * bool(count)
 
     def factors(self, uvw: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
-        """Return the blending functions of each direction and their slopes, (m, count) each."""
+        """Return for each direction the blending functions and their slopes at uvw, (m, count)."""
         counts = self.points.shape[:3]
         orders = self.orders or counts
         return [blending(n, o, t) for n, o, t in zip(counts, orders, uvw.T, strict=True)]
 
     def embed(self, nodes: IntArray, uvw: FloatArray) -> Embedding:
-        """Return nodes (m,) at parametric coordinates (m, 3)."""
+        """Return the embedding of nodes (m,) at parametric coordinates (m, 3)."""
         (u, _), (v, _), (w, _) = self.factors(uvw)
         return Embedding(nodes, uvw, (u, v, w))
 
@@ -125,7 +126,7 @@ class Box:
         return self.embed(np.arange(len(uvw)), uvw).sums(self.points)
 
     def slopes(self, uvw: FloatArray) -> FloatArray:
-        """Return the derivatives (m, 3, 3) of the points for u, v and w, which come last."""
+        """Return the derivatives (m, 3, 3) of points with respect to (u, v, w), the last axis."""
         functions = self.factors(uvw)
         columns = []
         for axis in range(3):
@@ -134,7 +135,7 @@ class Box:
         return np.stack(columns, axis=-1)
 
     def change(self, index: Index, vector: tuple[float, ...]) -> FloatArray:
-        """Return the change (I, J, K, 3) of the control points that moves some of them.
+        """Return the change (I, J, K, 3) of all control points that moves those of ``index``.
 
         Raises
         ------
@@ -150,7 +151,7 @@ class Box:
         return out
 
     def problem(self, index: Index) -> str:
-        """Return why there is no such control point; empty where there is."""
+        """Return why the box has no control point of this index; empty where it has."""
         for name, at, most in zip("ijk", index, self.degrees, strict=True):
             if not -1 <= at <= most:
                 return (
@@ -160,12 +161,12 @@ class Box:
         return ""
 
     def moved(self, change: FloatArray) -> Box:
-        """Return the box with other control points, by their change (I, J, K, 3)."""
+        """Return the box with its control points moved by ``change`` (I, J, K, 3)."""
         return replace(self, points=self.points + change)
 
 
 def _sums(u: FloatArray, v: FloatArray, w: FloatArray, lattice: FloatArray) -> FloatArray:
-    """Return the sums (m, c) of values (I, J, K, c) times the factors of each direction."""
+    """Return the sums (m, c) of values (I, J, K, c) times factors (m, I), (m, J), (m, K)."""
     m, (i, j, k, c) = len(u), lattice.shape
     plane = (u @ lattice.reshape(i, -1)).reshape(m, j, k * c)
     line = np.einsum("mj,mjx->mx", v, plane).reshape(m, k, c)
@@ -188,7 +189,7 @@ def regular_box(name: str, corners: FloatArray, degrees: Index, orders: Index | 
     Raises
     ------
     CaseError
-        A degree or an order is not possible, or the corners enclose no volume in their order.
+        A degree or an order is not possible, or the corners in this order enclose no volume.
     """
     for letter, degree in zip("ijk", degrees, strict=True):
         if degree < 1:
@@ -202,7 +203,7 @@ def regular_box(name: str, corners: FloatArray, degrees: Index, orders: Index | 
     box = Box(name, lattice(corners, degrees), orders, corners)
     ends = np.array(list(product((0.0, 0.5, 1.0), repeat=3)))
     volume = np.linalg.det(box.slopes(ends))
-    # Of either hand, and perhaps with sides that shrink to an edge.
+    # The box may be left-handed, and sides may shrink to an edge.
     if volume.min() < 0.0 < volume.max() or not volume.any():
         raise CaseError(
             "the corners enclose no volume in their order; needed are those of the bottom "
@@ -212,5 +213,5 @@ def regular_box(name: str, corners: FloatArray, degrees: Index, orders: Index | 
 
 
 def plane_corners(corners: FloatArray) -> FloatArray:
-    """Return the corners (8, 3) of a box in 2D, of its corners in the plane (4, 2)."""
+    """Return the corners (8, 3) of a box in 2D from its corners (4, 2) in the plane."""
     return np.concatenate([np.column_stack([corners, np.full(4, z)]) for z in (-HALF, HALF)])

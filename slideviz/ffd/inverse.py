@@ -10,19 +10,21 @@ from slideviz.ffd.box import Box
 from slideviz.mesh.model import FloatArray
 
 INSIDE = 1e-8
-"""By how much a parametric coordinate may be outside of [0, 1]: a point of a side is inside."""
+"""A parametric coordinate may be so far outside of [0, 1]: a point on a side is inside."""
 MET = 1e-13
-"""What may be left of a point, as a part of the size of the box along each axis."""
+"""Distance from a point at which Newton's method ends, in parts of the box's size on each axis."""
 CLOSE = 1e-9
-"""The same for a point that Newton's method gets no closer to."""
+"""Largest distance at which a point counts as found, in the same measure."""
 ROUNDING = 1e-14
-"""The same as a part of the largest coordinate."""
+"""Part of the largest coordinate that is added to `CLOSE`."""
 STEPS, HALVINGS, STARTS = 40, 12, 4
+"""Most steps of Newton's method, most halvings of a step, and number of starts of a point."""
 SAMPLES = 3
-"""Starts for each control point and direction, among which the nearest are taken."""
+"""Sampled points for each control point and direction; the nearest ones are the starts."""
 REACH = 0.5
-"""How far outside of [0, 1] points are looked for."""
+"""Newton's method stays so near to [0, 1] in each parametric coordinate."""
 CHUNK = 20_000
+"""Points solved for together."""
 
 
 def parametric(box: Box, points: FloatArray) -> tuple[FloatArray, np.ndarray]:
@@ -32,7 +34,7 @@ def parametric(box: Box, points: FloatArray) -> tuple[FloatArray, np.ndarray]:
     ----------
     box : Box
     points : (m, 3) or (m, 2) float64
-        In 2D those of the plane z = 0.
+        In 2D, points of the plane z = 0.
 
     Returns
     -------
@@ -59,7 +61,10 @@ def parametric(box: Box, points: FloatArray) -> tuple[FloatArray, np.ndarray]:
 
 
 def _solved(box: Box, points: FloatArray, size: FloatArray) -> FloatArray:
-    """Return the parametric coordinates (m, 3) of points, NaN where none are found."""
+    """Return the parametric coordinates (m, 3) of points (m, 3), NaN where none are found.
+
+    They may be outside of [0, 1]. ``size`` (3,) is that of the box along each axis.
+    """
     from scipy.spatial import cKDTree  # takes long to load
 
     steps = [np.linspace(0.0, 1.0, SAMPLES * (degree + 1)) for degree in box.degrees]
@@ -83,9 +88,9 @@ def _solved(box: Box, points: FloatArray, size: FloatArray) -> FloatArray:
 def _newton(
     box: Box, points: FloatArray, uvw: FloatArray, size: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return where Newton's method gets from coordinates (m, 3), and the distance left (m,).
+    """Return the end of Newton's method from ``uvw`` (m, 3), and its distance from points, (m,).
 
-    Distances are those of a box of size 1, since boxes can be thin.
+    Distances are scaled to a box of size 1 along each axis, since boxes can be thin.
     """
     uvw = uvw.copy()
     rest = points - box.at(uvw)
@@ -114,7 +119,7 @@ def _newton(
 
 
 def _step(slopes: FloatArray, rest: FloatArray) -> FloatArray:
-    """Return Newton's step (m, 3); where the derivative is singular, the shortest that helps."""
+    """Return Newton's steps (m, 3); least-squares ones if any derivative (m, 3, 3) is singular."""
     try:
         step = np.linalg.solve(slopes, rest[..., None])[..., 0]
     except np.linalg.LinAlgError:

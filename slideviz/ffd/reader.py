@@ -16,12 +16,12 @@ _LETTERS = "IJK"
 
 
 Row = tuple[int, list[str]]
-"""A line of numbers, by its place in the section, as words."""
+"""A line of numbers: its place in the section, from 0, and its words."""
 
 
 @dataclass
 class BoxEntry:
-    """A keyword line, and the rows that follow it, as words."""
+    """A keyword line of a box: its value, its place in the section, and the rows that follow it."""
 
     value: str
     line: int
@@ -29,7 +29,7 @@ class BoxEntry:
 
 
 Entries = dict[str, BoxEntry]
-"""The keyword lines of a box."""
+"""The keyword lines of a box, by key."""
 
 
 def read_boxes(mesh: Mesh, lines: list[str]) -> tuple[Box, ...]:
@@ -52,7 +52,7 @@ def read_boxes(mesh: Mesh, lines: list[str]) -> tuple[Box, ...]:
 
 
 def _require_count(mesh: Mesh, lines: list[str], names: list[str]) -> None:
-    """Raise where ``FFD_NBOX=`` does not say how many boxes follow."""
+    """Raise MeshError where ``FFD_NBOX=`` is missing or is not the number of boxes that follow."""
     given = [(at, line) for at, line in enumerate(lines) if key_of(line) == "FFD_NBOX"]
     if not given:
         if names:
@@ -77,12 +77,13 @@ def _error(mesh: Mesh, line: int, sentence: str) -> MeshError:
 
 
 def key_of(line: str) -> str:
-    """Return the key of a keyword line; "" of another."""
+    """Return the key of a keyword line, in capitals; an empty text for other lines."""
     head, sign, _ = line.partition("%")[0].partition("=")
     return head.strip().upper() if sign else ""
 
 
 def _value(line: str) -> str:
+    """Return the value of a keyword line, without a comment."""
     return line.partition("%")[0].partition("=")[2].strip()
 
 
@@ -104,7 +105,7 @@ def entries_of(lines: list[str]) -> list[Entries]:
 
 
 class _Reader:
-    """Reads one box, and tells what is wrong with it."""
+    """Reads one box from its lines; all methods raise MeshError for a mistake."""
 
     def __init__(self, mesh: Mesh, entries: Entries) -> None:
         self.mesh, self.entries = mesh, entries
@@ -132,7 +133,7 @@ class _Reader:
         return box
 
     def orders(self, letters: str) -> Index | None:
-        """Return the orders of the B-splines, or None."""
+        """Return the orders of the B-splines; None for a Bézier box."""
         entry = self.entries.get("FFD_BLENDING")
         kind = "BEZIER" if entry is None else entry.value.upper()
         if kind == "BEZIER":
@@ -187,27 +188,27 @@ class _Reader:
         return found
 
     def count(self, key: str) -> int:
-        """Return the whole number after a key."""
+        """Return the value of a key, a whole number from 0."""
         word = (self.entry(key).value.split() or [""])[0]
         if not word.isdecimal():
             raise self.error(f"{key}= {word} is no whole number from 0", key)
         return int(word)
 
     def numbers(self, key: str, count: int, width: int) -> FloatArray:
-        """Return the rows of numbers (count, width) after a key."""
+        """Return the rows of numbers after a key, (count, width); its value must be ``count``."""
         if self.count(key) != count:
             raise self.error(f"{key} is {self.count(key)}; needed is {count}", key)
         return self.table(key, self.rows(key, count), width)
 
     def rows(self, key: str, count: int) -> list[Row]:
-        """Return the rows after a key, which must be so many."""
+        """Return the rows after a key, which must be ``count``."""
         rows = self.entry(key).rows
         if len(rows) != count:
             raise self.error(f"{len(rows)} rows follow {key}= {count}; correct the count", key)
         return rows
 
     def table(self, key: str, rows: list[Row], width: int) -> FloatArray:
-        """Return rows as numbers, (rows, width)."""
+        """Return rows as numbers, (len(rows), width), which must be finite."""
         table = np.empty((len(rows), width))
         for k, (line, words) in enumerate(rows):
             try:
@@ -221,7 +222,7 @@ class _Reader:
         return table
 
     def entry(self, key: str) -> BoxEntry:
-        """Return the line of a key."""
+        """Return the keyword line of a key."""
         if key not in self.entries:
             raise self.error(f"{key}= is missing")
         return self.entries[key]

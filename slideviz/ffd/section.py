@@ -1,7 +1,6 @@
-"""The boxes of an SU2 mesh file, in its section ``FFD_NBOX=``, and how they are written back.
+"""The boxes of an SU2 mesh file, in its section ``FFD_NBOX=``: read, and written back.
 
-Of a box that moved only the rows that changed are written anew: the rest of the file keeps its
-bytes.
+Only rows of control points that changed are written anew; the rest of the section keeps its bytes.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from slideviz.mesh.model import FloatArray, Mesh
 
 _LETTERS = "IJK"
 _BOXES: WeakKeyDictionary[Mesh, tuple[Box, ...]] = WeakKeyDictionary()
+"""The boxes that were read, by mesh."""
 
 
 def boxes_of(mesh: Mesh) -> tuple[Box, ...]:
@@ -36,15 +36,15 @@ def boxes_of(mesh: Mesh) -> tuple[Box, ...]:
 
 
 def with_boxes(mesh: Mesh, boxes: Sequence[Box], *, anew: bool = False) -> Mesh:
-    """Return the mesh whose SU2 file has these boxes, as SU2 writes them.
+    """Return the mesh with boxes in the section that its SU2 file will have.
 
     Parameters
     ----------
     mesh : Mesh
     boxes : sequence of Box
-        Those that changed, and new ones; others stay.
+        Changed boxes, matched by name, and new ones; the mesh's other boxes stay.
     anew : bool
-        Whether the boxes that it had, if any, are dropped.
+        Whether all boxes that the mesh had are dropped.
     """
     lines = [] if anew else _lines(mesh)
     entries = entries_of(lines)
@@ -66,7 +66,7 @@ def with_boxes(mesh: Mesh, boxes: Sequence[Box], *, anew: bool = False) -> Mesh:
 
 
 def _lines(mesh: Mesh) -> list[str]:
-    """Return the lines of the section, with their ends."""
+    """Return the lines of the section, with their line breaks; empty without a section."""
     origin = mesh.origin
     if origin.ffd is not None:
         text = origin.ffd
@@ -79,7 +79,10 @@ def _lines(mesh: Mesh) -> list[str]:
 
 
 def _update(lines: list[str], entries: Entries, box: Box) -> None:
-    """Write the control points of a box into its lines, and where there are none, all of it."""
+    """Write the changed control points of a box into ``lines``, in place.
+
+    Control points and surface points that the file does not list are written as a whole.
+    """
     surface = entries.get("FFD_SURFACE_POINTS")
     if surface is not None and not surface.rows and box.embedded:
         lines[surface.line : surface.line + 1] = _surface_lines(box)
@@ -110,16 +113,19 @@ def _written(box: Box, dim: int) -> Iterator[str]:
 
 
 def _control_lines(points: FloatArray) -> Iterator[str]:
+    """Yield the lines of all control points (I, J, K, 3)."""
     yield f"FFD_CONTROL_POINTS= {points[..., 0].size}\n"
     for index in np.ndindex(points.shape[:3]):
         yield _control_row(points, *index) + "\n"
 
 
 def _control_row(points: FloatArray, i: int, j: int, k: int) -> str:
+    """Return the row of a control point, without a line break."""
     return f"{i}\t{j}\t{k}\t" + _tabbed(points[i, j, k].tolist())
 
 
 def _surface_lines(box: Box) -> Iterator[str]:
+    """Yield the lines of the embedded surface points of a box."""
     yield f"FFD_SURFACE_POINTS= {sum(len(nodes) for nodes, _ in box.embedded.values())}\n"
     for marker, (nodes, uvw) in box.embedded.items():
         for node, at in zip(nodes.tolist(), uvw.tolist(), strict=True):
@@ -127,4 +133,5 @@ def _surface_lines(box: Box) -> Iterator[str]:
 
 
 def _tabbed(values: Sequence[float]) -> str:
+    """Return numbers with all their digits, separated by tabs."""
     return "\t".join(repr(value) for value in values)

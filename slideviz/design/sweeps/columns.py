@@ -1,9 +1,9 @@
 """The columns of a table of designs: numbers of the case's motions, and keys of the case.
 
-A number of a motion is called ``BLADE.translate.y``: what is moved, how, and which number; or by
-the place of the motion in ``MOTION``, ``motion2.y``, which is needed where the same is moved the
-same way twice. That of a box names its control point, ``BLADE.ffd.BOX.1.0.0.y``. A key is called
-as ``--set`` calls it, ``STEPS``.
+The name of a number is ``BLADE.translate.y``: marker, kind of motion, and number; or, by the place
+of the motion in ``MOTION``, ``motion2.y``, which is needed where two motions of one kind move the
+same marker. The name of a box's number has the control point, ``BLADE.ffd.BOX.1.0.0.y``. The name
+of a key is that of ``--set``, ``STEPS``.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from slideviz.case.words import nearest, number, shown
 from slideviz.errors import CaseError
 
 Value = str | float
-"""A number of a motion, or the text of a key's value; empty for that of the case."""
+"""A number of a motion, or the text of a key's value; an empty text means the case's own value."""
 
 _AXES = "xyz"
 _SHORT = {"vector": "", "point": "point_", "axis": "axis_", "factors": "factor_"}
-"""What the components of a field are called before their axis, where that is not the field."""
+"""Prefixes of the names of components, by field, where they are not the field's name."""
 _ALSO = {
     "angle": "angle_deg",
     "degrees": "angle_deg",
@@ -38,26 +38,26 @@ _ALSO = {
     "pz": "point_z",
     "dr": "distance",
 }
-"""Other names of numbers, as the grammar of ``MOTION`` has them, and what they are here."""
+"""Names of numbers in the grammar of ``MOTION``, and their names here."""
 _WHOLE_MOTION = ("MOTION", "DEFORMATION_FILENAME")
 _LISTED = 24
 
 
 @dataclass(frozen=True)
 class NumberPlace:
-    """The place of a number: which motion (from 0), its field, and which of several numbers."""
+    """The place of a number: index of the motion, its field, and component of the field."""
 
     motion: int
     field: str
     component: int | None = None
 
     def of(self, case: Case) -> float:
-        """Return the number that a case has there."""
+        """Return the number of a case at this place."""
         value = getattr(case.motions[self.motion], self.field)
         return float(value if self.component is None else value[self.component])
 
     def put(self, motions: list[Motion], value: float) -> None:
-        """Put a number there, in place."""
+        """Replace the number at this place in a list of motions, in place."""
         motion = motions[self.motion]
         new: Any = value
         if self.component is not None:
@@ -68,7 +68,7 @@ class NumberPlace:
 
 
 def numbers_of(case: Case) -> dict[str, NumberPlace]:
-    """Return the numbers of a case's motions by name, the shortest that tells each apart."""
+    """Return the places of all numbers of a case's motions, by their shortest unique name."""
     found: dict[str, NumberPlace] = {}
     heads = [_head(motion) for motion in case.motions]
     for at, (motion, head) in enumerate(zip(case.motions, heads, strict=True)):
@@ -112,7 +112,7 @@ def columns_of(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]
 def applied(
     case: Case, columns: Mapping[str, NumberPlace | str], values: Mapping[str, Value]
 ) -> Case:
-    """Return the case of one design; an empty value is that of the case.
+    """Return the case with the values of one design; an empty value leaves the case's own.
 
     Raises
     ------
@@ -144,13 +144,13 @@ def applied(
 
 
 def column_name(name: str) -> str:
-    """Return what a column is called in results: a key in capitals, else as it was given."""
+    """Return the name of a column in results: a key in capitals, else as it was given."""
     plain = name.strip()
     return plain.upper() if plain.upper() in KEYS else plain
 
 
 def own_values(case: Case, columns: Mapping[str, NumberPlace | str]) -> dict[str, Value]:
-    """Return what the case itself has in each column: a number, or a text."""
+    """Return the case's own value for each column: a number, or a text."""
     found: dict[str, Value] = {}
     for name, what in columns.items():
         if isinstance(what, NumberPlace):
@@ -164,7 +164,8 @@ def own_values(case: Case, columns: Mapping[str, NumberPlace | str]) -> dict[str
 def _meant(case: Case, name: str, known: Mapping[str, NumberPlace]) -> NumberPlace | str:
     """Return the place of a number, or the key, that a name means.
 
-    ``known`` has the numbers by all their names: the shortest, and by the place of the motion.
+    ``known`` are the numbers by all their names: the shortest, and by the place of the motion.
+    Raises CaseError where the name means nothing, several numbers, or a key that cannot vary.
     """
     key = name.strip().upper()
     if key in KEYS:
@@ -204,13 +205,13 @@ def _all_names(case: Case) -> dict[str, NumberPlace]:
 
 
 def _usual(name: str) -> str:
-    """Return a name with the usual name of its number."""
+    """Return the name of a number with its last part in lower case, as here (`_ALSO`)."""
     head, dot, part = name.strip().rpartition(".")
     return f"{head}{dot}{_ALSO.get(part.lower(), part.lower())}"
 
 
 def _head(motion: Motion) -> str:
-    """Return what a motion moves and how: ``BLADE.translate``, ``BLADE.ffd.BOX.1.0.0``."""
+    """Return the begin of the names of a motion's numbers: ``BLADE.translate``."""
     head = f"{'+'.join(named(motion.marker)) or '*'}.{type(motion).__name__.lower()}"
     if isinstance(motion, Ffd):
         return ".".join([head, motion.box, *map(str, motion.index)])
@@ -237,15 +238,18 @@ def _parts(motion: Motion, at: int) -> Iterator[tuple[str, NumberPlace]]:
 
 
 def _is_number(value: object) -> bool:
+    """Tell whether a value is a real number, and not a bool."""
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def _listed(known: Iterable[str]) -> str:
+    """Return names in words, `_LISTED` at most."""
     names = list(known)
     return ", ".join(names[:_LISTED]) + (", ..." if len(names) > _LISTED else "")
 
 
 def _number(value: Value) -> float:
+    """Return a value as a number; raises CaseError where it is not a finite number."""
     if isinstance(value, str):
         return number(value.strip())
     if not isinstance(value, Real) or not math.isfinite(value):
@@ -254,7 +258,7 @@ def _number(value: Value) -> float:
 
 
 def _text(value: Any) -> str:
-    """Return a value as a case file would have it."""
+    """Return a value as the text in a case file."""
     if isinstance(value, str):
         return value.strip()
     if isinstance(value, bool):

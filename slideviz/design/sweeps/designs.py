@@ -1,4 +1,4 @@
-"""The designs of a sweep: a table read from CSV or given as values, each row made a case."""
+"""The designs of a sweep: a table, read from CSV or given as values; each row becomes a case."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SEPARATORS = (",", ";", "\t")
 
 @dataclass(frozen=True)
 class Design:
-    """A row of the table: its number (from 1), what it has in each column, and its case."""
+    """A row of the table: its number (from 1), its values by column, and its case."""
 
     number: int
     values: Mapping[str, Value]
@@ -30,14 +30,15 @@ class Design:
 
 @dataclass(frozen=True)
 class Designs:
-    """The designs of a table, and what its columns mean."""
+    """The designs of a table; ``columns`` has the place of a number, or a key, for each column."""
 
     columns: Mapping[str, NumberPlace | str]
     rows: tuple[Design, ...]
 
 
 Table = str | Path | Sequence[Mapping[str, Any]] | Mapping[str, Sequence[Any]] | Designs
-"""A CSV file; the designs, each by the names of its columns; the columns by name; or as read."""
+"""The path of a CSV file; a sequence of designs, each by column names; a mapping of columns; or
+what `read_designs` returned."""
 
 
 def read_designs(case: Case, table: Table) -> Designs:
@@ -46,8 +47,8 @@ def read_designs(case: Case, table: Table) -> Designs:
     Raises
     ------
     CaseError
-        The file cannot be read, a column is unknown, or values are wrong: all of them, each with
-        its line.
+        The file cannot be read, a column is unknown, or values are wrong; all mistakes are listed,
+        each with its line.
     """
     if isinstance(table, Designs):
         return table
@@ -82,7 +83,7 @@ def _rows_of(table: Sequence[Mapping[str, Any]] | Mapping[str, Sequence[Any]]) -
 
 
 def _value(value: Any) -> Value:
-    """Return a value as a plain one: those of NumPy become numbers of Python."""
+    """Return a value as a text or a number of Python; None becomes an empty text."""
     if isinstance(value, str):
         return value.strip()
     if value is None or value != value:  # what tables of numbers have where there is nothing
@@ -93,8 +94,8 @@ def _value(value: Any) -> Value:
 def _read_csv(case: Case, path: Path) -> Designs:
     """Return the designs of a file: a head with the names of the columns, then a row for each.
 
-    Empty lines and lines that begin with ``#`` are passed over; commas, semicolons or tabs
-    separate. Of a table of results the designs are read.
+    Empty lines and lines that begin with ``#`` are ignored; commas, semicolons or tabs separate.
+    In a table of results (``results.csv``) the columns of results are ignored.
     """
     text, _ = read_text(path, "table of designs")
     lines = _filled(text)
@@ -133,7 +134,7 @@ def _read_csv(case: Case, path: Path) -> Designs:
 
 
 def own_columns(head: Sequence[str]) -> slice:
-    """Return which columns are of designs; in a table of results others stand around them."""
+    """Return the slice of the columns of designs; a table of results has others around them."""
     at = len(head) - 1
     while at > 0 and list(head[at : at + len(NUMBERS)]) != list(NUMBERS):
         at -= 1
@@ -141,7 +142,7 @@ def own_columns(head: Sequence[str]) -> slice:
 
 
 def _known(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]:
-    """Return the columns that mean something, so that the mistakes in their rows are told, too."""
+    """Return the columns with known names, so that mistakes in their values are found, too."""
     found: dict[str, NumberPlace | str] = {}
     for name in names:
         with suppress(CaseError):
@@ -152,7 +153,7 @@ def _known(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]:
 def _design(
     case: Case, columns: Mapping[str, NumberPlace | str], number: int, values: Mapping[str, Value]
 ) -> Design:
-    """Return a design, with the numbers of motions as numbers."""
+    """Return a design, with motions' numbers as float; CaseError where values are wrong."""
     made = applied(case, columns, values)
     plain = {
         name: float(value) if isinstance(columns[name], NumberPlace) and value != "" else value
@@ -162,7 +163,7 @@ def _design(
 
 
 def _filled(text: str) -> list[tuple[int, str]]:
-    """Return the lines that hold something, with their numbers from 1."""
+    """Return the lines that are neither empty nor comments, with their numbers from 1."""
     return [
         (at, line)
         for at, line in enumerate(text.splitlines(), start=1)
@@ -171,4 +172,5 @@ def _filled(text: str) -> list[tuple[int, str]]:
 
 
 def _split(line: str, separator: str) -> list[str]:
+    """Return the cells of a line of CSV."""
     return next(csv.reader(StringIO(line), delimiter=separator, skipinitialspace=True))

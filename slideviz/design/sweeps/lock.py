@@ -13,14 +13,15 @@ from slideviz.mesh.io.atomic import reason_of
 
 NAME = "sweep.lock"
 _TAKEN = (errno.EAGAIN, errno.EACCES)
+"""Errors where another process has the lock."""
 _UNKNOWN = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
-"""What file systems say that have no locks."""
+"""Errors of file systems without locks."""
 
 
 class FolderLock:
     """The right to write results into a folder, until `release` or the end of the process.
 
-    The system frees it then, however the process ends: a file that is left is taken over.
+    The system frees the lock however the process ends; a lock file that is left does not lock.
 
     Parameters
     ----------
@@ -29,7 +30,7 @@ class FolderLock:
     Raises
     ------
     CaseError
-        Another sweep has it, or the file cannot be written.
+        Another sweep has the lock, or the file cannot be written.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -61,6 +62,7 @@ class FolderLock:
             file.close()
 
     def _refusal(self, file: BinaryIO) -> CaseError:
+        """Return the error that another sweep has the lock; closes the file."""
         with file:
             file.seek(0)
             number = file.read(20).decode("ascii", "replace").strip()
@@ -71,7 +73,7 @@ class FolderLock:
         )
 
     def release(self) -> None:
-        """Let others write into the folder."""
+        """Free the lock and remove its file."""
         if not self._file.closed:
             with self._file, suppress(OSError):
                 self._path.unlink()

@@ -1,7 +1,7 @@
-"""Processes of this machine for a sweep: one of them that ends takes one design with it.
+"""Worker processes of this machine for a sweep; one that is lost loses one design only.
 
-``ProcessPoolExecutor`` ends all its processes when one is lost, and tells all their work as lost.
-Here each has a pool of its own, which is made anew.
+``ProcessPoolExecutor`` ends all its processes when one is lost, and all their work is lost. Here
+each process has a pool of its own, which is made anew.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from slideviz.mesh.io.cleanup import clean_up
 
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _QUIET = "ignore::UserWarning:multiprocessing.resource_tracker"
-"""What tidies up semaphores would complain of a command that is ended by a signal."""
+"""Hides a warning of ``resource_tracker`` when the command is ended by a signal."""
 _environment = threading.Lock()
 _STARTS = 2
-"""Processes in a row that may end before they begin."""
+"""Number of processes in a row that end before their first call, at which no more are started."""
 
 
 def usable_cores() -> int:
@@ -37,7 +37,7 @@ def usable_cores() -> int:
 
 
 class _Call(NamedTuple):
-    """A call that is asked for."""
+    """A call that was submitted."""
 
     future: Future
     fn: Callable
@@ -46,14 +46,15 @@ class _Call(NamedTuple):
 
 
 class Processes(Executor):
-    """An executor with so many processes of this machine, each with one thread.
+    """An executor with ``count`` processes of this machine, each with one thread.
 
-    A process that works has its next call with it, so that it need not wait for this one, while
-    there are calls enough for those that are free. When it is lost, that call goes to another.
+    While there are enough calls for idle processes, a busy process is given its next call, too, so
+    that it need not wait. When the process is lost, that next call goes to another.
 
     Parameters
     ----------
     count : int
+        Number of processes.
     mesh : Packed
         Sent to each process when it starts.
     """
@@ -67,13 +68,13 @@ class Processes(Executor):
         self._failed_starts = 0
         self._given_up = False
         self.lost = 0
-        """Processes that ended while they worked."""
+        """Number of processes that ended during a call."""
         self.exit_codes: list[int] = []
-        """Of those that ended before they began; negative where a signal ended them."""
+        """Exit codes of processes that ended before their first call; negative for a signal."""
 
     @property
     def why_none_starts(self) -> str:
-        """Return why processes end before they begin; nothing where they do not."""
+        """Return why no process starts, after `_STARTS` failures in a row; else an empty text."""
         if self._failed_starts < _STARTS:
             return ""
         if any(code < 0 for code in self.exit_codes):
@@ -91,11 +92,11 @@ class Processes(Executor):
 
     @property
     def pids(self) -> list[int]:
-        """Return the numbers of the processes that run."""
+        """Return the process ids of the processes that run."""
         return [pid for one in self._all for pid in one.pids]
 
     def submit(self, fn: Callable, /, *args: Any, **kwargs: Any) -> Future:
-        """Return the future of a call in the first process that is free."""
+        """Queue a call for the first process that is free; return its future."""
         future: Future = Future()
         with self._lock:
             self._asked.append(_Call(future, fn, args, kwargs))
@@ -103,7 +104,7 @@ class Processes(Executor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes; those in work are stopped where ``cancel_futures`` says so."""
+        """End the processes; with ``cancel_futures`` drop queued calls and kill busy processes."""
         with self._lock:
             asked = list(self._asked) if cancel_futures else []
             if cancel_futures:
@@ -115,7 +116,7 @@ class Processes(Executor):
             one.end(wait, kill=cancel_futures)
 
     def _give(self) -> None:
-        """Give processes what is asked for."""
+        """Give queued calls to processes, as many as these take."""
         while True:
             with self._lock:
                 one = self._next()
@@ -129,7 +130,7 @@ class Processes(Executor):
             one.run(call)
 
     def _next(self) -> _Process | None:
-        """Return the process that is to have the next call: a free one, or one that works."""
+        """Return the process for the next call: an idle one, else a busy one; None without one."""
         if self._given_up or not self._asked:
             return None
         free = (one for one in self._all if not one.load)
@@ -137,12 +138,16 @@ class Processes(Executor):
         return next(free, next((one for one in self._all if more and one.takes_more), None))
 
     def _done(self, one: _Process, call: _Call, inner: Future, *, lost: bool, began: bool) -> None:
-        """Pass a result on, and give the process the next.
+        """Pass the result of a call on, or queue the call again, and give out the next ones.
 
         Parameters
         ----------
+        inner
+            The future of the call in the process's pool.
         lost
-            Whether the process ended while it did this call, and not one before it.
+            Whether the process ended during this call, and not during one before it.
+        began
+            Whether the process had the mesh, and so could do calls.
         """
         problem = BrokenProcessPool() if inner.cancelled() else inner.exception()
         broken = isinstance(problem, BrokenProcessPool)
@@ -164,12 +169,12 @@ class Processes(Executor):
 
 
 class _Process:
-    """A process that is started when it is needed, and again when it was lost.
+    """A process that is started at its first call, and again when it was lost.
 
     Attributes
     ----------
     load : int
-        Calls that it has: the one that it does, and perhaps the next.
+        Number of calls it was given: the one it does, and perhaps the next.
     """
 
     def __init__(self, owner: Processes) -> None:
@@ -177,22 +182,22 @@ class _Process:
         self.load = 0
         self._pool: ProcessPoolExecutor | None = None
         self._begun: Future | None = None
-        # What is told of a loss by a pool must not be the end of that pool: it holds its own lock.
+        # Kept, for a pool must not be deleted by its own callback, which holds its lock.
         self._broken: list[ProcessPoolExecutor] = []
 
     @property
     def pids(self) -> list[int]:
-        """Return the number of the process, if it runs."""
+        """Return the process id, or an empty list if it does not run."""
         found = getattr(self._pool, "_processes", None) or {}
         return list(found)
 
     @property
     def takes_more(self) -> bool:
-        """Tell whether it has begun, and can take its next call."""
+        """Tell whether it has the mesh and does one call, so that it can be given the next."""
         return self.load == 1 and self._begun is not None and _succeeded(self._begun)
 
     def run(self, call: _Call) -> None:
-        """Let the process do a call."""
+        """Give the process a call; start it if it does not run."""
         try:
             if self._pool is None:
                 self._start()
@@ -222,7 +227,7 @@ class _Process:
             self._begun = self._pool.submit(hold, self._owner._mesh)
 
     def _forget(self, pool: ProcessPoolExecutor | None) -> bool:
-        """Do without a pool, so that the next call starts another; tell whether that is new."""
+        """Drop a broken pool, so that the next call starts another; False if dropped before."""
         with self._owner._lock:
             if pool is None:
                 return True
@@ -233,7 +238,7 @@ class _Process:
             return True
 
     def end(self, wait: bool, kill: bool) -> None:
-        """End the process."""
+        """End the process, after its calls or, with ``kill``, at once; ``wait`` for its end."""
         for pool in (*self._broken, *([self._pool] if self._pool is not None else [])):
             if kill:
                 for process in list((getattr(pool, "_processes", None) or {}).values()):
@@ -243,14 +248,15 @@ class _Process:
 
 
 def _succeeded(future: Future) -> bool:
+    """Tell whether a future is done and has a result."""
     return future.done() and not future.cancelled() and future.exception() is None
 
 
 @contextmanager
 def _settings_of_workers() -> Iterator[None]:
-    """Return a context whose processes have one thread, and leave Ctrl+C to this one.
+    """Context in which processes are started with one thread, and without a reaction to Ctrl+C.
 
-    What blocks a signal is inherited, from the beginning: nothing is lost that comes meanwhile.
+    A process inherits the signal mask, so that no signal reaches it before it can set its own.
     """
     with _environment:
         before = {name: os.environ.get(name) for name in (*_THREADS, "PYTHONWARNINGS")}
@@ -269,9 +275,9 @@ def _settings_of_workers() -> Iterator[None]:
 
 
 def _begin() -> None:
-    """Prepare a worker: it leaves no draft when it is ended, and does not outlive its parent.
+    """Prepare a worker: at SIGTERM or at its parent's end it removes its drafts and ends.
 
-    Threads wait for both, since Python would act on a signal only after a loop that computes.
+    Threads wait for both, for Python's signal handlers run only after a compiled loop.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
     for wait in (lambda: signal.sigwait({signal.SIGTERM}), _wait_for_parent):
@@ -279,11 +285,13 @@ def _begin() -> None:
 
 
 def _wait_for_parent() -> None:
+    """Wait for the end of the parent process."""
     parent = parent_process()
     assert parent is not None
     parent.join()
 
 
 def _leave() -> NoReturn:
+    """Remove drafts and end this process at once."""
     clean_up()
     os._exit(128 + signal.SIGTERM)

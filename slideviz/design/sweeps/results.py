@@ -1,6 +1,6 @@
-"""The folder of a sweep: ``results.csv`` with a row for each design, and what it was made of.
+"""The folder of a sweep: ``results.csv``, a row for each design, and ``sweep.json``, its sources.
 
-A row is added as soon as it comes, so that a sweep that was stopped, in whatever way, can go on.
+A row is written as soon as a design is done, so that a stopped sweep can be resumed.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class SweepResults:
     folder : Path
     designs : Designs
     sources : mapping of str to str
-        What the results depend on; see `sources_of`.
+        What the results depend on, as `sources_of` returns it.
     """
 
     def __init__(self, folder: Path, designs: Designs, sources: Mapping[str, str]) -> None:
@@ -53,19 +53,19 @@ class SweepResults:
 
     @property
     def path(self) -> Path:
-        """Return the table."""
+        """Return the path of the table."""
         return self._folder / RESULTS
 
     def start(self, *, resume: bool, force: bool, meshes: bool) -> list[DesignRow]:
-        """Begin the table, or return the rows of a stopped sweep that need not be done again.
+        """Lock the folder; begin the table, or with ``resume`` return the rows that are done.
 
-        Designs that failed are done again, and those whose mesh is wanted and missing.
+        Not among them are designs that failed, and with ``meshes`` those whose mesh is missing.
 
         Raises
         ------
         CaseError
-            There are results, and it was not said what to do with them; or they are of another
-            case, mesh or table; or the table cannot be written; or another sweep writes it.
+            There are results, with neither ``resume`` nor ``force``; or, to be resumed, they are of
+            another case, mesh or table; or the table cannot be written; or another sweep writes it.
         """
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -81,11 +81,12 @@ class SweepResults:
             raise
 
     def close(self) -> None:
-        """Let other sweeps write into the folder."""
+        """Unlock the folder."""
         if self._lock is not None:
             self._lock.release()
 
     def _started(self, resume: bool, force: bool, meshes: bool) -> list[DesignRow]:
+        """Do what `start` does, in the locked folder."""
         if resume and self.path.exists():
             found = {row.design: row for row in self._go_on()}
             return [row for row in found.values() if not row.problem and _has(row, meshes)]
@@ -98,7 +99,7 @@ class SweepResults:
         return []
 
     def _begin(self) -> None:
-        """Write an empty table, and what the results depend on."""
+        """Write an empty table, and the sources."""
         text = json.dumps({"slideviz": __version__, **self._sources}, indent=2) + "\n"
         with atomic_write(self._folder / SOURCES, CaseError) as file:
             file.write(text.encode())
@@ -106,9 +107,9 @@ class SweepResults:
             file.write(_line(self._head))
 
     def _go_on(self) -> list[DesignRow]:
-        """Return the rows that are there, after a check that they are of the same sweep.
+        """Return the rows of the table; CaseError where they are of another sweep.
 
-        A line that was cut off when the sweep was stopped is taken away.
+        A last line that was cut off when the sweep was stopped is removed from the file.
         """
         self._require_same_sources()
         try:
@@ -128,12 +129,12 @@ class SweepResults:
         return [self._row(at, line) for at, line in enumerate(lines, start=2)]
 
     def add(self, row: DesignRow) -> None:
-        """Add a row at the end of the table, in one piece.
+        """Append a row to the table, by one write.
 
         Raises
         ------
         CaseError
-            It cannot be written.
+            The table cannot be written.
         """
         try:
             with self.path.open("ab", buffering=0) as file:
@@ -150,6 +151,7 @@ class SweepResults:
                 file.write(_line(self._cells(last[number])))
 
     def _cells(self, row: DesignRow) -> list[Any]:
+        """Return the cells of a row, in the order of the head."""
         done = not row.problem
         return [
             row.design,
@@ -161,7 +163,7 @@ class SweepResults:
         ]
 
     def _row(self, line: int, cells: Sequence[str]) -> DesignRow:
-        """Return the row of a line, after a check that it is of the design of that number."""
+        """Return the row of a line; CaseError where the design of that number is another."""
         try:
             if len(cells) != len(self._head):
                 raise ValueError
@@ -200,6 +202,7 @@ class SweepResults:
         )
 
     def _require_same_sources(self) -> None:
+        """Raise CaseError where the results in the folder depend on something else."""
         path = self._folder / SOURCES
         try:
             before = json.loads(path.read_bytes())
@@ -228,7 +231,10 @@ _REMEDY = "choose another folder, or begin anew with --force (force=True)"
 
 
 def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
-    """Return what the results of a case depend on: digests of its files, and its keys as text."""
+    """Return what the results of a case depend on: digests of its data by name, keys as text.
+
+    Digests are of the mesh, its FFD boxes, given displacements and files of displacements.
+    """
     given = [motion for motion in case.motions if isinstance(motion, Prescribed)]
     written = tuple(motion for motion in case.motions if not isinstance(motion, Prescribed))
     plain = effective(case.change(motions=written))
@@ -254,10 +260,12 @@ def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
 
 
 def _has(row: DesignRow, meshes: bool) -> bool:
+    """Tell whether the mesh of a row exists, or is not wanted."""
     return not meshes or (row.mesh is not None and row.mesh.is_file())
 
 
 def _digest(*parts: Any) -> str:
+    """Return a digest of arrays or bytes."""
     digest = blake2b(digest_size=16)
     for part in parts:
         digest.update(part)
@@ -265,6 +273,7 @@ def _digest(*parts: Any) -> str:
 
 
 def _line(cells: Sequence[Any]) -> bytes:
+    """Return a line of CSV; NaN is an empty cell."""
     out = StringIO()
     plain = ["" if isinstance(c, float) and math.isnan(c) else c for c in cells]
     csv.writer(out, lineterminator="\n").writerow(plain)
@@ -272,7 +281,7 @@ def _line(cells: Sequence[Any]) -> bytes:
 
 
 def _same(text: str, value: Value) -> bool:
-    """Tell whether a value is what the table has as text: as words, or as a number."""
+    """Tell whether a cell's text means a value: the same text, or the same number."""
     if text == str(value):
         return True
     try:
@@ -282,6 +291,7 @@ def _same(text: str, value: Value) -> bool:
 
 
 def _short(text: str | None) -> str:
+    """Return a text, cut to 60 characters; ``nothing`` for None."""
     if text is None:
         return "nothing"
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -19,7 +19,7 @@ class DesignRow:
     design : int
         Its number in the table of designs, from 1.
     values : mapping of str to str or float
-        What it has in each column of that table.
+        Its values, by column of that table.
     min, mean : float
         Quality of the deformed mesh; NaN where there is none.
     inverted : int
@@ -30,16 +30,16 @@ class DesignRow:
     control_nodes, steps : int
         Control nodes in the last step, and steps made.
     seconds : float
-        That the worker spent on it.
+        Time that the worker spent on it.
     mesh : Path or None
         The file of the deformed mesh, where it was written.
     warnings : tuple of str
     problem : str
         Why there is no result; empty where there is one.
     lost : int
-        How often its worker was lost, and it was done again.
+        How often its worker was lost, so that it was done again.
     earlier : bool
-        Whether it is of a sweep that was stopped, and goes on now.
+        Whether it was done before the sweep was stopped and resumed.
     """
 
     design: int
@@ -67,4 +67,4 @@ NUMBERS: Mapping[str, tuple[str, Callable[[str], float]]] = {
     "steps": ("steps made", int),
     "seconds": ("seconds that the worker spent", float),
 }
-"""The numbers of a result: what each is, and how it is read."""
+"""The numbers of a result, in the order of their columns: meaning, and how a cell is read."""

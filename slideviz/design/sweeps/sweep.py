@@ -1,4 +1,4 @@
-"""Sweeps: one mesh deformed by many designs, on as many processes or machines as there are."""
+"""Sweeps: one mesh deformed by many designs, in many processes or on many machines."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from slideviz.mesh.io.files import read, usual_ending
 from slideviz.mesh.model import Mesh, Origin
 
 LOST = 3
-"""How often a design may lose its worker, before it is a row that says so."""
+"""Number of lost workers at which a design is given up, and its row says so."""
 
 _EVERY = 0.2
-"""Seconds between two questions whether to go on."""
+"""Seconds between two calls of ``going_on``."""
 
 
 @takes(case=Case, designs=object, executor=Executor, mesh=Mesh)
@@ -42,19 +42,19 @@ def sweep(
 ) -> Iterator[DesignRow]:
     """Return an iterator over the results of designs, each as it comes.
 
-    Each design is deformed as ``slideviz run`` would with its values: to the bit where that has one
-    thread, else to the rounding of a large system that several solve.
+    Each design is deformed as by ``slideviz run`` with its values: with the same bits where that
+    has one thread, else but for the rounding of a large system that several threads solve.
 
     Parameters
     ----------
     case : Case
-        What is the same for all designs.
+        Motions and settings for what the designs do not change.
     designs : path, sequence of mappings, or mapping of sequences
         A CSV file, the designs one by one, or the columns. A column is a number of a motion, as
         ``BLADE.translate.y`` or ``motion2.angle_deg``, or a key of the case, as ``STEPS``; where
         a value is empty, that of the case holds.
     executor : concurrent.futures.Executor, optional
-        What does the work: ``ProcessPoolExecutor``, ``mpi4py.futures.MPIPoolExecutor``, Dask's
+        Runs the designs: ``ProcessPoolExecutor``, ``mpi4py.futures.MPIPoolExecutor``, Dask's
         ``client.get_executor()``. Without it, processes of this machine, which are replaced when
         they are lost. Each process works on one design at a time, with one thread, and is sent
         the mesh once.
@@ -69,9 +69,10 @@ def sweep(
     resume : bool
         Whether designs that have a result in ``folder`` are left out. Their rows come first.
     force : bool
-        Whether results that are in ``folder`` may be lost.
+        Whether results that are in ``folder`` may be overwritten.
     going_on : callable
-        Called several times a second while it waits for workers; what it raises ends the sweep.
+        Called several times a second while waiting for workers; an exception it raises ends the
+        sweep.
 
     Yields
     ------
@@ -133,7 +134,7 @@ def sweep(
 def _rows(
     loop: _Loop, earlier: list[DesignRow], results: SweepResults | None
 ) -> Iterator[DesignRow]:
-    """Yield the rows of a stopped sweep and then the others as they come; keep them in a table."""
+    """Yield the rows of a stopped sweep, then new ones as they come; write new ones to results."""
     rows = list(earlier)
     with closing(loop.rows()) as coming, nullcontext() if results is None else closing(results):
         yield from earlier
@@ -147,14 +148,14 @@ def _rows(
 
 
 class _Tasks:
-    """What workers are sent: the mesh once, and the case of each design.
+    """Makes the tasks that workers are sent: the case of each design, and the mesh once.
 
     Parameters
     ----------
     mesh : Mesh
     designs : sequence of Design
     folder : Path or None
-        Where the workers write the meshes.
+        Where the workers write deformed meshes; None: they write none.
     """
 
     def __init__(self, mesh: Mesh, designs: Sequence[Design], folder: Path | None) -> None:
@@ -166,7 +167,7 @@ class _Tasks:
         self._mesh, self._width = mesh, len(str(len(designs)))
 
     def of(self, design: Design, with_mesh: bool) -> Task:
-        """Return the task of a design."""
+        """Return the task of a design; ``with_mesh``: with the mesh, for a worker that lacks it."""
         case = design.case
         motions = tuple(
             replace(motion, path=motion.path.absolute()) if isinstance(motion, FromFile) else motion
@@ -189,12 +190,12 @@ class _Tasks:
 
 
 class _Loop:
-    """The designs that wait and those that workers have.
+    """Submits the designs to the executor, and yields their rows.
 
     Attributes
     ----------
     holding, lacking : set of str
-        Workers that have the mesh, and that said that they need it.
+        Workers that have the mesh, and workers that answered that they need it.
     """
 
     def __init__(
@@ -213,7 +214,7 @@ class _Loop:
         self._refused = False
 
     def rows(self) -> Generator[DesignRow, None, None]:
-        """Yield the rows as they come; when it is closed, what is in work is given up."""
+        """Yield the rows as they come; when the generator is closed, cancel submitted calls."""
         try:
             while self._waiting or self._flying:
                 self._submit()
@@ -231,14 +232,17 @@ class _Loop:
                 self._executor.shutdown(cancel_futures=True)
 
     def _submit(self) -> None:
-        """Give the executor, for each worker, the design in work, the next, and one in reserve."""
+        """Submit designs until there are three for each worker: one in work, and two in reserve.
+
+        One for each worker that is not known to have the mesh.
+        """
         unknown = max(_slots(self._executor) - len(self.holding) - len(self.lacking), 1)
         window = 3 * len(self.holding) + len(self.lacking) + unknown
         sent = sum(with_mesh for _, with_mesh in self._flying.values())
         while self._waiting and len(self._flying) < window:
             with_mesh = sent < len(self.lacking)
             if self._refused and not with_mesh:
-                return  # what lacks the mesh, and is idle for that, would be asked again and again
+                return  # else an idle worker that lacks the mesh would be asked again and again
             design = self._waiting.popleft()
             sent += with_mesh
             try:
@@ -269,7 +273,10 @@ class _Loop:
         return replace(answer.row, values=design.values, lost=lost)
 
     def _lost(self, design: Design, problem: Exception) -> DesignRow | None:
-        """Let a design be done again whose worker was lost; a row when that was so too often."""
+        """Queue a design again whose worker was lost, and return None; its row if lost too often.
+
+        Raises DeformError where processes of this machine cannot be started.
+        """
         if isinstance(self._executor, Processes) and (why := self._executor.why_none_starts):
             raise DeformError(why) from problem
         self.lacking.clear()
@@ -288,7 +295,7 @@ class _Loop:
 
 
 def _slots(executor: Executor) -> int:
-    """Return how many calls an executor does at once, as far as it tells."""
+    """Return how many calls an executor does at once; 1 where that is not known."""
     client = getattr(executor, "_client", None)  # of Dask
     if client is not None and hasattr(client, "nthreads"):
         return sum(client.nthreads().values())

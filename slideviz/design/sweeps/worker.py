@@ -1,8 +1,8 @@
-"""The work of a sweep on one design, in whatever process or machine an executor has.
+"""The work of a sweep on one design, in a process of any executor.
 
-The mesh goes to a process once and is held there, with all that is found once for it (boundary,
-undeformed quality); a design is the case alone. A process that does not hold the mesh says so,
-and is sent it with the next design.
+The mesh is sent to a process once and kept there, with what is computed once for it (boundary,
+undeformed quality); a task is then the case only. A process without the mesh answers so, and is
+sent the mesh with its next task.
 """
 
 from __future__ import annotations
@@ -31,15 +31,16 @@ from slideviz.mesh.quality import quality
 from slideviz.terms import FileFormat
 
 _KEPT = 2
-"""Meshes that a process holds: that of the sweep, and one of another that uses it, too."""
+"""Number of meshes that a process keeps: that of the sweep, and one of another sweep."""
 _held: dict[str, Mesh] = {}
+"""The meshes of this process, by name."""
 _one_at_a_time = Lock()
-"""Numba's threads end the process where two loops of different threads meet."""
+"""Held during a task: Numba ends the process if loops of two threads run at once."""
 
 
 @dataclass(frozen=True)
 class Packed:
-    """A mesh as bytes, and the name it goes by."""
+    """A mesh as bytes, and a name that is unique to them."""
 
     name: str
     content: bytes
@@ -47,7 +48,24 @@ class Packed:
 
 @dataclass(frozen=True)
 class Task:
-    """A design as it is sent: its number, its case, the name of the mesh, perhaps the mesh."""
+    """A design as it is sent to a worker.
+
+    Attributes
+    ----------
+    design : int
+        Its number, from 1.
+    case : Case
+    mesh : str
+        Name of the packed mesh.
+    version : str
+        Of the slideviz that sends it.
+    packed : Packed or None
+        The mesh, for a worker that lacks it.
+    output : Path or None
+        Where the deformed mesh is written; None: it is not.
+    file_format : FileFormat or None
+        Of ``output``; None: as its ending says.
+    """
 
     design: int
     case: Case
@@ -60,20 +78,20 @@ class Task:
 
 @dataclass(frozen=True)
 class Answer:
-    """What came of a task, and who did it; no row where the mesh is not held there."""
+    """The result of a task, and the name of the worker; no row where the worker lacks the mesh."""
 
     worker: str
     row: DesignRow | None = None
 
 
 def packed(mesh: Mesh) -> Packed:
-    """Return a mesh as bytes, under a name that tells it apart from all others."""
+    """Return a mesh as bytes, named by their digest."""
     content = pickle.dumps(mesh, protocol=pickle.HIGHEST_PROTOCOL)
     return Packed(blake2b(content, digest_size=16).hexdigest(), content)
 
 
 def hold(mesh: Packed) -> str:
-    """Keep a mesh in this process, and return who it is."""
+    """Keep a mesh in this process; return the name of the process."""
     if mesh.name not in _held:
         while len(_held) >= _KEPT:
             _held.pop(next(iter(_held)))
@@ -82,7 +100,7 @@ def hold(mesh: Packed) -> str:
 
 
 def work(task: Task) -> Answer:
-    """Return the result of a design: whatever goes wrong with it is a row with the reason."""
+    """Deform the mesh by a design; return its row. An exception becomes a row with the reason."""
     if task.version != __version__:
         reason = f"the worker {_myself()} has slideviz {__version__}, this is {task.version}"
         return Answer(
@@ -134,17 +152,18 @@ def _result(task: Task, mesh: Mesh, begin: float) -> DesignRow:
 
 
 def _warnings(last: Step) -> tuple[str, ...]:
-    """Return what should be known of a run, without what is harmless."""
+    """Return the warnings of a run, without notes."""
     return tuple(text for text in last.warnings if not isinstance(text, Note))
 
 
 def _myself() -> str:
+    """Return the name of this process: host and process id."""
     return f"{os.uname().nodename}, process {os.getpid()}"
 
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Return a context in which loops and linear algebra use one thread: designs use the cores."""
+    """Context in which loops and linear algebra use one thread: designs run in parallel."""
     from numba import get_num_threads, set_num_threads
 
     before = get_num_threads()
