@@ -47,8 +47,8 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
     ``mean_quality``.
 
     Products with the Jacobian, forward and reverse, are those of the deformer: exact for its frozen
-    choices, such as the control nodes. They are made for the undeformed mesh; to renew them, set
-    the option ``deformer`` to ``deformer.refresh(displacement)``.
+    choices, such as the control nodes. These are made at the deformer's reference; to renew them,
+    set the option ``deformer`` to ``deformer.refresh(displacement)``.
 
     Variables are not distributed: it is made for one process.
 

@@ -1,4 +1,4 @@
-"""The surface of a solver: which nodes of the mesh it has, in which order, and how often."""
+"""The surface of a solver: its nodes, in the solver's order and with repetitions, in the mesh."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 COINCIDES = 1e-8
-"""How far a node of the surface may lie from one of the mesh, as a part of the mesh's extent."""
+"""Largest distance of a node of the surface from its node of the mesh, in parts of the extent."""
 
 
 @dataclass(frozen=True, eq=False)
 class SolverSurface:
-    """Nodes of a mesh as a solver has them.
+    """The nodes of a solver's surface, as nodes of a mesh.
 
     Attributes
     ----------
     mesh : Mesh
         Undeformed.
     moving : (m,) int64
-        The nodes that a displacement is given for, ascending.
+        The moving nodes of the case, ascending.
     nodes : (N,) int64
-        The nodes of the surface: all moving ones, any of them several times, and others.
+        The nodes of the surface, in the solver's order: all moving nodes and perhaps others, each
+        once or several times.
     """
 
     mesh: Mesh
@@ -45,7 +46,7 @@ class SolverSurface:
 
     @cached_property
     def tolerance(self) -> float:
-        """Return how far apart two places may be that are the same."""
+        """Return the distance up to which two places are the same, in the mesh's length unit."""
         return COINCIDES * self.mesh.extent
 
     @cached_property
@@ -56,23 +57,23 @@ class SolverSurface:
 
     @cached_property
     def held(self) -> NDArray[np.bool_]:
-        """Return which nodes are none of the moving ones, (N, 1)."""
+        """Return a mask (N, 1) of the nodes that are not moving nodes."""
         return self.place[:, None] < 0
 
     @cached_property
     def copies(self) -> IntArray:
-        """Return how often the surface has each moving node, (m, 1)."""
+        """Return the number of copies of each moving node in the surface, (m, 1)."""
         return np.bincount(self.place[self.place >= 0], minlength=len(self.moving))[:, None]
 
     def means(self, values: FloatArray) -> FloatArray:
-        """Return the mean of what the copies of each moving node have, (m, c) of (N, c)."""
+        """Return the mean (m, c) of ``values`` (N, c) over the copies of each moving node."""
         out = np.zeros((len(self.moving), values.shape[1]))
         moves = self.place >= 0
         np.add.at(out, self.place[moves], values[moves])
         return out / self.copies
 
     def spread(self, values: FloatArray) -> FloatArray:
-        """Return what each node has of its moving node, (N, c) of (m, c), or 0."""
+        """Return ``values`` (m, c) of the moving nodes at all copies, (N, c); 0 at other nodes."""
         return np.where(self.held, 0.0, values[np.maximum(self.place, 0)])
 
     def displacement(self, given: FloatArray, now: FloatArray) -> FloatArray:
@@ -81,14 +82,16 @@ class SolverSurface:
         Parameters
         ----------
         given : (N, d)
-            Where the nodes are to be.
+            Coordinates that the nodes are to have.
         now : (N, d)
-            Where they are; those that are not moving ones may be there or undeformed.
+            Coordinates that the nodes have. Those of a node that is not a moving one must be given
+            as these, or undeformed.
 
         Raises
         ------
         CaseError
-            Their number is another, copies of a node disagree, or one was moved that is held.
+            The number of nodes is wrong, copies of a node disagree, or a node that is not a moving
+            one was moved.
         """
         if len(given) != len(self.nodes):
             raise CaseError(
@@ -120,7 +123,7 @@ def surface_at(mesh: Mesh, moving: IntArray, given: FloatArray) -> SolverSurface
     Raises
     ------
     CaseError
-        A node is none of the mesh's boundaries, or a moving node is not in the surface.
+        A node is on none of the mesh's boundaries, or a moving node is not in the surface.
     """
     boundary = np.unique(np.concatenate([moving, *(marker.nodes for marker in mesh.markers)]))
     distance, found = cKDTree(mesh.points[boundary]).query(given)
@@ -142,4 +145,5 @@ def surface_at(mesh: Mesh, moving: IntArray, given: FloatArray) -> SolverSurface
 
 
 def _lengths(vectors: FloatArray) -> FloatArray:
+    """Return the lengths (n,) of vectors (n, d)."""
     return np.asarray(np.linalg.norm(vectors, axis=1))

@@ -1,4 +1,4 @@
-"""The class that stands for IDWarp's."""
+"""The class that replaces IDWarp's ``USMesh``."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _THEIRS = (
     *("LdefFact", "alpha", "errTol", "evalMode", "symmTol", "useRotations", "zeroCornerRotations"),
     *("cornerAngle", "restartFile", "bucketSize"),
 )
-"""Options of IDWarp; those that say how it deforms do nothing here."""
+"""Options of IDWarp; they are accepted and have no effect here."""
 
 
 class USMesh:
@@ -46,14 +46,14 @@ class USMesh:
     ----------
     options : dict
         ``gridFile``: a mesh file or a `slideviz.Mesh`; ``case``: a case file or a `slideviz.Case`,
-        with the roles of the boundaries and the method. ``displacements``: what the deformation
-        is prepared for, as for `slideviz.Deformer`; without them the motions of the case, and
-        without those none, which is enough without data reduction.
-        Options of IDWarp that say how to deform are taken, with a warning, and do nothing.
+        with the roles of the boundaries and the method. ``displacements``: those that the
+        deformation is prepared for, as for `slideviz.Deformer`; without them, those of the case's
+        motions; without motions zero, which is enough without data reduction.
+        Options of IDWarp that say how to deform are accepted with a warning, and have no effect.
     comm : mpi4py.MPI.Comm, optional
         Of one process.
     debug : bool
-        Does nothing.
+        Has no effect.
 
     Raises
     ------
@@ -95,7 +95,7 @@ class USMesh:
     # What the solver says ------------------------------------------------------------------
 
     def setExternalMeshIndices(self, ind: ArrayLike) -> None:
-        """Say which coordinates of the grid, counted from 0, the solver has, and in which order.
+        """Set which coordinates of the grid, counted from 0, the solver has, and in which order.
 
         Raises
         ------
@@ -117,7 +117,7 @@ class USMesh:
         faceSizes: ArrayLike = (),
         cgnsBlockID: object = None,
     ) -> None:
-        """Say which surface the solver has: undeformed coordinates ``pts`` (N, d).
+        """Set the solver's surface by its undeformed coordinates ``pts`` (N, d).
 
         Its nodes are found in the mesh by their coordinates; so ``conn`` and the rest, which
         IDWarp needs, are not used.
@@ -125,7 +125,7 @@ class USMesh:
         Raises
         ------
         CaseError
-            A node is none of the mesh, or a moving node of the case is not in the surface.
+            A node is on none of the mesh's boundaries, or a moving node is not in the surface.
         """
         del conn, faceSizes, cgnsBlockID
         nodes = np.asarray(self.deformer.nodes)
@@ -145,8 +145,8 @@ class USMesh:
         Raises
         ------
         CaseError
-            Their number is another, copies of a node disagree, or one was moved that the case
-            does not move.
+            The number of nodes is wrong, copies of a node disagree, or a node was moved that the
+            case does not move.
         """
         given = self._shaped(coordinates)
         now = self._points[self._surface.nodes]
@@ -159,7 +159,7 @@ class USMesh:
         self._coordinates = self._followed(self._coordinates)
 
     def getSolverGrid(self) -> FloatArray:
-        """Return the coordinates of the grid, flat, those of `setExternalMeshIndices`."""
+        """Return the coordinates of the grid, flat, that `setExternalMeshIndices` chose."""
         return self.getWarpGrid()[self._indices]
 
     def getWarpGrid(self) -> FloatArray:
@@ -187,20 +187,24 @@ class USMesh:
     # Derivatives ---------------------------------------------------------------------------
 
     def warpDeriv(self, dXv: ArrayLike, solverVec: bool = True) -> None:
-        """Find the transposed product with ``dXv``, flat, at the surface that was set.
+        """Compute the transposed Jacobian times ``dXv``, flat, at the surface that was set.
 
-        `getdXs` returns it. ``solverVec``: ``dXv`` is as `getSolverGrid` is, else as
-        `getWarpGrid`.
+        `getdXs` returns the product. ``solverVec``: the entries of ``dXv`` are those of
+        `getSolverGrid`; else those of `getWarpGrid`.
         """
         weights = self._of_grid(dXv, solverVec)
         self._gradient = np.array(self.deformer.vjp(self._displacement, weights))
 
     def getdXs(self) -> FloatArray:
-        """Return the product that `warpDeriv` found, for each node of the surface (N, d)."""
+        """Return the product that `warpDeriv` computed, for each node of the surface, (N, d)."""
         return self._surface.spread(self._gradient / self._surface.copies)
 
     def warpDerivFwd(self, dXs: ArrayLike, solverVec: bool = True) -> FloatArray:
-        """Return the change of the grid, flat, for a change of the surface, (N, d) or flat."""
+        """Return the derivative of the grid, flat, as the surface changes by ``dXs``.
+
+        ``dXs`` is (N, d) or flat. ``solverVec``: in the order of `getSolverGrid`; else of
+        `getWarpGrid`.
+        """
         change = self._surface.means(self._shaped(dXs))
         moved = self.deformer.jvp(self._displacement, change)[self._order].ravel()
         return moved[self._indices] if solverVec else moved
@@ -237,18 +241,21 @@ class USMesh:
     # Between the orders of numbers ---------------------------------------------------------
 
     def _followed(self, coordinates: FloatArray) -> FloatArray:
-        """Return coordinates (N, d), those of nodes that are not moving as the grid has them."""
+        """Return coordinates (N, d) with nodes that are not moving ones where the grid has them."""
         return np.where(self._surface.held, self._points[self._surface.nodes], coordinates)
 
     def _shaped(self, values: ArrayLike) -> FloatArray:
-        """Return a row for each node, (N, d), of numbers that may be flat."""
+        """Return values, flat or (N, d), as (N, d); CaseError if any is not finite."""
         out = np.asarray(values, np.float64).reshape(-1, self.deformer.mesh.dim)
         if not np.isfinite(out).all():
             raise CaseError("values of the surface are infinite or no numbers; give numbers")
         return out
 
     def _of_grid(self, values: ArrayLike, solver: bool) -> FloatArray:
-        """Return sums of what is given for the points of the grid (n, d), flat, over all copies."""
+        """Return flat values of the grid as (n, d), summed over the copies of each point.
+
+        ``solver``: in the order of `getSolverGrid`; else of `getWarpGrid`.
+        """
         given, dim = np.asarray(values, np.float64).ravel(), self._points.shape[1]
         places = (self._order[:, None] * dim + np.arange(dim)).ravel()
         if solver:
@@ -263,7 +270,10 @@ class USMesh:
 
 
 def _read(options: Mapping[str, Any]) -> tuple[Mesh, Case, Any]:
-    """Return mesh, case and displacements of the options."""
+    """Return mesh, case and displacements (None without) of the options.
+
+    Raises CaseError where an option is missing or unknown; warns of options without effect.
+    """
     from slideviz.case.model import Case
     from slideviz.mesh.io.files import read
 

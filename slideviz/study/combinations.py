@@ -1,8 +1,8 @@
 """The comparison of methods: one case by several methods, periodic modes, numbers of steps.
 
-The mesh is read once, and what only the method and the periodic mode decide (topology, classes of
-nodes, tracks) is found once for all numbers of steps. A combination that cannot be is a row that
-says why; it never ends the comparison.
+What depends on the method and the periodic mode only (topology, classes of nodes, tracks) is
+computed once for all numbers of steps. An impossible combination is a row with the reason; it
+does not end the comparison.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ COMPARED_METHODS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     for method, term in terms.METHODS.items()
     if method != "rbf"
 }
-"""What each method is called, and what of a case it changes."""
+"""For each method its name, and the fields of a case that it changes."""
 
 MODES = terms.names(terms.PERIODIC_MODES)
-"""What each PERIODIC_MODE is called."""
+"""The name of each PERIODIC_MODE."""
 
 AUTO = 0
-"""Number of steps: as many as it takes."""
+"""Number of steps that means STEPS= auto: the solver chooses it."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Combination:
         One of ``COMPARED_METHODS``.
     periodic : PeriodicMode
     steps : int
-        ``AUTO`` for as many as it takes.
+        ``AUTO``: the solver chooses.
     """
 
     method: str
@@ -82,11 +82,11 @@ class Result:
     steps : int
         Steps made.
     mesh : Mesh or None
-        The last one; None where it was not kept, so that there is no picture of it.
+        After the last step; None where it was not kept, so that there is no picture of it.
     quality : Quality
-        Of it.
+        Of that mesh.
     minimum, mean : (steps,) float64
-        Quality after each step.
+        Lowest and mean quality after each step.
     control_nodes : int
         In the last step.
     max_error : float
@@ -127,7 +127,7 @@ class CombinationRow:
 
 
 def bounded(rows: Iterable[CombinationRow], bytes_kept: int) -> Iterator[CombinationRow]:
-    """Yield the rows; meshes are kept until their points take so many bytes, then no more."""
+    """Yield the rows, without meshes once the points of all meshes exceed ``bytes_kept`` bytes."""
     kept = 0
     for row in rows:
         result = row.result
@@ -141,7 +141,7 @@ def bounded(rows: Iterable[CombinationRow], bytes_kept: int) -> Iterator[Combina
 
 @dataclass(frozen=True, eq=False)
 class _Shared:
-    """The setup that runs with the same method and mode share, and the time it took."""
+    """The setup shared by runs of one method and mode, made for ``first``, and the time it took."""
 
     first: Combination
     setup: Setup
@@ -149,12 +149,12 @@ class _Shared:
     processor_seconds: float
 
     def serves(self, combination: Combination) -> bool:
-        """Tell whether the combination differs in the number of steps alone."""
+        """Tell whether a combination differs from ``first`` in the number of steps only."""
         return replace(combination, steps=self.first.steps) == self.first
 
 
 def warm(methods: Iterable[str]) -> None:
-    """Load in advance what the methods load once, so that it takes no time of a run."""
+    """Load and compile what the methods need once, by small runs, so that no run's time has it."""
     warm_up(lambda: None, lambda: False)
     made = sample("square", 4, "motion")
     (block,) = made.case.markers_with("moving")
@@ -175,12 +175,12 @@ def compare(
     Parameters
     ----------
     case : Case
-        Method, mode and number of steps are those of the combinations, the rest is its own.
+        All settings but method, mode and number of steps, which are those of the combinations.
     mesh : Mesh
         The undeformed mesh.
     wanted : sequence of Combination
     tell : callable, optional
-        Called often; an exception it raises ends the comparison.
+        Called often with the progress of a combination; raising `Cancelled` ends the comparison.
     """
     shared: _Shared | None = None
     for combination in wanted:
@@ -204,6 +204,7 @@ def compare(
 
 
 def _share(combination: Combination, case: Case, mesh: Mesh) -> _Shared:
+    """Return the setup of a combination, timed."""
     clock = _Clock()
     with clock:
         setup = make_setup(combination.applied(case), mesh)
@@ -217,7 +218,7 @@ def _result(
     shared: _Shared,
     tell: Callable[[Combination, Progress], None] | None,
 ) -> Result:
-    """Return the result of a combination; only the deformation is timed."""
+    """Return the result of a combination; its times are those of setup and deformation only."""
     applied = combination.applied(case)
     progress = (lambda now: tell(combination, now)) if tell else None
     pulled = deform(applied, mesh, progress, shared.setup)
@@ -253,7 +254,7 @@ def _result(
 
 
 class _Clock:
-    """``with clock:`` adds the time of the block, by the clock and of all processors."""
+    """Stopwatch: ``with clock:`` adds the block's wall time and the time of all processors."""
 
     def __init__(self, seconds: float = 0.0, processor: float = 0.0) -> None:
         self.seconds, self.processor = seconds, processor

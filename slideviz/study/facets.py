@@ -1,4 +1,4 @@
-"""Facets of a comparison's plots: the rows that are drawn together, and their lines.
+"""Facets of a comparison's plots: axes, each with some of the rows as lines.
 
 Where both methods and periodic modes vary, each method has a facet and each mode a line, as in
 the thesis (Figures 5.5, 5.7, 5.8), or the other way round where there are fewer modes; otherwise
@@ -23,7 +23,7 @@ Span = Literal["r", "x", "y", "z"]
 
 @dataclass(frozen=True, eq=False)
 class FacetLine:
-    """A row with the name and the number of its line in a facet."""
+    """A line in a facet: its name, its number ``series`` (which sets its look), and its row."""
 
     label: str
     series: int
@@ -32,18 +32,18 @@ class FacetLine:
 
 @dataclass(frozen=True, eq=False)
 class Facet:
-    """Rows that are drawn together; ``title`` is empty where there is one facet only."""
+    """Lines that are drawn in one plot; ``title`` is empty where there is one facet only."""
 
     title: str
     lines: tuple[FacetLine, ...]
 
 
 def facets(rows: Sequence[CombinationRow]) -> tuple[Facet, ...]:
-    """Return rows with a result in facets; a line has the same look in each."""
+    """Return facets of the rows that have a result; lines of one name look alike in all facets."""
     asked = [list(dict.fromkeys(_titles(row)[axis] for row in rows)) for axis in (0, 1)]
     done = [row for row in rows if row.result is not None]
     methods, modes = (len({_titles(row)[axis] for row in done}) for axis in (0, 1))
-    # What has a line for each; the other has the facets.
+    # 0: each method is a line, each mode a facet; 1: the other way round.
     lined = 0 if modes == 1 or modes < methods else 1
     other = 1 - lined
     found: dict[str, list[FacetLine]] = {title: [] for title in asked[other]}
@@ -62,11 +62,11 @@ def _titles(row: CombinationRow) -> tuple[str, str]:
 
 
 Profiler = Callable[[FacetLine], Profile]
-"""Makes the profile of a line along the span."""
+"""Returns the profile of a line's quality along the span."""
 
 
 def result_of(line: FacetLine) -> Result:
-    """Return the result of a line; it has one, or it would not be drawn."""
+    """Return the result of a line; lines always have one."""
     assert line.row.result is not None
     return line.row.result
 
@@ -78,11 +78,11 @@ def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | Non
     ----------
     case : Case
     mesh : Mesh
-        The undeformed mesh. Its cells say which layer a cell is in, so that layers of cells stay
-        together while they bend.
+        The undeformed mesh. Cells are assigned to places along the span by it, so that a layer of
+        cells stays together when it bends.
     span : {"r", "x", "y", "z"}, optional
         When left out: the radius of a 3D mesh that repeats by rotation, z of another 3D mesh,
-        nothing of a 2D mesh.
+        no span for a 2D mesh.
     """
     axis, origin, turns = case.axis, case.origin, False
     names = case.markers_with("periodic")

@@ -21,22 +21,23 @@ from slideviz.study.plots import WIDTH
 from slideviz.study.wanted import TITLES, reasons, words_for
 
 GridPlace = tuple[int, int]
+"""Row and column of a picture in the montage."""
 
 DPI = 300
 NOT_KEPT = "not drawn: too many large meshes; compare fewer methods or steps at once"
 _OVERSAMPLED = 2
-"""Pictures are drawn so much larger than shown, so that fine mesh lines turn grey, not black."""
+"""Ratio of drawn to shown size of pictures, so that fine mesh lines turn grey, not black."""
 _NAME, _LOWEST = 0.3, 0.5
-"""Inches: about the width of the name of a row, and the least height, so that it stands beside."""
+"""Inches: width of the name of a row, and the least height of a row, so that its name fits."""
 _HIGHEST = 40.0
-"""Inches that a montage has room for while it is laid out."""
+"""Inches: height of the figure while it is laid out; it is trimmed afterwards."""
 
 
 def montage(rows: Sequence[CombinationRow], base: Mesh) -> Any:
     """Return the pictures of rows as a figure: a row for each method, a column for each mode.
 
-    Of many methods and few modes it is the other way round, so that the montage is not too long.
-    A method or a mode that could not be computed at all has no place; the foot says why.
+    With many methods and few modes it is the other way round, so that the montage is not too long.
+    A method or a mode without any result has no row or column; a note at the foot says why.
 
     Parameters
     ----------
@@ -87,9 +88,9 @@ def montage(rows: Sequence[CombinationRow], base: Mesh) -> Any:
 def _axis(
     rows: Sequence[CombinationRow], done: Sequence[CombinationRow], what: str
 ) -> dict[str, tuple[int, str]]:
-    """Return place and name of each method, or mode, of which there is a result.
+    """Return place and name of each method, or mode (``what``), that has a result.
 
-    The name is empty where no other was asked for.
+    The name is empty where only one was asked for.
     """
     words = (
         {name: title for name, (title, _) in COMPARED_METHODS.items()}
@@ -108,7 +109,7 @@ def _words(
     rows: Sequence[CombinationRow],
     shown: Mapping[GridPlace, Pixels],
 ) -> tuple[dict[GridPlace, str], list[str]]:
-    """Return what stands in places without a picture, and the notes at the foot."""
+    """Return the words in places without a picture, and the notes at the foot."""
     problems = {row.combination: row.problem for row in rows if row.result is None}
     every = [row.combination for row in rows]
     given = list(reasons(problems).items())
@@ -131,7 +132,7 @@ def _words(
 def _facets(
     names: Sequence[Sequence[str]], shown: Mapping[GridPlace, Pixels], wide: float
 ) -> tuple[Any, Any]:
-    """Return a figure with axes for each row and column, their names, and the pictures in them."""
+    """Return a figure and its axes (rows, columns), with names and pictures drawn in them."""
     across = _drawn(list(shown.values()), 1)
     width = across.stop - across.start
     down = [
@@ -161,7 +162,7 @@ def _facets(
 
 
 def _drawn(images: Sequence[Pixels], axis: int) -> slice:
-    """Return where any of the images is not white: rows for axis 0, columns for axis 1."""
+    """Return the slice of rows (axis 0) or columns (axis 1) where any image is not white."""
     some = np.zeros(images[0].shape[axis], bool)
     for image in images:
         some |= (image < WHITE).any(axis=(1 - axis, 2))
@@ -170,7 +171,7 @@ def _drawn(images: Sequence[Pixels], axis: int) -> slice:
 
 
 def _fill(axes: Any, words: str, row: CombinationRow, wide: float) -> None:
-    """Write the numbers below a facet, and into it why there is no picture."""
+    """Write ``words`` into a facet, the reason why it has no picture, and numbers below it."""
     style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": SMALLEST, "color": "0.35"}
     axes.text(0.5, 0.5, fitted(words, wide, SMALLEST)[0], transform=axes.transAxes, **style)
     if row.result is not None:
@@ -178,6 +179,7 @@ def _fill(axes: Any, words: str, row: CombinationRow, wide: float) -> None:
 
 
 def _numbers(result: Result) -> str:
+    """Return the lowest and mean quality, and the number of inverted cells, in words."""
     found = result.quality
     text = f"min {found.min:.3f}, mean {found.mean:.3f}"
     return f"{text}\n{found.inverted} inverted" if found.inverted else text

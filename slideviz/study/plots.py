@@ -23,13 +23,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH = 7.0
-"""Inches; that of a page's text, at which letters are 8 points or more."""
+"""Width of figures, in inches: that of a page's text, so that letters are at least 8 points."""
 
 _BINS = 25
-"""Intervals of a histogram, each wide enough to see the dashes of its lines."""
+"""Number of intervals of a histogram, each wide enough to show the dashes of its lines."""
 _WIDE = 8.0
-"""Times that differ more than so many times need a logarithmic axis."""
+"""Ratio of the largest to the smallest time from which their axis is logarithmic."""
 _LAST = ("minimum", "mean")
+"""Names that come last in the legend: of markers, not of lines."""
 _QUIET = replace(PRINT, legend=False)
 
 
@@ -41,7 +42,8 @@ def figures(rows: Sequence[CombinationRow], span: Profiler | None) -> Iterator[t
     rows : sequence of CombinationRow
         Rows without a result are left out.
     span : callable or None
-        What makes the profile of a row along the span; see `profiler`.
+        Returns the profile of a row along the span, as `slideviz.study.facets.profiler` makes it;
+        None: no figures along the span.
     """
     numbers = list(dict.fromkeys(row.combination.steps for row in rows))
     if len({row.result.steps for row in rows if row.result}) > 1:
@@ -90,6 +92,7 @@ _Draw = Callable[["Axes", Sequence[FacetLine]], None]
 
 
 def _outcomes(lines: Sequence[FacetLine]) -> list[plots.Outcome]:
+    """Return the results of lines as plots against steps take them."""
     found = []
     for line in lines:
         result = result_of(line)
@@ -110,19 +113,22 @@ def _outcomes(lines: Sequence[FacetLine]) -> list[plots.Outcome]:
 
 
 def _minimum(axes: Axes, lines: Sequence[FacetLine]) -> None:
+    """Draw the lowest quality against the number of steps."""
     plots.against_steps(axes, _outcomes(lines), "minimum", _QUIET)
 
 
 def _mean(axes: Axes, lines: Sequence[FacetLine]) -> None:
+    """Draw the mean quality against the number of steps."""
     plots.against_steps(axes, _outcomes(lines), "mean", _QUIET)
 
 
 def _seconds(axes: Axes, lines: Sequence[FacetLine]) -> None:
+    """Draw the time against the number of steps."""
     plots.against_steps(axes, _outcomes(lines), "seconds", _QUIET)
 
 
 def _histogram(every: Sequence[FacetLine]) -> _Draw:
-    """Return what draws some of the lines, with the intervals that suit all."""
+    """Return a function that draws histograms of lines, with the same intervals for all facets."""
     good = [_values(line)[~_inverted(line)] for line in every]
     values = np.concatenate([*good, [1.0]])
     edges = np.linspace(*rounded_out(float(values.min()), float(values.max())), _BINS + 1)
@@ -139,16 +145,19 @@ def _histogram(every: Sequence[FacetLine]) -> _Draw:
 
 
 def _inverted(line: FacetLine) -> np.ndarray:
+    """Return a mask of the inverted cells among the counted ones."""
     found = result_of(line).quality
     return np.asarray(found.status[found.counted] == INVERTED)
 
 
 def _values(line: FacetLine) -> np.ndarray:
+    """Return the quality of the counted cells."""
     found = result_of(line).quality
     return found.values[found.counted]
 
 
 def _by_step(axes: Axes, lines: Sequence[FacetLine]) -> None:
+    """Draw the lowest and mean quality after each step."""
     runs = []
     for line in lines:
         result = result_of(line)
@@ -158,6 +167,7 @@ def _by_step(axes: Axes, lines: Sequence[FacetLine]) -> None:
 
 
 def _convergence(axes: Axes, lines: Sequence[FacetLine]) -> None:
+    """Draw the error against the control nodes, of the greedy selection of the first step."""
     runs = []
     for line in lines:
         if not result_of(line).history:
@@ -177,6 +187,8 @@ def _convergence(axes: Axes, lines: Sequence[FacetLine]) -> None:
 
 
 def _span(make: Profiler, what: Literal["minimum", "mean"]) -> _Draw:
+    """Return a function that draws profiles along the span."""
+
     def draw(axes: Axes, lines: Sequence[FacetLine]) -> None:
         spanwise(axes, [make(line) for line in lines], what, style=_QUIET)
 
@@ -184,7 +196,10 @@ def _span(make: Profiler, what: Literal["minimum", "mean"]) -> _Draw:
 
 
 def _grid(group: Sequence[Facet], draws: Sequence[_Draw], across: bool = False) -> Figure:
-    """Return a figure with a row for each facet, or a column if ``across``, and one legend."""
+    """Return a figure with a row for each facet, or a column if ``across``, and one legend.
+
+    A row has a plot for each function of ``draws``; with ``across`` there is one function.
+    """
     count = len(group)
     shape = (1, count) if across else (count, len(draws))
     figure = empty_figure((WIDTH, 0.9 + shape[0] * (3.0 if across else 2.1)), 100.0, "constrained")
@@ -210,7 +225,7 @@ def _grid(group: Sequence[Facet], draws: Sequence[_Draw], across: bool = False) 
 
 
 def _one_legend(figure: Figure) -> None:
-    """Put one legend for all axes below them, lines first and what markers mean last."""
+    """Draw one legend for all axes below them: lines first, markers last."""
     handles: dict[str, Any] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -236,11 +251,12 @@ def _one_legend(figure: Figure) -> None:
 
 
 def _is_cross(gid: str) -> bool:
+    """Tell whether a line with this gid is the crosses at meshes with inverted cells."""
     return gid.startswith("inverted:")
 
 
 def _same_height(together: Sequence[Axes]) -> None:
-    """Give axes the limits that hold all of them, so that they can be compared."""
+    """Give all axes the same vertical limits and scale, so that they can be compared."""
     scales = {axes.get_yscale() for axes in together}
     log = "log" in scales
     for axes in together:
@@ -255,7 +271,7 @@ def _same_height(together: Sequence[Axes]) -> None:
 
 
 def _readable_seconds(together: Sequence[Axes]) -> None:
-    """Let times that differ much be told apart: a logarithmic axis with plain numbers."""
+    """Give axes of times that differ much (`_WIDE`) a logarithmic scale with plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     values = np.concatenate([line.get_ydata() for axes in together for line in axes.lines])

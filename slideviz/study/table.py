@@ -23,9 +23,9 @@ class StudyColumn:
     ----------
     meaning : str
     value : callable
-        Of a result.
+        Returns the value of a result.
     head, form : str
-        Head and format on a terminal, which shows the columns that have one.
+        Head and format on a terminal; columns with an empty head are not shown there.
     """
 
     meaning: str
@@ -65,13 +65,13 @@ COLUMNS: Mapping[str, StudyColumn] = {
         "the same, of all processors together", lambda r: r.processor_seconds
     ),
 }
-"""What ``compare.csv`` has after method, periodic and steps; the last column is ``problem``."""
+"""The columns of ``compare.csv`` between `KEY_COLUMNS` and the last one, ``problem``."""
 
 KEY_COLUMNS = ("method", "periodic", "steps")
 
 
 def csv_text(rows: Sequence[CombinationRow]) -> str:
-    """Return the table as CSV; numbers with all their digits, nothing where there is no result."""
+    """Return the table as CSV; numbers with all their digits, empty cells without a result."""
     out = StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow([*KEY_COLUMNS, *COLUMNS, "problem"])
@@ -105,7 +105,7 @@ def save_text(path: Path, text: str) -> None:
     Raises
     ------
     CaseError
-        It cannot be written.
+        The file cannot be written.
     """
     with atomic_write(path, CaseError) as file:
         file.write(text.encode())
@@ -120,8 +120,8 @@ def terminal_head() -> str:
 def terminal_line(row: CombinationRow, given: list[str] | None = None) -> str:
     """Return a row for a terminal; the reason where there is no result.
 
-    ``given`` has the reasons given so far, and gets those given here: each is written once, and
-    later by its number.
+    ``given`` are the reasons written so far, and a new one is appended: a reason is written once,
+    and later as its number.
     """
     tried = row.combination
     begin = f"{tried.method:<7} {tried.periodic:<8}"
@@ -137,7 +137,7 @@ def terminal_line(row: CombinationRow, given: list[str] | None = None) -> str:
 
 
 def _reason(problem: str, given: list[str] | None) -> str:
-    """Return a number and the reason, or the number alone where it was given before."""
+    """Return the number of a reason in ``given``, with the reason itself if it is new."""
     given = [] if given is None else given
     if problem in given:
         return f"[{given.index(problem) + 1}]"
@@ -146,4 +146,5 @@ def _reason(problem: str, given: list[str] | None) -> str:
 
 
 def _cell(text: str, column: StudyColumn) -> str:
+    """Return a text, right-aligned to the width of its column on a terminal."""
     return text.rjust(max(len(column.head), 8 if column.form.endswith("f") else 5))

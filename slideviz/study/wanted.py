@@ -12,32 +12,32 @@ from slideviz.study.combinations import COMPARED_METHODS, MODES, Combination
 from slideviz.terms import SLIDING, PeriodicMode
 
 Names = tuple[Callable[[str], str], Callable[[str], str]]
-"""What a method and a periodic mode are called."""
+"""Functions that return the name of a method and of a periodic mode."""
 
 KEYS: Names = (lambda method: f"method {method}", lambda mode: f"periodic {mode}")
-"""As the options of the command call them."""
+"""Names as in the options of the command."""
 
 TITLES: Names = (lambda method: COMPARED_METHODS[method][0], lambda mode: MODES[mode])
-"""As figures call them."""
+"""Names as in figures."""
 
 
 def combinations(
     methods: Sequence[str], modes: Sequence[PeriodicMode], steps: Sequence[int]
 ) -> tuple[Combination, ...]:
-    """Return all combinations, with those that share work after each other."""
+    """Return all combinations; those of one method and mode, which share a setup, are adjacent."""
     return tuple(Combination(*row) for row in product(methods, modes, steps))
 
 
 def wanted_modes(case: Case) -> tuple[PeriodicMode, ...]:
-    """Return the modes worth trying: the case's own.
+    """Return the modes that are compared by default: the case's own, and with ``moving`` ``fixed``.
 
-    Beside moving ends there are fixed ones, so that the method that does not slide has a row.
+    For ``moving`` is not possible without sliding.
     """
     return ("fixed", "moving") if case.periodic == "moving" else (case.periodic,)
 
 
 def wanted_methods(case: Case) -> tuple[str, ...]:
-    """Return the methods worth trying: those that slide, if the case has boundaries for it."""
+    """Return the methods compared by default: all of SLIDING_MODE, or ``none`` without sliding."""
     slides = any(case.markers_with(role) for role in ("sliding", "periodic", "internal"))
     return tuple(SLIDING) if slides else ("none",)
 
@@ -45,7 +45,7 @@ def wanted_methods(case: Case) -> tuple[str, ...]:
 def refused(case: Case, mesh: Mesh, wanted: Iterable[Combination]) -> dict[Combination, str]:
     """Return the combinations that contradict the case or the mesh, each with the reason.
 
-    Nothing is computed: others may turn out to be impossible later.
+    Nothing is deformed: other combinations may turn out to be impossible later.
     """
     problems: dict[tuple[str, str], str] = {}
     found = {}
@@ -59,7 +59,7 @@ def refused(case: Case, mesh: Mesh, wanted: Iterable[Combination]) -> dict[Combi
 
 
 def reasons(problems: Mapping[Combination, str]) -> dict[str, list[Combination]]:
-    """Return the combinations for which each reason is given."""
+    """Return for each reason the combinations that have it."""
     found: dict[str, list[Combination]] = {}
     for combination, problem in problems.items():
         found.setdefault(" ".join(problem.split()), []).append(combination)
@@ -67,9 +67,9 @@ def reasons(problems: Mapping[Combination, str]) -> dict[str, list[Combination]]
 
 
 def words_for(some: Iterable[Combination], every: Iterable[Combination], names: Names) -> str:
-    """Return a few words for some of the combinations, whatever their numbers of steps.
+    """Return words for ``some`` of ``every`` combination, whatever their numbers of steps.
 
-    Where all methods with a mode are among them, or a method with all modes, that one word does.
+    A mode with all methods is named by the mode only, a method with all modes by the method only.
     """
     pairs = dict.fromkeys((one.method, one.periodic) for one in some)
     others = {(one.method, one.periodic) for one in every} - pairs.keys()
@@ -98,8 +98,8 @@ def announcement(
     cannot : mapping of Combination to str
         Those that are left out, with the reason; see `refused`.
     more : mapping of str to sequence of str
-        What else could be asked for, by option (``methods``, ``periodic``); empty where the user
-        has chosen.
+        Further values that each option (``methods``, ``periodic``) takes; empty where the user has
+        chosen.
     """
     tried: dict[str, Iterable[str]] = {
         "methods": dict.fromkeys(one.method for one in wanted),
