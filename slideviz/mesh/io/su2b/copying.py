@@ -1,6 +1,7 @@
-"""Bytes of a large file copied to the same place of another, piece by piece, and held against it.
+"""Copying parts of a large file to the same place of another, piece by piece, and checking them.
 
-One process copies beside its other work, ranks copy when the copy has to be ready.
+A single process copies in a thread beside its other work; several ranks copy when the copy has to
+be ready.
 """
 
 from __future__ import annotations
@@ -19,21 +20,29 @@ from slideviz.mesh.ranks import ALONE, Alone, Make
 from slideviz.mesh.threads import Tick
 
 _PIECE = 1 << 26
+"""Most bytes that are copied in one task."""
 _BLOCK = 1 << 20
-"""Bytes of a piece that are in memory at a time."""
+"""Most bytes of a piece that are in memory at a time."""
 Piece = tuple[int, int]
-"""The first of some bytes, and the one after the last."""
+"""First byte of a range, and the one after the last."""
 
 
 def copying(
     source: Path, ours: Path, parts: Sequence[Piece], ranks: Alone, *, is_left: bool
 ) -> AbstractContextManager[Callable[[Tick], None]]:
-    """Return what waits until parts of a file stand in another one, too.
+    """Return a context with a function that waits until parts of a file are copied to another one.
 
     Parameters
     ----------
+    source, ours : Path
+        The file to copy from, and the existing one to copy to.
+    parts : sequence of Piece
+        The ranges of bytes to copy.
+    ranks : Alone or Ranks
+        The processes that copy.
     is_left : bool
-        Whether they have been copied before: then only what is another by now is copied.
+        Whether they were copied before, by a stopped process: then only bytes that differ are
+        copied again.
     """
     tasks = [piece for begin, end in parts for piece in _pieces(begin, end)]
     way = _beside if ranks.size == 1 else _together
@@ -52,7 +61,7 @@ def checksums(path: Path, tick: Tick, ranks: Alone = ALONE) -> list[int]:
 
 
 def _pieces(begin: int, end: int) -> list[Piece]:
-    """Return the pieces of some bytes; each but the last ends where a page does."""
+    """Return the pieces of a range of bytes; all but the last end at a page boundary."""
     ends = [*range((begin // _PIECE + 1) * _PIECE, end, _PIECE), end]
     return list(zip([begin, *ends[:-1]], ends, strict=True)) if begin < end else []
 
@@ -61,7 +70,7 @@ def _pieces(begin: int, end: int) -> list[Piece]:
 def _together(
     make: Make[Piece, None], files: tuple[Path, Path], tasks: list[Piece], ranks: Alone
 ) -> Iterator[Callable[[Tick], None]]:
-    """Return what copies the pieces of a file, all ranks some."""
+    """Context with a function in which all ranks do the ``tasks``, by ``make(*files)``."""
 
     def ready(tick: Tick) -> None:
         with ranks.sharing(make, *files) as do:
@@ -75,7 +84,10 @@ def _together(
 def _beside(
     make: Make[Piece, None], files: tuple[Path, Path], tasks: list[Piece], _: Alone
 ) -> Iterator[Callable[[Tick], None]]:
-    """Return what waits until the pieces of a file are copied, as they are from now on."""
+    """Context in which a thread does the ``tasks``, with a function that waits for it.
+
+    At the end of the context it stops after the current task.
+    """
     stopped, done = Event(), 0
 
     def run() -> None:
@@ -105,7 +117,10 @@ def _beside(
 
 @contextmanager
 def _copying(source: Path, ours: Path) -> Iterator[Callable[[Piece], None]]:
-    """Return what copies some bytes of a file to the same place of another, and to the disk."""
+    """Context with a function that copies a piece of a file to the same place of another.
+
+    When it returns, the bytes are on the disk.
+    """
     with source.open("rb") as given, ours.open("r+b") as file:
 
         def copy(task: Piece) -> None:
@@ -118,7 +133,10 @@ def _copying(source: Path, ours: Path) -> Iterator[Callable[[Piece], None]]:
 
 
 def _copied(given: BinaryIO, file: BinaryIO, at: int, count: int) -> int:
-    """Copy some bytes within the kernel where that is possible, and return how many."""
+    """Copy at most ``count`` bytes at ``at``, inside the kernel if possible; return how many.
+
+    Raises MeshError if the file ends there.
+    """
     with suppress(OSError, AttributeError):
         moved = os.copy_file_range(given.fileno(), file.fileno(), count, at, at)
         if moved:
@@ -131,7 +149,7 @@ def _copied(given: BinaryIO, file: BinaryIO, at: int, count: int) -> int:
 
 @contextmanager
 def _mending(source: Path, ours: Path) -> Iterator[Callable[[Piece], None]]:
-    """Return what copies some bytes of a file again where they are others in its copy."""
+    """Context with a function that copies the blocks of a piece that differ in the copy again."""
     with _copying(source, ours) as copy, source.open("rb") as given, ours.open("rb") as file:
 
         def mend(task: Piece) -> None:
@@ -144,7 +162,7 @@ def _mending(source: Path, ours: Path) -> Iterator[Callable[[Piece], None]]:
 
 @contextmanager
 def _summing(path: Path) -> Iterator[Callable[[Piece], int]]:
-    """Return what finds the CRC-32 of some bytes of a file."""
+    """Context with a function that returns the CRC-32 of a piece of a file."""
     with path.open("rb") as file:
 
         def add_up(task: Piece) -> int:
@@ -157,6 +175,6 @@ def _summing(path: Path) -> Iterator[Callable[[Piece], int]]:
 
 
 def _blocks(task: Piece) -> Iterator[tuple[int, int]]:
-    """Yield where the blocks of a piece begin, and their bytes."""
+    """Yield first byte and number of bytes of the blocks of a piece."""
     for at in range(*task, _BLOCK):
         yield at, min(_BLOCK, task[1] - at)
