@@ -65,7 +65,7 @@ class ConditionWarning(UserWarning):
 
 
 class ArgumentError(SlidevizError, TypeError):
-    """An argument is of another type than the function takes."""
+    """An argument is not of the type that the function needs."""
 
 
 class Cancelled(SlidevizError):
@@ -82,9 +82,12 @@ class Note(str):
 
 
 def takes(**kinds: type | tuple[type, ...]) -> Callable[[Callable[P, Result]], Callable[P, Result]]:
-    """Return what makes a function raise ArgumentError where arguments are of other types.
+    """Return a decorator: the function raises ArgumentError for arguments of other types.
 
-    None may be given where it is the default.
+    Parameters
+    ----------
+    **kinds : type or tuple of type
+        The types allowed for an argument, by its name; None is allowed where it is the default.
     """
 
     def checked(function: Callable[P, Result]) -> Callable[P, Result]:
@@ -106,7 +109,7 @@ def takes(**kinds: type | tuple[type, ...]) -> Callable[[Callable[P, Result]], C
 
 
 def _said(value: object) -> str:
-    """Return in words what was given: short things themselves, others by their type."""
+    """Return a wrong argument in words: its value if that is short, else its type."""
     is_short = isinstance(value, str | int | float | None) and len(repr(value)) <= 60
     return repr(value) if is_short else f"of type {type(value).__name__}"
 

@@ -108,7 +108,10 @@ def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
 
 
 def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:
-    """Return a sentence for each marker that the mesh lacks; ``named`` has the key of each."""
+    """Return a sentence for each of the markers ``named`` that the mesh lacks.
+
+    ``named`` has the key of the case file that names each marker.
+    """
     known = mesh.marker_names
     names = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
     has = f"it has {names}" if known else "it has none"

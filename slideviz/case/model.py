@@ -158,7 +158,7 @@ _KINDS = (
     ("motions", tuple | list, "a tuple of motions"),
     ("reduction", Reduction | None, "a Reduction, or None for all boundary nodes"),
 )
-"""What some fields of a case are, and the words for it."""
+"""Fields of a case with the types that are allowed, and words for these in messages."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The settings of data reduction, and the check of fields with a value of an enumeration."""
+"""The settings of data reduction, and the check of dataclass fields that are enumerations."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ if TYPE_CHECKING:
 
 
 def require_chosen(given: DataclassInstance) -> None:
-    """Check fields that have a value of an enumeration, whose terms are the field's metadata.
+    """Raise where a field that is an enumeration has another value.
+
+    Such a field has the terms of the enumeration as its metadata. Its default is always allowed.
 
     Raises
     ------
     CaseError
-        A value is none of them; None may stand where it is the usual one.
+        A value is neither one of the terms nor the default.
     """
     for each in fields(given):
         value, terms = getattr(given, each.name), each.metadata
@@ -34,7 +36,7 @@ class Reduction:
     Attributes
     ----------
     tolerance : float
-        Largest error of the boundary that is left to the correction, in the length unit.
+        Largest error at boundary nodes that is left to the correction, in the mesh's length unit.
     multilevel : bool
         Select in levels instead of all at once.
     criterion : "size" or "tol"
@@ -48,10 +50,12 @@ class Reduction:
     max_nodes : int or None
         Stop at so many control nodes, whatever the error.
     gamma : float
-        The correction reaches ``gamma`` times the largest error (thesis Eq. 2.31).
+        Radius of the correction over the largest error (thesis Eq. 2.31); the default is
+        `slideviz.rbf.problem.GAMMA`, which holds without data reduction, too.
     auto : bool
-        Only where the boundary has many nodes, and with a tolerance that is a part of the largest
-        displacement, whatever ``tolerance`` and ``relative`` are.
+        Select only where the boundary has many nodes, to a tolerance that is a part of the largest
+        displacement, whatever ``tolerance`` and ``relative`` are (`slideviz.deformation.reduction`
+        has both numbers).
     """
 
     tolerance: float = 1e-3
@@ -70,3 +74,4 @@ class Reduction:
 
 
 AUTO = Reduction(auto=True)
+"""DATA_REDUCTION= AUTO, the default."""

@@ -131,7 +131,7 @@ class ShapeTerms:
 
     @property
     def letter(self) -> str:
-        """Return the letter of its first number."""
+        """Return the symbol of its size in a case file, ``r`` or ``a``; ``nx`` for a plane."""
         return self.numbers.partition(",")[0]
 
     def point_tip(self, dim: int) -> str:

@@ -171,12 +171,12 @@ def shown(text: str) -> str:
 
 
 def counted(number: int, what: str) -> str:
-    """Return a number of things in words: 1 step, 2 steps."""
+    """Return a number with a noun in singular or plural: 1 step, 2,000 steps."""
     return f"{number} {what}" if number == 1 else f"{number:,} {what}s"
 
 
 def not_one_of(value: object, known: Iterable[str]) -> str:
-    """Return in words that a value is none of the known ones, and which is most like it."""
+    """Return the message that a value is none of the known ones, and which is most similar."""
     words = list(known)
     said = shown(value) if isinstance(value, str) else repr(value)
     return f"{said} is not one of {' | '.join(words)}{nearest(str(value), words)}"

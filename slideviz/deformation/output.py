@@ -271,5 +271,5 @@ def _zone(path: Path, file: BinaryIO, zone: int | None) -> tuple[BinaryFile, Zon
 
 
 def _byte(source: BinaryFile, place: ZonePlace, point: int) -> int:
-    """Return where a point begins in the file."""
+    """Return the place of the point with the number ``point`` in the file, in bytes."""
     return place.points + point * source.point(place.dim).itemsize

@@ -1,4 +1,4 @@
-"""Files of tables of designs: those that are loaded, and designs with their results."""
+"""Reading and writing tables of designs as CSV files, without and with results."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from slideviz.session.design_table import MOST, DesignTable, shown
 
 
 def read_table(case: Case, path: Path) -> DesignTable:
-    """Return the table of a CSV file, checked against a case.
+    """Return the table of designs in a CSV file, whose columns and values must fit the case.
 
     Raises
     ------
     CaseError
-        It cannot be read, or has mistakes.
+        The file cannot be read, has mistakes, or more designs than the window allows.
     """
     found = read_designs(case, path)
     if len(found.rows) > MOST:
@@ -56,7 +56,7 @@ def read_results(path: Path) -> DesignTable:
     Raises
     ------
     CaseError
-        The file cannot be read, or is none of these.
+        The file cannot be read, or is no table of results.
     """
     try:
         with path.open(newline="", encoding="utf-8") as file:

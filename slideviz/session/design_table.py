@@ -104,11 +104,14 @@ class DesignTable:
         )
 
     def count_done(self) -> int:
-        """Return how many designs have a result, and did not fail."""
+        """Return the number of designs that have a result and did not fail."""
         return sum(not row.problem for row in self.results.values())
 
     def filled(self, case: Case | None) -> DesignTable:
-        """Return the table with what the case of its results has where a cell is empty."""
+        """Return the table with values of ``case``, that of the results, in all empty cells.
+
+        Unchanged where ``case`` is None, or there are no results.
+        """
         if case is None or not self.results or all(map(all, self.rows)):
             return self
         own = own_values(case, columns_of(case, self.columns))
@@ -169,7 +172,7 @@ class DesignTable:
 
 
 def _named(numbers: list[int]) -> str:
-    """Return the names of designs, of many the first."""
+    """Return words for designs by their numbers, the first ones of many: "Designs 1, 2"."""
     first = ", ".join(map(str, numbers[:_NAMED]))
     more = f" and {len(numbers) - _NAMED:,} more" if len(numbers) > _NAMED else ""
     return f"Design{'s' * (len(numbers) > 1)} {first}{more}"

@@ -66,7 +66,7 @@ def left_out(path: Path, mesh: Mesh) -> str:
 
 
 def lost_in(end: str, mesh: Mesh) -> list[str]:
-    """Return what of the file of a mesh, in words, one with this ending does not keep."""
+    """Return words for the parts of a mesh and its file that a file of ending ``end`` lacks."""
     if end == ".cgns":
         return []
     lost: list[str] = []

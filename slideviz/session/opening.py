@@ -142,7 +142,10 @@ def guess_roles(mesh: Mesh, pairs: Sequence[Pair] = ()) -> dict[str, Guess]:
 
 
 def _is_box(mesh: Mesh, pairs: Sequence[Pair]) -> bool:
-    """Tell whether pairs match by translations along all axes of a box, and no other way."""
+    """Return whether all pairs match by translations, along all axes of a box.
+
+    That is along perpendicular directions, as many as the mesh has dimensions.
+    """
     ways = np.array(
         [p.vector / np.linalg.norm(p.vector) for p in pairs if p.kind == "translational"]
     )

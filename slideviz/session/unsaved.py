@@ -108,9 +108,9 @@ class Unsaved:
 
 
 def unsaved_sections(session: Session) -> bool:
-    """Tell whether the sections are others than those of the case file, however they are shown.
+    """Return whether the sections differ from those of the case file, but for how they are shown.
 
-    Where there is no case file they were only looked at: False.
+    False where there is no case file.
     """
     now, saved = (
         [replace(section, shown=True, flat=False, name="") for section in sections]
