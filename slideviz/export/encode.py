@@ -150,6 +150,7 @@ def closed(pipe: IO[bytes]) -> Iterator[None]:
 def _start_ffmpeg(
     path: str, size: tuple[int, int], rate: Fraction, log: IO[bytes]
 ) -> subprocess.Popen[bytes]:
+    """Return a process of ffmpeg that reads raw images and writes an MP4; its messages: ``log``."""
     import imageio_ffmpeg
 
     given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate)]
@@ -175,6 +176,7 @@ def _start_ffmpeg(
 
 
 def _raise_ffmpeg(file: Path, process: subprocess.Popen[bytes], log: IO[bytes]) -> None:
+    """Stop ffmpeg and raise SlidevizError with the last line of its log."""
     process.kill()
     process.wait()
     log.seek(0)

@@ -192,6 +192,7 @@ class Running(QObject):
         self._end("failed")
 
     def _run_done(self, _: Any) -> None:
+        """Show the result of a finished run, with its warnings, and write both to the log."""
         session = self.store.session
         run = session.runs[-1]
         if run.last is None:

@@ -139,6 +139,7 @@ def _profile(
     layers: int | None,
     label: str,
 ) -> Profile:
+    """Return the quality in layers of nodal coordinates ``height`` (n,); see `along_radius`."""
     cells = mesh.cells
     if len(values) != len(cells):
         raise SlidevizError(

@@ -110,7 +110,7 @@ class GhostLayer(Layer):
                 self._draw_wire(key, colour, not rim_goes_along(points, surface, session.mesh))
 
     def _draw_wire(self, key: str, colour: str, wanted: bool) -> None:
-        """Draw the edges of a ghost's faces over everything, or end that."""
+        """Show the edges of a ghost's faces in front of everything, or hide them."""
         shape = self._shapes[key]
         wanted = wanted and shape.n_cells <= MOST_WIRE
         if wanted or f"{key}{WIRE}" in self._actors:
@@ -143,7 +143,7 @@ class GhostLayer(Layer):
     ) -> list[tuple[Any, Any]]:
         """Return actor and data set of each part of a ghost: lines in 2D; faces and rim in 3D.
 
-        ``nearer`` is the depth offset of the rim.
+        ``nearer`` is how much the rim is drawn before its place (see `DEEPER`).
         """
         faces = self._part(key, lambda at, lift: actors.surface_shape(surface, at, lift))
         if surface.flat:
@@ -197,9 +197,9 @@ def is_apart(points: FloatArray, surface: Surface, session: Session) -> bool:
 
 
 def rim_goes_along(points: FloatArray, surface: Surface, mesh: Mesh) -> bool:
-    """Tell whether the rim of a ghost, at points (u, d), goes where its faces go, and shows it.
+    """Return whether the rim of a ghost at points (u, d) moves about as far as its faces.
 
-    That of a wall that a free-form box dents stays where it is, and a closed surface has none.
+    The rim of a wall that a free-form box dents stays in place; a closed surface has no rim.
     """
     way = np.abs(points - mesh.points[surface.nodes]).max(axis=1)
     return bool(way[surface.rim].max(initial=0.0) > 0.5 * way.max())

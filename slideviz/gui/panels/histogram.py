@@ -245,6 +245,7 @@ class HistogramPanel(Panel):
     # What the user does ----------------------------------------------------------------
 
     def _brushed(self, band: Range | None) -> None:
+        """Schedule the threshold for a selected range; None ends the threshold."""
         if band is None:
             self.clear_range()
             return

@@ -185,6 +185,7 @@ class MotionEditor(MotionForm):
             self.changed.emit(motion)
 
     def _about_chosen(self, what: str) -> None:
+        """Set the fixed point and axis to a choice, a key of `ABOUT`, and emit the motion."""
         motion = self._motion
         assert motion is not None
         across = self._radial(motion)

@@ -116,6 +116,7 @@ class JobRunner(QObject):
                 self._wake.emit()
 
     def _deliver(self) -> None:
+        """Emit the reports of the job, and its end, in the GUI thread; progress is delayed."""
         if self._closed:
             return
         wait = self._delivered_s + NEWS_S - time.monotonic()

@@ -189,6 +189,7 @@ class Player(QWidget):
         set_icon(self.buttons["play"], "play")
 
     def _tick(self) -> None:
+        """Show the step that is due by now; after the last one, stop or begin again."""
         last = len(self.store.session.frames) - 1
         if self.store.session.view.frame >= last:
             # The last step was shown for its full time.

@@ -172,6 +172,7 @@ class Viewing(QWidget):
         self.render()
 
     def _drop_second(self) -> None:
+        """Close the second view, if there is one, and give the first one all the room."""
         if self.second is None:
             return
         self.second_leaves.emit()

@@ -209,6 +209,7 @@ class NumberField(QLineEdit):
         self.mark()
 
     def _tidy(self) -> None:
+        """Keep a valid number when the editing is finished, or restore the one before."""
         if not self.problem:
             self._before = self._value
             return
