@@ -109,7 +109,7 @@ class Autosave(QObject):
             self._lock.unlock()
 
     def look(self) -> None:
-        """Write the session after a while, if it has changed."""
+        """Schedule `save` after `AUTOSAVE_MS`, if the session differs from what was written."""
         self._changed(self.store.session, self.store.session)
 
     def _changed(self, _old: Session, new: Session) -> None:

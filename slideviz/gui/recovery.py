@@ -100,7 +100,10 @@ class SessionRecovery(QObject):
         self.window.say("Session restored. Runs are not kept; Run computes them again")
 
     def _restore_designs(self, found: LeftSession) -> None:
-        """Show the table of designs there was; results of another case are those of none here."""
+        """Show the restored table of designs, or the error of its file.
+
+        Its results count as those of the session's case only if the file says so.
+        """
         panel, session = self.window.docks_.panel(DesignsPanel), self.window.store.session
         try:
             table, current = found.designs()

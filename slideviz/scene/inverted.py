@@ -97,7 +97,7 @@ class InvertedLayer(Layer):
 
 
 def _wanted(session: Session) -> bool:
-    """Return whether rings are drawn: there are inverted cells, and toggle and threshold agree."""
+    """Return whether rings are drawn: inverted cells exist, within the threshold, and toggle on."""
     view, frame = session.view, session.frame
     if frame is None or not frame.quality.inverted or "inverted" not in view.drawn:
         return False

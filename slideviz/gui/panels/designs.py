@@ -228,7 +228,7 @@ class DesignsPanel(Panel):
         return table if self._may_become(table) else self.table
 
     def _may_become(self, table: DesignTable) -> bool:
-        """Return whether a table may take the place of this one: results that go may be saved."""
+        """Return whether a table may replace this one; asks to save results that would be lost."""
         lost = self.table.count_done() - table.count_done()
         if lost <= 0 or self.table is self.written:
             return True

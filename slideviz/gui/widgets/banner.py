@@ -138,7 +138,7 @@ class Banner(QFrame):
         self.tell(text, full, answers=answers)
 
     def _offer(self, answers: Answers) -> None:
-        """Make a button for each answer, in place of those there were."""
+        """Replace the buttons by one for each answer."""
         for button in self.answers.values():
             self._row.removeWidget(button)
             button.hide()
