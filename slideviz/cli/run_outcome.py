@@ -57,7 +57,15 @@ def save_report(arguments: argparse.Namespace, report: dict) -> bool:
 
 
 def tell_warnings(report: dict, folded: Mapping[int, tuple[int, int]], *, quiet: bool) -> int:
-    """Print the warnings of a run, and which cells are inverted; return the exit code."""
+    """Print the warnings of a run and its inverted cells to stderr; return the exit code.
+
+    Parameters
+    ----------
+    report, folded
+        As `tell` gets them.
+    quiet : bool
+        Leave out notes; warnings stay.
+    """
     from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.report import print_remarks
 

@@ -207,7 +207,11 @@ def parts(count: int, done: int = 0) -> list[Part]:
 def moving(
     path: Path, zone: int | None, partial: Path, rest: Rest, synced: bool
 ) -> Iterator[Callable[[Part], int]]:
-    """Context with a function that writes the deformed points of a part, as `move` does."""
+    """Context with a function that writes the deformed points of a part, as `move` does.
+
+    Undeformed points are read from a zone of ``path``, deformed ones written to ``partial``; with
+    ``synced`` they are on the disk when the function returns.
+    """
     with path.open("rb") as file:
         source, place = _zone(path, file, zone)
         out = os.open(partial, os.O_WRONLY | (os.O_DSYNC if synced else 0))

@@ -117,9 +117,10 @@ class Setup:
     def constraints(self, coords: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return nodes (q,) and unit normals (q, d) along which sliding nodes may not move.
 
-        A node has a row for each of its normals. Of periodic images only the representative has
-        any. Where no boundary is curved, the normals are those of the undeformed mesh, so that
-        flat boundaries stay flat to the bit; else those at ``coords`` (n, d).
+        A node has a row for each of its normals; nodes on the axis come last, with axes of the
+        frame instead (`hold_on_axis`). Of periodic images only the representative has any. Where
+        no boundary is curved, the normals are those of the undeformed mesh, so that flat
+        boundaries stay flat to the bit; else those at ``coords`` (n, d).
         """
         at = coords if self.tracks.curved else self.coords
         corners = corners_of(at, self.boundary.facets, self.axis)

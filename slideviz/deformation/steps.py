@@ -72,12 +72,13 @@ class Step:
     mesh : Mesh
         The deformed mesh.
     control_nodes : int
-        Nodes in the interpolation system of this step.
+        Nodes in the interpolation system of this step, or of known displacement where a method
+        has no such system.
     max_error : float
-        Largest misfit at nodes of known displacement before the correction sets them exactly, in
-        the mesh's length unit.
+        Largest misfit at nodes of known or projected displacement before the correction sets them
+        exactly, with data reduction that of all steps so far, in the mesh's length unit.
     condition : float
-        Estimated condition number of the interpolation system.
+        Estimated condition number of the interpolation system; NaN where a method has none.
     node_counts : Mapping of str to int
         ``moving``, ``fixed``, ``sliding_edge``, ``sliding_surface``, ``internal``.
     seconds : Mapping of str to float

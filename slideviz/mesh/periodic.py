@@ -94,8 +94,8 @@ def match(
     Raises
     ------
     MeshError
-        They do not match to ``TOLERANCE``; the message has the best transformation tried, the
-        largest mismatch and where it is.
+        They have different numbers of nodes, or do not match to ``TOLERANCE``: then the message
+        has the best transformation tried and its largest mismatch.
     """
     a, b = mesh.marker(first).nodes, mesh.marker(second).nodes
     where = f"{mesh.name}: periodic markers {first!r} and {second!r} do not match"

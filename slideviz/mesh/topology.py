@@ -162,7 +162,7 @@ def _touch(nodes: IntArray, chosen: NDArray[np.bool_], least: int) -> NDArray[np
 
 @njit(nogil=True, cache=True)
 def _mark(nodes, chosen, least, found):  # type: ignore[no-untyped-def]
-    """Write the mask that `_touch` returns into ``found`` (m,)."""
+    """Write into ``found`` (m,) which of ``nodes`` (m, n) have ``least`` or more in ``chosen``."""
     for row in range(len(nodes)):
         count = 0
         for node in nodes[row]:

@@ -108,7 +108,7 @@ class Profiles:
 
 
 def coordinates(session: Session) -> dict[Coordinate, str]:
-    """Return the texts of the coordinates that layers can be along, by name."""
+    """Return in words the coordinates that curves along the span can have; no z in 2D."""
     if session.mesh is None or session.mesh.dim == 2:
         return {"y": "along y", "x": "along x", "r": "along the radius"}
     return {"r": "along the radius", "z": "along z", "y": "along y", "x": "along x"}

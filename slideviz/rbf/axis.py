@@ -48,6 +48,9 @@ def corners(coords: FloatArray, facets: IntArray, axis: np.ndarray) -> FloatArra
 def _corners_at_axis(x: FloatArray, touching: np.ndarray, nodes: IntArray) -> FloatArray:
     """Return the corners (k, d) of one facet; those on the axis get the angle of their neighbours.
 
+    A triangle with one corner on the axis becomes a quadrilateral, which begins at the corner
+    before and has that corner twice, with the angle of each neighbour; else it gets their mean.
+
     Parameters
     ----------
     x, touching, nodes : (k, d), (k,) bool, (k,)

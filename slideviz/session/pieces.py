@@ -22,7 +22,7 @@ PART_CELLS = 10_000
 
 @dataclass(frozen=True)
 class Beside:
-    """A piece of work that draws nothing: any thread may do it, by ``call``, which has a result."""
+    """Work that draws nothing: who pulls the generator runs ``call`` and sends its result back."""
 
     call: Callable[[GoingOn], Any]
 

@@ -14,7 +14,7 @@ from slideviz.export.vector import draw_vector
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.plots.section_paint import paint
-from slideviz.plots.section_picture import SectionStyle, Shown, draw_section
+from slideviz.plots.section_picture import SectionInRun, SectionStyle, draw_section
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import changes
@@ -80,7 +80,7 @@ def test_inverted_cells_are_seen_in_the_picture_of_a_section(base, folded):
     section = Section("plane", (0, 0.5, 0), (0, 1, 0), whole=True)
     pieces = {0: Cutter.of(folded).show(folded.points, section)}
     painted = paint(folded, quality(folded, base), "size-skew", base)
-    figure = draw_section([Shown(pieces, painted)], section, SectionStyle())
+    figure = draw_section([SectionInRun(pieces, painted)], section, SectionStyle())
     (cells,) = figure.axes[0].collections
     assert cells.get_facecolors()[-1][:3] == pytest.approx(to_rgb(INVERTED_COLOUR))
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from slideviz.scene.axis_handle import (
-    drag,
     dragged_size,
     frame_of,
     patch_in,
+    pixel_and_slope,
 )
 from slideviz.sections.around_axis import patch_of
 from slideviz.sections.model import Section
@@ -103,7 +103,7 @@ def test_along_the_radius_upwards_is_outwards():
     section = Section("cylinder", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.7)
     points = np.array([[0.0, 0.0, 0.7], [1.0, 0.0, 0.7]])
     place = patch_of(section, points).middle
-    at, way, steep = drag(parallel, section, place, 0.7)
+    at, way, steep = pixel_and_slope(parallel, section, place, 0.7)
     assert steep
     assert way == pytest.approx((0.0, 100.0))
     now = at + np.array([5.0, 20.0])

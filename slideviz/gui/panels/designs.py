@@ -117,7 +117,7 @@ class DesignsPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
-        """Offer the columns of the session's case; clear the table if the mesh is another."""
+        """Offer the columns of the session's case; for another mesh stop and clear the table."""
         now = (session.mesh, session.case)
         if now[0] is self._drawn[0] and now[1] is self._drawn[1]:
             return
@@ -223,7 +223,7 @@ class DesignsPanel(Panel):
             self._try(lambda: self._replacing(read_table(self.store.session.case, path)))
 
     def _replacing(self, table: DesignTable) -> DesignTable:
-        """Return another table, with the results it shares; this one if results would be lost."""
+        """Return another table, with the results it shares; this one if the user cancels."""
         table = table.keeping(self.table)
         return table if self._may_become(table) else self.table
 

@@ -121,7 +121,7 @@ class MethodPanel(Panel):
         self.watch = FieldWatch(self, store, "method")
 
     def _complete_form(self) -> None:
-        """Add hints to the form: the period found below ``origin``, one beside ``tolerance``."""
+        """Add hints: the period that was found, and what part of the extent the tolerance is."""
         form, fields = self.form, self.form.fields
         row, _ = _position(form, fields["origin"])
         form.insertRow(row + 1, "", self.found)

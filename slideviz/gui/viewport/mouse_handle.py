@@ -94,7 +94,8 @@ class MouseHandle(QObject, Generic[Grasp]):
     def place_of(self, where: QPoint) -> FloatArray:
         """Return a position in the widget, (2,), in the handle's coordinates.
 
-        They are the mesh's length unit in its plane (line, circle), or pixels (about an axis).
+        These are in the mesh's plane, in its length unit (line, circle), or pixels from the lower
+        left (about an axis).
         """
         raise NotImplementedError
 

@@ -92,7 +92,7 @@ def find_bounds(lines: Lines, sections: list[KeywordBlock], number: int | None) 
 
 
 def boxes_elsewhere(sections: list[KeywordBlock], bounds: Bounds) -> dict[str, int]:
-    """Return the names of boxes for free-form deformation in other zones, and numbers of these."""
+    """Return the zone of each FFD box, by name, in other zones than that of ``bounds``."""
     found, zone = {}, 1
     for section in sections:
         if section.key == "IZONE":
