@@ -61,7 +61,7 @@ FEW = [RUNS[k] for k in (1, 5, 6, 7, 13)]
         *(
             pytest.param(end, *row, marks=pytest.mark.slow)
             for end in ("su2", "su2b")
-            for row in RUNS
+            for row in (getattr(run, "values", run) for run in RUNS)
         ),
     ],
 )
