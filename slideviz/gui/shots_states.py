@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from slideviz.case.model import Case, Motion, Rotate, Translate
 from slideviz.errors import SlidevizError
 from slideviz.gui.panels.sections import SectionsPanel
+from slideviz.gui.widgets.plot_canvas import PlotCanvas
 from slideviz.samples.table import sample, write_sample
 from slideviz.sections.model import Section
 from slideviz.session import changes
@@ -42,10 +43,11 @@ def wait(until: Callable[[], bool]) -> None:
 
 
 def settle(window: MainWindow) -> None:
-    """Wait until no job runs, and half a second more for delayed drawings."""
+    """Wait until no job runs, half a second more for delayed drawings, and for all plots."""
     wait(lambda: not window.runner.busy)
     end = time.monotonic() + 0.5
     wait(lambda: time.monotonic() > end)
+    wait(lambda: not any(plot.busy for plot in window.findChildren(PlotCanvas)))
 
 
 STATOR_CELLS = 40_000
