@@ -450,3 +450,5 @@ def test_the_question_tells_how_far_a_sweep_is_meanwhile(make, qtbot, monkeypatc
     monkeypatch.setattr(QMessageBox, "exec", look)
     words = "Save it?\n0 are done."
     questions.ask_unsaved(window, words, ["table"], lambda: f"Save it?\n{next(counts)} are done.")
+    # Nothing of it is left that goes on counting.
+    qtbot.waitUntil(lambda: not window.findChildren(QMessageBox))

@@ -126,7 +126,10 @@ def ask_unsaved(
     box.setDefaultButton(next(iter(buttons.values())) if can_save else buttons["cancel"])
     box.exec()
     clicked = box.clickedButton()
-    return next((name for name, button in buttons.items() if button is clicked), "cancel")
+    answer = next((name for name, button in buttons.items() if button is clicked), "cancel")
+    # Its parent would keep it, and the timer would go on asking `now`.
+    box.deleteLater()
+    return answer
 
 
 def ask_folder(parent: QWidget, title: str, default: Path) -> Path | None:
