@@ -112,11 +112,13 @@ def unsaved_sections(session: Session) -> bool:
 
     False where there is no case file.
     """
+    if session.case.source is None or session.view.sections is session.saved_sections:
+        return False
     now, saved = (
         [replace(section, shown=True, flat=False, name="") for section in sections]
         for sections in (session.view.sections, session.saved_sections)
     )
-    return session.case.source is not None and now != saved
+    return now != saved
 
 
 def title_of(session: Session) -> str:
