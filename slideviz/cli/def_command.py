@@ -72,7 +72,7 @@ def run_def(arguments: argparse.Namespace) -> int:
     from slideviz.cli.places import OutputPath, require_places, tell_lost
     from slideviz.cli.report import folded_cells, run_report
     from slideviz.cli.run_command import pull
-    from slideviz.cli.run_outcome import CELLS, tell, write_qualities
+    from slideviz.cli.run_outcome import CELLS, advice_for, tell, write_qualities
     from slideviz.design.su2.surface import at_rest, make_surface
 
     begin = time.perf_counter()
@@ -112,12 +112,15 @@ def run_def(arguments: argparse.Namespace) -> int:
     seconds["total"] = time.perf_counter() - begin
     folded = folded_cells(steps, mesh, found)
     report = run_report(case, mesh, steps, seconds, quality=found, undeformed=before, folded=folded)
+    advice = advice_for(case, mesh, found)
     report["design"] = {
         "variables": variable_rows(surface),
         "boxes": {name: len(found.nodes) for name, found in surface.inside.items()},
         "ignored": list(config.ignored),
     }
-    return tell(arguments, report, {"mesh": output, CELLS: rated}, found, before, folded)
+    return tell(
+        arguments, report, {"mesh": output, CELLS: rated}, found, before, folded, advice=advice
+    )
 
 
 def variable_rows(surface: MovingSurface) -> list[dict[str, Any]]:

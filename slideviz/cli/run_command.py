@@ -19,7 +19,7 @@ from slideviz.cli.options import (
     require_mesh_file,
     size,
 )
-from slideviz.cli.run_outcome import CELLS, tell, write_qualities
+from slideviz.cli.run_outcome import CELLS, advice_for, tell, write_qualities
 from slideviz.cli.run_streamed import is_to_be_streamed, require_streamable, run_streamed
 
 if TYPE_CHECKING:
@@ -116,8 +116,9 @@ def run(arguments: argparse.Namespace) -> int:
     seconds["total"] = time.perf_counter() - begin
     folded = folded_cells(steps, mesh, found)
     report = run_report(case, mesh, steps, seconds, quality=found, undeformed=before, folded=folded)
+    advice = advice_for(case, mesh, found)
     files = {"mesh": output, CELLS: qualities}
-    return tell(arguments, report, files, found, before, folded)
+    return tell(arguments, report, files, found, before, folded, advice=advice)
 
 
 def _require_places(

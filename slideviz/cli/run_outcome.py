@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.terms import SLIDES
-
 if TYPE_CHECKING:
+    from slideviz.case.model import Case
+    from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
 
 CELLS = "quality of each cell"
@@ -27,6 +27,8 @@ def tell(
     found: Quality,
     before: Quality,
     folded: Mapping[int, tuple[int, int]],
+    *,
+    advice: str,
 ) -> int:
     """Write the report of a run, print its summary and warnings, and return the exit code.
 
@@ -38,13 +40,15 @@ def tell(
         Quality after and before the run.
     folded : mapping of int to (int, int)
         VTK type and first inverted step of the inverted cells with the lowest numbers.
+    advice : str
+        What may help against inverted cells, from `advice_for`.
     """
     if not save_report(arguments, report) and not arguments.quiet:
         files |= {"report": arguments.json, "picture": arguments.picture}
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
         files |= {"all steps": arguments.steps_file}
         _print_run(report, found, before, files)
-    return tell_warnings(report, folded, quiet=arguments.quiet)
+    return tell_warnings(report, folded, advice, quiet=arguments.quiet)
 
 
 def save_report(arguments: argparse.Namespace, report: dict) -> bool:
@@ -56,12 +60,14 @@ def save_report(arguments: argparse.Namespace, report: dict) -> bool:
     return save_json(arguments.json, report)
 
 
-def tell_warnings(report: dict, folded: Mapping[int, tuple[int, int]], *, quiet: bool) -> int:
+def tell_warnings(
+    report: dict, folded: Mapping[int, tuple[int, int]], advice: str, *, quiet: bool
+) -> int:
     """Print the warnings of a run and its inverted cells to stderr; return the exit code.
 
     Parameters
     ----------
-    report, folded
+    report, folded, advice
         As `tell` gets them.
     quiet : bool
         Leave out notes; warnings stay.
@@ -71,7 +77,7 @@ def tell_warnings(report: dict, folded: Mapping[int, tuple[int, int]], *, quiet:
 
     print_remarks(report["warnings"], quiet=quiet)
     if report["quality"]["inverted"]:
-        print(f"slideviz: {_inverted_sentence(report, folded)}", file=sys.stderr)
+        print(f"slideviz: {_inverted_sentence(report, folded, advice)}", file=sys.stderr)
         return INVERTED
     return DONE
 
@@ -123,7 +129,26 @@ def _print_run(
             print(f"{name}: {path}")
 
 
-def _inverted_sentence(report: dict, folded: Mapping[int, tuple[int, int]]) -> str:
+def advice_for(case: Case, mesh: Mesh | None = None, found: Quality | None = None) -> str:
+    """Return what may help against inverted cells: the remedies of the window, with keys.
+
+    Without a mesh in memory, with its quality ``found`` after the run, neither the pitch nor
+    boundaries beside the cells are named.
+    """
+    from slideviz.deformation.remedies import beyond_pitch, fixed_beside, remedies
+
+    beside: tuple[str, ...] = ()
+    pitch = ""
+    if mesh is not None and found is not None:
+        if not found.inverted:
+            return ""
+        beside = fixed_beside(case, mesh, found.inverted_cells())
+        pitch = beyond_pitch(case, mesh)
+    ideas = "; ".join(remedy.keys for remedy in remedies(case, beside, pitch))
+    return f"{pitch[:1].lower()}{pitch[1:]}; what may help: {ideas}".removeprefix("; ")
+
+
+def _inverted_sentence(report: dict, folded: Mapping[int, tuple[int, int]], advice: str) -> str:
     """Return a sentence on how many and which cells are inverted, and what may help."""
     from slideviz.mesh.elements import ELEMENTS
 
@@ -133,20 +158,4 @@ def _inverted_sentence(report: dict, folded: Mapping[int, tuple[int, int]]) -> s
         for cell, (vtk, step) in list(folded.items())[:5]
     )
     more = f" and {inverted - 5} more" if inverted > 5 else ""
-    return (
-        f"{inverted} of {cells} cells are inverted: {named}{more}; more STEPS, "
-        f"{_advice(report)} may help"
-    )
-
-
-def _advice(report: dict) -> str:
-    """Return the remedies that the case of the report has not tried yet, as words."""
-    ideas = ["STEPS= auto" if report["steps"] < 20 else "a smaller motion"]
-    if report["method"] != "rbf":
-        ideas.append("METHOD= rbf")
-    if report["sliding"] == "none":
-        ideas.append(f"SLIDING_MODE= {SLIDES}")
-    if report["periodic"] in ("none", "periodic") and report["sliding"] != "none":
-        ideas.append("PERIODIC_MODE= moving for a repeating mesh")
-    ideas.append("another role for the boundaries near these cells")
-    return ", ".join(ideas[:-1]) + " or " + ideas[-1]
+    return f"{inverted} of {cells} cells are inverted: {named}{more}; {advice}"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from slideviz.cli.run_outcome import (
     CELLS,
     QUALITY_BYTES,
+    advice_for,
     save_report,
     tell,
     tell_warnings,
@@ -99,7 +100,7 @@ def run_streamed(
     if arguments.resume and (known := finished(about, made)):
         say("note", f"{output}: is finished, of this case, mesh and version; nothing is done")
         save_report(arguments, known[0])
-        return tell_warnings(*known, quiet=arguments.quiet)
+        return tell_warnings(*known, advice_for(case), quiet=arguments.quiet)
     with Bar(not arguments.quiet) as bar:
         done = stream(
             case,
@@ -131,4 +132,5 @@ def run_streamed(
     )
     note_finished(about, made, report, done.folded)
     files = {"mesh": output, CELLS: qualities}
-    return tell(arguments, report, files, done.quality, done.undeformed, done.folded)
+    advice = advice_for(case)
+    return tell(arguments, report, files, done.quality, done.undeformed, done.folded, advice=advice)

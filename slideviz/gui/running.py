@@ -210,7 +210,7 @@ class Running(QObject):
         bad = inverted_words(run)
         if bad:
             folding = "" if session.outdated else session.folding
-            warnings.insert(0, f"{bad}. {help_for(run.case, folding)}")
+            warnings.insert(0, f"{bad}. {help_for(run, session.mesh, folding)}")
         if file is not None:
             warnings.insert(0, f"The deformed mesh is in {file}.")
             log.info("the deformed mesh is in %s", file)

@@ -120,8 +120,8 @@ class Quality:
         ids = np.arange(len(self))[self.counted]
         return ids[np.argsort(self.values[ids], kind="stable")[: max(n, 0)]]
 
-    def inverted_cells(self, n: int) -> IntArray:
-        """Return the ids, ascending, of the first ``n`` inverted cells, without the halo's."""
+    def inverted_cells(self, n: int | None = None) -> IntArray:
+        """Return the ids, ascending, of the (first ``n``) inverted cells, without the halo's."""
         found = self.status == INVERTED
         return np.flatnonzero(found if self.halo is None else found & ~self.halo)[:n]
 

@@ -9,14 +9,13 @@ import numpy as np
 
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Ffd, FromFile, Motion, Radial, Rotate, Scale, Translate, moves
+from slideviz.deformation.remedies import MOST_NAMES, beyond_pitch, fixed_beside, remedies
 from slideviz.errors import Note
 from slideviz.mesh.model import Mesh
 from slideviz.session.state import PanelPlace, Run, Session
 
 LARGE = 1e9
 """Bytes of memory from which on there is a message before a run on what it takes."""
-MOST_NAMES = 2
-"""Most boundaries that a hint names; of more it has the number."""
 RATE = 2e10
 """Floating-point operations a second of a machine with few cores in factoring a large matrix."""
 
@@ -63,30 +62,35 @@ def inverted_words(run: Run) -> str:
     return f"{count:,} inverted cell{'' if count == 1 else 's'}" if count else ""
 
 
-def help_for(case: Case, folding: str = "") -> str:
-    """Return a sentence with remedies against inverted cells, the most promising first.
+def help_for(run: Run, mesh: Mesh | None, folding: str = "") -> str:
+    """Return sentences on a run's inverted cells: their first step, and remedies.
 
     Parameters
     ----------
-    folding : str
+    run
+        A run with inverted cells after its last step.
+    mesh
+        The undeformed mesh.
+    folding
         ``Session.folding``: where what moves crosses itself, which only another motion can mend.
     """
     if folding:
         crossed = folding.partition("; ")[0]
         return f"{crossed}, so more steps cannot help; another motion, or a smaller one, may."
-    helps = []
-    if case.method != "rbf":
-        helps.append("radial basis functions as the method")
-    roles = set(case.roles.values())
-    if not {"sliding", "periodic"} & roles and "fixed" in roles:
-        method = ", and a sliding method" if case.sliding == "none" else ""
-        helps.append(f"the role “sliding” for boundaries near these cells{method}")
-    elif case.sliding == "none" and {"sliding", "periodic"} & roles:
-        helps.append("sliding boundary nodes")
-    if case.steps:
-        helps.append("more steps, or automatic steps")
-    helps.append("a smaller motion")
-    return f"What may help: {'; '.join(helps)}."
+    assert mesh is not None
+    beside: tuple[str, ...] = ()
+    if run.last is not None:
+        beside = fixed_beside(run.case, mesh, run.last.quality.inverted_cells())
+    pitch = beyond_pitch(run.case, mesh)
+    helps = "; ".join(remedy.window for remedy in remedies(run.case, beside, pitch))
+    words = (_last_valid_words(run), f"{pitch}." if pitch else "", f"What may help: {helps}.")
+    return " ".join(filter(None, words))
+
+
+def _last_valid_words(run: Run) -> str:
+    """Return a sentence on the last step without inverted cells; "" where none was kept."""
+    steps = [frame.step for frame in run.frames if not frame.quality.inverted and frame.step]
+    return f"Step {steps[-1].index} of {steps[-1].total} is the last without any." if steps else ""
 
 
 def warnings_of(run: Run) -> tuple[str, ...]:

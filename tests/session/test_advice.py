@@ -5,14 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slideviz.case.model import Case
+from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.reduction import Reduction
+from slideviz.cli.run_outcome import advice_for
 from slideviz.deformation import solver
+from slideviz.deformation.remedies import beyond_pitch
 from slideviz.deformation.solver import deform
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.session.run_messages import ended, exact_cost, help_for, inverted_words
 from slideviz.session.state import Run, StepFrame
+from tests.builders import sector
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +51,7 @@ def test_it_tells_the_end_and_the_inverted_cells(run):
         (Case(roles={"a": "sliding"}), ("sliding", "more steps"), ("radial",)),
         (
             Case(roles={"a": "fixed", "b": "moving"}, steps=0),
-            ("help: the role “sliding” for boundaries near these cells, and a", "smaller motion"),
+            ("help: the role “sliding” for", "near these cells, and a sliding", "smaller motion"),
             ("steps",),
         ),
         (Case(roles={"a": "fixed"}, sliding="ps"), ("help: the role “sliding”",), ("method",)),
@@ -57,17 +60,71 @@ def test_it_tells_the_end_and_the_inverted_cells(run):
     ],
 )
 def test_it_offers_what_the_case_has_not_used(case, words, not_words):
-    text = help_for(case)
+    """The window and the command line offer the same, in the same order."""
+    mesh = Mesh(np.zeros((3, 2)), Cells.from_blocks([(5, [[0, 1, 2]])]))
+    text = help_for(Run(1, case), mesh)
     assert all(word in text for word in words)
     assert not any(word in text for word in not_words)
+    assert advice_for(case).count(";") == text.count(";")
 
 
-def test_where_the_motion_goes_through_itself_no_steps_are_offered():
+def test_where_the_motion_goes_through_itself_no_steps_are_offered(run, passage):
     folding = "airfoil goes through itself near (0, 0); cells will be inverted there."
-    assert help_for(Case(steps=2), folding) == (
+    assert help_for(run, passage.mesh, folding) == (
         "airfoil goes through itself near (0, 0), so more steps cannot help; another motion, or a "
         "smaller one, may."
     )
+
+
+def test_fixed_boundaries_beside_inverted_cells_and_the_last_valid_step_are_named(run, passage):
+    """Only boundaries that touch the cells: here those of the first cell at the blade's wall."""
+    mesh, case = passage.mesh, run.case
+    last = with_inverted(run, 0).last.quality
+    wall = np.isin(mesh.cells.connectivity, mesh.marker("outflow").nodes)
+    cell = int(np.searchsorted(mesh.cells.offsets, np.flatnonzero(wall)[0], side="right")) - 1
+    status = np.where(np.arange(len(mesh.cells)) == cell, INVERTED, last.status)
+    bad = replace(last, status=status)
+    frames = (run.frames[0], replace(run.last, quality=bad))
+    fixed = dict(case.roles) | {"outflow": "fixed", "inflow": "fixed"}
+    of_fixed = replace(run, case=case.change(roles=fixed), frames=frames)
+    text = help_for(of_fixed, mesh)
+    assert text.startswith("Step 1 of 2 is the last without any. What may help: the role “slid")
+    assert "“sliding” for outflow beside these cells, and a sliding method; more steps" in text
+    assert "MARKER_SLIDING for outflow beside these cells, and SLIDING_MODE= ps or ds; more" in (
+        advice_for(of_fixed.case, mesh, bad)
+    )
+    without = replace(of_fixed, frames=frames[1:])
+    assert help_for(without, mesh).startswith("What may help: ")
+
+
+@pytest.mark.parametrize(
+    ("motion", "words"),
+    [
+        (Translate("airfoil", (0.0, 0.7)), ""),
+        (Translate("airfoil", (9.0, 0.0)), ""),
+        (
+            Translate("airfoil", (0.1, -0.8)),
+            "The motion is 0.8, farther than the pitch: 0.75",
+        ),
+    ],
+)
+def test_a_motion_beyond_the_pitch_is_named(run, passage, motion, words):
+    case = passage.case.change(motions=(motion,), periodic="moving", sliding="ps")
+    text = help_for(replace(run, case=case, frames=()), passage.mesh)
+    assert text.startswith(words or "What may help")
+    assert ("a motion below the pitch" in text) == bool(words)
+    assert "pitch" not in help_for(replace(run, case=case.change(periodic="none")), passage.mesh)
+
+
+def test_a_rotation_beyond_the_pitch_is_named_in_degrees(run, passage):
+    """A sector of 90 degrees, turned about its axis."""
+    mesh = sector(angle_deg=90.0)
+    roles = {"per1": "periodic", "per2": "periodic", "inner": "moving"}
+    case = Case(roles=roles, periodic="moving", sliding="ps")
+    for angle, words in ((89.0, ""), (-95.0, "The motion is 95°, farther than the pitch: 90° ab")):
+        turned = case.change(motions=(Rotate("inner", angle, (0.0, 0.0)),))
+        assert beyond_pitch(turned, mesh).startswith(words)
+        assert bool(beyond_pitch(turned, mesh)) == bool(words)
 
 
 def test_a_large_exact_run_is_told_beforehand(monkeypatch):

@@ -26,7 +26,7 @@ from slideviz.session.run_messages import (
     inverted_words,
     notes_of,
 )
-from slideviz.session.state import Session
+from slideviz.session.state import Run, Session
 from slideviz.session.store import Store
 
 LONG = 100
@@ -53,6 +53,7 @@ class RunPanel(Panel):
         self._key: tuple[object, ...] = ()
         self._missing: tuple[Requirement, ...] = ()
         self._cost = ""
+        self._remedy: tuple[Run | None, str, str] = (None, "", "")
         self.run = self._button(COMMANDS["run"], "#ffffff")
         self.cancel = self._button(COMMANDS["cancel"], "#3b4652")
         self.text = QLabel()
@@ -125,8 +126,12 @@ class RunPanel(Panel):
             count = f"{len(notes)} note{'' if len(notes) == 1 else 's'}"
             link = f" <a href='{NOTES}'>{count}</a>" if notes else ""
             self.text.setText((f"<b>{text}</b>" if bad else text) + link)
-            remedy = help_for(run.case, session.folding)
-            self.text.setToolTip(wrapped("\n".join([remedy] * bool(bad) + [*notes])))
+            if bad and self._remedy[:2] != (run, session.folding):
+                # The boundaries beside its cells are searched once.
+                remedy = help_for(run, session.mesh, session.folding)
+                self._remedy = (run, session.folding, remedy)
+            lines = [self._remedy[2], *notes] if bad else notes
+            self.text.setToolTip(wrapped("\n".join(lines)))
         elif run is session.runs[-1] and run.panels != session.case:
             self._tell_ready("Settings changed since the last run.", session)
         else:

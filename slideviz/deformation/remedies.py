@@ -1,0 +1,111 @@
+"""Remedies against inverted cells, in one order for the command line and the window."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from slideviz.case.model import Case
+from slideviz.case.motion import displacements
+from slideviz.errors import SlidevizError
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.periodic import Pair, pair_up
+from slideviz.terms import SLIDES
+
+MOST_NAMES = 2
+"""Most boundaries that a remedy names; of more it has the number."""
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """A remedy in the words of the case file (``keys``) and in those of the window."""
+
+    keys: str
+    window: str
+
+
+def remedies(case: Case, beside: Sequence[str] = (), pitch: str = "") -> tuple[Remedy, ...]:
+    """Return the remedies that a case has not tried yet, the most promising first.
+
+    Parameters
+    ----------
+    case
+        The case of the run.
+    beside
+        Fixed boundaries with nodes of inverted cells, from `fixed_beside`.
+    pitch
+        Sentence from `beyond_pitch`.
+    """
+    found, roles = [], set(case.roles.values())
+    if case.method != "rbf":
+        found.append(Remedy("METHOD= rbf", "radial basis functions as the method"))
+    if pitch:
+        found.append(Remedy(*["a motion below the pitch"] * 2))
+    slides = {"sliding", "periodic"} & roles
+    if beside or (not slides and "fixed" in roles):
+        few = len(beside) <= MOST_NAMES
+        who = " and ".join(beside) if few else f"{len(beside)} fixed boundaries"
+        who = f"{who} beside these cells" if beside else "boundaries near these cells"
+        off = case.sliding == "none"
+        keys = f"MARKER_SLIDING for {who}" + (f", and SLIDING_MODE= {SLIDES}" if off else "")
+        words = f"the role “sliding” for {who}" + (", and a sliding method" if off else "")
+        found.append(Remedy(keys, words))
+    elif slides and case.sliding == "none":
+        found.append(Remedy(f"SLIDING_MODE= {SLIDES}", "sliding boundary nodes"))
+    if "periodic" in roles and case.sliding != "none" and case.periodic in ("none", "periodic"):
+        found.append(Remedy("PERIODIC_MODE= moving", "periodicity with moving vertices"))
+    if case.steps:
+        found.append(Remedy("more STEPS, or STEPS= auto", "more steps, or automatic steps"))
+    if not pitch:
+        found.append(Remedy(*["a smaller motion"] * 2))
+    return tuple(found)
+
+
+def fixed_beside(case: Case, mesh: Mesh, cells: IntArray) -> tuple[str, ...]:
+    """Return the fixed boundaries that have nodes of cells (k,); none of a mesh in its file."""
+    if mesh.part is not None:
+        return ()
+    near = np.zeros(len(mesh.points), bool)
+    near[mesh.cells.take(cells).connectivity] = True
+    return tuple(
+        marker.name
+        for marker in mesh.markers
+        if case.roles.get(marker.name, "fixed") == "fixed" and near[marker.nodes].any()
+    )
+
+
+def beyond_pitch(case: Case, mesh: Mesh) -> str:
+    """Return a sentence on a motion that takes a node farther than the pitch; "" for none."""
+    names = case.markers_with("periodic")
+    if not names or case.periodic == "none":
+        return ""
+    try:
+        moved = displacements(case, mesh)
+        pairs = pair_up(mesh, names, case.periodic_type, case.axis, case.origin)
+    except SlidevizError:  # the run itself reports what is wrong
+        return ""
+    for pair in pairs:
+        farthest = _along(pair, mesh.points[moved.nodes], moved.vectors)
+        if farthest > pair.period * (1.0 + 1e-9):
+            turned = pair.kind == "rotational"
+            far = f"{np.degrees(farthest):.4g}°" if turned else f"{farthest:.4g}"
+            return f"The motion is {far}, farther than the pitch: {pair.describe()}"
+    return ""
+
+
+def _along(pair: Pair, points: FloatArray, vectors: FloatArray) -> float:
+    """Return the largest displacement along the period of a pair: a length, or an angle."""
+    if pair.kind == "translational":
+        return float(np.abs(vectors @ (pair.vector / pair.period)).max(initial=0.0))
+    axis = np.array(pair.axis) / np.linalg.norm(pair.axis)
+
+    def arms(at: FloatArray) -> FloatArray:
+        full = np.pad(at, ((0, 0), (0, 3 - at.shape[1]))) - np.array(pair.origin)
+        return full - np.outer(full @ axis, axis)
+
+    before, after = arms(points), arms(points + vectors)
+    sine = np.cross(before, after) @ axis
+    cosine = np.einsum("ij,ij->i", before, after)
+    return float(np.abs(np.arctan2(sine, cosine)).max(initial=0.0))
