@@ -95,7 +95,7 @@ def run_def(arguments: argparse.Namespace) -> int:
         return _set_boxes(arguments, config, mesh, begin)
     seconds = {"read": time.perf_counter() - begin}
     surface = make_surface(config, mesh)
-    tell_lost(output, surface.boxed(mesh), kind)
+    tell_lost(output, surface.displacer.boxed(mesh), kind)
     case = surface.case()
     moves = surface.displacement.any()
     steps = pull(arguments, case, mesh) if moves else [at_rest(case, mesh)]
@@ -104,7 +104,7 @@ def run_def(arguments: argparse.Namespace) -> int:
     before = quality(mesh, metric=case.quality_metric)
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
-    deformed = surface.boxed(steps[-1].mesh)
+    deformed = surface.displacer.boxed(steps[-1].mesh)
     write(output, deformed, overwrite=arguments.force, base=mesh, file_format=kind)
     if rated:
         write_qualities(rated, found)
@@ -115,7 +115,7 @@ def run_def(arguments: argparse.Namespace) -> int:
     advice = advice_for(case, mesh, found)
     report["design"] = {
         "variables": variable_rows(surface),
-        "boxes": {name: len(found.nodes) for name, found in surface.inside.items()},
+        "boxes": surface.displacer.inside,
         "ignored": list(config.ignored),
     }
     return tell(
@@ -124,10 +124,15 @@ def run_def(arguments: argparse.Namespace) -> int:
 
 
 def variable_rows(surface: MovingSurface) -> list[dict[str, Any]]:
-    """Return the entry of the report for each design variable."""
+    """Return the entry of the report for each value of the design variables."""
+    variables, idle = surface.config.variables, surface.idle
     return [
-        {"kind": variable.kind, "value": variable.value, "idle": idle}
-        for variable, idle in zip(surface.config.variables, surface.idle, strict=True)
+        {
+            "kind": variables[place].kind,
+            "value": variables[place].values[part],
+            "idle": idle[place],
+        }
+        for place, part in surface.values
     ]
 
 
@@ -137,7 +142,7 @@ def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, beg
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import tell_lost
     from slideviz.cli.report import print_remarks, save_json
-    from slideviz.design.su2.surface import set_boxes
+    from slideviz.design.su2.boxes import set_boxes
 
     case: Case = config.case
     boxed, boxes = set_boxes(config, mesh)

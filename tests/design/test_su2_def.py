@@ -100,6 +100,63 @@ def test_kinds_do_what_su2_says_and_add_up(here):
     np.testing.assert_allclose(half.displacement, [[1.0, 0.0]] * 7, atol=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("kinds", "params", "values", "alone", "said"),
+    [
+        (
+            "TRANSLATION, FFD_CONTROL_POINT_2D",
+            "(0, 1, 0); (BOX, 1, 0, 0, 1)",
+            "0.1, 0.2",
+            "TRANSLATION\nDV_PARAM= (0, 1, 0)\nDV_VALUE= 0.1",
+            (
+                "variable 2 (FFD_CONTROL_POINT_2D) of DV_KIND will do nothing, as in SU2: "
+                "TRANSLATION stands first, and decides what can move; make two runs"
+            ),
+        ),
+        (
+            "TRANSLATION, SCALE",
+            "(0, 1, 0)",
+            "0.1, 0.2",
+            "TRANSLATION\nDV_PARAM= (0, 1, 0)\nDV_VALUE= 0.1",
+            "DV_PARAM has 1 group for 2 variables: as in SU2, the last ones of DV_KIND do nothing",
+        ),
+        (
+            "TRANSLATION",
+            "(0, 1, 0, 7, 0)",
+            "0.1",
+            "TRANSLATION\nDV_PARAM= (0, 1, 0)\nDV_VALUE= 0.1",
+            "DV_PARAM: 7, 0 after the last variable is passed over",
+        ),
+        (
+            "NO_DEFORMATION, SCALE",
+            "(1.0); (1.0)",
+            "0.0, 2.0",
+            "SCALE\nDV_VALUE= 1.0",
+            "variable 2 (SCALE) of DV_KIND will do nothing, as in SU2: NO_DEFORMATION stands first",
+        ),
+    ],
+)
+def test_what_su2_passes_over_does_nothing_and_is_told(kinds, params, values, alone, said, here):
+    text = f"{BOXED}DV_KIND= {kinds}\nDV_PARAM= {params}\nDV_VALUE= {values}\n"
+    found = surface(text)
+    expected = surface(f"DV_KIND= {alone}\n").displacement
+    np.testing.assert_array_equal(found.displacement, expected)
+    assert any(one.startswith(said) for one in found.case().warnings), found.case().warnings
+
+
+def test_parameters_and_values_are_read_as_su2_reads_them(here):
+    text = "DV_KIND= TRANSLATION, TRANSLATION\nDV_PARAM= (1, 0, 0) ; ; (0, 1, 0) ;\nDV_VALUE="
+    found = surface(f"{text} 0.1, 0.2, 7\n")
+    np.testing.assert_allclose(found.displacement, [[0.1, 0.2]] * 7, atol=1e-16)
+    said = "DV_VALUE has 3 values for 2 variables: as in SU2, the last ones mean nothing"
+    assert said in found.case().warnings
+    boxed = (
+        f"{BOXED}DV_KIND= FFD_CONTROL_POINT_2D, FFD_CONTROL_POINT_2D\nOPT_RELAX_FACTOR= 3\n"
+        "DV_PARAM= (BOX, -1, -1, 0, 0); (BOX, 1, 0, 0, 0)\nDV_VALUE= 0.2, 0.1, 0.0, 0.0\n"
+    )
+    np.testing.assert_allclose(surface(boxed).displacement, [[0.2, 0.1]] * 7, atol=1e-15)
+
+
 def test_rotation_in_3d_turns_about_its_line(here):
     from tests.builders import cube
 
@@ -373,10 +430,25 @@ def test_roles_follow_from_the_lists_of_su2_and_of_ours(here):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("DV_KIND= HICKS_HENNE\nDV_VALUE= 1", r"a.cfg:5: DV_KIND: HICKS_HENNE not supported; supp"),
-        ("DV_KIND= FFD_TWIST, SCALE, AIRFOIL", "DV_KIND: FFD_TWIST, AIRFOIL not supported; "),
+        (
+            "DV_KIND= HIKS_HENNE\nDV_VALUE= 1",
+            r"5: DV_KIND: SU2 has no kind HIKS_HENNE; did you mean",
+        ),
+        ("DV_KIND= XYZ\nDV_VALUE= 1", "SU2 has no kind XYZ; supported: NO_DEFORMATION, "),
+        ("DV_KIND= SCALE, AIRFOIL", "AIRFOIL is not supported, as SU2 asks for its file at a term"),
+        (
+            "DV_KIND= FFD_TWIST_2D",
+            "is not supported: it moved nothing in SU2 7, and SU2 8 lacks it",
+        ),
+        ("DV_KIND= (NONE)", "DV_KIND: names no design variable; supported: NO_DEFORMATION, "),
         ("DV_VALUE= 1", "DV_KIND is missing: which design variables there are"),
-        ("DV_KIND= SCALE, SURFACE_FILE\nDV_VALUE= 1, 1", "SURFACE_FILE must stand alone; make two"),
+        (
+            (
+                f"{BOXED}DV_KIND= FFD_CONTROL_POINT_2D, SCALE\nDV_VALUE= 1, 1\n"
+                "DV_PARAM= (BOX, 1, 0, 0, 1); (1.0)"
+            ),
+            "SCALE cannot stand in a list that begins with FFD_CONTROL_POINT_2D: it has no FFD box",
+        ),
         ("DV_KIND= SCALE", "DV_VALUE is missing: a value for each variable"),
         ("DV_KIND= SCALE, SCALE\nDV_VALUE= 1", "DV_VALUE has 1 value for 2 variables"),
         ("DV_KIND= SCALE\nDV_VALUE= x", "DV_VALUE: 'x' is not a number"),
@@ -386,12 +458,19 @@ def test_roles_follow_from_the_lists_of_su2_and_of_ours(here):
             r"a.cfg:7: DV_PARAM: variable 1: 2 numbers are given; TRANSLATION needs \(x, y, z\)",
         ),
         (
-            "DV_KIND= TRANSLATION, SCALE\nDV_VALUE= 1, 1\nDV_PARAM= (1, 0, 0)",
-            "DV_PARAM has 1 group for 2 variables",
+            "DV_KIND= TRANSLATION\nDV_VALUE= 1\nDV_PARAM= (1, 0, 0); (0, 1, 0)",
+            "DV_PARAM has 2 groups for 1 variable; give one each",
         ),
         (
-            "DV_KIND= FFD_CONTROL_POINT_2D\nDV_VALUE= 1\nDV_PARAM= (BOX, 1, 0, 0, 0, 1)",
-            r"6 parameters are given; FFD_CONTROL_POINT_2D needs \(BOX, i, j, dx, dy\)",
+            (
+                "DV_KIND= FFD_CONTROL_POINT_2D, FFD_CONTROL_POINT_2D\nDV_VALUE= 1, 1\n"
+                "DV_PARAM= (BOX, 1, 0, 0, 0, 1); (BOX, 1, 0, 0, 1)"
+            ),
+            r"variable 1: 6 parameters are given; FFD_CONTROL_POINT_2D needs \(BOX, i, j, dx, dy\)",
+        ),
+        (
+            "DV_KIND= FFD_CONTROL_POINT_2D\nDV_VALUE= 1\nDV_PARAM= (BOX, 1, 0, 0, 0)",
+            "DV_VALUE has 1 value for 1 variable, which need 2; give one each",
         ),
         (
             "DV_KIND= FFD_CONTROL_POINT_2D\nDV_VALUE= 1\nDV_PARAM= (BOX, 1.5, 0, 0, 1)",
@@ -581,7 +660,7 @@ def test_set_changes_su2s_keys(here, capsys):
     assert run([*call, "dv_value = 0.05"]) == 0
     assert Path("out.su2").read_bytes() == expected
     for given, said in (
-        ("DV_VALUE=1, 2", "a.cfg: DV_VALUE has 2 values for 1 variable; give one each"),
+        ("DV_VALUE=( )", "a.cfg: DV_VALUE has 0 values for 1 variable; give one each"),
         ("DV_VALU=1", "unknown key 'DV_VALU'; did you mean DV_VALUE?"),
         ("MACH_NUMBER=1", "unknown key 'MACH_NUMBER'; `slideviz keys` lists those of slideviz"),
         ("DV_VALUE", "--set 'DV_VALUE' is not of the form KEY=VALUE"),

@@ -15,7 +15,7 @@ from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, require_no_mesh
 from slideviz.case.model import Case
 from slideviz.case.words import list_of, nearest, not_one_of, shown
-from slideviz.design.su2.variables import KINDS, DesignVariable, read_variables
+from slideviz.design.su2.variables import DesignVariable, read_variables, supported
 from slideviz.errors import CaseError
 from slideviz.terms import FILE_FORMATS, ROLES, Role
 
@@ -104,6 +104,11 @@ class Su2Config:
         assert self.case.source is not None
         return self.case.source
 
+    @property
+    def relaxation(self) -> float:
+        """Return OPT_RELAX_FACTOR, which multiplies values."""
+        return float(self.words["OPT_RELAX_FACTOR"])
+
 
 def own_changes(texts: Iterable[str]) -> tuple[dict[str, str], list[str]]:
     """Return the values of SU2's keys among texts KEY=VALUE, and the texts of slideviz's keys.
@@ -148,7 +153,8 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
     rows |= {key: Entry(key, value, 0) for key, value in (changes or {}).items()}
     reader = _Reader(rows, problems)
     case, markers = reader.case()
-    variables = read_variables(rows, problems)
+    notes: list[str] = []
+    variables = read_variables(rows, problems, notes)
     ignored = tuple(key for key in rows if key not in _read_keys())
     files = {key: Path(reader.word(key, default)) for key, default in FILES.items()}
     words = {key: reader.word(key, default) for key, default in WORDS.items()}
@@ -159,7 +165,7 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
         source=path,
         mesh_file=files["MESH_FILENAME"],
         mesh_out=_with_ending(files["MESH_OUT_FILENAME"], case),
-        warnings=(*warnings, *_perhaps_ours(path, ignored, rows)),
+        warnings=(*warnings, *notes, *_perhaps_ours(path, ignored, rows)),
     )
     return Su2Config(case, markers, variables, files, words, ignored, reader.named)
 
@@ -283,7 +289,9 @@ class _Reader:
             entry = self.rows["OPT_RELAX_FACTOR"]
             self.note(entry, f"{shown(entry.value)} is not a number")
         if "DV_KIND" not in self.rows:
-            said = f"DV_KIND is missing: which design variables there are ({', '.join(KINDS)})"
+            said = (
+                f"DV_KIND is missing: which design variables there are ({', '.join(supported())})"
+            )
             close = nearest("DV_KIND", self.rows)
             self.problems.append(
                 (max((e.line for e in self.rows.values()), default=1), said + close)

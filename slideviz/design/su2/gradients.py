@@ -37,7 +37,7 @@ class Gradients:
     surface : (m, d) float64
         With respect to the displacement of each moving node, with all inner points following.
     variables : (v,) float64
-        With respect to the value of each design variable.
+        With respect to each value of the design variables.
     points : (m, d) float64
         Positions of the moving nodes at the design.
     at_design : bool
@@ -96,8 +96,8 @@ def find_gradients(
             said += _difference(deformer.deform(displacement), written[0])
         pulled = deformer.vjp(displacement, matched.values)
     slopes = (
-        surface.slope(place, undeformed=not matched.at_design)
-        for place in range(len(config.variables))
+        surface.slope(place, part, undeformed=not matched.at_design)
+        for place, part in surface.values
     )
     return Gradients(
         surface=pulled,
@@ -152,13 +152,13 @@ def _directions(surface: MovingSurface) -> FloatArray:
     Each variable moves nodes by at most `REACH` times the mesh's extent.
     """
     sums: list[FloatArray] = []
-    for place in range(len(surface.config.variables)):
-        slope = surface.slope(place, undeformed=True)
+    for k, (place, part) in enumerate(surface.values):
+        slope = surface.slope(place, part, undeformed=True)
         largest = float(np.abs(slope).max(initial=0.0))
         unit = slope * (REACH * surface.mesh.extent / largest) if largest else slope
         if len(sums) < DIRECTIONS:
             sums.append(np.array(unit))
         else:
-            sums[place % DIRECTIONS] += unit
+            sums[k % DIRECTIONS] += unit
     moving = [each for each in sums if each.any()]
     return np.array(moving).reshape(-1, len(surface.nodes), surface.mesh.dim)

@@ -13,7 +13,7 @@ import numpy as np
 
 from slideviz.case.words import list_of
 from slideviz.design.su2.config import CONTINUITIES, SU2_CONTINUITY, Su2Config
-from slideviz.design.su2.variables import BOXED, DesignVariable
+from slideviz.design.su2.variables import DesignVariable
 from slideviz.ffd.box import Box
 from slideviz.mesh.model import FloatArray, Mesh
 
@@ -111,10 +111,7 @@ def idle_variables(
     continuity = asked or SU2_CONTINUITY
     held = {name: held_planes(config, mesh, box, continuity) for name, box in boxes.items()}
     idle = tuple(
-        variable.kind in BOXED
-        and any(
-            at in planes for at, planes in zip(_checked(variable), held[variable.box], strict=True)
-        )
+        any(at in planes for at, planes in zip(_checked(variable), held[variable.box], strict=True))
         for variable in config.variables
     )
     warnings = []

@@ -2,16 +2,62 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from slideviz.case.displacement import Columns, parse_rows
 from slideviz.case.lines import read_text
+from slideviz.design.su2.config import Su2Config
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 POSITION = Columns("position", ("x", "y", "z"), flat=True)
+
+
+@dataclass(frozen=True, eq=False)
+class ListedPositions:
+    """New positions of nodes, as a file lists them (a `Displacer`)."""
+
+    config: Su2Config
+    mesh: Mesh
+    nodes: IntArray
+
+    @cached_property
+    def _listed(self) -> tuple[FloatArray, tuple[str, ...]]:
+        config = self.config
+        of = f"{config.named[config.markers[0]]}= ({', '.join(config.markers)})"
+        return read_positions(config.files["DV_FILENAME"], self.nodes, self.mesh, of)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Return what reading the file found."""
+        return self._listed[1]
+
+    @property
+    def idle(self) -> tuple[bool, ...]:
+        """Return that no variable is without effect."""
+        return (False,) * len(self.config.variables)
+
+    @property
+    def inside(self) -> dict[str, int]:
+        """Return that no FFD box moves nodes."""
+        return {}
+
+    def displacement(self) -> FloatArray:
+        """Return the displacement (m, d) of the nodes."""
+        return self._listed[0] - self.mesh.points[self.nodes]
+
+    def slope(self, place: int, part: int, undeformed: bool) -> FloatArray:
+        """Return zeros (m, d): the variable has no value to change."""
+        del place, part, undeformed
+        return np.zeros((len(self.nodes), self.mesh.dim))
+
+    def boxed(self, mesh: Mesh) -> Mesh:
+        """Return the mesh: its FFD boxes stay."""
+        return mesh
 
 
 def read_positions(

@@ -1,115 +1,204 @@
-"""The design variables of SU2's configurations: kinds, parameters and values."""
+"""The design variables of SU2's configurations: the table of kinds, and how a list is read.
+
+SU2 reads ``DV_PARAM`` and ``DV_VALUE`` as streams of words (``COptionDVParam``): it has as many
+variables as ``DV_PARAM`` has parts between semicolons, and passes over what follows the last one.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from slideviz.case.lines import Entry, Problem
-from slideviz.case.words import Word, counted, groups_of, list_of, number, words_of
-from slideviz.errors import CaseError
+from slideviz.case.words import Word, counted, groups_of, list_of, nearest, number, words_of
+from slideviz.errors import CaseError, Note
+
+Group = Literal["nothing", "boxes", "ffd", "file", "grid", "surface", "naca", "parabolic"]
+"""What SU2 does with a list of variables; the first kind decides it for all of them."""
+
+NOT_YET = "is not supported"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of design variable."""
+
+    group: Group
+    form: str = ""
+    """Names of the parameters in DV_PARAM; BOX is the name of an FFD box, i, j, k are indices."""
+    order: int = 0
+    """Place among the passes over the variables of the group "surface"."""
+    several: str = ""
+    """Parameters that, where all are 0, are replaced by as many values."""
+    refused: str = ""
+    """Why the kind is not supported; empty where it is."""
+
+    @property
+    def parameters(self) -> list[str]:
+        """Return the names of the parameters."""
+        return self.form.replace(",", " ").split()
+
 
 KINDS = {
-    "TRANSLATION": "(x, y, z)",
-    "ROTATION": "(x0, y0, z0, x1, y1, z1)",
-    "SCALE": "(1.0)",
-    "SURFACE_FILE": "(1.0)",
-    "FFD_SETTING": "(1.0)",
-    "FFD_CONTROL_POINT_2D": "(BOX, i, j, dx, dy)",
-    "FFD_CONTROL_POINT": "(BOX, i, j, k, dx, dy, dz)",
+    "NO_DEFORMATION": Kind("nothing"),
+    "TRANSLATION": Kind("surface", "x, y, z", 1),
+    "ROTATION": Kind("surface", "x0, y0, z0, x1, y1, z1", 1),
+    "SCALE": Kind("surface", "", 1),
+    "HICKS_HENNE": Kind("surface", "side, x", 2, refused=NOT_YET),
+    "CST": Kind("surface", "side, k, n", 3, refused=NOT_YET),
+    "SURFACE_BUMP": Kind("surface", "x0, x1, x", 4, refused=NOT_YET),
+    "ANGLE_OF_ATTACK": Kind("surface", "one", 5, refused=NOT_YET),
+    "HICKS_HENNE_CAMBER": Kind("surface", "x", 6, refused=NOT_YET),
+    "NACA_4DIGITS": Kind("naca", "digit1, digit2, digits34", refused=NOT_YET),
+    "PARABOLIC": Kind("parabolic", "x, thickness", refused=NOT_YET),
+    "AIRFOIL": Kind(
+        "nothing",
+        "one, two",
+        refused="is not supported, as SU2 asks for its file at a terminal; use SURFACE_FILE",
+    ),
+    "SURFACE_FILE": Kind("file"),
+    "TRANSLATE_GRID": Kind("grid", "x, y, z", refused=NOT_YET),
+    "ROTATE_GRID": Kind("grid", "x0, y0, z0, x1, y1, z1", refused=NOT_YET),
+    "SCALE_GRID": Kind("grid", refused=NOT_YET),
+    "FFD_SETTING": Kind("boxes"),
+    "FFD_CONTROL_POINT": Kind("ffd", "BOX, i, j, k, dx, dy, dz", several="dx, dy, dz"),
+    "FFD_CONTROL_POINT_2D": Kind("ffd", "BOX, i, j, dx, dy", several="dx, dy"),
+    "FFD_CAMBER": Kind("ffd", "BOX, i, j", refused=NOT_YET),
+    "FFD_CAMBER_2D": Kind("ffd", "BOX, i", refused=NOT_YET),
+    "FFD_THICKNESS": Kind("ffd", "BOX, i, j", refused=NOT_YET),
+    "FFD_THICKNESS_2D": Kind("ffd", "BOX, i", refused=NOT_YET),
+    "FFD_TWIST": Kind("ffd", "BOX, j, x0, y0, z0, x1, y1, z1", refused=NOT_YET),
+    "FFD_ROTATION": Kind("ffd", "BOX, x0, y0, z0, x1, y1, z1", refused=NOT_YET),
+    "FFD_CONTROL_SURFACE": Kind("ffd", "BOX, x0, y0, z0, x1, y1, z1", refused=NOT_YET),
+    "FFD_GULL": Kind("ffd", "BOX, j", refused=NOT_YET),
+    "FFD_NACELLE": Kind("ffd", "BOX, i, j, k, dr, dx", refused=NOT_YET),
+    "FFD_ANGLE_OF_ATTACK": Kind("ffd", "BOX, one", refused=NOT_YET),
+    "FFD_TWIST_2D": Kind(
+        "ffd",
+        "BOX, x, y",
+        refused="is not supported: it moved nothing in SU2 7, and SU2 8 lacks it",
+    ),
+    "ELECTRIC_FIELD": Kind("nothing", "one, two"),
+    "YOUNG_MODULUS": Kind("nothing"),
+    "POISSON_RATIO": Kind("nothing"),
+    "STRUCTURAL_DENSITY": Kind("nothing"),
+    "DEAD_WEIGHT": Kind("nothing"),
 }
-"""The supported kinds, and the form of their parameters in DV_PARAM."""
-BOXED = {"FFD_CONTROL_POINT_2D": 5, "FFD_CONTROL_POINT": 7}
-"""Kinds that move a control point, and how many parameters they have."""
-NUMBERS = {"TRANSLATION": 3, "ROTATION": 6}
-"""Kinds with numbers as parameters, and how many they have."""
-ALONE = ("SURFACE_FILE", "FFD_SETTING")
-"""Kinds that must be the only variable."""
+"""SU2's kinds (8.3, and those of 7 that it dropped), by their name in DV_KIND."""
+WITHOUT_VALUE = ("nothing", "boxes", "file", "naca", "parabolic")
+"""Groups whose values mean nothing."""
+ALONE = ("naca", "parabolic")
+"""Groups of which SU2 takes one variable only: it stops, and waits for a key."""
 
 
 @dataclass(frozen=True)
 class DesignVariable:
-    """A design variable.
-
-    Attributes
-    ----------
-    kind : str
-        One of ``KINDS``.
-    value : float
-    numbers : tuple of float
-        Its parameters: a direction, two points, or the shift (dx, dy, dz) of a control point.
-    box, index : str, (int, int, int)
-        Box and control point, for kinds in ``BOXED``; an index of -1 means all.
-    """
+    """A design variable."""
 
     kind: str
-    value: float
+    values: tuple[float, ...]
+    """One, or a value for each parameter in `Kind.several`."""
     numbers: tuple[float, ...] = ()
+    """Its parameters without the box, as in `Kind.form`."""
     box: str = ""
-    index: tuple[int, int, int] = (0, 0, 0)
+    ignored: bool = False
+    """Whether it does nothing, beside the others in the list."""
+
+    @property
+    def value(self) -> float:
+        """Return the value, of several the first."""
+        return self.values[0]
+
+    @property
+    def group(self) -> Group:
+        """Return the group of its kind."""
+        return KINDS[self.kind].group
+
+    def parameter(self, name: str, default: float = 0.0) -> float:
+        """Return the parameter of a name in `Kind.form`; ``default`` where it has none."""
+        names = [one for one in KINDS[self.kind].parameters if one != "BOX"]
+        return dict(zip(names, self.numbers, strict=True)).get(name, default)
+
+    @property
+    def index(self) -> tuple[int, int, int]:
+        """Return the index of its control points, -1 for all of a direction."""
+        i, j, k = (int(self.parameter(letter, -1.0)) for letter in "ijk")
+        return i, j, k
+
+    @property
+    def shifts(self) -> tuple[tuple[float, float, float], ...]:
+        """Return the shift (dx, dy, dz) of its control points by each value of 1."""
+        if len(self.values) > 1:
+            axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+            return axes[: len(self.values)]
+        return ((self.parameter("dx"), self.parameter("dy"), self.parameter("dz")),)
+
+
+def supported() -> list[str]:
+    """Return the names of the kinds that are supported."""
+    return [name for name, kind in KINDS.items() if not kind.refused]
+
+
+def form(name: str) -> str:
+    """Return the parameters of a kind in words, as in DV_PARAM."""
+    return f"({KINDS[name].form or '1.0'})"
 
 
 def read_variables(
-    rows: Mapping[str, Entry], problems: list[Problem]
+    rows: Mapping[str, Entry], problems: list[Problem], warnings: list[str]
 ) -> tuple[DesignVariable, ...]:
     """Return the design variables of ``DV_KIND``, ``DV_PARAM`` and ``DV_VALUE``.
 
-    Mistakes are appended to ``problems``; none comes back where DV_KIND is missing or wrong.
+    Mistakes are appended to ``problems``, sentences about what is ignored to ``warnings``; no
+    variable comes back where DV_KIND is missing or wrong.
     """
-    kind_row = rows.get("DV_KIND")
-    if kind_row is None:
+    row = rows.get("DV_KIND")
+    if row is None:
         return ()
     try:
-        kinds = [word.text.upper() for word in list_of(kind_row.value)]
+        kinds = [word.text.upper() for word in list_of(row.value)]
     except CaseError as problem:
-        problems.append((kind_row.line, f"DV_KIND: {problem}"))
+        problems.append((row.line, f"DV_KIND: {problem}"))
         return ()
-    strange = [kind for kind in dict.fromkeys(kinds) if kind not in KINDS]
-    if strange or not kinds:
-        said = f"{', '.join(strange)} not supported" if strange else "names no design variable"
-        problems.append((kind_row.line, f"DV_KIND: {said}; supported: {', '.join(KINDS)}"))
+    if strange := _strange(kinds):
+        problems += [(row.line, f"DV_KIND: {sentence}") for sentence in strange]
         return ()
-    alone = [kind for kind in kinds if kind in ALONE]
-    if alone and len(kinds) > 1:
-        problems.append((kind_row.line, f"DV_KIND: {alone[0]} must stand alone; make two runs"))
-        return ()
+    groups = _groups(rows, kinds, problems, warnings)
     found = []
-    values, groups = _values(rows, kinds, problems), _groups(rows, kinds, problems)
-    for place, (kind, value, group) in enumerate(zip(kinds, values, groups, strict=False), start=1):
+    for place, (kind, group) in enumerate(zip(kinds, groups, strict=False), start=1):
         try:
-            found.append(_variable(kind, value, group))
+            found.append(_variable(kind, group))
         except CaseError as problem:
             problems.append((rows["DV_PARAM"].line, f"DV_PARAM: variable {place}: {problem}"))
-    return tuple(found)
+    if len(found) < len(groups):
+        return ()
+    found = _with_values(rows, found, problems, warnings)
+    problems += [(row.line, f"DV_KIND: {sentence}") for sentence in _contradictions(found)]
+    return _dispatched(found, warnings)
 
 
-def _values(rows: Mapping[str, Entry], kinds: list[str], problems: list[Problem]) -> list[float]:
-    """Return a value for each variable; 0 where it is missing, which kinds in ``ALONE`` may be."""
-    entry = rows.get("DV_VALUE")
-    if entry is None:
-        if kinds[0] not in ALONE:
-            problems.append(
-                (rows["DV_KIND"].line, "DV_VALUE is missing: a value for each variable")
-            )
-        return [0.0] * len(kinds)
-    try:
-        values = [number(word.text) for word in list_of(entry.value)]
-    except CaseError as problem:
-        problems.append((entry.line, f"DV_VALUE: {problem}"))
-        return [0.0] * len(kinds)
-    if len(values) != len(kinds) and kinds[0] not in ALONE:
-        said = f"DV_VALUE has {_for(len(values), 'value', kinds)}"
-        problems.append((entry.line, said))
-    return (values + [0.0] * len(kinds))[: len(kinds)]
+def _strange(kinds: list[str]) -> list[str]:
+    """Return a sentence for each kind that is unknown or not supported, or that there is none."""
+    if not kinds:
+        return [f"names no design variable; supported: {', '.join(supported())}"]
+    found = []
+    for kind in dict.fromkeys(kinds):
+        if kind not in KINDS:
+            hint = nearest(kind, KINDS) or f"; supported: {', '.join(supported())}"
+            found.append(f"SU2 has no kind {kind}{hint}")
+        elif KINDS[kind].refused:
+            found.append(f"{kind} {KINDS[kind].refused}; supported: {', '.join(supported())}")
+    return found
 
 
 def _groups(
-    rows: Mapping[str, Entry], kinds: list[str], problems: list[Problem]
+    rows: Mapping[str, Entry], kinds: list[str], problems: list[Problem], warnings: list[str]
 ) -> list[list[Word]]:
-    """Return the parameters of each variable; empty where DV_PARAM is wrong."""
+    """Return the words of each variable's parameters; none where DV_PARAM is wrong."""
     entry = rows.get("DV_PARAM")
     if entry is None:
-        if any(kind in BOXED or kind in NUMBERS for kind in kinds):
+        if any(KINDS[kind].form for kind in kinds):
             problems.append((rows["DV_KIND"].line, "DV_PARAM is missing: ( ... ) ; ( ... )"))
             return []
         return [[] for _ in kinds]
@@ -118,33 +207,116 @@ def _groups(
     except CaseError as problem:
         problems.append((entry.line, f"DV_PARAM: {problem}"))
         return []
-    groups = groups[:-1] if not groups[-1] else groups  # a semicolon after the last
-    if len(groups) != len(kinds):
-        said = f"DV_PARAM has {_for(len(groups), 'group', kinds)}"
-        problems.append((entry.line, said))
+    if len(groups) != len(kinds):  # SU2 takes several semicolons for one
+        groups = [group for group in groups if group]
+    said = f"{counted(len(groups), 'group')} for {counted(len(kinds), 'variable')}"
+    if len(groups) > len(kinds) or not groups:
+        problems.append((entry.line, f"DV_PARAM has {said}; give one each"))
+        return []
+    if len(groups) < len(kinds):
+        warnings.append(f"DV_PARAM has {said}: as in SU2, the last ones of DV_KIND do nothing")
+    last, needed = groups[-1], len(KINDS[kinds[len(groups) - 1]].parameters)
+    if needed and len(last) > needed:
+        extra = ", ".join(word.text for word in last[needed:])
+        warnings.append(Note(f"DV_PARAM: {extra} after the last variable is passed over"))
+        groups[-1] = last[:needed]
     return groups
 
 
-def _for(number: int, what: str, kinds: list[str]) -> str:
-    return f"{counted(number, what)} for {counted(len(kinds), 'variable')}; give one each"
-
-
-def _variable(kind: str, value: float, group: list[Word]) -> DesignVariable:
+def _variable(name: str, group: list[Word]) -> DesignVariable:
     """Return the variable with the parameters ``group``; raises CaseError where they are wrong."""
-    needed = f"{kind} needs {KINDS[kind]}"
-    if kind in NUMBERS:
-        numbers = tuple(number(word.text) for word in group)
-        if len(numbers) != NUMBERS[kind]:
-            raise CaseError(f"{len(numbers)} numbers are given; {needed}")
-        return DesignVariable(kind, value, numbers)
-    if kind not in BOXED:
-        return DesignVariable(kind, value)
-    if len(group) != BOXED[kind]:
-        raise CaseError(f"{len(group)} parameters are given; {needed}")
-    count = 3 if kind == "FFD_CONTROL_POINT" else 2
-    at = [number(word.text) for word in group[1 : 1 + count]]
-    if any(place != int(place) or place < -1 for place in at):
+    kind, names = KINDS[name], KINDS[name].parameters
+    if not names:
+        return DesignVariable(name, (0.0,))  # what is written there means nothing: mostly (1.0)
+    needed = f"{name} needs {form(name)}"
+    if len(group) != len(names):
+        what = "parameters" if "BOX" in names else "numbers"
+        raise CaseError(f"{len(group)} {what} are given; {needed}")
+    boxed = names[0] == "BOX"
+    numbers = tuple(number(word.text) for word in group[boxed:])
+    found = DesignVariable(name, (0.0,), numbers, group[0].text if boxed else "")
+    at = [found.parameter(letter, -1.0) for letter in "ijk"]
+    if boxed and any(place != int(place) or place < -1 for place in at):
         raise CaseError(f"an index is no whole number from -1; {needed}")
-    i, j, k = (*(int(place) for place in at), -1)[:3]
-    shift = tuple(number(word.text) for word in group[1 + count :])
-    return DesignVariable(kind, value, (*shift, 0.0)[:3], group[0].text, (i, j, k))
+    several = kind.several.split(", ") if kind.several else []
+    if several and not any(found.parameter(each) for each in several):
+        found = replace(found, values=(0.0,) * len(several))
+    return found
+
+
+def _with_values(
+    rows: Mapping[str, Entry],
+    variables: list[DesignVariable],
+    problems: list[Problem],
+    warnings: list[str],
+) -> list[DesignVariable]:
+    """Return the variables with their values; 0 where these are missing."""
+    entry = rows.get("DV_VALUE")
+    needless = not variables or variables[0].group in WITHOUT_VALUE
+    if entry is None:
+        if not needless:
+            said = "DV_VALUE is missing: a value for each variable"
+            problems.append((rows["DV_KIND"].line, said))
+        return variables
+    try:
+        values = [number(word.text) for word in list_of(entry.value)]
+    except CaseError as problem:
+        problems.append((entry.line, f"DV_VALUE: {problem}"))
+        return variables
+    needed = sum(len(each.values) for each in variables)
+    said = f"{counted(len(values), 'value')} for {counted(len(variables), 'variable')}"
+    if len(variables) < needed:
+        said += f", which need {needed}"
+    if len(values) < needed and not needless:
+        problems.append((entry.line, f"DV_VALUE has {said}; give one each"))
+    if len(values) > needed:
+        warnings.append(f"DV_VALUE has {said}: as in SU2, the last ones mean nothing")
+    left = iter(values + [0.0] * needed)
+    return [replace(each, values=tuple(next(left) for _ in each.values)) for each in variables]
+
+
+def _contradictions(variables: list[DesignVariable]) -> list[str]:
+    """Return why variables cannot stand in one list."""
+    first = variables[0] if variables else None
+    if first is None or len(variables) == 1:
+        return []
+    if first.group in ALONE:
+        return [f"{first.kind} must stand alone; make two runs"]
+    others = {each.kind: None for each in variables if each.group != first.group}
+    if first.group == "ffd" and others:
+        said = f"{', '.join(others)} cannot stand in a list that begins with {first.kind}"
+        return [f"{said}: it has no FFD box; make two runs"]
+    alike = all(each.kind == first.kind for each in variables)
+    if first.kind == "HICKS_HENNE_CAMBER" and not alike:
+        return ["HICKS_HENNE_CAMBER stands with variables of its kind only; make two runs"]
+    return []
+
+
+def _dispatched(variables: list[DesignVariable], warnings: list[str]) -> tuple[DesignVariable, ...]:
+    """Return the variables, those marked that do nothing in SU2 beside the first one."""
+    reasons: dict[str, list[str]] = {}
+    found = []
+    for place, each in enumerate(variables, start=1):
+        reason = _why_ignored(each, variables[0]) if place > 1 else ""
+        found.append(replace(each, ignored=bool(reason)))
+        if reason:
+            reasons.setdefault(reason, []).append(f"{place} ({each.kind})")
+    for reason, places in reasons.items():
+        more = f" and {len(places) - 6} more" if len(places) > 6 else ""
+        said = f"variable{'s' * (len(places) > 1)} {', '.join(places[:6])}{more} of DV_KIND"
+        warnings.append(f"{said} will do nothing, as in SU2: {reason}; make two runs")
+    return tuple(found)
+
+
+def _why_ignored(variable: DesignVariable, first: DesignVariable) -> str:
+    """Return why SU2 ignores a variable, or loses its motion; empty where it moves."""
+    if first.group == "grid":
+        return f"{first.kind} stands first, and moves the mesh alone"
+    if variable.group != first.group:
+        return f"{first.kind} stands first, and decides what can move"
+    order, leading = KINDS[variable.kind].order, KINDS[first.kind].order
+    if variable.kind == "HICKS_HENNE_CAMBER" != first.kind:
+        return f"HICKS_HENNE_CAMBER moves only where it stands first, and {first.kind} does"
+    if order < leading and first.kind != "ANGLE_OF_ATTACK":
+        return f"its motion is lost, since {first.kind}, which stands first, begins anew after it"
+    return ""
