@@ -1,5 +1,6 @@
 """Halo layers (SEND_RECEIVE): copies follow what they are copies of, and count for nothing else."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
+from slideviz.mesh.periodic import match
 from tests.slow import one_of_each_fast
 
 UP = np.array([[0.0, 0, 0], [0, 0, 0], [0, -1.0, 0]])
@@ -121,6 +123,40 @@ def test_copies_follow_by_every_method(tmp_path, values):
     *_, last = sv.deform(case, plain)
     assert misfit(mesh, step.mesh.points) <= 1e-14
     np.testing.assert_allclose(step.mesh.points[: len(plain.points)], last.mesh.points, atol=1e-9)
+
+
+def rounded(text: str, digits: int) -> str:
+    """Return a text with every coordinate rounded to so many digits."""
+    return re.sub(r"-?\d+\.\d{5,}(e-?\d+)?", lambda m: f"{float(m[0]):.{digits - 1}e}", text)
+
+
+@pytest.mark.parametrize("method", ["run", "deformer", "moving side"])
+@pytest.mark.parametrize("change", ["seven digits", "angle"])
+@pytest.mark.parametrize("angle", [1.0, 12.0])
+def test_sides_that_fit_to_few_digits_move_alike(tmp_path, change, method, angle):
+    """Images are not turned by the halo's rotation, which differs a little from their period."""
+    build, sides, transform, roles = MESHES["sector"]
+    text = halo_text(build(), *sides, transform)
+    turn = repr(float(np.radians(30.0)))
+    text = rounded(text, 7) if change == "seven digits" else text.replace(turn, f"{turn[:8]}")
+    mesh = sv.read(save(tmp_path, text))
+    assert mesh.remarks == ()
+    assert mesh.halo.mismatch.max() > 1e-9
+    body = "BLOCK"
+    if method == "moving side":
+        body, roles = "inner", roles | {"BLOCK": "sliding", "inner": "moving"}
+    motions = (Rotate(body, angle, point=(0.0, 0.0)),)
+    case = Case(roles=roles, motions=motions, sliding="ps", periodic="moving", steps=3)
+    if method == "deformer":
+        points = sv.Deformer(mesh, case).deform()
+    else:
+        *_, step = sv.deform(case, mesh)
+        assert step.periodic_misfit <= 1e-14
+        assert sv.quality(step.mesh, mesh).inverted == 0
+        points = step.mesh.points
+    sides = mesh, mesh.with_points(points)
+    before, after = (match(each, "per1", "per2", "rotational").mismatch for each in sides)
+    assert after <= 2.0 * before + 1e-14
 
 
 def test_copies_of_nodes_at_rest_keep_every_bit(tmp_path):

@@ -256,6 +256,23 @@ def test_images_that_moved_differently_are_an_error_with_nodes_and_numbers():
         next(sv.deform(case, mesh, setup=replace(setup, target=wrong)))
 
 
+def test_inverted_cells_are_the_message_where_images_moved_differently_as_well():
+    mesh, roles = split_wall("fixed", "sliding")
+    case = Case(
+        roles=roles | {"x_p": "moving"},
+        motions=(Translate("x_p", (-0.9, 0.0)),),
+        periodic="moving",
+        sliding="ps",
+    )
+    setup = make_setup(case, mesh)
+    wrong = setup.target.copy()
+    wrong[setup.known == mesh.marker("y_p").nodes[-1], 0] += 1.0
+    step = next(sv.deform(case, mesh, setup=replace(setup, target=wrong)))
+    assert sv.quality(step.mesh, mesh).inverted
+    assert step.periodic_misfit == pytest.approx(1.0)
+    assert "have moved differently, by 1;" in step.warnings[-1]
+
+
 @pytest.mark.parametrize("shift", [0.0, 1e3])
 @pytest.mark.parametrize("build", [lambda: builders.square(6), lambda: builders.passage((2, 4, 6))])
 def test_the_misfit_is_what_images_moved_apart(build, shift):

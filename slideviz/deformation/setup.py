@@ -110,6 +110,17 @@ class Setup:
         """Return the largest displacement that is asked for, in the frame."""
         return float(np.linalg.norm(self.target, axis=1).max(initial=0.0))
 
+    @cached_property
+    def copies(self) -> IntArray:
+        """Return the halo's pairs (k,) whose copies follow their donors.
+
+        Periodic images move alike in the frame already; by a rotation of the halo, which differs a
+        little from the period, or from where files with few digits put them, they would not.
+        """
+        halo = self.halo
+        outside = halo is not None and ~np.isin(halo.receivers, self.images)
+        return np.flatnonzero(outside)
+
     def once(self, nodes: IntArray) -> np.ndarray:
         """Return a mask (k,) of the nodes (k,) that represent their images, or have none."""
         return np.asarray(self.classes.stands[nodes] == nodes)

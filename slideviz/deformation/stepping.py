@@ -20,7 +20,7 @@ from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.threads import in_parts
 from slideviz.rbf.constraint_rows import AGREE
 from slideviz.rbf.frames import Frame
-from slideviz.rbf.images import largest_misfit
+from slideviz.rbf.images import largest_misfit, misfits
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Problem, Solution, Watch
 from slideviz.rbf.refine import TRUSTED
@@ -86,8 +86,7 @@ class Stepping:
             moved = moved_by(setup, coords, solution.displacement, goal)
             points = cartesian(setup.frame, mesh.points, setup.coords, moved)
             if mesh.halo is not None:
-                points = mesh.halo.follow(mesh.points, points)
-                moved = followed(setup, mesh.halo, points, moved)
+                points, moved = followed(setup, mesh, mesh.halo, points, moved)
             if not within(points, np.finfo(float).max):
                 raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
             step = self._made(index + 1, total, points, solution, watch, part)
@@ -115,10 +114,12 @@ class Stepping:
                 remarks = _dropped_warning(setup, solution, index, mesh)
             warnings += [f"step {index}: {text}" for text in solution.warnings]
             least = max(least, (solution.doubt, solution.refined, index, solution.condition))
+            misfit, apart = self._misfit(step)
+            warnings += apart
             yield replace(
                 step,
                 warnings=(*warnings, *remarks, *_doubt_warning(*least)),
-                periodic_misfit=largest_misfit(setup.frame, setup.coords, points, setup.images),
+                periodic_misfit=misfit,
             )
             seconds = {}
 
@@ -133,6 +134,20 @@ class Stepping:
         if self.rate is not None:
             return self.rate(steps)
         return quality(steps[-1].mesh, self.mesh, self.case.quality_metric)
+
+    def _misfit(self, step: Step) -> tuple[float | None, list[str]]:
+        """Return the misfit of periodic images, and a warning where cells are inverted as well.
+
+        Inverted cells are what a run then fails by. Raises DeformError where no cell is inverted.
+        """
+        setup = self.setup
+        state = setup.frame, setup.coords, step.mesh.points, setup.images
+        try:
+            return largest_misfit(*state), []
+        except DeformError as problem:
+            if self.rate is not None or not self.quality_of([step]).inverted:
+                raise
+            return float(misfits(*state).max()), [f"step {step.index}: {problem}"]
 
     def _report(self, index: int, total: int) -> Callable[[str, float], None]:
         return lambda phase, fraction: self.tell(Progress(index, total, phase, fraction))
@@ -274,15 +289,14 @@ def cartesian(
     return out
 
 
-def followed(setup: Setup, halo: Halo, points: FloatArray, moved: FloatArray) -> FloatArray:
-    """Return coordinates ``moved`` (n, d) with those of halo copies made anew from ``points``.
-
-    Periodic images are left as they are: they have moved alike to the bit already.
-    """
-    copies = np.setdiff1d(halo.receivers, setup.images)
-    out = moved.copy()
-    out[copies] = setup.frame.coords(points[copies])
-    return out
+def followed(
+    setup: Setup, mesh: Mesh, halo: Halo, points: FloatArray, moved: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return Cartesian ``points`` and coordinates ``moved`` (n, d), with halo copies moved, too."""
+    rows = setup.copies
+    points, out = halo.follow(mesh.points, points, rows), moved.copy()
+    out[halo.receivers[rows]] = setup.frame.coords(points[halo.receivers[rows]])
+    return points, out
 
 
 def _short_warning(setup: Setup, solution: Solution, index: int) -> str:

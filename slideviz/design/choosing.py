@@ -131,5 +131,5 @@ def _further(
         coords = moved_by(setup, coords, made[-1].displacement, goal)
         if mesh.halo is not None:
             points = cartesian(setup.frame, mesh.points, setup.coords, coords)
-            coords = followed(setup, mesh.halo, mesh.halo.follow(mesh.points, points), coords)
+            coords = followed(setup, mesh, mesh.halo, points, coords)[1]
     return made

@@ -48,6 +48,8 @@ class Halo:
         The cells of the halo: those with an outer receiver.
     sides : tuple of (str, str)
         Pairs of boundaries of the domain: the first is a copy of the second.
+    mismatch : (h,) float64
+        Distance of each copy from where the motion of the halo puts its donor, undeformed.
     """
 
     receivers: IntArray
@@ -56,20 +58,23 @@ class Halo:
     outer: IntArray
     cells: NDArray[np.bool_]
     sides: tuple[tuple[str, str], ...]
+    mismatch: FloatArray
 
-    def follow(self, before: FloatArray, after: FloatArray) -> FloatArray:
+    def follow(self, before: FloatArray, after: FloatArray, rows: IntArray) -> FloatArray:
         """Return ``after`` (n, d), with receivers moved as their donors, turned by their rotations.
 
         Parameters
         ----------
         before, after : (n, d)
             Undeformed points, at which the halo is in place, and deformed ones.
+        rows : (k,)
+            The pairs that are moved.
         """
-        moved = np.einsum("hij,hj->hi", self.rotations, (after - before)[self.donors])
+        moved = np.einsum("hij,hj->hi", self.rotations[rows], (after - before)[self.donors[rows]])
         out = np.array(after)
-        start = before[self.receivers]
+        start = before[self.receivers[rows]]
         # Adding zero would turn -0.0 into 0.0: copies of nodes at rest keep every bit.
-        out[self.receivers] = np.where(moved == 0, start, start + moved)
+        out[self.receivers[rows]] = np.where(moved == 0, start, start + moved)
         return out
 
     def outer_mask(self, count: int) -> NDArray[np.bool_]:
@@ -112,7 +117,12 @@ def make_halo(
     outer = np.setdiff1d(receivers, np.concatenate([*inner, np.empty(0, np.int64)]))
     beyond = np.zeros(len(mesh.points), bool)
     beyond[outer] = True
-    donors, rotations = _rooted(len(mesh.points), receivers, donors, rotations)
+    mismatch = np.empty(len(receivers))
+    for index, motion in enumerate(motions):
+        some = which == index
+        image = motion.at(mesh.points[donors[some]])
+        mismatch[some] = np.linalg.norm(mesh.points[receivers[some]] - image, axis=1)
+    donors, rotations = _rooted(len(mesh.points), receivers, donors, rotations, mismatch)
     return Halo(
         frozen_array(receivers, np.int64),
         frozen_array(donors, np.int64),
@@ -120,13 +130,21 @@ def make_halo(
         frozen_array(outer, np.int64),
         frozen_array(_touching(mesh.cells, beyond), bool),
         sides,
+        frozen_array(mismatch, np.float64),
     )
 
 
 def _rooted(
-    count: int, receivers: IntArray, donors: IntArray, rotations: FloatArray
+    count: int,
+    receivers: IntArray,
+    donors: IntArray,
+    rotations: FloatArray,
+    mismatch: FloatArray,
 ) -> tuple[IntArray, FloatArray]:
-    """Return donors (h,) and rotations (h, d, d) without chains: donors that are no receivers."""
+    """Return donors (h,) and rotations (h, d, d) without chains: donors that are no receivers.
+
+    ``mismatch`` (h,) is summed along the chains, in place.
+    """
     row = np.full(count, -1)
     row[receivers] = np.arange(len(receivers))
     donors, rotations = donors.copy(), rotations.copy()
@@ -134,6 +152,7 @@ def _rooted(
         copied = np.flatnonzero(row[donors] >= 0)
         via = row[donors[copied]]
         rotations[copied] = rotations[copied] @ rotations[via]
+        mismatch[copied] += mismatch[via]
         donors[copied] = donors[via]
     return donors, rotations
 

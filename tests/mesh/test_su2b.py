@@ -333,7 +333,7 @@ def test_zones_that_are_not_there_are_told(tmp_path):
 def test_what_cannot_be_held_is_refused(tmp_path):
     square = grid((2, 2))
     nothing = np.empty(0, np.int64)
-    halo = Halo(nothing, nothing, np.empty((0, 2, 2)), nothing, np.zeros(4, bool), ())
+    halo = Halo(nothing, nothing, np.empty((0, 2, 2)), nothing, np.zeros(4, bool), (), np.zeros(0))
     with pytest.raises(MeshError, match=r"has a halo .SEND_RECEIVE markers.* write a .su2 file"):
         write(tmp_path / "a.su2b", replace(square, halo=halo))
     for name in ("a" * 33, "", "a\nb", "Send_Receive"):

@@ -178,11 +178,12 @@ class FrozenStep:
         halo = self.mesh.halo
         if halo is None:
             return moved, at
-        donor, start = self.mesh.points[halo.donors], self.mesh.points[halo.receivers]
-        follow = transform(halo.rotations, take(at, halo.donors) - donor)
+        rows = setup.copies
+        donors, copies = halo.donors[rows], halo.receivers[rows]
+        donor, start = self.mesh.points[donors], self.mesh.points[copies]
+        follow = transform(halo.rotations[rows], take(at, donors) - donor)
         own = at is not moved
-        at = put(at, halo.receivers, _shifted(start, follow), own=own)
-        copies = np.setdiff1d(halo.receivers, setup.images)
+        at = put(at, copies, _shifted(start, follow), own=own)
         return put(moved, copies, coords_of(frame, take(at, copies)), own=own), at
 
 
