@@ -243,6 +243,13 @@ class Docks(QObject):
         seen = {side: self._seen(side) for side in widths}
         return all(dock is None or abs(dock.width() - widths[s]) < 4 for s, dock in seen.items())
 
+    def is_behind(self, widget: QWidget | None) -> bool:
+        """Return whether a widget is in a dock that another tab hides."""
+        if widget is None:
+            return False
+        docks = (dock for dock in self.by_name.values() if dock.isAncestorOf(widget))
+        return any(not _is_in_front(dock) for dock in docks)
+
     def toggle_all(self) -> None:
         """Hide all docks; if none is visible, show those again that were hidden together."""
         if any(dock.isVisible() for dock in self.by_name.values()):

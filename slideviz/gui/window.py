@@ -326,6 +326,14 @@ class MainWindow(Services):
 
     # Qt --------------------------------------------------------------------------------
 
+    def focusNextPrevChild(self, forwards: bool) -> bool:
+        moved = super().focusNextPrevChild(forwards)
+        first = self.focusWidget()
+        # For Qt a field behind a tab is visible: what is typed would change it unseen.
+        while moved and self.docks_.is_behind(self.focusWidget()):
+            moved = super().focusNextPrevChild(forwards) and self.focusWidget() is not first
+        return moved
+
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         if any(url.isLocalFile() for url in event.mimeData().urls()):
             event.acceptProposedAction()

@@ -72,25 +72,63 @@ def test_what_has_no_value_is_not_worked_out(qtbot, typed):
     assert made.value == 1.0
 
 
-@pytest.mark.parametrize("typed", ["0.0.945", "12e", "", "-"])
-def test_a_malformed_number_goes_back_to_what_was_there_before(qtbot, typed):
-    made, other, told = NumberField(0.949), NumberField(1.0), []
-    for field in (made, other):
-        qtbot.addWidget(field)
+@pytest.mark.parametrize("typed", ["0.0.945", "12e", "", "-", "abc", "0x10"])
+def test_an_invalid_text_stays_and_its_value_is_the_one_from_before(qtbot, typed):
+    made, told = NumberField(0.949), []
+    qtbot.addWidget(made)
     made.changed.connect(told.append)
     made.selectAll()
     QTest.keyClick(made, Qt.Key.Key_Backspace)
     QTest.keyClicks(made, typed)
-    assert made.problem
+    assert made.text() == typed
     made.editingFinished.emit()
-    assert (made.text(), made.value) == ("0.949", 0.949)
+    made.focusOutEvent(QFocusEvent(QFocusEvent.Type.FocusOut))
+    assert (made.text(), made.value) == (typed, 0.949), "no valid beginning of what was typed"
     assert (told or [0.949])[-1] == 0.949
-    made.selectAll()
-    QTest.keyClicks(made, "0.5")
-    made.editingFinished.emit()
+    assert made.property("bad")
+    assert made.fault in made.toolTip()
+    made.show_value(0.949)  # as the session does after any change
+    assert made.text() == typed
+    made.show_value(0.5)
+    assert (made.text(), made.fault) == ("0.5", "")
     QTest.keyClicks(made, "..")
     made.editingFinished.emit()
     assert made.value == 0.5, "the last one that was left valid"
+    QTest.keyClick(made, Qt.Key.Key_Escape)
+    assert (made.text(), made.value, made.fault) == ("0.5", 0.5, "")
+
+
+def is_typed(box, text):
+    """Type a text into a box; return whether all its letters were the box's own."""
+    own = True
+    for letter in text:
+        override = QKeyEvent(QEvent.Type.ShortcutOverride, ord(letter.upper()), NONE, letter)
+        own = box.event(override) and override.isAccepted() and own
+        QTest.keyClicks(box, letter)
+    return own
+
+
+@pytest.mark.parametrize("typed", ["2.5", "-4", "360*2", "abc", "99", ""])
+def test_a_whole_number_loses_no_character(qtbot, typed):
+    box, told = NumberBox(), []
+    qtbot.addWidget(box)
+    box.setRange(1, 40)
+    box.setValue(7)
+    box.valueChanged.connect(told.append)
+    box.focusInEvent(QFocusEvent(QFocusEvent.Type.FocusIn))
+    box.selectAll()
+    QTest.keyClick(box, Qt.Key.Key_Backspace)
+    assert is_typed(box, typed), "no letter is a shortcut of the window"
+    QTest.keyClick(box, Qt.Key.Key_Return)
+    box.focusOutEvent(QFocusEvent(QFocusEvent.Type.FocusOut))
+    assert (box.text(), box.value()) == (typed, 7)
+    assert (told or [7])[-1] == 7
+    words = f"“{typed}” is not a whole number from 1 to 40" if typed else "a number is needed"
+    assert (box.fault, box.toolTip(), box.property("bad")) == (words, words, True)
+    box.show_value(7)
+    assert box.text() == typed
+    QTest.keyClick(box, Qt.Key.Key_Escape)
+    assert (box.text(), box.value(), box.fault) == ("7", 7, "")
 
 
 def test_a_double_click_selects_the_whole_number(qtbot):
@@ -201,11 +239,9 @@ def test_a_word_for_the_lowest_number_can_be_typed(qtbot):
     box.setSpecialValueText("automatic")
     box.setValue(5)
     box.valueChanged.connect(told.append)
-    for key in (Qt.Key.Key_A, Qt.Key.Key_U, Qt.Key.Key_T, Qt.Key.Key_O):
-        override = QKeyEvent(QEvent.Type.ShortcutOverride, key, NONE, chr(key).lower())
-        assert box.event(override)
-        assert override.isAccepted(), "it is no shortcut of the window"
-        QTest.keyClick(box, key)
-    assert (box.text(), told) == ("automatic", [0])
+    box.selectAll()
+    assert is_typed(box, "auto")
+    assert (box.text(), told, box.fault) == ("automatic", [0], "")
+    box.selectAll()
     QTest.keyClicks(box, "12")
     assert told[-1] == 12

@@ -91,13 +91,24 @@ def test_the_tab_key_leaves_every_table_and_comes_around(opened):
     window, seen = opened.window, set()
     window.store.change(changes.add_motion, Translate("airfoil", (0.01, 0.0)))
     window.boundaries.table.setFocus()
-    for _ in range(120):
-        at = window.focusWidget()
-        if at in seen:
-            break
-        seen.add(at)
-        QTest.keyClick(at, Qt.Key.Key_Tab)
-    assert {window.boundaries.table, window.motions.list, window.run_panel.run} <= seen
+    for key in (Qt.Key.Key_Tab, Qt.Key.Key_Backtab):
+        for _ in range(120):
+            at = window.focusWidget()
+            if at in seen:
+                break
+            assert not at.visibleRegion().isEmpty(), f"{at.objectName()} is behind a tab"
+            seen.add(at)
+            QTest.keyClick(at, key)
+        wanted = {window.boundaries.table, window.motions.list, window.run_panel.run}
+        assert wanted <= seen
+        assert not [at for at in seen if window.docks["method"].isAncestorOf(at)]
+        seen.clear()
+    window.docks_.bring_to_front("method")
+    window.boundaries.table.setFocus()
+    for _ in range(9):
+        QTest.keyClick(window.focusWidget(), Qt.Key.Key_Tab)
+        seen.add(window.focusWidget())
+    assert window.method.sliding in seen
 
 
 FIRST = {
@@ -264,3 +275,7 @@ def test_arrows_change_no_role_after_a_click_on_one(driver, passage_file, qtbot)
     QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Down)
     assert driver.session.case.roles == roles
     assert driver.session.view.selected == ("outflow",)
+    driver.role("outflow", "moving")
+    QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Up)
+    assert driver.session.view.selected == ("inflow",)
+    assert driver.session.case.roles == {**roles, "outflow": "moving"}

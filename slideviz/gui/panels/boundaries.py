@@ -161,10 +161,10 @@ class BoundariesPanel(Panel):
             self.table.setItem(row, COUNT, count)
             choice = Choice(labels(ROLES))
             choice.setFrame(False)
-            # The tab key goes on to the next panel: F2 opens the roles. After a click the keys
-            # still belong to the table: arrows go to other rows, and change no role.
-            choice.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
-            choice.setFocusProxy(self.table)
+            # The tab key goes on to the next panel: F2 opens the roles. A click on one gives the
+            # focus to the table: arrows go to other rows, and change no role. With the table as
+            # focus proxy, Shift+Tab would go from the view to the table and back, and no farther.
+            choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             for index, role in enumerate(ROLES):
                 choice.setItemIcon(index, role_icon(role))
             choice.explain({role: f"{role}: {ROLES[role].tip}" for role in ROLES})

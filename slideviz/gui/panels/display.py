@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -41,14 +42,14 @@ NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbour
 MOST_PASSAGES = 9
 """Most neighbouring passages on each side for translational periodicity, which is endless."""
 
+_PASSAGES = re.compile(r"(\d{1,9})(?: on each side)?|all(?: \d+ around)?")
+"""What can be typed as a number of passages."""
 
 ONLY = "Draw only the cells whose value is within these two numbers."
 
 
 class PassagesBox(NumberBox):
     """A spin box for the number of neighbouring passages; its maximum means the whole wheel."""
-
-    letters = "al"  # of "all"
 
     def __init__(self) -> None:
         super().__init__()
@@ -71,16 +72,15 @@ class PassagesBox(NumberBox):
 
     def valueFromText(self, text: str) -> int:
         """Return the number of neighbours for typed words or digits."""
-        if text.strip().startswith("all"):
-            return self.maximum()
-        digits = "".join(sign for sign in text if sign.isdigit())
-        return min(int(digits), self.maximum()) if digits else 0
+        typed = _PASSAGES.fullmatch(text.strip())
+        if typed is None:
+            return 0
+        return self.maximum() if typed[1] is None else int(typed[1])
 
     def validate(self, text: str, at: int) -> tuple[QValidator.State, str, int]:
         """Accept any text that a number can be read from."""
-        good = any(sign.isdigit() for sign in text) or text.strip() == "all"
-        state = QValidator.State.Acceptable if good else QValidator.State.Intermediate
-        return state, text, at
+        good = _PASSAGES.fullmatch(text.strip()) and self.valueFromText(text) <= self.maximum()
+        return QValidator.State.Acceptable if good else QValidator.State.Intermediate, text, at
 
 
 class Span(QWidget):
@@ -88,15 +88,22 @@ class Span(QWidget):
 
     def __init__(self, name: str, changed: Callable[[tuple[float, float]], object]) -> None:
         super().__init__()
+        self._changed = changed
         self.low = NumberField(0.0, lambda value: self._must(value < self.high.value, value, "<"))
         self.high = NumberField(1.0, lambda value: self._must(value > self.low.value, value, ">"))
         for end, field in (("low", self.low), ("high", self.high)):
             field.setObjectName(f"{name}_{end}")
             field.setAccessibleName(f"{name} {end}")
-            field.changed.connect(lambda _: changed((self.low.value, self.high.value)))
+            field.changed.connect(lambda _: self._tell())
         parts = in_row(self.low, QLabel("to"), self.high, wide=[self.low, self.high], spacing=4)
         parts.setContentsMargins(0, 0, 0, 0)
         self.setLayout(parts)
+
+    def _tell(self) -> None:
+        # The other number may have been typed before it was valid.
+        for field in (self.low, self.high):
+            field.recheck()
+        self._changed((self.low.value, self.high.value))
 
     def _must(self, good: bool, value: float, sign: str) -> str:
         """Return, unless ``good``, why a number must be less (``<``) or greater than the other."""
@@ -253,10 +260,12 @@ class DisplayPanel(Panel):
                 f"Neighbouring passages drawn beside the mesh: {pair.first} and {pair.second} "
                 f"repeat by {pair.describe()}."
             )
-        self.passages.setValue(self.passages.maximum() if count < 0 else count)
+        if not self.passages.fault:
+            self.passages.setValue(self.passages.maximum() if count < 0 else count)
         for widget in (self.passages, self.passages_label):
             widget.setEnabled(pair is not None)
-            widget.setToolTip(wrapped(tip))
+        self.passages.set_tip(tip)
+        self.passages_label.setToolTip(wrapped(tip))
 
     # Widgets to state ------------------------------------------------------------------
 

@@ -117,5 +117,6 @@ def _set_tip(field: Field, text: str) -> None:
     """Set the tooltip of a field and of its parts."""
     if hasattr(field, "set_tip"):
         field.set_tip(text)
-    if not isinstance(field, NumberField):  # its tooltip may show why its text is invalid
+    # The tooltip of a number may show why its text is invalid.
+    if not isinstance(field, NumberField | NumberBox):
         field.setToolTip(wrapped(text))

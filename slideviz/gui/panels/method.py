@@ -117,8 +117,8 @@ class MethodPanel(Panel):
         parts = (self.form, self.reason, self.more, None)
         in_column(*parts, on=self.area.widget(), margins=(6, 6, 6, 4))
         self._connect()
-        self.follow()
         self.watch = FieldWatch(self, store, "method")
+        self.follow()
 
     def _complete_form(self) -> None:
         """Add hints: the period that was found, and what part of the extent the tolerance is."""
@@ -183,6 +183,7 @@ class MethodPanel(Panel):
         """Fill the panel from the session's case."""
         if session.mesh is not self._mesh:
             self._mesh, self._reduction = session.mesh, None
+            self.watch.restore()
             # Once for each mesh: it takes 10 ms where there are 250,000 cells.
             self._extent = session.mesh.extent if session.mesh is not None else 0.0
         self._reduction = session.case.reduction or self._reduction

@@ -206,8 +206,11 @@ class MotionEditor(MotionForm):
         self.show_motion(self._motion, self._targets, self._dim)
 
     def show_another(self) -> None:
-        """Reset the choice of “a point” instead of the axis, before another motion is shown."""
+        """Reset what is not of the motion before another is shown: “a point”, invalid texts."""
         self._as_point = False
+        for field in self._rows.values():
+            if isinstance(field, NumberField | VectorField):
+                field.restore()
 
     def focus(self) -> None:
         """Put the cursor into the first number field of the shown motion, and select its text."""

@@ -35,6 +35,11 @@ class FieldWatch(QObject):
         )
         self.store.change(changes.set_invalid, self.place, tuple(dict.fromkeys(faults)))
 
+    def restore(self) -> None:
+        """Replace invalid texts by the values, as another mesh is shown."""
+        for field in self._fields:
+            field.restore()
+
     def focus(self) -> bool:
         """Put the cursor into the first invalid field; return whether there is one."""
         field = next((field for field in self._fields if field.fault), None)

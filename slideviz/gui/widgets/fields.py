@@ -7,8 +7,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from qtpy.QtCore import QEvent, QLocale, QSignalBlocker, Qt, Signal
-from qtpy.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QWheelEvent
+from qtpy.QtCore import QLocale, QSignalBlocker, Qt, Signal
+from qtpy.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QValidator, QWheelEvent
 from qtpy.QtWidgets import (
     QApplication,
     QCheckBox,
@@ -44,24 +44,19 @@ def short_text(value: float, scale: float = 0.0) -> str:
     return exact if len(exact) <= SHORT else f"{float(value):.6g}"
 
 
-def is_stray(event: QEvent, letters: str = "eE") -> bool:
-    """Return whether an event is a key press of a letter not in ``letters``, without Ctrl or Alt.
-
-    A number field leaves it to the window's shortcuts.
-    """
-    kinds = (QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress)
-    if not isinstance(event, QKeyEvent) or event.type() not in kinds:
-        return False
-    plain = Qt.KeyboardModifier.ShiftModifier
-    return event.text().isalpha() and event.text() not in letters and not event.modifiers() & ~plain
+def _say_kept(field: QWidget, problem: str, value: str) -> None:
+    """Say in the status bar that a field was left with an invalid text."""
+    window = main_window(field)
+    if window is not None:
+        window.say(f"Not taken: {problem}; the value is still {value}.")
 
 
 class NumberField(QLineEdit):
     """A field for a number, typed as such or as an expression, which its value then replaces.
 
     It shows six digits, and all of them while it is edited. An invalid text is marked at once. If
-    the text is invalid when the field is left, the number from before the editing comes back (not
-    a valid beginning of what was typed), and the status bar says so.
+    the text is invalid when the field is left, it stays and is marked; its value is the one from
+    before the editing (not a valid beginning of what was typed), which Escape writes again.
 
     Parameters
     ----------
@@ -106,7 +101,7 @@ class NumberField(QLineEdit):
         self.setMinimumWidth(46)
         self.setLocale(QLocale.c())
         self.textEdited.connect(self._edited)
-        self.editingFinished.connect(self._tidy)
+        self.editingFinished.connect(self._finish)
 
     @property
     def value(self) -> float:
@@ -114,9 +109,13 @@ class NumberField(QLineEdit):
         return self._value
 
     @property
+    def _shows_value(self) -> bool:
+        return self.text() in (number_text(self._value), short_text(self._value, self._scale))
+
+    @property
     def problem(self) -> str:
         """Return why the text is invalid; empty if it is valid."""
-        if self.text() in (number_text(self._value), short_text(self._value, self._scale)):
+        if self._shows_value:
             return self._allowed(self._value)
         if not self.text().strip():
             return "a number is needed"
@@ -159,11 +158,23 @@ class NumberField(QLineEdit):
         if not exact:
             self.setCursorPosition(0)
 
-    def event(self, event: QEvent) -> bool:
-        if is_stray(event):
-            event.ignore()
-            return False
-        return super().event(event)
+    def restore(self) -> None:
+        """Replace an invalid text by the value; nothing is emitted."""
+        if self.problem:
+            self._write()
+            self.mark()
+
+    def recheck(self) -> None:
+        """Take the text if it was invalid and is valid now, because of another field."""
+        if not (self._shows_value or self.problem) and typed_number(self.text()) != self._value:
+            self._edited()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape and self.problem:
+            self._finish()
+            self.restore()
+        else:
+            super().keyPressEvent(event)
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         if not self.problem:
@@ -197,8 +208,8 @@ class NumberField(QLineEdit):
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
-        self.setModified(False)
         if not self.problem:
+            self.setModified(False)
             self._write()
 
     def _edited(self) -> None:
@@ -208,17 +219,13 @@ class NumberField(QLineEdit):
             self.changed.emit(self._value)
         self.mark()
 
-    def _tidy(self) -> None:
-        """Keep a valid number when the editing is finished, or restore the one before."""
+    def _finish(self) -> None:
+        """Keep a valid number when the editing ends; of an invalid text, the number before it."""
         if not self.problem:
             self._before = self._value
             return
-        window = main_window(self)
-        if window is not None:
-            back = short_text(self._before, self._scale)
-            window.say(f"Not taken: {self.problem}; {back} is there again.")
         typed, self._value = self._value, self._before
-        self._write()
+        _say_kept(self, self.problem, short_text(self._value, self._scale))
         if typed != self._value:
             self.changed.emit(self._value)
         self.mark()
@@ -234,34 +241,75 @@ class NumberField(QLineEdit):
 
 
 class NumberBox(QSpinBox):
-    """A spin box for a whole number; without digits it is marked as invalid, as `NumberField` is.
+    """A spin box for a whole number, which keeps and marks an invalid text as `NumberField` does.
 
-    The wheel does not change it. Typing the first letter of the text for the lowest value (such as
-    ``automatic``) selects that value. ``letters`` are the other letters its texts may contain.
+    The wheel does not change it. The text for the lowest value (such as ``automatic``) is completed
+    as it is typed.
     """
 
     marked = Signal()
-    letters = ""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.fault = ""
+        self._tip, self.fault = "", ""
+        self._before = self.value()
         # No single signal covers each change of the text, by the user or by the program.
         for change in (self.lineEdit().textChanged, self.editingFinished, self.valueChanged):
             change.connect(lambda *_: self._look())
 
-    def event(self, event: QEvent) -> bool:
-        if is_stray(event, self.letters + self.specialValueText()):
-            event.ignore()
-            return False
-        return super().event(event)
+    def validate(self, text: str, at: int) -> tuple[QValidator.State, str, int]:
+        """Accept every character, so that 2.5 is not typed as 25."""
+        state = super().validate(text, at)[0]
+        good = state == QValidator.State.Acceptable
+        return (state if good else QValidator.State.Intermediate), text, at
+
+    @property
+    def problem(self) -> str:
+        """Return why the text is invalid; empty if it is valid."""
+        if self.hasAcceptableInput():
+            return ""
+        text = self.cleanText().strip()
+        low = self.minimum() + bool(self.specialValueText())
+        span = f"a whole number from {low:,} to {self.maximum():,}"
+        return f"“{text}” is not {span}" if text else "a number is needed"
+
+    def restore(self) -> None:
+        """Replace an invalid text by the value; nothing is emitted."""
+        if self.fault:
+            with QSignalBlocker(self):
+                self.setValue(self.value())
+            self._look()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.text() and self.specialValueText().startswith(event.text()):
-            self.setValue(self.minimum())
-            self.selectAll()
-        else:
+        if self.fault and event.key() == Qt.Key.Key_Escape:
+            self.setValue(self._before)
+            self._look()
+        # Return would replace an invalid text by a number that nobody typed.
+        elif not self.fault or event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             super().keyPressEvent(event)
+        if event.text().isalpha():
+            self._complete()
+
+    def _complete(self) -> None:
+        """Complete the beginning of the text for the lowest value; what was added is selected."""
+        typed, word = self.text(), self.specialValueText()
+        if typed and word.startswith(typed):
+            self.setValue(self.minimum())
+            self.lineEdit().setSelection(len(typed), len(word))
+            self._look()
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        if not self.fault:
+            self._before = self.value()
+        super().focusInEvent(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        typed, bad = self.text(), self.fault
+        super().focusOutEvent(event)
+        if bad:
+            self.setValue(self._before)
+            _say_kept(self, bad, self.text())
+            self.lineEdit().setText(typed)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         event.ignore()
@@ -271,11 +319,18 @@ class NumberBox(QSpinBox):
         if self.value() != value:
             with QSignalBlocker(self):
                 self.setValue(value)
+            self._look()
+
+    def set_tip(self, text: str) -> None:
+        """Set the tooltip, which is shown while the value is valid."""
+        self._tip = text
+        self.setToolTip(wrapped(self.fault or text))
 
     def _look(self) -> None:
-        fault = "" if self.lineEdit().hasAcceptableInput() else "a number is needed"
+        fault = self.problem
         if fault != self.fault:
             self.fault = fault
+            self.set_tip(self._tip)
             set_style(self, "bad", bool(fault))
             self.marked.emit()
 

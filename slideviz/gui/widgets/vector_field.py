@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import chain
 
-from qtpy.QtCore import QTimer, Signal
+from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QLabel, QSizePolicy, QWidget
 
 from slideviz.gui.widgets.build import in_row
@@ -16,8 +16,7 @@ class VectorField(QWidget):
     """A row of fields for two or three numbers.
 
     ``allowed`` returns why the numbers are not valid together, or an empty text. While they are
-    not, they are marked and ``changed`` is not emitted; when the row loses the focus, the last
-    valid numbers come back.
+    not, they are marked and ``changed`` is not emitted.
     """
 
     changed = Signal(tuple)
@@ -36,8 +35,6 @@ class VectorField(QWidget):
         for label, field in zip(self._labels, self.fields, strict=True):
             field.setAccessibleName(label.text())
             field.changed.connect(lambda _: self._tell())
-            # In the next turn of the event loop, when it is known where the focus went.
-            field.editingFinished.connect(lambda: QTimer.singleShot(0, self, self._tidy))
         pairs = chain(*zip(self._labels, self.fields, strict=True))
         line = in_row(*pairs, wide=self.fields, spacing=4)
         line.setContentsMargins(0, 0, 0, 0)
@@ -64,9 +61,11 @@ class VectorField(QWidget):
             self.changed.emit(self.value)
         self._mark()
 
-    def _tidy(self) -> None:
-        if self.problem and not any(field.hasFocus() for field in self.fields):
-            self._write(self._good)
+    def restore(self) -> None:
+        """Replace what is invalid by the last valid numbers; nothing is emitted."""
+        for field in self.fields:
+            field.restore()
+        self._write(self._good)
 
     def _mark(self) -> None:
         for field in self.fields:
