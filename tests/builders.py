@@ -241,6 +241,31 @@ def airfoil(n: int = 40, layers: int = 8, first: float = 0.05) -> Mesh:
     )
 
 
+def far_field(size: float = 60.0, bodies: int = 1, n: int = 4) -> Mesh:
+    """Block of side 1 (``body``) in a square field of half-width ``size`` (``far``), in 2D.
+
+    With two ``bodies`` a block 2 long and 1 high (``other``) begins 2.5 behind it. Cells grow
+    outwards.
+    """
+    near = np.linspace(-0.5, 0.5, n + 1)
+    out = np.geomspace(0.5, size, 2 * n + 1)[1:]
+    behind = np.r_[np.linspace(0.5, 3.0, n + 1)[1:], np.linspace(3.0, 5.0, n + 1)[1:]]
+    x = np.r_[-out[::-1], near, *([behind] if bodies > 1 else []), (bodies > 1) * 4.5 + out]
+    y = np.r_[-out[::-1], near, out]
+    points = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
+    at = np.arange(len(points)).reshape(len(x), len(y))
+    cells = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], -1).reshape(-1, 4)
+
+    def on(p: np.ndarray, first: float, last: float) -> bool:
+        return bool(np.all((first <= p[..., 0]) & (p[..., 0] <= last) & (abs(p[..., 1]) <= 0.5)))
+
+    solid = np.array([on(points[c], -0.5, 0.5) or on(points[c], 3.0, 5.0) for c in cells])
+    solid &= (points[cells].mean(axis=1)[:, 0] < 1) | (bodies > 1)
+    rules: list[Rule] = [("body", lambda p: on(p, -0.5, 0.5))]
+    rules += [("other", lambda p: on(p, 3.0, 5.0))] if bodies > 1 else []
+    return make_mesh(points, [(9, cells[~solid])], [*rules, ("far", lambda p: True)])
+
+
 def sphere_in_box(n: int = 4, layers: int = 3) -> Mesh:
     """Hexahedra between a sphere of radius 0.4 (``sphere``) and a cube of side 2 (six sides)."""
     lattice = np.stack(np.meshgrid(*[np.arange(n + 1)] * 3, indexing="ij"), -1).reshape(-1, 3)

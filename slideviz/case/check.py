@@ -11,6 +11,7 @@ from slideviz.case.boxes import ffd_problems
 from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.key import BOUNDARIES, FILES, MOTION, Key
 from slideviz.case.keys import KEYS
+from slideviz.case.method_keys import FACTORS
 from slideviz.case.model import (
     Ffd,
     FromFile,
@@ -42,6 +43,7 @@ def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """
     return (
         *_value_problems(case),
+        *_radius_problems(case, mesh),
         *(sentence for _, sentence in contradictions(case)),
         *marker_problems(case, mesh),
         *motion_problems(case, mesh),
@@ -191,6 +193,16 @@ def _value_problems(case: Case) -> Iterator[str]:
             key.kind.read(key.kind.write(value))
         except (CaseError, TypeError, ValueError) as problem:
             yield f"{key.name}: {problem}"
+
+
+def _radius_problems(case: Case, mesh: Mesh) -> Iterator[str]:
+    part = (case.support_radius or mesh.extent) / mesh.extent
+    if not FACTORS[0] < part < FACTORS[1]:
+        low, high = (f"{mesh.extent * factor:g}" for factor in FACTORS)
+        yield (
+            f"SUPPORT_RADIUS: {case.support_radius!r} does not fit {mesh.name}, whose extent is "
+            f"{mesh.extent:g}; needed is a length above {low} and below {high}"
+        )
 
 
 def _zone_problems(case: Case, mesh: Mesh) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from slideviz.case.key import METHOD, setting
 from slideviz.case.model import Case
@@ -11,6 +12,8 @@ from slideviz.errors import CaseError
 from slideviz.terms import KERNELS, METHODS, SLIDING, names
 
 _WAYS = " or ".join(f"{name} ({way})" for way, name in names(SLIDING).items() if way != "none")
+FACTORS = 1e-6, 1e6
+"""Limits of the support radius over the extent of the mesh."""
 
 
 def nothing_slides(case: Case) -> str:
@@ -19,27 +22,35 @@ def nothing_slides(case: Case) -> str:
     return "" if slides else "no boundary has the role “sliding” or “periodic”"
 
 
-def steps_kind() -> Kind:
-    """Return the kind of the value of STEPS: a whole number from 1, or auto (0 in the case)."""
-    counted = whole(1)
-    allowed = f"{counted.allowed}, or auto"
+def or_auto(kind: Kind, word: str) -> Kind:
+    """Return the kind of the values of ``kind``, which are numbers, or ``word``: 0 in the case."""
+    nothing = 0 if kind.entry == "whole" else 0.0
 
-    def read(text: str) -> int:
-        if text.lower() == "auto":
-            return 0
+    def read(text: str) -> Any:
+        if text.lower() == word.lower():
+            return nothing
         try:
-            return int(counted.read(text))
+            return kind.read(text)
         except CaseError as problem:
-            raise CaseError(f"{problem}, or auto") from None
+            raise CaseError(f"{problem}, or {word}") from None
 
-    return Kind(
-        allowed,
-        read,
-        lambda value: "auto" if value == 0 else str(value),
-        entry="whole",
-        words={0: "automatic"},
-        span=(0, MAX_STEPS),
+    return replace(
+        kind,
+        allowed=f"{kind.allowed}, or {word}",
+        read=read,
+        write=lambda value: kind.write(value) if value else word,
+        words={nothing: "automatic"},
     )
+
+
+def automatic_radius(case: Case) -> bool:
+    """Return whether the support radius of a case is found from its motion."""
+    return case.method == "rbf" and case.support_radius is None and not case.influence_factor
+
+
+def put_factor(case: Case, factor: float) -> Case:
+    """Return the case with a support radius that is a multiple of the extent; 0: automatic."""
+    return case.change(influence_factor=factor, support_radius=None)
 
 
 METHOD_ROWS = (
@@ -74,7 +85,7 @@ METHOD_ROWS = (
     setting(
         "STEPS",
         METHOD,
-        steps_kind(),
+        replace(or_auto(whole(1), "auto"), span=(0, MAX_STEPS)),
         "steps",
         "Steps in which the deformation is applied; auto tries 1, 2, 3, 5, 8, 13, 21 and 34, "
         "halves steps that fold a cell, and takes the fewest that are enough.",
@@ -93,17 +104,32 @@ METHOD_ROWS = (
         "this part.",
         said="gain {}",
     ),
+    replace(
+        setting(
+            "INFLUENCE_FACTOR",
+            METHOD,
+            or_auto(real(*FACTORS), "AUTO"),
+            "influence_factor",
+            "Support radius of the radial function over the largest extent of the mesh. AUTO: 15 "
+            "times the largest extent of a connected moving body, or 20 times the largest "
+            "displacement where that is more, and 2.5 extents of the mesh at most.",
+            label="Support radius ×",
+            form="more",
+            tip="How far a boundary node reaches into the mesh, as a multiple of the mesh's "
+            "largest extent. Automatic: as far as the motion needs.",
+            said="radius × {}",
+            method="rbf",
+        ),
+        put=put_factor,
+    ),
     setting(
-        "INFLUENCE_FACTOR",
+        "SUPPORT_RADIUS",
         METHOD,
-        real(1e-6, 1e6),
-        "influence_factor",
-        "Support radius of the radial function over the largest extent of the mesh.",
-        label="Support radius ×",
-        form="more",
-        tip="How far a boundary node reaches into the mesh, as a multiple of the mesh's largest "
-        "extent.",
-        said="radius × {}",
+        real(0.0),
+        "support_radius",
+        "Support radius in the mesh's length unit, instead of INFLUENCE_FACTOR.",
+        label="a support radius of a case file,",
+        said="radius {}",
         method="rbf",
     ),
     setting(

@@ -175,6 +175,8 @@ class Case:
     * ``feature_angle_deg``: the angle in degrees from which a bend in a boundary is an edge; the
       default is ``DEFAULT_FEATURE_ANGLE_DEG`` of `slideviz.mesh.topology`.
     * ``steps``: 0, or "auto", finds the number of steps; ``steps_gain`` is when to stop.
+    * ``influence_factor``: the support radius over the extent of the mesh; 0, or "auto", fits it
+      to the motion. ``support_radius``, if not None, is used instead: a length.
     * ``reduction``: None: all boundary nodes are control nodes, however many.
     * ``idw_power``: None: the number of dimensions.
     * ``view``: how the window showed the case, by key; changes no result.
@@ -220,7 +222,8 @@ class Case:
     curved: bool = False
     steps: int = 1
     steps_gain: float = 0.02
-    influence_factor: float = 2.5
+    influence_factor: float = 0.0
+    support_radius: float | None = None
     kernel: str = field(default="wendland-c2", metadata=KERNELS)
     reduction: Reduction | None = AUTO
     idw_power: float | None = None
@@ -243,11 +246,11 @@ class Case:
             if not isinstance(motion, Motion):
                 raise CaseError(f"motions: {motion!r} is none, as Translate(...) is")
         object.__setattr__(self, "motions", tuple(self.motions))
-        given: object = self.steps
-        if isinstance(given, str):
-            if given.lower() != "auto":  # as in a case file
-                raise CaseError(f'steps is {given!r}; needed is a whole number, or "auto"')
-            object.__setattr__(self, "steps", 0)
+        for name, number in (("steps", "a whole number"), ("influence_factor", "a number")):
+            if isinstance(given := getattr(self, name), str):
+                if given.lower() != "auto":  # as in a case file
+                    raise CaseError(f'{name} is {given!r}; needed is {number}, or "auto"')
+                object.__setattr__(self, name, 0)
 
     def change(self, **values: Any) -> Case:
         """Return the case with other values of some fields.

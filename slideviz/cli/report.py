@@ -10,6 +10,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from slideviz.case.method_keys import automatic_radius
 from slideviz.case.model import Case
 from slideviz.case.reduction_keys import get_reduction
 from slideviz.deformation.solver import Step, folded_at
@@ -85,6 +86,10 @@ def run_report(
             "asked": get_reduction(case),
             "used": last.tolerance is not None,
             "tolerance": last.tolerance,
+        },
+        "support_radius": {
+            "automatic": automatic_radius(case),
+            "used": last.support_radius,
         },
         "condition": [s.condition if isfinite(s.condition) else None for s in steps],
         "max_error": max(step.max_error for step in steps),

@@ -117,6 +117,9 @@ def _print_run(
     if reduction["used"]:
         chosen = " (AUTO)" if reduction["asked"] == "AUTO" else ""
         rows.append((f"tolerance{chosen}", float(reduction["tolerance"])))
+    radius = report["support_radius"]
+    if radius["used"] is not None:
+        rows.append((f"support radius{' (AUTO)' * radius['automatic']}", radius["used"]))
     if report["periodic_misfit"] is not None:
         rows.append(("periodic misfit", report["periodic_misfit"]))
     print(table(rows))

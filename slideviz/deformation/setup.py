@@ -15,6 +15,7 @@ from slideviz.case.model import Case
 from slideviz.case.motion import displacements, require_valid
 from slideviz.deformation.classes import find_classes, find_period, roles_of_copies
 from slideviz.deformation.prescribed import displaced, image_tolerance, prescribed
+from slideviz.deformation.radius import support_radius
 from slideviz.deformation.reduction import find_reduction, loose_warnings
 from slideviz.errors import MeshError
 from slideviz.mesh.cached_boundary import boundary_of
@@ -229,7 +230,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
     second = np.flatnonzero(stands != np.arange(len(stands)))
     images = np.stack([stands[second], second], axis=1)
     angle = frame.period if frame.cylindrical else 0.0
-    basis = Basis(case.influence_factor * mesh.extent, angle, case.kernel)
+    basis = Basis(support_radius(case, mesh, boundary, moved), angle, case.kernel)
     return Setup(
         frame=frame,
         basis=basis,

@@ -100,6 +100,8 @@ class Step:
         unit. It is rounding only, since more raises. None where images need not move alike.
     part : float
         The part of the whole displacement that is reached after this step, 0 to 1.
+    support_radius : float or None
+        Of the radial functions, in the mesh's length unit; None where a method has none.
     field : Field or None
         The function that displaced the nodes off the boundary in this step; kept in streamed runs.
     """
@@ -120,4 +122,5 @@ class Step:
     tolerance: float | None = None
     periodic_misfit: float | None = None
     part: float = 1.0
+    support_radius: float | None = None
     field: Field | None = None

@@ -40,6 +40,11 @@ def _error(run: Run) -> float | None:
     return step.max_error if step is not None else None
 
 
+def _radius(run: Run) -> float | None:
+    step = run.last.step if run.last is not None else None
+    return step.support_radius if step is not None else None
+
+
 def _misfit(run: Run) -> float | None:
     found = [frame.step.periodic_misfit for frame in run.frames if frame.step is not None]
     return max((value for value in found if value is not None), default=None)
@@ -67,7 +72,7 @@ COLUMNS: tuple[Column, ...] = (
     Column("periodicity", lambda run: PERIODIC_MODES[run.case.periodic].name),
     Column("steps", lambda run: len(run.frames)),
     Column("kernel", lambda run: run.case.kernel),
-    Column("support radius / extent", lambda run: run.case.influence_factor, "g"),
+    Column("support radius", _radius, ".4g"),
     Column("control nodes chosen", lambda run: reduction_words(run.case)),
     Column("minimum quality", lambda run: _of_last(run, "min"), QUALITY),
     Column("mean quality", lambda run: _of_last(run, "mean"), QUALITY),

@@ -418,6 +418,9 @@ def test_settings_reach_the_case_and_impossible_numbers_do_not(opened):
     assert field.property("bad")
     assert "-1 is out of range; needed is a number above 1e-06" in field.toolTip()
     assert opened.session.case.influence_factor == 2.5
+    opened.type(field, "auto")
+    assert opened.session.case.influence_factor == 0
+    assert field.text() == "automatic"
     kernel = more.kernel
     assert kernel.count() == 14
     assert {kernel.itemData(row) for row in range(14)} >= {"wendland-c2", "gaussian"}

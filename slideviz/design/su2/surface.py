@@ -160,6 +160,7 @@ def at_rest(case: Case, mesh: Mesh) -> Step:
         seconds={},
         warnings=(*case.warnings, *setup.warnings),
         candidates=setup.candidates,
+        support_radius=setup.basis.radius if case.method == "rbf" else None,
     )
 
 

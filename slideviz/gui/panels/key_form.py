@@ -20,7 +20,11 @@ from slideviz.gui.widgets.vector_field import VectorField, a_direction
 
 def number_field(kind: Kind) -> NumberField:
     """Return a number field that accepts only numbers valid for a kind of value."""
-    return NumberField(0.0, lambda value: kind.problem(number_text(value)))
+
+    def problem(value: float) -> str:
+        return "" if value in kind.words else kind.problem(number_text(value))
+
+    return NumberField(0.0, problem, words=kind.words)
 
 
 def _choice(kind: Kind) -> Choice:

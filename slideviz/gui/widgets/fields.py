@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from qtpy.QtCore import QLocale, QSignalBlocker, Qt, Signal
 from qtpy.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QValidator, QWheelEvent
@@ -64,6 +64,8 @@ class NumberField(QLineEdit):
     allowed : callable, optional
         Returns why a value is not allowed; empty if it is.
     tip : str
+    words : mapping of float to str, optional
+        Texts for some values; the first letters of one are enough to type it.
 
     Attributes
     ----------
@@ -88,8 +90,10 @@ class NumberField(QLineEdit):
         value: float = 0.0,
         allowed: Callable[[float], str] | None = None,
         tip: str = "",
+        words: Mapping[float, str] | None = None,
     ) -> None:
         super().__init__(short_text(value))
+        self._words = words or {}
         self._allowed = allowed or (lambda _: "")
         self._value = self._before = float(value)
         self._scale = 0.0
@@ -110,7 +114,7 @@ class NumberField(QLineEdit):
 
     @property
     def _shows_value(self) -> bool:
-        return self.text() in (number_text(self._value), short_text(self._value, self._scale))
+        return self.text() in (self._text(exact=True), self._text())
 
     @property
     def problem(self) -> str:
@@ -120,12 +124,25 @@ class NumberField(QLineEdit):
         if not self.text().strip():
             return "a number is needed"
         try:
-            value = typed_number(self.text())
+            value = self._typed()
         except ValueError:
             return f"“{self.text()}” is not a number"
         if not math.isfinite(value):
             return "the number must be finite"
         return self._allowed(value)
+
+    def _typed(self) -> float:
+        """Return the value of the text; raises ValueError where it has none."""
+        start = self.text().strip().lower()
+        for value, word in self._words.items():
+            if start and word.startswith(start):
+                return value
+        return typed_number(self.text())
+
+    def _text(self, *, exact: bool = False) -> str:
+        """Return the text of the value: its word, or its first digits, or all with ``exact``."""
+        digits = number_text(self._value) if exact else short_text(self._value, self._scale)
+        return self._words.get(self._value, digits)
 
     def set_tip(self, text: str) -> None:
         """Set the tooltip, which is shown while the value is valid."""
@@ -152,7 +169,7 @@ class NumberField(QLineEdit):
     def _write(self) -> None:
         """Set the text to the value, all digits while it is edited, the first digits in view."""
         exact = self.hasFocus() and not self.isReadOnly()
-        text = number_text(self._value) if exact else short_text(self._value, self._scale)
+        text = self._text(exact=exact)
         if text != self.text():
             self.setText(text)
         if not exact:
@@ -166,7 +183,7 @@ class NumberField(QLineEdit):
 
     def recheck(self) -> None:
         """Take the text if it was invalid and is valid now, because of another field."""
-        if not (self._shows_value or self.problem) and typed_number(self.text()) != self._value:
+        if not (self._shows_value or self.problem) and self._typed() != self._value:
             self._edited()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -214,7 +231,7 @@ class NumberField(QLineEdit):
 
     def _edited(self) -> None:
         if not self.problem:
-            self._value = typed_number(self.text())
+            self._value = self._typed()
             # Before `mark`: who listens to ``marked`` shows the value, and needs the new one.
             self.changed.emit(self._value)
         self.mark()

@@ -1,0 +1,63 @@
+"""The support radius of the radial functions: as the case says, or fitted to the motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slideviz.case.displacement import Displacements
+from slideviz.case.model import Case
+from slideviz.mesh.fans import components
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.topology import Boundary
+
+EXTENTS = 2.5
+"""Largest automatic support radius over the extent of the mesh: the thesis's rule, for passages."""
+
+BODIES = 15.0
+"""Automatic support radius over the largest extent of a moving body. A larger one carries a far
+field along where the body turns or stretches, a smaller one gives worse cells beside the body."""
+
+DISPLACEMENTS = 20.0
+"""Automatic support radius over the largest displacement, at least: a body that moves by more than
+its size needs a radius that fits the way."""
+
+
+def support_radius(case: Case, mesh: Mesh, boundary: Boundary, moved: Displacements) -> float:
+    """Return the support radius R, in the mesh's length unit.
+
+    Parameters
+    ----------
+    case, boundary
+        With the roles that boundaries have, and the facets of all of them.
+    moved : Displacements
+        The prescribed displacements, from which ``INFLUENCE_FACTOR= AUTO`` is found.
+    """
+    if case.support_radius is not None:
+        return case.support_radius
+    if case.influence_factor:
+        return case.influence_factor * mesh.extent
+    sizes = np.ptp(moving_bodies(case, mesh, boundary, moved), axis=1)
+    farthest = np.linalg.norm(moved.vectors, axis=1).max(initial=0.0)
+    needed = max(BODIES * sizes.max(initial=0.0), DISPLACEMENTS * farthest)
+    return min(EXTENTS * mesh.extent, float(needed) or np.inf)
+
+
+def moving_bodies(case: Case, mesh: Mesh, boundary: Boundary, moved: Displacements) -> FloatArray:
+    """Return the bounding boxes of the moving bodies, (b, 2, d): lowest and highest coordinates.
+
+    A body is a connected part of the moving boundaries. Those of which no node is displaced do not
+    count, unless no node at all is displaced.
+    """
+    names = case.markers_with("moving")
+    moving = np.isin(boundary.marker, [k for k, n in enumerate(boundary.names) if n in names])
+    facets: IntArray = boundary.facets[moving]
+    nodes, places = np.unique(facets, return_inverse=True)
+    places = places.reshape(facets.shape)
+    links = [places[:, [0, k]] for k in range(1, facets.shape[1])]
+    body = components(len(nodes), *np.concatenate(links).T) if len(nodes) else nodes
+    boxes = np.full((int(body.max(initial=-1)) + 1, 2, mesh.dim), np.inf)
+    boxes[:, 1] = -np.inf
+    np.minimum.at(boxes[:, 0], body, mesh.points[nodes])
+    np.maximum.at(boxes[:, 1], body, mesh.points[nodes])
+    displaced = np.isin(nodes, moved.nodes[moved.vectors.any(axis=1)])
+    return boxes[np.unique(body[displaced])] if displaced.any() else boxes
