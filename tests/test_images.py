@@ -12,6 +12,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.motion import displacements
 from slideviz.case.reduction import Reduction
 from slideviz.cli import run as command
 from slideviz.deformation import stepping
@@ -231,6 +232,37 @@ def test_boundary_nodes_beyond_a_periodic_side_move_like_their_images(method, pe
             gap = shift[at[low]] - shift[at[low + 6]]
             assert np.abs(gap).max() < ROUNDING, (wall, low)
     assert not any("nearly coincide" in text for text in step.warnings)
+
+
+@pytest.mark.parametrize("build", ["square", "sector", "passage"])
+def test_boundaries_go_on_by_their_period_however_far_nodes_slide(build):
+    """Farther than one period, nodes were put onto the end of the boundary, two in one place."""
+    roles, periodic = {"BLOCK": "moving"}, ("per1", "per2")
+    if build == "square":
+        mesh, periodic = builders.square(6), ("y_m", "y_p")
+        roles |= dict.fromkeys(("x_m", "x_p"), "sliding")
+        motion = Translate("BLOCK", (0.0, 2.3))
+    elif build == "sector":
+        mesh, motion = builders.sector(8), Rotate("BLOCK", 2.3 * 30.0, point=(0.0, 0.0))
+        roles |= dict.fromkeys(("inner", "outer"), "sliding")
+    else:
+        mesh, motion = builders.passage((3, 6, 6)), Rotate("blade", 2.3 * 30.0, point=(0, 0, 0))
+        roles = dict.fromkeys(("hub", "shroud", "inflow", "outflow"), "sliding")
+        roles["blade"] = "moving"
+    roles |= dict.fromkeys(periodic, "periodic")
+    case = Case(roles=roles, motions=(motion,), sliding="ps", periodic="moving", steps=2)
+    step = run(case, mesh)
+    found = sv.quality(step.mesh, mesh)
+    assert found.inverted == 0
+    assert found.min > 0.5
+    deformer = sv.Deformer(mesh, case)
+    np.testing.assert_allclose(deformer.deform(), step.mesh.points, rtol=0, atol=1e-12)
+    rng = np.random.default_rng(0)
+    change = rng.normal(size=(len(deformer.nodes), mesh.dim))
+    given = displacements(case, mesh).vectors
+    ends = [deformer.deform(given + h * change) for h in (1e-6, -1e-6)]
+    slope = (ends[0] - ends[1]) / 2e-6
+    np.testing.assert_allclose(deformer.jvp(given, change), slope, rtol=0, atol=1e-6)
 
 
 # The check

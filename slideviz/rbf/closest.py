@@ -21,6 +21,8 @@ TIE = 1e-12
 ON = 1e-30
 """A point is on its guessed triangle when its squared distance from it is at most this part of its
 squared distance from the origin."""
+MOST, TURNS = 1e150, 2.0**30
+"""Largest coordinate with which periods are counted, and the largest number of them."""
 _OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy"}
 
 
@@ -257,7 +259,10 @@ def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignor
 
 
 class ClosestPoints:
-    """Finds the closest points on simplices and on their images one period before and after.
+    """Finds the closest points on simplices and on their images at all periods.
+
+    The tree has the images one period before and after. A point more than one period from the
+    middle of the simplices is taken back by whole periods, and its closest point forth by as many.
 
     Attributes
     ----------
@@ -284,8 +289,12 @@ class ClosestPoints:
             self._corners[:, count:] = self._corners[:, count - 1 : count]
         self._shifts: FloatArray = np.zeros((3, 3))
         items = n
+        self._along: FloatArray | None = None
         if shift is not None:
             items, self._shifts[1, :dim], self._shifts[2, :dim] = 3 * n, -shift, shift
+            self._along = shift / (shift @ shift)
+            places = corners.reshape(-1, dim) @ self._along
+            self._middle = (places.min() + places.max()) / 2.0
         depth = max(0, int(np.ceil(np.log2(max(1, items / LEAF)))))
         self._bounds = np.empty((2 ** (depth + 1) - 1, 6), np.float32)
         self._order = np.arange(items, dtype=np.int32)
@@ -294,10 +303,22 @@ class ClosestPoints:
     def simplices(self, which: IntArray) -> FloatArray:
         """Return the corners (k, c, d) of simplices (k,), numbered as `nearest` returns them."""
         image, one = np.divmod(which, len(self.corners))
+        turn, image = np.divmod(image, 3)
         moved = self.corners[one]
         there = image > 0
         moved[there] += self._shifts[image[there], None, : moved.shape[2]]
+        far = turn != 0
+        moved[far] += turn[far, None, None] * self._shifts[2, : moved.shape[2]]
         return moved
+
+    def _periods(self, x: FloatArray) -> IntArray:
+        """Return the whole periods (m,) by which x (m, d) are taken back; 0 up to one period."""
+        if self._along is None:
+            return np.zeros(len(x), np.int64)
+        # What has become infinite, or no number, is not taken back.
+        place = np.clip(np.nan_to_num(x), -MOST, MOST) @ self._along - self._middle
+        place[np.abs(place) > TURNS] = 0.0
+        return (np.sign(place) * np.maximum(np.ceil(np.abs(place) - 1.0), 0.0)).astype(np.int64)
 
     def query(self, x: FloatArray) -> FloatArray:
         """Return the closest point on the simplices for each x, (m, d)."""
@@ -306,7 +327,7 @@ class ClosestPoints:
     def nearest(self, x: FloatArray, guess: IntArray | None = None) -> tuple[FloatArray, IntArray]:
         """Return the closest point for each x (m, d), (m, d), and the number of its simplex, (m,).
 
-        Numbers from n on are images; `simplices` returns the corners.
+        Numbers below 0 and from n on are images; `simplices` returns the corners.
 
         Parameters
         ----------
@@ -314,13 +335,17 @@ class ClosestPoints:
             Numbers of simplices that are probably the closest, for speed. Where x is on its
             guessed simplex, that one is taken, even if x is on others too.
         """
-        begin = np.empty(0, np.int64) if guess is None else guess
-        dim = x.shape[1]
+        begin = np.empty(0, np.int64) if guess is None else guess % len(self._order)
+        dim, turns = x.shape[1], self._periods(x)
         targets = np.zeros((len(x), 3))
         targets[:, :dim] = x
+        far = np.flatnonzero(turns)
+        by = turns[far, None] * self._shifts[2]
+        targets[far] -= by
         out, which = np.empty_like(targets), np.zeros(len(x), np.int64)
         with one_at_a_time(50 * len(x)):
             _query(
                 targets, self._corners, self._shifts, self._order, self._bounds, begin, out, which
             )
-        return out[:, :dim], which
+        out[far] += by
+        return out[:, :dim], which + turns * len(self._order)
