@@ -98,7 +98,10 @@ def run_def(arguments: argparse.Namespace) -> int:
     tell_lost(output, surface.displacer.boxed(mesh), kind)
     case = surface.case()
     moves = surface.displacement.any()
-    steps = pull(arguments, case, mesh) if moves else [at_rest(case, mesh)]
+    if surface.whole or not moves:
+        steps = [at_rest(case, surface.moved() if moves else mesh)]
+    else:
+        steps = pull(arguments, case, mesh)
     seconds["quality"] = -time.perf_counter()
     found = quality(steps[-1].mesh, reference=mesh, metric=case.quality_metric)
     before = quality(mesh, metric=case.quality_metric)

@@ -38,8 +38,9 @@ def run_dot(arguments: argparse.Namespace) -> int:
     begin = time.perf_counter()
     config, mesh = read_configuration(arguments)
     kinds = {variable.kind for variable in config.variables}
-    if "FFD_SETTING" in kinds:
-        raise CaseError(f"{config.source}: FFD_SETTING moves nothing: there is no gradient for it")
+    first = config.variables[0]
+    if first.group in ("boxes", "nothing"):
+        raise CaseError(f"{config.source}: {first.kind} moves nothing: there is no gradient for it")
     arguments.inputs.setdefault(sensitivity_file(config), "the file of the sensitivities")
     sensitivities = config.files["DV_SENS_FILENAME"]
     gradient = None if "SURFACE_FILE" in kinds else config.files["GRAD_OBJFUNC_FILENAME"]

@@ -248,6 +248,28 @@ def corner_vectors(x: FloatArray) -> FloatArray:
     return out
 
 
+def vertex_normals(points: FloatArray, facets: IntArray) -> tuple[IntArray, FloatArray]:
+    """Return the nodes (k,) of facets (f, 2 or 4), and at each its share of their normals, (k, d).
+
+    Of a line that is a half, in 3D the part of a facet between its centre and the middles of the
+    two edges at the node: the boundary of the node's cell of the median-dual mesh.
+    """
+    x = points[facets]
+    if facets.shape[1] == 2:
+        shares = np.repeat(0.5 * facet_vectors(points, facets)[:, None], 2, axis=1)
+    else:
+        triangle = facets[:, 2] == facets[:, 3]
+        before, after = np.roll(x, 1, axis=1), np.roll(x, -1, axis=1)
+        after[triangle, 2] = x[triangle, 0]
+        centre = np.where(triangle[:, None], x[:, :3].mean(axis=1), x.mean(axis=1))[:, None]
+        shares = np.cross(centre - x, 0.25 * (before - after))  # diagonals of each part
+        shares[triangle, 3] = 0.0
+    nodes, place = np.unique(facets, return_inverse=True)
+    out = np.zeros((len(nodes), points.shape[1]))
+    np.add.at(out, place.reshape(-1), shares.reshape(-1, points.shape[1]))
+    return nodes, out
+
+
 def unit(vectors: FloatArray) -> FloatArray:
     """Return the vectors (n, d) at length 1; zero vectors stay zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)

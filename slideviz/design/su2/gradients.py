@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -12,7 +12,14 @@ import numpy as np
 from slideviz.deformation.solver import deform
 from slideviz.deformation.steps import Progress
 from slideviz.design.deformer import Deformer
-from slideviz.design.su2.sensitivities import CLOSE, match, read_sensitivities
+from slideviz.design.su2.restart import angle_sensitivity
+from slideviz.design.su2.sensitivities import (
+    CLOSE,
+    Matched,
+    Sensitivities,
+    match,
+    read_sensitivities,
+)
 from slideviz.design.su2.surface import MovingSurface
 from slideviz.errors import ConditionWarning, ToleranceWarning
 from slideviz.mesh.model import FloatArray, largest_coordinate
@@ -69,9 +76,14 @@ def find_gradients(
     -----
     The warnings of the `Deformer` are among the warnings of the result.
     """
-    config, mesh = surface.config, surface.mesh
-    found = read_sensitivities(config, mesh)
+    mesh = surface.mesh
+    found = read_sensitivities(surface.config, mesh)
     displacement = surface.displacement
+    if surface.whole:
+        matched = match(found, mesh, lambda: surface.moved().points)
+        moved = displacement if matched.at_design else np.zeros_like(displacement)
+        told = (*surface.case().warnings, *matched.warnings)
+        return _gradients(surface, found, matched, matched.values, moved, told)
     moves = bool(displacement.any())
     prepared: list[Deformer] = []
     written: list[FloatArray] = []
@@ -95,17 +107,38 @@ def find_gradients(
         if written and matched.at_design:
             said += _difference(deformer.deform(displacement), written[0])
         pulled = deformer.vjp(displacement, matched.values)
+    said = [*deformer.warnings, *matched.warnings, *dict.fromkeys(said)]
+    return _gradients(surface, found, matched, pulled, displacement, said)
+
+
+def _gradients(
+    surface: MovingSurface,
+    found: Sensitivities,
+    matched: Matched,
+    pulled: FloatArray,
+    displacement: FloatArray,
+    said: Sequence[str],
+) -> Gradients:
+    """Return the gradients from that for each moving node, ``pulled`` (m, d)."""
     slopes = (
         surface.slope(place, part, undeformed=not matched.at_design)
         for place, part in surface.values
     )
+    gradient = np.array([float((pulled * slope).sum()) for slope in slopes])
+    kinds = np.array([surface.config.variables[place].kind for place, _ in surface.values])
+    angles = np.char.endswith(kinds, "ANGLE_OF_ATTACK")
+    if angles.any():
+        rate = angle_sensitivity(found.path)
+        gradient[angles] = rate or 0.0
+        lacks = f"{found.path} has no SENS_AOA=, as text of SU2 has: 0 is written for the angle"
+        said = [*said, lacks] if rate is None else said
     return Gradients(
         surface=pulled,
-        variables=np.array([float((pulled * slope).sum()) for slope in slopes]),
-        points=mesh.points[surface.nodes] + displacement,
+        variables=gradient,
+        points=surface.mesh.points[surface.nodes] + displacement,
         at_design=matched.at_design,
         source=str(found.path),
-        warnings=(*deformer.warnings, *matched.warnings, *dict.fromkeys(said)),
+        warnings=tuple(said),
     )
 
 

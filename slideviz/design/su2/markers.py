@@ -44,9 +44,9 @@ def on_mesh(config: Su2Config, mesh: Mesh) -> Su2Config:
     return replace(config, case=case, named=named, markers=markers)
 
 
-def problems_of_markers(config: Su2Config, mesh: Mesh) -> list[str]:
-    """Return that nothing would move, or each boundary that the mesh lacks."""
-    if not config.markers:
+def problems_of_markers(config: Su2Config, mesh: Mesh, needed: bool = True) -> list[str]:
+    """Return that nothing would move, if some are ``needed``, or each that the mesh lacks."""
+    if needed and not config.markers:
         return [f"{config.source}: DV_MARKER names no boundary; nothing would move"]
     return [f"{config.source}: {text}" for text in unknown_markers(mesh, config.named)]
 

@@ -31,6 +31,18 @@ def read_restart(path: Path) -> tuple[list[str], FloatArray]:
     return _binary(path) if binary else _csv(path)
 
 
+def angle_sensitivity(path: Path) -> float | None:
+    """Return the derivative with respect to the angle of attack in degrees, or None.
+
+    SU2 notes it at the end of a restart in text: ``SENS_AOA= 0.1``.
+    """
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - 10_000))
+        notes = file.read().decode("latin-1").splitlines()
+    words = [line.partition("=")[2].strip() for line in notes if line.startswith("SENS_AOA")]
+    return float(words[-1]) if words and is_number(words[-1]) else None
+
+
 def is_number(word: str) -> bool:
     """Tell whether Python reads a word as a number."""
     try:

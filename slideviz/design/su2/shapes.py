@@ -4,59 +4,205 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from slideviz.case.bumps import hicks_henne, kulfan, normals_at, require_peak, surface_bump
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.variables import DesignVariable
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
+
+LEVEL = 1e-12
+"""A node is on neither side where y is less than this part of its normal: that is rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Moving nodes of a mesh: what the formulas depend on."""
+
+    mesh: Mesh
+    markers: tuple[str, ...]
+    nodes: IntArray
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """Return the points (m, d) of the nodes."""
+        return self.mesh.points[self.nodes]
+
+    @cached_property
+    def normals(self) -> FloatArray:
+        """Return the normals (m, d) into the mesh; those of SU2's median-dual mesh."""
+        return normals_at(self.mesh, self.markers, self.nodes)
+
+    @cached_property
+    def side(self) -> FloatArray:
+        """Return 1 for nodes (m,) of the upper side, -1 for those of the lower one; 0 between."""
+        upwards = self.normals[:, 1]
+        level = np.abs(upwards) <= LEVEL * np.linalg.norm(self.normals, axis=1)
+        return np.where(level, 0.0, np.sign(upwards))
+
+    def along_y(self, shift: FloatArray) -> FloatArray:
+        """Return displacements (m, d) of the nodes by ``shift`` (m,) along y."""
+        out = np.zeros_like(self.points)
+        out[:, 1] = shift
+        return out
+
+    @cached_property
+    def chord(self) -> tuple[FloatArray, float]:
+        """Return leading edge (2,), and angle of attack in radians, as SU2 finds them for camber.
+
+        The trailing edge is between the first node of the last marker and its last one with
+        x > 0, or the first if its normal is nearer to x; the leading edge is farthest from it.
+        """
+        mesh, markers = self.mesh, [name for name in self.mesh.marker_names if name in self.markers]
+        listed = mesh.marker(markers[-1]).cells.connectivity
+        order = listed[np.sort(np.unique(listed, return_index=True)[1])]
+        first = mesh.points[order[0], :2]
+        nx, ny = np.abs(self.normals[np.searchsorted(self.nodes, order[0]), :2])
+        positive = order[mesh.points[order, 0] > 0.0]
+        other = mesh.points[positive[-1], :2] if ny > nx and len(positive) else first
+        trailing = 0.5 * (first + other)
+        apart = np.linalg.norm(self.points[:, :2] - trailing, axis=1)
+        leading = self.points[int(np.argmax(apart)), :2]
+        width = trailing[0] - leading[0]
+        if width == 0.0:
+            raise CaseError("HICKS_HENNE_CAMBER: the chord of DV_MARKER is along y; turn the mesh")
+        return leading, float(np.arctan((leading[1] - trailing[1]) / width))
 
 
 @dataclass(frozen=True)
 class Formula:
     """Displacement by a variable, as a formula of its value times OPT_RELAX_FACTOR."""
 
-    moved: Callable[[DesignVariable, FloatArray, float], FloatArray]
-    """Displacement (m, d) of points (m, d) by an amount."""
-    rate: Callable[[DesignVariable, FloatArray, float], FloatArray] | None = None
+    moved: Callable[[DesignVariable, Surface, float], FloatArray]
+    """Displacement (m, d) of the nodes by an amount."""
+    rate: Callable[[DesignVariable, Surface, float], FloatArray] | None = None
     """Its derivative with respect to the amount; None: that of 1, since it is linear."""
+    relaxed: bool = True
+    """Whether OPT_RELAX_FACTOR multiplies its value."""
 
 
-def _shifted(variable: DesignVariable, points: FloatArray, amount: float) -> FloatArray:
-    vector = np.array(variable.numbers[: points.shape[1]])
-    return np.broadcast_to(amount * vector, points.shape)
+def _shifted(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+    vector = np.array(variable.numbers[: on.mesh.dim])
+    return np.broadcast_to(amount * vector, on.points.shape)
 
 
-def _scaled(variable: DesignVariable, points: FloatArray, amount: float) -> FloatArray:
+def _shifted_mesh(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+    vector = np.array(variable.numbers[: on.mesh.dim])
+    length = np.linalg.norm(vector)
+    if length == 0.0:
+        raise CaseError("TRANSLATE_GRID: its direction has no length; give one, as (1, 0, 0)")
+    return np.broadcast_to(amount * (vector / length), on.points.shape)
+
+
+def _scaled(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
     del variable
-    return (amount - 1.0) * points
+    return (amount - 1.0) * on.points
 
 
-def _scaling(variable: DesignVariable, points: FloatArray, amount: float) -> FloatArray:
+def _scaling(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
     del variable, amount
-    return points
+    return on.points
 
 
-def _rotated(variable: DesignVariable, points: FloatArray, amount: float) -> FloatArray:
-    return _turned(variable, points, np.radians(amount), derivative=False)
+def _rotated(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+    return _turned(variable, on.points, np.radians(amount), derivative=False)
 
 
-def _rotating(variable: DesignVariable, points: FloatArray, amount: float) -> FloatArray:
-    return np.radians(1.0) * _turned(variable, points, np.radians(amount), derivative=True)
+def _rotating(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+    return np.radians(1.0) * _turned(variable, on.points, np.radians(amount), derivative=True)
+
+
+def _hicks_henne(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+    side, peak = variable.numbers
+    require_peak(peak)
+    outwards = np.maximum(on.side, 0.0) if side else np.minimum(on.side, 0.0)
+    return on.along_y(amount * outwards * hicks_henne(on.points[:, 0], peak))
+
+
+def _cst(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+    side, k, n = variable.numbers
+    there = on.side > 0.0 if side else on.side < 0.0
+    return on.along_y(amount * there * kulfan(on.points[:, 0], k, n))
+
+
+def _bumped(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+    return on.along_y(amount * surface_bump(on.points[:, 0], *variable.numbers))
+
+
+def _cambered(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+    (peak,) = variable.numbers
+    require_peak(peak)
+    leading, angle = on.chord
+    arm = on.points[:, :2] - leading
+    x = arm[:, 0] * np.cos(angle) - arm[:, 1] * np.sin(angle)
+    shift = np.where(x > 0.99, 0.0, amount * hicks_henne(x, peak))
+    out = np.zeros_like(on.points)
+    out[:, :2] = shift[:, None] * np.array([np.sin(angle), np.cos(angle)])
+    return out
+
+
+def _naca(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+    del amount  # SU2 uses the digits only
+    most, where, thickness = np.array(variable.numbers) / (100.0, 10.0, 100.0)
+    if not 0.0 < where < 1.0 and most:
+        raise CaseError(
+            f"NACA_4DIGITS: the second digit is {variable.numbers[1]:g}; the largest camber must "
+            "lie between 0 and 10 tenths of the chord"
+        )
+    x = on.points[:, 0]
+    camber = np.zeros_like(x)
+    if most:
+        front = most / where**2 * (2.0 * where * x - x**2)
+        back = most / (1.0 - where) ** 2 * (1.0 - 2.0 * where + 2.0 * where * x - x**2)
+        camber = np.where(x < where, front, back)
+    root = np.sqrt(np.maximum(x, 0.0))  # SU2 has no number where x is below 0
+    polynomial = 1.4845 * root - 0.63 * x - 1.758 * x**2 + 1.4215 * x**3 - 0.518 * x**4
+    return _put(on, camber + on.side * thickness * polynomial)
+
+
+def _parabolic(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+    del amount  # SU2 uses the parameters only
+    centre, thickness = variable.numbers
+    if centre in (0.0, 1.0):
+        raise CaseError(f"PARABOLIC: the centre is {centre:g}; it must not be 0 or 1")
+    x = on.points[:, 0]
+    half = 0.01 * thickness * (x**2 - x) / (2.0 * (centre**2 - centre))
+    return _put(on, on.side * half)
+
+
+def _put(on: Surface, y: FloatArray) -> FloatArray:
+    """Return displacements (m, d) that put the nodes of both sides onto y (m,)."""
+    return on.along_y(np.where(on.side == 0.0, 0.0, y - on.points[:, 1]))
+
+
+def _still(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+    del variable, amount
+    return np.zeros_like(on.points)
 
 
 FORMULAS = {
     "TRANSLATION": Formula(_shifted),
     "ROTATION": Formula(_rotated, _rotating),
     "SCALE": Formula(_scaled, _scaling),
+    "HICKS_HENNE": Formula(_hicks_henne),
+    "CST": Formula(_cst),
+    "SURFACE_BUMP": Formula(_bumped),
+    "HICKS_HENNE_CAMBER": Formula(_cambered, relaxed=False),
+    "NACA_4DIGITS": Formula(_naca, _still),
+    "PARABOLIC": Formula(_parabolic, _still),
+    "TRANSLATE_GRID": Formula(_shifted_mesh),
+    "ROTATE_GRID": Formula(_rotated, _rotating),
+    "SCALE_GRID": Formula(_scaled, _scaling),
 }
 """What each kind does; kinds that are not here move nothing."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """Formulas that move the boundary (a `Displacer`).
+    """Formulas that move nodes (a `Displacer`).
 
     As in SU2 each acts on the undeformed points, and their displacements are added up.
     """
@@ -65,7 +211,28 @@ class Shapes:
     mesh: Mesh
     nodes: IntArray
 
-    warnings = ()
+    @cached_property
+    def _surface(self) -> Surface:
+        return Surface(self.mesh, self.config.markers, self.nodes)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Return what a variable does to the flow only, and where SU2 would do otherwise."""
+        variables, said = self.config.variables, []
+        angles = [each for each in variables if each.kind == "ANGLE_OF_ATTACK"]
+        if angles:  # of which the last one wins in SU2
+            offset = self.config.relaxation * angles[-1].value
+            said.append(
+                "ANGLE_OF_ATTACK moves no node; add its value times OPT_RELAX_FACTOR, "
+                f"{offset:.10g} degrees, to AOA of the flow"
+            )
+        heights = {each.numbers[2] for each in variables if each.kind == "ROTATION"}
+        if self.mesh.dim == 3 and heights - {*variables[0].numbers[2:3]}:
+            said.append(
+                "SU2 turns all ROTATION about lines through the z0 of the first variable; here "
+                "each has its own"
+            )
+        return tuple(said)
 
     @property
     def inside(self) -> dict[str, int]:
@@ -79,24 +246,27 @@ class Shapes:
 
     def displacement(self) -> FloatArray:
         """Return the displacement (m, d) of the nodes by all variables."""
-        points = self.mesh.points[self.nodes]
-        total = np.zeros_like(points)
+        total = np.zeros_like(self._surface.points)
         for variable in self.config.variables:
             if variable.kind in FORMULAS and not variable.ignored:
-                amount = self.config.relaxation * variable.value
-                total += FORMULAS[variable.kind].moved(variable, points, amount)
+                formula = FORMULAS[variable.kind]
+                amount = self._factor(formula) * variable.value
+                total += formula.moved(variable, self._surface, amount)
         return total
 
     def slope(self, place: int, part: int, undeformed: bool) -> FloatArray:
         """Return the derivative (m, d) with respect to the value of a variable."""
         del part  # all have one value
         variable = self.config.variables[place]
-        points = self.mesh.points[self.nodes]
-        formula, factor = FORMULAS[variable.kind], self.config.relaxation
+        formula = FORMULAS[variable.kind]
+        factor = self._factor(formula)
         if formula.rate is None:
-            return factor * formula.moved(variable, points, 1.0)
+            return factor * formula.moved(variable, self._surface, 1.0)
         amount = 0.0 if undeformed else factor * variable.value
-        return factor * formula.rate(variable, points, amount)
+        return factor * formula.rate(variable, self._surface, amount)
+
+    def _factor(self, formula: Formula) -> float:
+        return self.config.relaxation if formula.relaxed else 1.0
 
     def boxed(self, mesh: Mesh) -> Mesh:
         """Return the mesh: its FFD boxes stay."""

@@ -56,6 +56,9 @@ class Displacer(Protocol):
 DISPLACERS: dict[Group, Callable[[Su2Config, Mesh, IntArray], Displacer]] = {
     "nothing": Shapes,
     "surface": Shapes,
+    "naca": Shapes,
+    "parabolic": Shapes,
+    "grid": Shapes,
     "file": ListedPositions,
     "ffd": move_boxes,
 }
@@ -71,7 +74,7 @@ class MovingSurface:
     config : Su2Config
     mesh : Mesh
     nodes : (m,) int64
-        Of all moving boundaries, ascending.
+        Of all moving boundaries, or of the mesh (``*_GRID``), ascending.
     displacer : Displacer
     warnings : tuple of str
     """
@@ -115,6 +118,17 @@ class MovingSurface:
             return np.zeros((len(self.nodes), self.mesh.dim))
         return self.displacer.slope(place, part, undeformed)
 
+    @property
+    def whole(self) -> bool:
+        """Return whether all nodes of the mesh move as the variables say (``*_GRID``)."""
+        return self.config.variables[0].group == "grid"
+
+    def moved(self) -> Mesh:
+        """Return the mesh with the nodes moved, and no others."""
+        points = self.mesh.points.copy()
+        points[self.nodes] += self.displacement
+        return self.mesh.with_points(points)
+
     def case(self) -> Case:
         """Return the case with this displacement as its motion."""
         case = self.config.case
@@ -123,8 +137,13 @@ class MovingSurface:
         if not others and kinds <= {*RIGID} and case.kernel == Case().kernel:
             # All boundaries move as a body does, or grow: this kernel has that exactly inside.
             case = case.change(kernel="thin-plate")
-        motion = Prescribed(self.nodes, self.displacement)
-        return case.change(motions=(motion,), warnings=(*case.warnings, *self.warnings))
+        if self.whole or not self.config.markers:
+            every = dict.fromkeys(self.mesh.marker_names, "moving")
+            case = case.change(roles=every, sliding="none", periodic="none")
+        listed = [self.mesh.marker(name).nodes for name in case.markers_with("moving")]
+        nodes = np.unique(np.concatenate(listed)) if self.whole else self.nodes
+        motions = (Prescribed(nodes, self.displacement[np.searchsorted(self.nodes, nodes)]),)
+        return case.change(motions=motions, warnings=(*case.warnings, *self.warnings))
 
 
 def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
@@ -136,11 +155,13 @@ def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
         Markers or boxes are missing, or variables do not fit the mesh.
     """
     group = config.variables[0].group
-    problems = problems_of_markers(config, mesh)
+    problems = problems_of_markers(config, mesh, needed=group not in ("grid", "nothing"))
     if group == "ffd":
         problems += problems_of_boxes(config, mesh)
     raise_all(tuple(problems))
-    nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in config.markers]))
+    listed = [mesh.marker(name).nodes for name in config.markers]
+    nodes = np.unique(np.concatenate([np.empty(0, np.int64), *listed]))
+    nodes = np.arange(len(mesh.points)) if group == "grid" else nodes
     displacer = DISPLACERS[group](config, mesh, nodes)
     left = [] if group == "ffd" else _left_behind(config, mesh)
     return MovingSurface(config, mesh, nodes, displacer, (*displacer.warnings, *left))

@@ -1,0 +1,336 @@
+"""SU2's design variables that are no boxes, against literal formulas and differences."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.cli import run
+from slideviz.design.su2.config import read_config
+from slideviz.design.su2.surface import make_surface
+from slideviz.errors import CaseError
+from slideviz.mesh.topology import find_boundary, vertex_normals
+from tests.builders import airfoil, cube, sphere_in_box
+from tests.design.test_su2_dot import differences, gradient, values_text, write_csv, written
+from tests.oracles import airfoils
+
+HEAD = "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nDV_MARKER= (NAMES)\n"
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def bent():
+    """An airfoil with camber and incidence; no node has a normal along x."""
+    mesh = airfoil(24, 3)
+    x, y = mesh.points.T
+    points = np.stack([x + 0.02 * y, y + 0.2 * x * (1 - x) - 0.1 * x + 0.013], axis=1)
+    return mesh.with_points(np.where(np.hypot(x - 0.5, y)[:, None] > 2, mesh.points, points))
+
+
+def halves(mesh):
+    """The airfoil's marker as two: upper and lower."""
+    lines = mesh.marker("airfoil").cells.by_type[3][1]
+    upper = mesh.points[lines].mean(axis=1)[:, 1] > mesh.points[lines].mean(axis=1)[:, 0] * -0.1
+    parts = [
+        sv.Marker(name, sv.Cells.from_blocks([(3, lines[which])]))
+        for name, which in (("upper", upper), ("lower", ~upper))
+    ]
+    return replace(mesh, markers=(*parts, mesh.marker("far")))
+
+
+def ball():
+    mesh = sphere_in_box()
+    x, y, z = mesh.points.T
+    return mesh.with_points(np.stack([x + 0.1 * y + 0.5, y, z - 0.07 * y], axis=1))
+
+
+MESHES = {
+    "airfoil": (bent, ("airfoil",)),
+    "two markers": (lambda: halves(bent()), ("upper", "lower")),
+    "3D": (ball, ("sphere",)),
+}
+
+
+def surface(mesh, markers, text):
+    sv.write("mesh.su2", mesh, overwrite=True)
+    Path("a.cfg").write_text(HEAD.replace("NAMES", ", ".join(markers)) + text)
+    return make_surface(read_config(Path("a.cfg")), sv.read("mesh.su2"))
+
+
+def as_table(found, expected):
+    assert set(expected) == set(found.nodes.tolist())
+    return np.array([expected[node] for node in found.nodes])
+
+
+@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize(
+    ("kind", "numbers"),
+    [
+        ("HICKS_HENNE", (1, 0.3)),
+        ("HICKS_HENNE", (0, 0.7)),
+        ("HICKS_HENNE", (2, 0.5)),
+        ("CST", (1, 2, 6)),
+        ("CST", (0, 5, 5)),
+        ("SURFACE_BUMP", (0.2, 0.9, 0.4)),
+        ("NACA_4DIGITS", (2, 4, 15)),
+        ("PARABOLIC", (0.4, 6)),
+    ],
+)
+def test_kinds_move_nodes_as_su2_does(name, kind, numbers, here):
+    make, markers = MESHES[name]
+    mesh = make()
+    text = f"DV_KIND= {kind}\nDV_PARAM= {numbers}\nDV_VALUE= 0.06\nOPT_RELAX_FACTOR= 0.5\n"
+    found = surface(mesh, markers, text)
+    expected = airfoils.displaced(mesh, markers, kind, numbers, 0.03)
+    np.testing.assert_allclose(found.displacement, as_table(found, expected), atol=1e-15)
+    assert found.displacement.any()
+    rate = 0.0 if kind in ("NACA_4DIGITS", "PARABOLIC") else found.displacement / 0.06
+    np.testing.assert_allclose(found.slope(0), rate, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_camber_moves_both_sides_normal_to_the_chord(name, here):
+    make, markers = MESHES[name]
+    text = (
+        "DV_KIND= HICKS_HENNE_CAMBER, HICKS_HENNE_CAMBER\nDV_PARAM= (0.3); (0.8)\n"
+        "DV_VALUE= 0.02, -0.01\nOPT_RELAX_FACTOR= 7\n"
+    )
+    found = surface(make(), markers, text)
+    expected = airfoils.cambered(found.mesh, markers, (0.3, 0.8), (0.02, -0.01))
+    np.testing.assert_allclose(found.displacement, as_table(found, expected), atol=1e-15)
+    total = 0.02 * found.slope(0) - 0.01 * found.slope(1)
+    np.testing.assert_allclose(found.displacement, total, atol=1e-16)
+
+
+@pytest.mark.parametrize("make", [bent, ball, lambda: cube(4), lambda: airfoil(12, 2)])
+def test_normals_of_nodes_are_those_of_the_median_dual_mesh(make):
+    mesh = make()
+    boundary = find_boundary(mesh)
+    for index, marker in enumerate(mesh.markers):
+        nodes, normals = vertex_normals(mesh.points, boundary.facets[boundary.marker == index])
+        expected = airfoils.inward_normals(mesh, marker)
+        table = np.array([expected[node][: mesh.dim] for node in nodes])
+        np.testing.assert_allclose(-normals, table, atol=1e-15)
+
+
+def test_normals_of_triangles_are_those_of_the_median_dual_mesh():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0.2, 1, 0.1], [0.1, 0.2, 1]])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    mesh = sv.Mesh(
+        points,
+        sv.Cells.from_blocks([(10, [[0, 1, 2, 3]])]),
+        (sv.Marker("all", sv.Cells.from_blocks([(5, faces)])),),
+    )
+    nodes, normals = vertex_normals(mesh.points, find_boundary(mesh).facets)
+    expected = airfoils.inward_normals(mesh, mesh.markers[0])
+    np.testing.assert_allclose(-normals, [expected[node] for node in nodes], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "params", "values", "moving", "said"),
+    [
+        (
+            "HICKS_HENNE, TRANSLATION",
+            "(1, 0.5); (0, 1, 0)",
+            (0.02, 0.1),
+            (True, False),
+            "variable 2 (TRANSLATION) of DV_KIND will do nothing, as in SU2: its motion is lost,",
+        ),
+        ("TRANSLATION, HICKS_HENNE", "(0, 1, 0); (1, 0.5)", (0.1, 0.02), (True, True), ""),
+        (
+            "SURFACE_BUMP, CST, ROTATION, HICKS_HENNE",
+            "(0, 1, 0.5); (1, 1, 3); (0, 0, 0, 0, 0, 1); (1, 0.3)",
+            (0.02, 0.03, 4.0, 0.01),
+            (True, False, False, False),
+            "variables 2 (CST), 3 (ROTATION), 4 (HICKS_HENNE) of DV_KIND will do nothing, as in",
+        ),
+        (
+            "HICKS_HENNE, SURFACE_BUMP, HICKS_HENNE_CAMBER",
+            "(1, 0.3); (0, 1, 0.4); (0.5)",
+            (0.02, 0.03, 0.1),
+            (True, True, False),
+            "variable 3 (HICKS_HENNE_CAMBER) of DV_KIND will do nothing, as in SU2: HICKS_HENNE_",
+        ),
+        (
+            "ANGLE_OF_ATTACK, SCALE",
+            "(1.0); (1.0)",
+            (2.0, 1.1),
+            (False, True),
+            "ANGLE_OF_ATTACK moves no node; add its value times OPT_RELAX_FACTOR, 2 degrees, to",
+        ),
+        (
+            "SCALE_GRID, TRANSLATE_GRID",
+            "(1.0); (1, 0, 0)",
+            (1.1, 0.1),
+            (True, False),
+            "variable 2 (TRANSLATE_GRID) of DV_KIND will do nothing, as in SU2: SCALE_GRID stands",
+        ),
+    ],
+)
+def test_order_of_passes_is_that_of_su2(kinds, params, values, moving, said, here):
+    found = surface(
+        bent(),
+        ("airfoil",),
+        f"DV_KIND= {kinds}\nDV_PARAM= {params}\nDV_VALUE= {values_text(values)}\n",
+    )
+    assert found.idle == tuple(not one for one in moving)
+    total = np.zeros_like(found.displacement)
+    for kind, group, value, moves in zip(
+        kinds.split(", "), params.split("; "), values, moving, strict=True
+    ):
+        if moves:
+            alone = f"DV_KIND= {kind}\nDV_PARAM= {group}\nDV_VALUE= {value}\n"
+            total += surface(bent(), ("airfoil",), alone).displacement
+    np.testing.assert_allclose(found.displacement, total, atol=1e-15)
+    assert any(one.startswith(said) for one in found.case().warnings) or not said
+    assert bool(found.case().warnings) == bool(said)
+
+
+GRID = {
+    "TRANSLATE_GRID": ("(3, 4, 0)", 0.5, lambda x: x + np.array([0.3, 0.4])),
+    "ROTATE_GRID": ("(1, 2, 0, 1, 2, 1)", 90.0, lambda x: np.stack([3 - x[:, 1], 1 + x[:, 0]], 1)),
+    "SCALE_GRID": ("(1.0)", 1.5, lambda x: 1.5 * x),
+}
+
+
+@pytest.mark.parametrize("kind", GRID)
+def test_grid_kinds_move_every_node(kind, here, capsys):
+    params, value, formula = GRID[kind]
+    mesh = bent()
+    sv.write("mesh.su2", mesh)
+    text = "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nSOLUTION_ADJ_FILENAME= adj\n"
+    text += f"DV_KIND= {kind}\nDV_PARAM= {params}\nDV_VALUE= VALUES\n"
+    points = written(text.replace("VALUES", str(value)))
+    np.testing.assert_allclose(points, formula(mesh.points), atol=1e-14)
+    weights = np.random.default_rng(5).normal(size=points.shape)
+    expected = differences(text, [value], weights, [1e-4])
+    write_csv("adj_cd.csv", points, weights)
+    Path("dot.cfg").write_text(text.replace("VALUES", str(value)))
+    assert run(["dot", "dot.cfg", "-q", "--json", "dot.json"]) == 0
+    np.testing.assert_allclose(gradient(), expected, rtol=1e-7)
+    assert json.loads(Path("dot.json").read_text())["at"] == "design"
+    write_csv("adj_cd.csv", mesh.points, weights)
+    assert run(["dot", "dot.cfg", "-q", "--json", "dot.json"]) == 0
+    assert json.loads(Path("dot.json").read_text())["at"] == "mesh"
+    table = np.loadtxt("surface_sensitivity.dat", delimiter=",")
+    np.testing.assert_allclose(table[:, :2], mesh.points, atol=1e-14)
+    np.testing.assert_array_equal(table[:, 3:5], weights)
+
+
+SHAPES = """\
+MESH_FILENAME= mesh.su2
+MESH_OUT_FILENAME= out.su2
+SOLUTION_ADJ_FILENAME= adj
+DV_MARKER= (airfoil)
+OPT_RELAX_FACTOR= 0.5
+DATA_REDUCTION= NO
+DV_KIND= TRANSLATION, HICKS_HENNE, HICKS_HENNE, CST, SURFACE_BUMP, ANGLE_OF_ATTACK
+DV_PARAM= (0, 1, 0); (1, 0.3); (0, 0.6); (1, 2, 4); (0.1, 0.8, 0.4); (1.0)
+DV_VALUE= VALUES
+"""
+
+
+@pytest.mark.parametrize("kinds", ["shapes", "camber"])
+def test_gradients_are_those_of_central_differences(kinds, here, capsys):
+    mesh, text, values = bent(), SHAPES, [0.01, 0.02, -0.03, 0.02, 0.01, 0.5]
+    if kinds == "camber":
+        text = SHAPES.partition("DV_KIND")[0] + (
+            "DV_KIND= HICKS_HENNE_CAMBER, HICKS_HENNE_CAMBER\nDV_PARAM= (0.2); (0.5)\n"
+            "DV_VALUE= VALUES\n"
+        )
+        values = [0.02, -0.01]
+    sv.write("mesh.su2", mesh)
+    weights = np.random.default_rng(6).normal(size=mesh.points.shape)
+    expected = differences(text, values, weights, [1e-5] * len(values))
+    text = text.replace("VALUES", values_text(values))
+    write_csv("adj_cd.csv", written(text), weights, extra="AOA= 1.25\nSENS_AOA= 0.0625\n")
+    Path("dot.cfg").write_text(text)
+    capsys.readouterr()
+    assert run(["dot", "dot.cfg"]) == 0
+    assert "no SENS_AOA" not in capsys.readouterr().err
+    if kinds == "shapes":
+        expected[-1] = 0.0625  # SU2's own, which says what the flow does
+    np.testing.assert_allclose(gradient(), expected, rtol=2e-6, atol=1e-8)
+
+
+def test_gradient_for_the_angle_that_the_restart_lacks_is_told(here, capsys):
+    mesh = bent()
+    sv.write("mesh.su2", mesh)
+    text = SHAPES.partition("DV_KIND")[0] + (
+        "DV_KIND= HICKS_HENNE, ANGLE_OF_ATTACK\nDV_PARAM= (1, 0.5); (1.0)\nDV_VALUE= 0.0, 1.0\n"
+    )
+    Path("dot.cfg").write_text(text)
+    write_csv("adj_cd.csv", mesh.points, np.ones_like(mesh.points))
+    assert run(["dot", "dot.cfg", "-q"]) == 0
+    assert "adj_cd.csv has no SENS_AOA=, as text of SU2 has: 0 is" in capsys.readouterr().err
+    assert gradient()[1] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "numbers", "message"),
+    [
+        ("HICKS_HENNE", (1, 1.0), "the peak is at x = 1; it must lie between 0 and 1"),
+        ("HICKS_HENNE_CAMBER", "(0.0)", "the peak is at x = 0; it must lie between 0 and 1"),
+        ("SURFACE_BUMP", (0.2, 0.5, 0.6), "the peak is at x = 0.6; it must lie between 0.2 and 0"),
+        ("CST", (1, 4, 3), "there is no coefficient 4 of 3; the first must be 1 to 3"),
+        ("NACA_4DIGITS", (2, 0, 12), "NACA_4DIGITS: the second digit is 0; the largest camber"),
+        ("PARABOLIC", (1.0, 12), "PARABOLIC: the centre is 1; it must not be 0 or 1"),
+        ("TRANSLATE_GRID", (0, 0, 0), "TRANSLATE_GRID: its direction has no length; give one"),
+    ],
+)
+def test_parameters_that_make_no_shape_are_refused(kind, numbers, message, here):
+    text = f"DV_KIND= {kind}\nDV_PARAM= {numbers}\nDV_VALUE= 0.1\n"
+    with pytest.raises(CaseError, match=message):
+        _ = surface(bent(), ("airfoil",), text).displacement
+
+
+def test_a_chord_along_y_has_no_camber(here):
+    mesh = bent()
+    turned = mesh.with_points(mesh.points[:, ::-1] * [1, -1])
+    straight = turned.with_points(
+        np.where(np.abs(turned.points) < 1.05, turned.points * [0, 1], turned.points)
+    )
+    text = "DV_KIND= HICKS_HENNE_CAMBER\nDV_PARAM= (0.5)\nDV_VALUE= 0.1\n"
+    with pytest.raises(CaseError, match="HICKS_HENNE_CAMBER: the chord of DV_MARKER is along y"):
+        _ = surface(straight, ("airfoil",), text).displacement
+
+
+@pytest.mark.parametrize(
+    ("kinds", "message"),
+    [
+        ("NACA_4DIGITS, NACA_4DIGITS", "NACA_4DIGITS must stand alone; make two runs"),
+        ("HICKS_HENNE_CAMBER, SCALE", "HICKS_HENNE_CAMBER stands with variables of its kind only"),
+    ],
+)
+def test_lists_that_su2_refuses_are_refused(kinds, message, here):
+    params = {"NACA_4DIGITS": "(2, 4, 12)", "HICKS_HENNE_CAMBER": "(0.5)", "SCALE": "(1.0)"}
+    group = "; ".join(params[kind] for kind in kinds.split(", "))
+    with pytest.raises(CaseError, match=message):
+        surface(bent(), ("airfoil",), f"DV_KIND= {kinds}\nDV_PARAM= {group}\nDV_VALUE= 1, 1\n")
+
+
+def test_no_deformation_writes_the_mesh_back(here):
+    sv.write("mesh.su2", bent())
+    Path("a.cfg").write_text(
+        "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nDV_KIND= NO_DEFORMATION\n"
+        "DV_PARAM= (1.0)\nDV_VALUE= 0.0\n"
+    )
+    assert run(["def", "a.cfg", "-q"]) == 0
+    assert Path("out.su2").read_bytes() == Path("mesh.su2").read_bytes()
+
+
+def test_lines_of_rotations_in_3d_are_their_own_though_su2_mixes_them(here):
+    text = (
+        "DV_KIND= ROTATION, ROTATION\nDV_PARAM= (0, 0, 0, 1, 0, 0); (0, 0, 0.5, 0, 1, 0.5)\n"
+        "DV_VALUE= 5, 0\n"
+    )
+    found = surface(ball(), ("sphere",), text)
+    said = "SU2 turns all ROTATION about lines through the z0 of the first variable; here each"
+    assert any(one.startswith(said) for one in found.warnings)
