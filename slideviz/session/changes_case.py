@@ -20,7 +20,8 @@ def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
     """Return the session with boundaries in a role, which is no longer a guess.
 
     Motions lose boundaries that no longer move. Boundaries guessed periodic only because they match
-    one of these become fixed. The first periodic boundary turns periodicity on, the last one off.
+    one of these become fixed. The first periodic boundary turns periodicity on, the last one off;
+    the first sliding one turns pseudo sliding on where nothing slides.
     """
     changed = tuple(names)
     roles = dict(session.case.roles) | dict.fromkeys(changed, role)
@@ -32,6 +33,9 @@ def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
     still = (_of_moving(motion, roles) for motion in session.case.motions)
     motions = tuple(motion for motion in still if motion is not None)
     case = session.case.change(roles=roles, motions=motions)
+    first_sliding = "sliding" in roles.values() and "sliding" not in session.case.roles.values()
+    if first_sliding and case.sliding == "none":
+        case = case.change(sliding="ps")
     if "periodic" not in roles.values():
         case = case.change(periodic="none")
     elif case.periodic == "none" and "periodic" not in session.case.roles.values():

@@ -68,6 +68,17 @@ def test_periodicity_ends_with_the_last_periodic_boundary(session):
     assert changes.set_role(session, ("right",), "fixed").case.periodic == "none"
 
 
+def test_the_first_sliding_boundary_turns_sliding_on_and_no_later_one(session):
+    """Without it the role would do nothing, and a run would repeat the one before."""
+    assert session.case.sliding == "none"
+    new = changes.set_role(session, ("left", "right"), "sliding")
+    assert new.case.sliding == "ps"
+    off = changes.set_case(new, sliding="none")
+    assert changes.set_role(off, ("top",), "sliding").case.sliding == "none"
+    direct = changes.set_case(session, sliding="ds")
+    assert changes.set_role(direct, ("left",), "sliding").case.sliding == "ds"
+
+
 def test_motions_are_added_replaced_moved_and_removed_in_order(session):
     a, b, c = (Translate("left", (float(i), 0.0)) for i in range(3))
     for motion in (a, b):
