@@ -77,25 +77,31 @@ def deformation(case: Case) -> tuple[object, ...]:
 def motion_labels(cases: Sequence[Case]) -> list[str]:
     """Return a label for each case: its motions in few words; all "" where all have the same.
 
+    Of equal numbers of motions, labels have those that differ.
     Labels name boundaries only where motions of different ones occur, and points, axes and folders
     only where different motions would have the same label without.
     """
     if len({case.motions for case in cases}) < 2:
         return [""] * len(cases)
-    several = len({motion.marker for case in cases for motion in case.motions} - {""}) > 1
-    labels = [_label(case, several, exact=False) for case in cases]
+    every = [case.motions for case in cases]
+    if len({len(motions) for motions in every}) == 1:
+        # What all have in common would push what differs out of a narrow list.
+        places = [at for at, column in enumerate(zip(*every, strict=True)) if len({*column}) > 1]
+        every = [tuple(motions[at] for at in places) for motions in every]
+    several = len({motion.marker for motions in every for motion in motions} - {""}) > 1
+    labels = [_label(motions, several, exact=False) for motions in every]
     alike: dict[str, set[object]] = {}
-    for label, case in zip(labels, cases, strict=True):
-        alike.setdefault(label, set()).add(case.motions)
+    for label, motions in zip(labels, every, strict=True):
+        alike.setdefault(label, set()).add(motions)
     return [
-        _label(case, several, exact=True) if len(alike[label]) > 1 else label
-        for label, case in zip(labels, cases, strict=True)
+        _label(motions, several, exact=True) if len(alike[label]) > 1 else label
+        for label, motions in zip(labels, every, strict=True)
     ]
 
 
-def _label(case: Case, several: bool, exact: bool) -> str:
+def _label(motions: Sequence[Motion], several: bool, exact: bool) -> str:
     parts = []
-    for motion in case.motions:
+    for motion in motions:
         words = _exactly(motion) if exact else _briefly(motion)
         with_target = several and bool(motion.marker)
         parts.append(f"{target_words(motion.marker)}: {words}" if with_target else words)

@@ -24,8 +24,10 @@ from slideviz.session.run_messages import (
     notes_of,
     warnings_of,
 )
+from slideviz.session.runs_words import method_words
 from slideviz.session.state import Run, Session, StepFrame
 from slideviz.session.store import Store
+from slideviz.terms import PERIODIC_MODES
 
 log = logging.getLogger("slideviz")
 
@@ -126,8 +128,9 @@ class Running(QObject):
         session = self.store.session
         if session.view.colour_by == "role":
             self.store.change(changes.set_view, colour_by="size-skew")
+        periodic = PERIODIC_MODES[case.periodic].name
         steps = case.steps or "automatic"
-        log.info("run: sliding %s, periodic %s, %s steps", case.sliding, case.periodic, steps)
+        log.info("run: %s, %s, %s steps", method_words(case), periodic, steps)
         self._deforms = True
         if session.in_file:
             assert output is not None

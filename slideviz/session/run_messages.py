@@ -13,6 +13,7 @@ from slideviz.deformation.remedies import MOST_NAMES, beyond_pitch, fixed_beside
 from slideviz.errors import Note
 from slideviz.mesh.model import Mesh
 from slideviz.session.state import PanelPlace, Run, Session
+from slideviz.terms import KERNELS
 
 LARGE = 1e9
 """Bytes of memory from which on there is a message before a run on what it takes."""
@@ -184,8 +185,11 @@ def _problems(session: Session) -> list[str]:
 
 
 _LABELLED = sorted((name for name, key in KEYS.items() if key.label), key=len, reverse=True)
-# A key with a label, and its value where one follows, as in "DATA_REDUCTION= YES".
-_KEY = re.compile(rf"\b({'|'.join(_LABELLED)})\b(?:=(?:\s?([\w.+-]*\w))?)?")
+# A key with a label, and its values where some follow, as in "SLIDING_MODE= ps or ds".
+_VALUE = r"\s?([\w.+-]*\w)(?:( \(?or )([\w-]+))?"
+_KEY = re.compile(rf"\b({'|'.join(_LABELLED)})\b(?:=(?:{_VALUE})?)?")
+# Values of RBF_KERNEL in a sentence; where some are words of their own only before "is too".
+_KERNEL = re.compile(rf"\b({'|'.join(KERNELS)})\b(?= is too)|\b\w+-c\d[ab]?\b")
 
 
 def idle_words(case: Case) -> tuple[str, ...]:
@@ -203,9 +207,15 @@ def idle_words(case: Case) -> tuple[str, ...]:
 
 def in_window_words(text: str) -> str:
     """Return a message with keys of the case file replaced by their labels in the window."""
-    return _KEY.sub(_words, text)
+    kernel = KEYS["RBF_KERNEL"].kind
+    return _KERNEL.sub(lambda found: kernel.called(found[0]), _KEY.sub(_words, text))
 
 
 def _words(found: re.Match[str]) -> str:
-    key = KEYS[found[1]]
-    return key.label if found[2] is None else f"{key.label} “{key.kind.called(found[2])}”"
+    key, first, link, second = KEYS[found[1]], *found.groups()[1:]
+    label = key.label.removesuffix(" ×")  # which a message would have beside the × that closes it
+    if first is None:
+        return label
+    other = "" if second is None else key.kind.called(second)
+    more = "" if not link else f"{link}{second}" if other == second else f"{link}“{other}”"
+    return f"{label} “{key.kind.called(first)}”{more}"

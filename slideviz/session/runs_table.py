@@ -11,6 +11,7 @@ from pathlib import Path
 from slideviz.case.motion_words import deformation, describe
 from slideviz.errors import SlidevizError
 from slideviz.mesh.io.atomic import atomic_write
+from slideviz.session.run_messages import notes_of, warnings_of
 from slideviz.session.runs_words import (
     control_nodes,
     end_words,
@@ -18,7 +19,7 @@ from slideviz.session.runs_words import (
     reduction_words,
 )
 from slideviz.session.state import Run
-from slideviz.terms import PERIODIC_MODES
+from slideviz.terms import KERNELS, PERIODIC_MODES
 
 DIGITS = 4
 """Decimals of qualities in the window."""
@@ -71,7 +72,7 @@ COLUMNS: tuple[Column, ...] = (
     Column("method", lambda run: method_words(run.case)),
     Column("periodicity", lambda run: PERIODIC_MODES[run.case.periodic].name),
     Column("steps", lambda run: len(run.frames)),
-    Column("kernel", lambda run: run.case.kernel),
+    Column("kernel", lambda run: KERNELS[run.case.kernel].name),
     Column("support radius", _radius, ".4g"),
     Column("control nodes chosen", lambda run: reduction_words(run.case)),
     Column("minimum quality", lambda run: _of_last(run, "min"), QUALITY),
@@ -108,9 +109,9 @@ def described(run: Run) -> str:
     """Return a line for each column with a run's value, and lines with its warnings and notes."""
     shown = [column for column in COLUMNS if column.title != "name" or run.name]
     lines = [f"{column.title}: {column.text(run)}" for column in shown]
-    step = run.last.step if run.last is not None else None
-    if step is not None and step.warnings:
-        lines += ["", *(f"{text[:1].upper()}{text[1:]}." for text in step.warnings)]
+    warned = (*warnings_of(run), *notes_of(run))
+    if warned:
+        lines += ["", *(f"{text[:1].upper()}{text[1:]}." for text in warned)]
     return "\n".join(lines)
 
 

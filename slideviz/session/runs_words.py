@@ -89,7 +89,7 @@ def _setting_words(key: Key, case: Case) -> str:
         return ""
     if key.field == "reduction":
         return reduction_words(case)
-    text = key.kind.write(value)
+    text = key.kind.called(key.kind.write(value)).partition(" (")[0]  # "Gaussian (global)"
     if key.kind.entry in ("axis", "point"):
         text = f"({', '.join(map(_number_words, value))})"
     elif key.kind.entry == "real":
@@ -149,20 +149,24 @@ def differing(run: Run, among: Sequence[Run]) -> str:
     return ", ".join(filter(None, words))
 
 
-def brief(run: Run, among: Sequence[Run] = ()) -> str:
+def brief(run: Run, among: Sequence[Run] = (), method: bool = False) -> str:
     """Return a line on a run's settings, to be put beside its name.
 
     Settings that differ in the runs ``among`` come first, since the end of the line may be cut off.
+    The method is one of them where the run has a name of its own, or with ``method``.
     """
     cases = [other.case for other in among]
     words = [] if run.end == "done" else [end_words(run)]
-    if run.name:
-        words.append(method_words(run.case))
+    named = [method_words(run.case)] if run.name or method else []
+    if len({method_words(case) for case in cases}) > 1:
+        words += named
+        named = []
     if run in among:
         words.append(motion_labels(cases)[among.index(run)])
         words.append(_roles_words(run.case, cases))
     settings = list(_settings_words(run, cases))
     words += [text for text, differs in settings if differs]
+    words += named
     words += [text for text, differs in settings if not differs]
     if run.frames:
         words.append(seconds_words(run.seconds))

@@ -92,6 +92,27 @@ def test_each_run_has_a_row_with_its_quality_that_playing_leaves_and_the_best_is
     assert not filled
 
 
+def test_the_first_row_is_the_undeformed_mesh(ran):
+    first, tree = row(ran, changes.UNDEFORMED), panel(ran).tree
+    assert first is tree.topLevelItem(0)
+    assert first.text(RUN) == "Undeformed"
+    assert first.text(MIN) == f"{ran.session.first.quality.min:.4f}"
+    click(ran, changes.UNDEFORMED)
+    assert (ran.session.shown, ran.session.view.frame) == (2, 0)
+    assert tree.currentItem() is first
+    enabled = {name for name, button in panel(ran).buttons.items() if button.isEnabled()}
+    assert enabled == {"compare", "copy", "export"}
+    QTest.keyClick(tree, Qt.Key.Key_F2)
+    assert editor(ran) is None
+    assert not actions(ran, changes.UNDEFORMED)["Rename\tF2"].isEnabled()
+    assert not actions(ran, changes.UNDEFORMED)["Remove"].isEnabled()
+    QTest.keyClick(tree, Qt.Key.Key_Down)
+    assert (ran.session.shown, ran.session.view.frame) == (1, 2)
+    click(ran, changes.UNDEFORMED, keys=Qt.KeyboardModifier.ControlModifier)
+    assert ran.session.view.beside == changes.UNDEFORMED
+    assert first.data(RUN, WORDS).startswith("beside · ")
+
+
 def test_runs_of_other_motions_say_which_and_none_is_best(ran):
     (motion, *_), window = ran.session.case.motions, ran.window
     window.store.change(changes.set_case, motions=(replace(motion, angle_deg=-2.5),), steps=1)
@@ -287,7 +308,7 @@ def test_settings_are_put_back_and_undo_does_that_and_removing_a_run_again(ran):
     ran.window.actions_.by_name["undo"].trigger()
     assert ran.session.run(2).frames is frames
     assert ran.session.shown == 2
-    assert panel(ran).tree.topLevelItemCount() == 2
+    assert panel(ran).tree.topLevelItemCount() == 3
 
 
 def test_the_menu_removes_shows_beside_and_saves(ran, answers, tmp_path):
@@ -305,7 +326,7 @@ def test_the_menu_removes_shows_beside_and_saves(ran, answers, tmp_path):
     actions(ran, 1)["Remove"].trigger()
     assert [run.number for run in ran.session.runs] == [2]
     assert ran.session.shown == 2
-    assert panel(ran).tree.topLevelItemCount() == 1
+    assert panel(ran).tree.topLevelItemCount() == 2
 
 
 def test_the_table_is_exported_and_copied_or_it_is_told_why_not(ran, answers, tmp_path):

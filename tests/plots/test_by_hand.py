@@ -152,9 +152,24 @@ def test_a_vtu_file_has_the_displacement(square, tmp_path, vector):
             "PERIODIC_MODE= moving needs a sliding method: set SLIDING_MODE= ps or ds",
             (
                 "Periodicity “periodic, moving vertices” needs a sliding method: set Sliding "
-                "“pseudo sliding” or ds"
+                "“pseudo sliding” or “direct sliding”"
             ),
         ),
+        (
+            (
+                "gaussian is too smooth: use a RBF_KERNEL such as wendland-c0, a smaller "
+                "INFLUENCE_FACTOR or RBF_KERNEL= ctps-c2a"
+            ),
+            (
+                "Gaussian (global) is too smooth: use a Kernel such as CP C0 (compact), a "
+                "smaller Support radius or Kernel “CTPS C2a (compact)”"
+            ),
+        ),
+        (
+            "with PERIODIC_MODE= moving (or fixed) they do",
+            "with Periodicity “periodic, moving vertices” (or “periodic, fixed vertices”) they do",
+        ),
+        ("STEPS= auto or less", "Steps “automatic” or less"),
         ("MARKER_MOVING= (a, b) does not have it", "the role “moving” (a, b) does not have it"),
         ("use more STEPS, or METHOD= rbf", "use more Steps, or Method “RBF interpolation”"),
         ("use DATA_REDUCTION= YES, or", "use Data reduction “on”, or"),

@@ -81,7 +81,8 @@ def test_a_run_is_described_in_a_line_and_in_full(runs):
     assert brief(first).startswith(f"moving vertices · 2 steps · {nodes[0]} nodes · ")
     assert brief(second).startswith(f"fixed vertices · 1 step · {nodes[1]} nodes · ")
     other = replace(second, case=second.case.change(kernel="gaussian", periodic="none"))
-    assert brief(other).startswith("1 step · gaussian · ")
+    assert brief(other).startswith("1 step · Gaussian · ")
+    assert "kernel: Gaussian (global)" in described(other)
     text = described(second)
     assert all(f"{column.title}: " in text for column in COLUMNS if column.title != "name")
     assert "name" not in text

@@ -74,6 +74,9 @@ def test_several_motions_are_told_in_their_order():
     both = moved(Rotate("blade", 5.0), Translate("blade", (0.0, 0.05)))
     assert motion_labels([both, BASE])[0] == "rotate +5° + translate y +0.05"
     assert motion_labels([both, moved()])[1] == "no motion"
+    # What is the same in all would push the difference out of a narrow list.
+    other = moved(Rotate("blade", 5.0), Translate("blade", (0.0, 0.04)))
+    assert motion_labels([both, other]) == ["translate y +0.05", "translate y +0.04"]
 
 
 def test_the_boundary_is_named_where_several_move():
@@ -153,8 +156,8 @@ def test_the_names_of_views_tell_runs_apart(square):
         Run(2, moved(Rotate("blade", -5.0)), frames, "done", name="back"),
     )
     titles = choices(replace(session, runs=runs))
-    assert titles[1].startswith("Run 1: no sliding · rotate +5° · ")
-    assert titles[2].startswith("Run 2: back · no sliding · rotate -5° · ")
+    assert titles[1].startswith("Run 1: rotate +5° · no sliding · ")
+    assert titles[2].startswith("Run 2: back · rotate -5° · no sliding · ")
 
 
 def test_a_motion_in_full():

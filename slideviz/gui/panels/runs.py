@@ -56,37 +56,49 @@ class RunsPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
-        """Fill the list from the session; skipped if no run and no choice of runs changed."""
+        """Fill the list from the session; playing only selects another row."""
         key = (session.runs, session.shown, session.view.beside)
-        if key == self._drawn:
-            return
-        self._drawn = key
         with QSignalBlocker(self.tree):
-            self._fill(session)
+            if key != self._drawn:
+                self._drawn = key
+                self._fill(session)
+            self._select(session)
         self.empty.setVisible(not session.runs)
         self.tree.setVisible(bool(session.runs))
         self.actions_.sync(session)
 
+    def _select(self, session: Session) -> None:
+        """Select the row of the shown run, or that of the undeformed mesh at step 0."""
+        numbers = [run.number for run in session.runs]
+        place = -1
+        if session.shown in numbers:
+            place = 1 + numbers.index(session.shown) if session.view.frame else 0
+        index = self.tree.model().index(place, 0)
+        if index != self.tree.currentIndex():
+            self.tree.setCurrentIndex(index)
+
     def _fill(self, session: Session) -> None:
         tree, runs = self.tree, session.runs
-        while tree.topLevelItemCount() > len(runs):
+        count = len(runs) + 1 if runs else 0
+        while tree.topLevelItemCount() > count:
             tree.takeTopLevelItem(tree.topLevelItemCount() - 1)
-        while tree.topLevelItemCount() < len(runs):
+        while tree.topLevelItemCount() < count:
             item = QTreeWidgetItem()
             item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable)
             tree.addTopLevelItem(item)
         champions = best(runs)
-        for place, run in enumerate(runs):
+        for place, run in enumerate((None, *runs) if runs else ()):
             row = tree.topLevelItem(place)
             assert row is not None
-            self._sync_row(row, run, session, run.number in champions)
-        shown = next((place for place, run in enumerate(runs) if run.number == session.shown), None)
-        index = tree.model().index(-1 if shown is None else shown, 0)
-        tree.setCurrentIndex(index)
+            self._sync_row(row, run, session, run is not None and run.number in champions)
 
-    def _sync_row(self, item: QTreeWidgetItem, run: Run, session: Session, champion: bool) -> None:
-        last = run.last
-        texts = [f"{run.number}  {run_words(run)}", "–", "–", "–"]
+    def _sync_row(
+        self, item: QTreeWidgetItem, run: Run | None, session: Session, champion: bool
+    ) -> None:
+        """Fill the row of a run; None: of the undeformed mesh."""
+        number = changes.UNDEFORMED if run is None else run.number
+        last = session.frames[0] if run is None else run.last
+        texts = ["Undeformed" if run is None else f"{number}  {run_words(run)}", "–", "–", "–"]
         if last is not None:
             quality = last.quality
             texts[1:] = (
@@ -94,8 +106,9 @@ class RunsPanel(Panel):
                 format(quality.mean, QUALITY),
                 f"{quality.inverted:,}",
             )
-        beside = run.number == session.view.beside
-        tip = described(run)
+        beside = number == session.view.beside
+        tip = "The mesh before it is deformed." if run is None else described(run)
+        words = "step 0 of each run" if run is None else brief(run, session.runs)
         if champion:
             tip += "\n\nIts minimum quality is the highest of the runs with the same motion."
         for column, text in enumerate(texts):
@@ -106,16 +119,16 @@ class RunsPanel(Panel):
         font = item.font(MIN)
         font.setBold(champion)
         item.setFont(MIN, font)
-        item.setData(RUN, NUMBER, run.number)
-        item.setData(RUN, NAME, run.name)
-        item.setData(RUN, WORDS, ("beside · " if beside else "") + brief(run, session.runs))
+        item.setData(RUN, NUMBER, number)
+        item.setData(RUN, NAME, "" if run is None else run.name)
+        item.setData(RUN, WORDS, ("beside · " if beside else "") + words)
         item.setIcon(RUN, icon("beside") if beside else QIcon())
 
     # Widgets to state ------------------------------------------------------------------
 
     def _chosen(self, item: QTreeWidgetItem | None, _before: object = None) -> None:
         if item is not None:
-            self.store.change(changes.show_run, item.data(RUN, NUMBER))
+            self.actions_.show(item.data(RUN, NUMBER))
 
     def _double_clicked(self) -> None:
         """Show the run beside the one shown before the double click, or end that comparison."""

@@ -22,6 +22,8 @@ from slideviz.session.state import Session
 from slideviz.session.store import Store
 
 TABLE_FILTERS = "Table (*.csv)"
+OF_ALL = ("copy", "export")
+"""Commands for all runs, whichever row is selected."""
 
 
 class RunActions:
@@ -59,31 +61,32 @@ class RunActions:
         return tool_button(tip, image="beside", text="Compare", menu=menu)
 
     def sync(self, session: Session) -> None:
-        """Enable the buttons of the actions that the shown run allows."""
+        """Enable the buttons of the actions that the shown run allows, or the undeformed mesh."""
         run = session.run_shown
         self.buttons["compare"].setEnabled(run is not None and run.last is not None)
         for command in filter(None, RUN_COMMANDS):
             able = run is not None and command.enabled(run)
-            self.buttons[command.name].setEnabled(able)
+            selected = command.name in OF_ALL or self.tree.number != changes.UNDEFORMED
+            self.buttons[command.name].setEnabled(able and selected)
 
     def menu(self, number: int) -> QMenu:
         """Return the menu of a run."""
         session, menu = self.store.session, QMenu(self.panel)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         run = session.run(number)
-        assert run is not None
         # A right click selects no row: the menu's first line names its run.
-        menu.addAction(f"Run {number}: {run_words(run)}").setEnabled(False)
+        title = "Undeformed mesh" if run is None else f"Run {number}: {run_words(run)}"
+        menu.addAction(title).setEnabled(False)
         menu.addSeparator()
         beside = session.view.beside == number
         for text, can, function in (
-            ("Show", True, lambda: self.store.change(changes.show_run, number)),
+            ("Show", True, lambda: self.show(number)),
             (
                 "End the comparison" if beside else f"Show beside run {session.shown}",
                 beside or number != session.shown,
                 lambda: self.show_beside(number),
             ),
-            ("Rename\tF2", True, lambda: self.tree.edit_name(number)),
+            ("Rename\tF2", run is not None, lambda: self.tree.edit_name(number)),
         ):
             menu.addAction(text, function).setEnabled(can)
         for command in RUN_COMMANDS:
@@ -91,8 +94,15 @@ class RunActions:
                 menu.addSeparator()
                 continue
             act = menu.addAction(command.title, self._doing(command, number))
-            act.setEnabled(command.enabled(run))
+            act.setEnabled(command.name in OF_ALL or (run is not None and command.enabled(run)))
         return menu
+
+    def show(self, number: int) -> None:
+        """Show the last step of a run, or the undeformed mesh."""
+        if number == changes.UNDEFORMED:
+            self.store.change(changes.show_frame, 0)
+        else:
+            self.store.change(changes.show_run, number)
 
     def _doing(self, command: Command, number: int) -> Callable[[], object]:
         return lambda: command.do(self, number)

@@ -28,7 +28,8 @@ RUN, MIN, MEAN, INVERTED = range(4)
 
 NUMBER = Qt.ItemDataRole.UserRole
 WORDS, NAME = NUMBER + 1, NUMBER + 2
-"""Item data roles of column `RUN`: the run's number, the row's second line, the run's own name."""
+"""Item data roles of column `RUN`: the run's number (0: the undeformed mesh), the row's second
+line, the run's own name."""
 
 PAD = 4
 """Space around the text of a row, in pixels."""
@@ -79,8 +80,8 @@ class _FirstLine(QStyledItemDelegate):
     def createEditor(  # type: ignore[override]  # Qt takes None, too
         self, parent: QWidget, _option: QStyleOptionViewItem, index: ModelIndex
     ) -> QLineEdit | None:
-        if index.column() != RUN:
-            return None
+        if index.column() != RUN or not index.data(NUMBER):
+            return None  # the undeformed mesh has no name of its own
         editor = QLineEdit(parent)
         editor.setPlaceholderText(f"Name of run {index.data(NUMBER)}")
         return editor
