@@ -6,23 +6,6 @@ The command line and the window show it as it is.
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
-from functools import wraps
-from os import PathLike
-from typing import ParamSpec, TypeVar
-
-P = ParamSpec("P")
-Result = TypeVar("Result")
-FILE = (str, PathLike)
-"""The types of the name of a file."""
-_NEEDED = {
-    "Case": "a Case, as slideviz.Case.read returns it",
-    "Mesh": "a Mesh, as slideviz.read returns it",
-    "str": "the name of a file",
-    "Executor": "an executor of concurrent.futures",
-}
-
 
 class SlidevizError(Exception):
     """An error that the user can correct; the base of all others."""
@@ -79,40 +62,3 @@ class Note(str):
     """
 
     __slots__ = ()
-
-
-def takes(**kinds: type | tuple[type, ...]) -> Callable[[Callable[P, Result]], Callable[P, Result]]:
-    """Return a decorator: the function raises ArgumentError for arguments of other types.
-
-    Parameters
-    ----------
-    **kinds : type or tuple of type
-        The types allowed for an argument, by its name; None is allowed where it is the default.
-    """
-
-    def checked(function: Callable[P, Result]) -> Callable[P, Result]:
-        wanted = inspect.signature(function).parameters
-        called = f"{function.__qualname__.removesuffix('.__init__')}({', '.join(kinds)})"
-
-        @wraps(function)
-        def call(*given: P.args, **named: P.kwargs) -> Result:
-            for name, value in (*zip(wanted, given, strict=False), *named.items()):
-                kind = kinds.get(name, object)
-                if isinstance(value, kind) or (value is None and wanted[name].default is None):
-                    continue
-                raise ArgumentError(f"{called}: {name} is {_said(value)}; needed is {_words(kind)}")
-            return function(*given, **named)
-
-        return call
-
-    return checked
-
-
-def _said(value: object) -> str:
-    """Return a wrong argument in words: its value if that is short, else its type."""
-    is_short = isinstance(value, str | int | float | None) and len(repr(value)) <= 60
-    return repr(value) if is_short else f"of type {type(value).__name__}"
-
-
-def _words(kind: type | tuple[type, ...]) -> str:
-    return _NEEDED[(kind if isinstance(kind, type) else kind[0]).__name__]

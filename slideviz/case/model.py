@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.argument_types import check_fields, check_types
 from slideviz.case.reduction import AUTO, Reduction, require_chosen
 from slideviz.case.words import nearest, not_one_of
-from slideviz.errors import FILE, CaseError, takes
+from slideviz.errors import CaseError
 from slideviz.mesh.model import frozen_array
 from slideviz.terms import (
     FFD_BLENDINGS,
@@ -46,6 +47,9 @@ class Translate:
     marker: Target
     vector: tuple[float, ...]
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
 
 @dataclass(frozen=True)
 class Rotate:
@@ -60,6 +64,9 @@ class Rotate:
     point: Point = "centroid"
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
 
 @dataclass(frozen=True)
 class Scale:
@@ -68,6 +75,9 @@ class Scale:
     marker: Target
     factors: tuple[float, ...]
     point: Point = "centroid"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -84,6 +94,9 @@ class Radial:
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     point: tuple[float, ...] = (0.0, 0.0, 0.0)
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
 
 @dataclass(frozen=True)
 class FromFile:
@@ -96,6 +109,7 @@ class FromFile:
     marker: Target = ""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         object.__setattr__(self, "path", Path(self.path))
 
 
@@ -114,6 +128,9 @@ class Ffd:
     index: tuple[int, int, int]
     vector: tuple[float, float, float]
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
@@ -127,6 +144,7 @@ class Prescribed:
     marker: Target = ""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         nodes = frozen_array(self.nodes, np.int64)
         vectors = frozen_array(self.vectors, np.float64)
         if nodes.ndim != 1 or vectors.ndim != 2 or len(nodes) != len(vectors):
@@ -140,6 +158,7 @@ class Prescribed:
         object.__setattr__(self, "vectors", vectors)
 
 
+_ROLES = 'a role for each marker, as {"blade": "moving"}'
 Motion = Translate | Rotate | Scale | Radial | Ffd | FromFile | Prescribed
 
 
@@ -151,14 +170,6 @@ def named(target: Target) -> tuple[str, ...]:
 def moves(motion: Motion, marker: str) -> bool:
     """Return whether a motion moves the moving marker ``marker``."""
     return not motion.marker or marker in named(motion.marker)
-
-
-_KINDS = (
-    ("roles", Mapping, 'a role for each marker, as {"blade": "moving"}'),
-    ("motions", tuple | list, "a tuple of motions"),
-    ("reduction", Reduction | None, "a Reduction, or None for all boundary nodes"),
-)
-"""Fields of a case with the types that are allowed, and words for these in messages."""
 
 
 @dataclass(frozen=True)
@@ -205,8 +216,8 @@ class Case:
     mesh_format: FileFormat | None = field(default=None, metadata=FILE_FORMATS)
     mesh_out_format: FileFormat | None = field(default=None, metadata=FILE_FORMATS)
     zone: int | None = None
-    roles: Mapping[str, Role] = field(default_factory=dict)
-    motions: tuple[Motion, ...] = ()
+    roles: Annotated[Mapping[str, Role], _ROLES] = field(default_factory=dict)
+    motions: Annotated[tuple[Motion, ...], "a tuple of motions, as Translate(...)"] = ()
     ffd_boxes: tuple[tuple[str, tuple[float, ...]], ...] = ()
     ffd_degrees: tuple[tuple[int, int, int], ...] = ()
     ffd_blending: FfdBlending = field(default="BEZIER", metadata=FFD_BLENDINGS)
@@ -220,9 +231,9 @@ class Case:
     direction: int | None = None
     feature_angle_deg: float = 40.0
     curved: bool = False
-    steps: int = 1
+    steps: Annotated[int, 'a whole number, or "auto"'] = 1
     steps_gain: float = 0.02
-    influence_factor: float = 0.0
+    influence_factor: Annotated[float, 'a number, or "auto"'] = 0.0
     support_radius: float | None = None
     kernel: str = field(default="wendland-c2", metadata=KERNELS)
     reduction: Reduction | None = AUTO
@@ -235,22 +246,17 @@ class Case:
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        for name in ("steps", "influence_factor"):
+            if str(getattr(self, name)).lower() == "auto":  # as in a case file
+                object.__setattr__(self, name, 0)
+        check_fields(self)
         require_chosen(self)
-        for name, kind, needed in _KINDS:
-            if not isinstance(value := getattr(self, name), kind):
-                raise CaseError(f"{name} is {value!r}; needed is {needed}")
         for marker, role in self.roles.items():
             if role not in ROLES:
                 raise CaseError(f"roles: {marker!r}: {not_one_of(role, ROLES)}")
-        for motion in self.motions:
-            if not isinstance(motion, Motion):
-                raise CaseError(f"motions: {motion!r} is none, as Translate(...) is")
-        object.__setattr__(self, "motions", tuple(self.motions))
-        for name, number in (("steps", "a whole number"), ("influence_factor", "a number")):
-            if isinstance(given := getattr(self, name), str):
-                if given.lower() != "auto":  # as in a case file
-                    raise CaseError(f'{name} is {given!r}; needed is {number}, or "auto"')
-                object.__setattr__(self, name, 0)
+        for name in ("mesh_file", "mesh_out", "source"):
+            if (path := getattr(self, name)) is not None:
+                object.__setattr__(self, name, Path(path))
 
     def change(self, **values: Any) -> Case:
         """Return the case with other values of some fields.
@@ -259,6 +265,8 @@ class Case:
         ------
         CaseError
             A case has no such field, or it cannot have such a value.
+        ArgumentError
+            A value is of another type.
         """
         names = [each.name for each in fields(self)]
         for name in values:
@@ -279,7 +287,7 @@ class Case:
         return found | dict.fromkeys(files, "a displacement file")
 
     @classmethod
-    @takes(path=FILE)
+    @check_types
     def read(cls, path: str | Path) -> Case:
         """Return the case that a ``.cfg`` file describes.
 
@@ -292,7 +300,7 @@ class Case:
 
         return read_case(Path(path))
 
-    @takes(path=FILE)
+    @check_types
     def write(self, path: str | Path) -> None:
         """Write the ``.cfg`` file, with paths relative to its folder."""
         from slideviz.case.cfg import write_case

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING
 
+from slideviz.argument_types import check_fields
 from slideviz.case.words import not_one_of
 from slideviz.errors import CaseError
 from slideviz.terms import LEVEL_CRITERIA, SELECTIONS, LevelCriterion, Selection
@@ -70,6 +71,7 @@ class Reduction:
     auto: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self)
         require_chosen(self)
 
 

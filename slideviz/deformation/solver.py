@@ -10,11 +10,12 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from slideviz.argument_types import check_types
 from slideviz.case.model import Case
 from slideviz.deformation.setup import Setup, make_setup
 from slideviz.deformation.stepping import Stepping, renumbered
 from slideviz.deformation.steps import Progress, Step, Trial
-from slideviz.errors import DeformError, UnsoundError, takes
+from slideviz.errors import DeformError, UnsoundError
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
@@ -30,7 +31,7 @@ ELASTIC_BYTES = {2: 2_000, 3: 8_000}
 quadrilaterals and hexahedra, whose matrix has the most entries."""
 
 
-@takes(case=Case, mesh=Mesh)
+@check_types
 def deform(
     case: Case,
     mesh: Mesh,

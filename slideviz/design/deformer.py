@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from slideviz.argument_types import check_types
 from slideviz.case import motion
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, Translate
@@ -24,7 +25,7 @@ from slideviz.design.frozen.loops import to_points
 from slideviz.design.frozen.step import FrozenStep, StepState
 from slideviz.design.frozen.tape import Array, Tape, Variable, value
 from slideviz.design.given import given_input
-from slideviz.errors import CaseError, DeformError, takes
+from slideviz.errors import CaseError, DeformError
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 from slideviz.rbf.images import FAR
 
@@ -85,7 +86,7 @@ class Deformer:
     array([0.  , 0.28, 0.5 ])
     """
 
-    @takes(mesh=Mesh, case=Case)
+    @check_types
     def __init__(
         self,
         mesh: Mesh,
@@ -153,6 +154,7 @@ class Deformer:
         if not warn_of_doubt(self._steps, np.max([state.doubt for state in states], axis=0)):
             warn_of_condition(self._steps)
 
+    @check_types
     def deform(self, displacement: FloatArray | None = None) -> FloatArray:
         """Return the deformed points, (n, d), or (k, n, d) of k designs.
 
@@ -183,6 +185,7 @@ class Deformer:
         warn_of_errors(errors, self._checks.tolerance(given), reduced=reduced)
         return points
 
+    @check_types
     def max_error(self, displacement: FloatArray) -> float | FloatArray:
         """Return the largest error at boundary nodes: a float, or (k,) of k designs.
 
@@ -193,6 +196,7 @@ class Deformer:
         found = self._deformed(self._checked(displacement, "displacement"))[1]
         return float(found) if found.ndim == 0 else found
 
+    @check_types
     def jvp(self, displacement: FloatArray, direction: FloatArray) -> FloatArray:
         """Return the derivative of the points in a direction, (n, d), or in several, (k, n, d).
 
@@ -206,6 +210,7 @@ class Deformer:
         _, start, end = self._taped(displacement)
         return np.array(start.tape.push(start, self._checked(direction, "direction"), end))
 
+    @check_types
     def vjp(self, displacement: FloatArray, weights: FloatArray) -> FloatArray:
         """Return the gradient of ``(weights * points).sum()``, (m, d), or of several, (k, m, d).
 
@@ -228,6 +233,7 @@ class Deformer:
         """
         return self._as_run
 
+    @check_types
     def refresh(self, displacement: FloatArray) -> Deformer:
         """Return a deformer that is made anew with another displacement, (m, d) or (k, m, d)."""
         return Deformer(self.mesh, self.case, displacement)
@@ -244,10 +250,7 @@ class Deformer:
         CaseError
             They have another shape, or numbers that are not finite.
         """
-        try:
-            out = np.asarray(vectors, np.float64)
-        except (TypeError, ValueError) as problem:
-            raise CaseError(f"{name} is no table of numbers: {problem}") from problem
+        out = np.asarray(vectors, np.float64)
         if out.shape[-2:] != shape or out.ndim not in (2, 3):
             raise CaseError(
                 f"{name} has the shape {out.shape}; needed is {shape}, a row for each node, or "

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from slideviz.argument_types import check_fields, check_types
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS, SIZES
 
@@ -74,7 +75,11 @@ class Cells:
     offsets: IntArray
     connectivity: IntArray
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
     @classmethod
+    @check_types
     def from_types(cls, types: ArrayLike, connectivity: ArrayLike) -> Cells:
         """Return cells from VTK identifiers (m,) and the flat connectivity (k,).
 
@@ -97,6 +102,7 @@ class Cells:
         return cls(ids, sealed(offsets), flat)
 
     @classmethod
+    @check_types
     def from_blocks(cls, blocks: Iterable[tuple[int, ArrayLike]]) -> Cells:
         """Return cells from ``(vtk, connectivity (m, n))`` blocks, in that order."""
         types, flats = [np.empty(0, np.uint8)], [np.empty(0, np.int64)]
@@ -161,6 +167,9 @@ class Marker:
 
     name: str
     cells: Cells
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     @property
     def nodes(self) -> IntArray:
@@ -253,6 +262,7 @@ class Mesh:
     part: Part | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self)
         object.__setattr__(self, "points", frozen_array(self.points, np.float64))
         if self.points.ndim != 2 or self.points.shape[1] not in (2, 3):
             raise MeshError(f"points have shape {self.points.shape}; needed is (n, 2) or (n, 3)")
@@ -308,6 +318,7 @@ class Mesh:
         """Return the number that a cell has in its file, for messages."""
         return cell if self.part is None else int(self.part.cells[cell])
 
+    @check_types
     def with_points(self, points: ArrayLike) -> Mesh:
         """Return the same mesh with other ``points`` (n, d).
 

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.errors import CaseError, MeshError, takes
+from slideviz.argument_types import check_types
+from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.check import check_size
 from slideviz.mesh.jacobians import (
     CORNERS,
@@ -115,16 +116,19 @@ class Quality:
         """Return the number of cells with a status, without those of the halo."""
         return int(np.count_nonzero(self.status[self.counted] == status))
 
+    @check_types
     def worst(self, n: int) -> IntArray:
         """Return the ids of the ``n`` cells of lowest value, worst first, ties by id."""
         ids = np.arange(len(self))[self.counted]
         return ids[np.argsort(self.values[ids], kind="stable")[: max(n, 0)]]
 
+    @check_types
     def inverted_cells(self, n: int | None = None) -> IntArray:
         """Return the ids, ascending, of the (first ``n``) inverted cells, without the halo's."""
         found = self.status == INVERTED
         return np.flatnonzero(found if self.halo is None else found & ~self.halo)[:n]
 
+    @check_types
     def histogram(self, bins: int = 20) -> tuple[IntArray, FloatArray]:
         """Return the counts (bins,) and the edges (bins + 1,) of equal bins over 0 to 1."""
         counts, edges = np.histogram(self.values[self.counted], bins, range=(0.0, 1.0))
@@ -146,7 +150,7 @@ class Quality:
         return numbers
 
 
-@takes(mesh=Mesh, reference=Mesh)
+@check_types
 def quality(
     mesh: Mesh,
     reference: Mesh | None = None,

@@ -10,7 +10,7 @@ from slideviz.case.key import METHOD, REDUCTION, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Translate
 from slideviz.case.reduction import Reduction
-from slideviz.errors import CaseError
+from slideviz.errors import ArgumentError, CaseError
 from slideviz.rbf.kernels import KERNELS
 from tests import builders
 from tests.slow import one_of_each_fast
@@ -104,7 +104,7 @@ def test_a_program_is_told_of_absurd_steps_and_names():
     assert case.change(steps="auto").steps == Case(steps="AUTO").steps == 0
     with pytest.raises(CaseError, match="a case has no 'stepz'; did you mean steps"):
         case.change(stepz=3)
-    with pytest.raises(CaseError, match="steps is 'many'; needed is a whole number"):
+    with pytest.raises(ArgumentError, match="steps is 'many'; needed is a whole number"):
         case.change(steps="many")
 
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from slideviz.case.lines import listed, read_text
 from slideviz.case.model import Case
@@ -36,7 +36,10 @@ class Designs:
     rows: tuple[Design, ...]
 
 
-Table = str | Path | Sequence[Mapping[str, Any]] | Mapping[str, Sequence[Any]] | Designs
+Table = Annotated[
+    str | Path | Sequence[Mapping[str, Any]] | Mapping[str, Sequence[Any]] | Designs,
+    "the name of a CSV file, a sequence of designs, or a mapping of names to sequences of values",
+]
 """The path of a CSV file; a sequence of designs, each by column names; a mapping of columns; or
 what `read_designs` returned."""
 

@@ -9,13 +9,14 @@ from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
+from slideviz.argument_types import check_types
 from slideviz.case.model import Case, Ffd, FromFile
 from slideviz.design.sweeps.designs import Design, Table, read_designs
 from slideviz.design.sweeps.processes import Processes, usable_cores
 from slideviz.design.sweeps.results import SweepResults, sources_of
 from slideviz.design.sweeps.row import DesignRow
 from slideviz.design.sweeps.worker import Answer, Packed, Task, packed, work
-from slideviz.errors import CaseError, DeformError, takes
+from slideviz.errors import CaseError, DeformError
 from slideviz.mesh.io.files import read, usual_ending
 from slideviz.mesh.model import Mesh, Origin
 
@@ -26,7 +27,7 @@ _EVERY = 0.2
 """Seconds between two calls of ``going_on``."""
 
 
-@takes(case=Case, designs=object, executor=Executor, mesh=Mesh)
+@check_types
 def sweep(
     case: Case,
     designs: Table,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from slideviz.errors import FILE, takes
+from slideviz.argument_types import check_types
 from slideviz.mesh.check import path_error
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.files import read, write
@@ -20,7 +20,7 @@ _ZONED = {".su2": "su2", ".su2b": "su2b"}
 """Formats with several zones, by file name ending."""
 
 
-@takes(source=FILE, target=FILE)
+@check_types
 def convert(
     source: str | Path,
     target: str | Path,

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from slideviz.errors import FILE, MeshError, takes
+from slideviz.argument_types import check_types
+from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh, path_error
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.file_checks import require_ordinary
@@ -29,7 +30,7 @@ _UNSURE = ("", ".txt", ".dat", ".mesh", ".grid")
 _NDIME = re.compile(rb"^\s*NDIME\s*=", re.IGNORECASE | re.MULTILINE)
 
 
-@takes(path=FILE)
+@check_types
 def read(
     path: str | Path,
     zone: int | None = None,
@@ -114,7 +115,7 @@ def usual_ending(mesh: Mesh) -> str:
     return mesh.origin.ending or ".su2"
 
 
-@takes(path=FILE, mesh=Mesh)
+@check_types
 def write(
     path: str | Path,
     mesh: Mesh,
