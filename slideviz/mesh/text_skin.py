@@ -34,6 +34,7 @@ def skin_of_text(text: Text, path: Path, tick: Tick, ranks: Alone = ALONE) -> Me
         zone=zone.bounds.number,
         zones=zone.bounds.zones,
         source=text.path.resolve(),
+        remarks=zone.remarks,
         origin=Origin(ffd=text.boxes(), ffd_at=zone.ffd_at, ffd_elsewhere=text.boxes_elsewhere),
     )
 

@@ -109,7 +109,8 @@ def odd_mesh(path, kind, zones=1):
     """Write a mesh with boxes, comments, tabs, elements without index and other ways of numbers."""
     mesh = grid((5, 4, 4), kind=kind)
     sv.write(path, mesh)
-    lines = path.read_text().replace("MARKER_TAG= x_p", "MARKER_TAG=   x_p % out").splitlines()
+    text = path.read_text().replace("MARKER_TAG= x_p", "MARKER_TAG=   x_p % out")
+    lines = text.replace("MARKER_TAG= y_m", "MarkerTag=y_m").splitlines()
     at = lines.index(f"NPOIN= {len(mesh.points)}")
     for k in range(3, at, 7):
         lines[k] = "\t" + lines[k].rpartition(" ")[0] + " % no index"

@@ -41,9 +41,9 @@ FAULTS = {
     "misspelt": ("NELEM= 3\n", "NELEMS= 3\n", 20, "has no line NELEM="),
     "misspelt tag": (
         "MARKER_TAG= lower",
-        "MARKERTAG= lower",
+        "MARKER_TAGS= lower",
         15,
-        r"MARKER_ELEMS= has no MARKER_TAG= before it; line 14 has MARKERTAG=, did you mean MARKER",
+        r"MARKER_ELEMS= has no MARKER_TAG= before it; line 14 has MARKER_TAGS=, did you mean MARKE",
     ),
     "misspelt second tag": (
         "MARKER_TAG= upper",

@@ -7,6 +7,7 @@ import pytest
 from su2_samples import MESSY, SAMPLES, SOLID, SQUARE, ZONES, assert_same, bits, save
 
 import slideviz.mesh.io.su2.scan as su2_scan
+from slideviz.deformation.given_mesh import given_mesh
 from slideviz.mesh.check import unused_nodes
 from slideviz.mesh.io.files import read
 from slideviz.mesh.io.su2.write import su2_blocks
@@ -108,6 +109,18 @@ def test_no_markers_and_empty_markers(tmp_path):
     mesh = read(save(tmp_path, bare + "NMARK= 1\nMARKER_TAG= none\nMARKER_ELEMS= 0\n"))
     assert mesh.marker_names == ("none",)
     assert len(mesh.markers[0].cells) == 0
+
+
+def test_another_spelling_that_su2_reads_is_read_with_a_remark(tmp_path):
+    text = SQUARE.replace("MARKER_TAG= upper", "MARKERTAG= upper")
+    path = save(tmp_path, text)
+    mesh = read(path)
+    assert_same(mesh, read(save(tmp_path, SQUARE, "usual.su2")))
+    (remark,) = mesh.remarks
+    assert remark == "line 18 has MARKERTAG=, which is read as MARKER_TAG="
+    with given_mesh(path, None, lambda _: None, tmp_path) as given:
+        assert given.skin(lambda _: None).remarks == mesh.remarks
+    assert b"".join(su2_blocks(mesh)) == text.encode()
 
 
 def test_ending_does_not_matter_for_a_file_with_keywords(tmp_path):

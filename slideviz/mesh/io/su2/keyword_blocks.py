@@ -17,6 +17,8 @@ _COUNT = re.compile(rb"\+?\d{1,18}")
 """The value of a key that counts."""
 KNOWN = ("NZONE", "IZONE", "NDIME", "NELEM", "NPOIN", "NMARK", "MARKER_TAG", "MARKER_ELEMS")
 """Keys of the sections that slideviz reads; all others are copied as they are."""
+ALIASES = {"MARKERTAG": "MARKER_TAG"}
+"""Other spellings of keys that SU2 reads."""
 
 
 def is_ffd(text: bytes) -> bool:
@@ -28,13 +30,15 @@ def is_ffd(text: bytes) -> bool:
 class KeywordBlock:
     """A section: key (in capitals) and value, its keyword line, and the next one ``stop``.
 
-    For the last section ``stop`` is the number of lines of the file.
+    For the last section ``stop`` is the number of lines of the file. ``spelt`` is the key as the
+    file has it (in capitals), which `ALIASES` may have.
     """
 
     key: str
     value: bytes
     line: int
     stop: int
+    spelt: str = ""
 
 
 @dataclass(frozen=True)
@@ -53,9 +57,13 @@ def find_blocks(lines: Lines) -> list[KeywordBlock]:
     for index in lines.firsts[:-1][lines.kinds == KEYWORD].tolist():
         key, _, value = lines.line(index).partition(b"=")
         if _KEY.fullmatch(key.strip()):
-            heads.append((key.strip().decode().upper(), value.strip(), index))
-    stops = [line for _, _, line in heads] + [len(lines)]
-    return [KeywordBlock(*head, stop) for head, stop in zip(heads, stops[1:], strict=True)]
+            spelt = key.strip().decode().upper()
+            heads.append((ALIASES.get(spelt, spelt), value.strip(), index, spelt))
+    stops = [line for _, _, line, _ in heads] + [len(lines)]
+    return [
+        KeywordBlock(key, value, line, stop, spelt)
+        for (key, value, line, spelt), stop in zip(heads, stops[1:], strict=True)
+    ]
 
 
 def find_bounds(lines: Lines, sections: list[KeywordBlock], number: int | None) -> Bounds:

@@ -109,7 +109,7 @@ def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
         source=raw.path.resolve(),
     )
     halo, remarks = find_halo(lines, found, mesh)
-    return replace(mesh, halo=halo, remarks=remarks)
+    return replace(mesh, halo=halo, remarks=(*found.remarks, *remarks))
 
 
 def _shares(sizes: list[int], progress: Progress) -> list[Progress]:

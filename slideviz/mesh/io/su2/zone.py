@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.mesh.io.su2.keyword_blocks import (
+    ALIASES,
     KNOWN,
     Bounds,
     KeywordBlock,
@@ -130,6 +131,8 @@ class TextZone:
         The ``SEND_RECEIVE`` markers, which list donors and receivers of a halo.
     unknown : tuple of KeywordBlock
         The unknown sections.
+    remarks : tuple of str
+        Sentences on what is unusual.
     """
 
     bounds: Bounds
@@ -139,6 +142,7 @@ class TextZone:
     markers: tuple[MarkerRows, ...]
     sends: tuple[SendRows, ...]
     unknown: tuple[KeywordBlock, ...]
+    remarks: tuple[str, ...] = ()
 
     @property
     def ffd_at(self) -> tuple[range, ...]:
@@ -200,6 +204,11 @@ class _Walk:
             markers=markers,
             sends=sends,
             unknown=unknown,
+            remarks=tuple(
+                f"line {part.line + 1} has {part.spelt}=, which is read as {part.key}="
+                for part in self.sections
+                if part.spelt in ALIASES
+            ),
         )
 
     def _only(self, key: str) -> KeywordBlock:
