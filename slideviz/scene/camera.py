@@ -244,12 +244,15 @@ class Camera:
         corners = (np.stack(np.meshgrid(*box), -1).reshape(-1, 3) for box in boxes)
         return [to_display(self.stage.plotter, one) for one in corners]
 
-    def loses_some(self) -> bool:
-        """Return whether a point of a data set is outside the view, or behind the legend."""
+    def loses_some(self, clouds: Iterable[FloatArray] = ()) -> bool:
+        """Return whether a point of a data set is outside the view, or behind the legend.
+
+        ``clouds`` are further arrays of points (n, 3).
+        """
         width, height = self.stage.plotter.window_size
         free = np.array([width - self.stage.strip(), height])
-        for shape in self._shapes():
-            seen = to_display(self.stage.plotter, np.asarray(shape.points))
+        for points in chain((np.asarray(shape.points) for shape in self._shapes()), clouds):
+            seen = to_display(self.stage.plotter, points)
             if (seen < 0).any() or (seen > free).any():
                 return True
         return False

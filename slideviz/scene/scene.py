@@ -206,13 +206,17 @@ class Scene:
         assert mesh is not None
         self.camera.turn(view.towards, view.up, True)
         if view.detail is None:
-            self.camera.fit(padded(self._cells.points(one)) for one in meshes)
+            self.camera.fit(self.clouds(meshes))
             return
         width, height = self.plotter.window_size
         free = max(width - self.stage.strip(), 1.0)
         half = view.detail.width / min(free, 1.3 * height) * height / 2.0
         self.camera.shift()
         self.camera.aim(padded(np.array([view.detail.centre]))[0], half, 2.0 * mesh.extent)
+
+    def clouds(self, meshes: Iterable[Mesh]) -> Iterator[FloatArray]:
+        """Yield the points (n, 3) of the mesh that are drawn, in states of the mesh."""
+        return (padded(self._cells.points(one)) for one in meshes)
 
     def fit(self, names: Sequence[str] = ()) -> None:
         """Fit everything drawn, or the named boundaries, to the view; the direction stays."""

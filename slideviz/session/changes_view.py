@@ -148,7 +148,7 @@ def followed(index: int | None, old: Sequence[Section], new: Sequence[Section]) 
 
 def mark_cell(session: Session, cell: int | None) -> Session:
     """Return the session with a cell marked; None: none."""
-    return set_view(session, marked_cell=cell)
+    return set_view(session, marked_cell=cell, marked_in=session.shown)
 
 
 def fresh_view(session: Session, old: ViewState) -> Session:

@@ -52,6 +52,8 @@ class ViewState:
         The number of the frame that is shown; 0 is the undeformed mesh.
     marked_cell : int or None
         The number of the cell that is marked, as of ``StepFrame.place_of``.
+    marked_in : int or None
+        The run that was shown when it was marked; None for none.
     beside : int or None
         The number of a run shown in a second view beside the first; 0 is the undeformed mesh.
     swapped : bool
@@ -76,6 +78,7 @@ class ViewState:
     selected: tuple[str, ...] = ()
     frame: int = 0
     marked_cell: int | None = None
+    marked_in: int | None = None
     beside: int | None = None
     swapped: bool = False
     ranges: tuple[tuple[ColourBy, tuple[float, float]], ...] = ()
@@ -94,6 +97,7 @@ class ViewState:
             selected=self.selected,
             frame=self.frame,
             marked_cell=self.marked_cell,
+            marked_in=self.marked_in,
             beside=self.beside,
             swapped=self.swapped,
         )
@@ -237,6 +241,12 @@ class Session:
         """Return the last step of the run that is shown, or None."""
         run = self.run_shown
         return run.last if run is not None else None
+
+    @property
+    def marked_here(self) -> bool:
+        """Return whether a cell is marked since it was looked at in a run that is shown now."""
+        view = self.view
+        return view.marked_cell is not None and view.marked_in in (self.shown, view.beside)
 
     @property
     def unsaved_mesh(self) -> bool:

@@ -23,3 +23,8 @@ def test_a_run_that_moves_the_mesh_leaves_it_in_the_view(driver, passage_file, z
     assert window.store.session.deformed is not None
     assert np.allclose(window.scene.camera.place, before) == zoomed
     assert zoomed or window.scene.camera.sees_all()
+    if not zoomed:
+        # And so does playing the steps.
+        for step in range(len(window.store.session.frames)):
+            window.store.change(changes.show_frame, step)
+            assert not window.scene.camera.loses_some()

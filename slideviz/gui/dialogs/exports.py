@@ -96,6 +96,7 @@ class Exports(QObject):
                 edges="edges" in shown.drawn,
                 fill=renderer.fills,
                 letters=LETTERS * size[0] / size[1] / 1.6,
+                marked=renderer.session.marked_here,
             )
             copy_image(to_image(renderer.image(options)))
         self.window.say(f"Copied a picture of {size[0]} × {size[1]} pixels")

@@ -200,8 +200,10 @@ class PictureDialog(QDialog):
         kept.update(
             preset=self.size_choice.currentData(), text=self.text.currentData(), paper=numbers
         )
-        # These two depend on the present view.
+        # These depend on the present view.
         del kept["fill"], kept["both"]
+        if not self.renderer.session.marked_here:
+            del kept["marked"]
         return json.dumps(kept)
 
     def _take(self, kept: str) -> None:
@@ -221,6 +223,9 @@ class PictureDialog(QDialog):
         self.dpi.setValue(round(dpi))
         for name, box in self.options.items():
             box.setChecked(bool(known.get(name, getattr(usual, name))))
+        # A cell that was marked in another run is of no interest here, unless it is asked for.
+        if not self.renderer.session.marked_here:
+            self.options["marked"].setChecked(False)
         self.background.show_value(known.get("background", usual.background))
         self.text.setCurrentIndex(1)
         self.text.show_value(known.get("text", 1.0))

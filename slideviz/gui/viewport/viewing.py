@@ -282,16 +282,21 @@ class Viewing(QWidget):
         self.render()
 
     def refit(self) -> None:
-        """Fit the mesh again if a step moved it out of a view.
+        """Fit all steps of a run to the view if the mesh moved out of it.
 
-        A camera that is still fitted is fitted again as soon as a part of the mesh is out of view,
-        another one only if all of it is. Otherwise the camera stays: a jump would look like a
-        motion of the mesh.
+        A camera that is still fitted is fitted again as soon as a part of any step is out of view,
+        another one only if all of the shown step is. Otherwise the camera stays: a jump would look
+        like a motion of the mesh.
         """
+        meshes, leader = [frame.mesh for frame in self.store.session.frames], self._leader
+        fitted = leader.camera.fitted
         cameras = [scene.camera for scene in self._scenes()]
-        fitted = self._leader.camera.fitted
-        if any(one.loses_some() if fitted else one.loses_all() for one in cameras):
-            self.fit()
+        if any(
+            one.loses_some(leader.clouds(meshes)) if fitted else one.loses_all() for one in cameras
+        ):
+            self._before = None
+            leader.camera.fit(leader.clouds(meshes))
+            self.render()
 
     def fly_to(self, cell: int) -> None:
         """Fly the camera to a cell of the shown mesh; `fly_back` returns."""
