@@ -35,8 +35,11 @@ def _groups(text: str) -> list[list[Word]]:
 
 def _read_definition(text: str) -> tuple[Definition, ...]:
     found = []
-    for group in _groups(text):
+    groups = _groups(text)
+    for group in groups:
         name, *corners = group
+        if group is groups[-1]:  # what is after the last box, SU2 passes over
+            corners = _without_zeros(corners)
         if len(corners) != NUMBERS or name.is_number:
             raise CaseError(
                 f"box {shown(name.text)} has {len(corners)} numbers; needed are its name and "
@@ -48,6 +51,13 @@ def _read_definition(text: str) -> tuple[Definition, ...]:
         if names.count(box) > 1:
             raise CaseError(f"box {box!r} is defined twice; rename one")
     return tuple(found)
+
+
+def _without_zeros(words: list[Word]) -> list[Word]:
+    """Return the numbers of a box without zeros that are too many."""
+    extra = words[NUMBERS:]
+    harmless = all(word.is_number and not number(word.text) for word in extra)
+    return words[:NUMBERS] if harmless else words
 
 
 def _write_definition(boxes: tuple[Definition, ...]) -> str:

@@ -586,6 +586,49 @@ def test_command_passes_over_a_boundary_and_is_that_without_it(here, capsys):
     assert said in capsys.readouterr().err
 
 
+def test_internal_boundaries_of_su2_are_passed_over_where_the_mesh_lacks_them(here):
+    from slideviz.design.su2.markers import on_mesh
+
+    text = "DV_KIND= SCALE\nDV_VALUE= 1.1\nMARKER_INTERNAL= (left, core)\n"
+    found = on_mesh(config(text), sv.read("mesh.su2"))
+    assert dict(found.case.roles) == {"low": "moving", "left": "internal"}
+    (warning,) = found.case.warnings
+    assert warning.startswith("a.cfg: MARKER_INTERNAL: mesh.su2 has no marker 'core': passed over,")
+    text = "DV_KIND= SCALE\nDV_VALUE= 1.1\nMARKER_DEFORM_MESH_INTERNAL= (left)\n"
+    assert config(text).case.roles["left"] == "internal"
+
+
+def test_set_replaces_lists_of_boundaries(here, capsys):
+    text = "DV_KIND= TRANSLATION\nDV_PARAM= (0, 1, 0)\nDV_VALUE= 0.05\n"
+    config(f"{text}MARKER_SLIDING= (lfet, right)\n")
+    assert run(["def", "a.cfg", "-q"]) == 1
+    assert "no marker 'lfet'" in capsys.readouterr().err
+    call = ["def", "a.cfg", "-q", "--json", "a.json", "--set"]
+    assert run([*call, "MARKER_SLIDING=(left, right)"]) == 0
+    expected = Path("out.su2").read_bytes()
+    config(f"{text}MARKER_SYM= (left, right)\n")
+    # A second list adds to SU2's, as it would in the file.
+    assert run([*call, "MARKER_SLIDING=(left)"]) == 0
+    assert Path("out.su2").read_bytes() == expected
+    assert json.loads(Path("a.json").read_text())["node_counts"]["sliding_edge"] == 10
+    for given, said in (
+        ("MARKER_MOVING=(high)", "--set MARKER_MOVING=(high): DV_MARKER says what moves here; se"),
+        ("MOTION=(low, scale, 2)", "a.cfg: MOTION: belongs into a case file (slideviz run); here"),
+    ):
+        assert run([*call, given]) == 1
+        assert said in capsys.readouterr().err
+
+
+def test_zeros_after_the_last_box_are_passed_over_as_in_su2(here):
+    more = BOXED.replace(")\nFFD_DEGREE", ", 0.0, 0)\nFFD_DEGREE")
+    kind = "DV_KIND= FFD_CONTROL_POINT_2D\nDV_PARAM= (BOX, 1, 0, 0, 1)\nDV_VALUE= 0.1\n"
+    np.testing.assert_array_equal(
+        surface(more + kind).displacement, surface(BOXED + kind).displacement
+    )
+    with pytest.raises(CaseError, match="FFD_DEFINITION: box 'BOX' has 25 numbers; needed are"):
+        config(BOXED.replace(")\nFFD_DEGREE", ", 3)\nFFD_DEGREE") + kind)
+
+
 def test_without_dv_marker_some_of_the_deformed_boundaries_may_be_missing(here, capsys):
     rest = "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nDV_KIND= SCALE\nDV_VALUE= 1.1\n"
     Path("a.cfg").write_text(f"{rest}MARKER_DEFORM_MESH= (low, flap)\n")
@@ -714,8 +757,29 @@ def test_mistyped_keys_of_our_own_are_told_though_shorter_or_given_besides(row, 
     assert config(text).case.warnings == (f"a.cfg:8: {key} is not read; did you mean {meant}?",)
 
 
+@pytest.mark.parametrize(
+    ("key", "meant"),
+    [
+        ("MARKER_SYMM", "MARKER_SYM"),
+        ("DV_VALEU", "DV_VALUE"),
+        ("DV_PARM", "DV_PARAM"),
+        ("DVMARKER", "DV_MARKER"),
+        ("MESH_FILENANE", "MESH_FILENAME"),
+    ],
+)
+def test_keys_with_one_wrong_letter_are_told_beside_the_right_ones(key, meant, here):
+    text = f"DV_KIND= SCALE\nDV_PARAM= (1.0)\nDV_VALUE= 1.1\nMARKER_SYM= (left)\n{key}= (high)\n"
+    found = config(text)
+    assert found.case.warnings == (f"a.cfg:9: {key} is not read; did you mean {meant}?",)
+    assert found.ignored == (key,)
+
+
 def test_keys_that_su2_has_are_not_taken_for_mistyped_ones(here):
     keys = [
+        "DEFORM_COEFF",
+        "DEFORM_MESH",
+        "KIND_RADIAL_BASIS_FUNCTION",
+        "FFD_TOLERANCE",
         "CONV_FILENAME",
         "DV_VALUE_NEW",
         "GAMMA_VALUE",

@@ -14,7 +14,14 @@ from slideviz.design.su2.surface import make_surface
 from slideviz.errors import CaseError
 from slideviz.mesh.topology import find_boundary, vertex_normals
 from tests.builders import airfoil, cube, sphere_in_box
-from tests.design.test_su2_dot import differences, gradient, values_text, write_csv, written
+from tests.design.test_su2_dot import (
+    differences,
+    gradient,
+    unpacked,
+    values_text,
+    write_csv,
+    written,
+)
 from tests.oracles import airfoils
 
 HEAD = "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nDV_MARKER= (NAMES)\n"
@@ -334,3 +341,88 @@ def test_lines_of_rotations_in_3d_are_their_own_though_su2_mixes_them(here):
     found = surface(ball(), ("sphere",), text)
     said = "SU2 turns all ROTATION about lines through the z0 of the first variable; here each"
     assert any(one.startswith(said) for one in found.warnings)
+
+
+def test_radial_functions_of_su2_are_used(here, capsys):
+    """SU2's own test case, which needs 26 control nodes there."""
+    unpacked("naca0012_inv.su2")
+    Path("a.cfg").write_text(
+        "MARKER_EULER= ( airfoil )\nMARKER_FAR= ( farfield )\nDV_KIND= HICKS_HENNE\n"
+        "DV_MARKER= ( airfoil )\nDV_PARAM= ( 1, 0.5 )\nDV_VALUE= 0.1\nDEFORM_KIND= RBF\n"
+        "RADIAL_BASIS_FUNCTION_PARAMETER= 2\nRBF_DATA_REDUCTION= YES\nRBF_GREEDY_TOLERANCE= 1E-3\n"
+        "MESH_FILENAME= naca0012_inv.su2\nMESH_OUT_FILENAME= out.su2\n"
+    )
+    assert run(["def", "a.cfg", "-q", "--json", "a.json"]) == 0
+    report = json.loads(Path("a.json").read_text())
+    assert report["control_nodes"][-1] <= 26
+    assert report["design"]["ignored"] == ["MARKER_EULER", "MARKER_FAR"]
+    mesh, moved = sv.read("naca0012_inv.su2"), sv.read("out.su2")
+    for node, shift in airfoils.displaced(mesh, ("airfoil",), "HICKS_HENNE", (1, 0.5), 0.1).items():
+        np.testing.assert_allclose(moved.points[node], mesh.points[node] + shift, atol=1e-15)
+
+
+RADIAL = {
+    "DEFORM_KIND= RBF\nRADIAL_BASIS_FUNCTION_PARAMETER= 2": {"support_radius": 2.0},
+    "RADIAL_BASIS_FUNCTION_PARAMETER= 2": {"support_radius": None},
+    "DEFORM_KIND= RBF\nRADIAL_BASIS_FUNCTION_PARAMETER= 2\nSUPPORT_RADIUS= 3": {
+        "support_radius": 3.0
+    },
+    "DEFORM_KIND= RBF\nKIND_RADIAL_BASIS_FUNCTION= MULTI_QUADRIC\n"
+    "RADIAL_BASIS_FUNCTION_PARAMETER= 0.5": {"kernel": "multiquadric", "support_radius": 10.0},
+    "DEFORM_KIND= RBF\nKIND_RADIAL_BASIS_FUNCTION= GAUSSIAN\nRBF_KERNEL= wendland-c4": {
+        "kernel": "wendland-c4"
+    },
+    "DEFORM_KIND= RBF\nDEFORM_NONLINEAR_ITER= 4": {"steps": 4},
+    "DEFORM_NONLINEAR_ITER= 4": {"steps": 1},
+    "RBF_DATA_REDUCTION= NO": {"reduction": None},
+    "RBF_DATA_REDUCTION= YES\nRBF_GREEDY_TOLERANCE= 1e-5\nRBF_GREEDY_CORRECTION_FACTOR= 30": {
+        "reduction": sv.Reduction(tolerance=1e-5, gamma=30.0, selection="one")
+    },
+    "RBF_GREEDY_TOLERANCE= 1e-5\nDATA_REDUCTION= NO": {"reduction": None},
+}
+
+
+@pytest.mark.parametrize("text", RADIAL)
+def test_settings_of_radial_functions_are_those_of_su2(text, here):
+    Path("a.cfg").write_text(f"{HEAD}DV_KIND= SCALE\nDV_VALUE= 1.1\n{text}\n")
+    found = read_config(Path("a.cfg"))
+    assert {name: getattr(found.case, name) for name in RADIAL[text]} == RADIAL[text]
+    used = "DEFORM_KIND" in text or "RBF_" in text
+    assert found.ignored == (() if used else (text.partition("=")[0],))
+
+
+def test_multiquadrics_of_su2_and_ours_are_proportional(here):
+    from slideviz.rbf.kernels import KERNELS
+
+    Path("a.cfg").write_text(
+        f"{HEAD}DV_KIND= SCALE\nDV_VALUE= 1\nDEFORM_KIND= RBF\nRADIAL_BASIS_FUNCTION_PARAMETER= 3\n"
+        "KIND_RADIAL_BASIS_FUNCTION= INV_MULTI_QUADRIC\n"
+    )
+    case = read_config(Path("a.cfg")).case
+    distance = np.linspace(0.0, 9.0, 7)
+    expected = 1.0 / np.sqrt(1.0 + (distance / 3.0) ** 2)
+    np.testing.assert_allclose(KERNELS[case.kernel](distance / case.support_radius), expected)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("DEFORM_KIND= SPRING", r"a.cfg:6: DEFORM_KIND: 'SPRING' is not one of ELASTIC \| RBF"),
+        ("DEFORM_KIND= RBF\nRADIAL_BASIS_FUNCTION_PARAMETER= -1", "FUNCTION_PARAMETER: -1 is out"),
+        ("RBF_GREEDY_TOLERANCE= x", "RBF_GREEDY_TOLERANCE: 'x' is not a number"),
+        (
+            "DEFORM_KIND= RBF\nKIND_RADIAL_BASIS_FUNCTION= CUBIC",
+            r"KIND_RADIAL_BASIS_FUNCTION: 'CUBIC' is not one of WENDLAND_C2 \| ",
+        ),
+    ],
+)
+def test_wrong_settings_of_radial_functions_are_told(text, message, here):
+    Path("a.cfg").write_text(f"{HEAD}DV_KIND= SCALE\nDV_VALUE= 1.1\n{text}\n")
+    with pytest.raises(CaseError, match=message):
+        read_config(Path("a.cfg"))
+
+
+def test_elasticity_that_su2_is_asked_for_is_noted(here):
+    Path("a.cfg").write_text(f"{HEAD}DV_KIND= SCALE\nDV_VALUE= 1.1\nDEFORM_KIND= ELASTIC\n")
+    (said,) = read_config(Path("a.cfg")).case.warnings
+    assert said.startswith("DEFORM_KIND= ELASTIC: radial functions move the mesh all the same; wr")

@@ -15,11 +15,14 @@ from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, require_no_mesh
 from slideviz.case.model import Case
 from slideviz.case.words import list_of, nearest, not_one_of, shown
+from slideviz.design.su2.radial import FUNCTION, READ_WITH_RBF, radial_keys, radial_settings
 from slideviz.design.su2.variables import DesignVariable, read_variables, supported
 from slideviz.errors import CaseError
 from slideviz.terms import FILE_FORMATS, ROLES, Role
 
 ROLE_KEYS: dict[str, Role] = {
+    "MARKER_INTERNAL": "internal",
+    "MARKER_DEFORM_MESH_INTERNAL": "internal",
     "MARKER_SYM": "sliding",
     "MARKER_DEFORM_MESH_SYM_PLANE": "sliding",
     "MARKER_DEFORM_TANGENTIAL": "sliding",
@@ -59,6 +62,8 @@ OURS = {
     for name, key in KEYS.items()
     if name not in NOT_HERE and (key.group != MOTION or name.startswith("FFD_"))
 }
+ELSEWHERE = ("MOTION", "DEFORMATION_FILENAME")
+"""Keys of case files that a configuration cannot have."""
 SU2_CONTINUITY = "2ND_DERIVATIVE"
 """SU2's default of FFD_CONTINUITY."""
 OWN = {name for name in OURS if not name.startswith(("FFD_", "MARKER_"))}
@@ -111,18 +116,24 @@ class Su2Config:
 
 
 def own_changes(texts: Iterable[str]) -> tuple[dict[str, str], list[str]]:
-    """Return the values of SU2's keys among texts KEY=VALUE, and the texts of slideviz's keys.
+    """Return the values of keys of a configuration among texts KEY=VALUE, and the other texts.
+
+    The first replace those in the file: they are SU2's keys, and lists of boundaries.
 
     Raises
     ------
     CaseError
-        A key is none of them.
+        A key is none of a configuration or of slideviz, or has no meaning here.
     """
-    found, others, known = {}, [], _read_keys()
+    every = {FUNCTION, *READ_WITH_RBF}
+    found, others, known = {}, [], _read_keys() | every
+    listed = {term.key for term in ROLES.values()} | {*ELSEWHERE}
     for text in texts:
         name, sign, value = text.partition("=")
         key = name.strip().upper()
-        if sign and key in known - set(KEYS):
+        if sign and key == "MARKER_MOVING":
+            raise CaseError(f"--set {text}: DV_MARKER says what moves here; set that")
+        if sign and key in (known - set(KEYS)) | listed:
             found[key] = value.strip()
             continue
         if sign and key not in {*known, *KEYS}:
@@ -153,9 +164,9 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
     rows |= {key: Entry(key, value, 0) for key, value in (changes or {}).items()}
     reader = _Reader(rows, problems)
     case, markers = reader.case()
-    notes: list[str] = []
+    notes = reader.warnings
     variables = read_variables(rows, problems, notes)
-    ignored = tuple(key for key in rows if key not in _read_keys())
+    ignored = tuple(key for key in rows if key not in _read_keys(rows))
     files = {key: Path(reader.word(key, default)) for key, default in FILES.items()}
     words = {key: reader.word(key, default) for key, default in WORDS.items()}
     reader.check(words)
@@ -174,18 +185,31 @@ def _perhaps_ours(path: Path, ignored: tuple[str, ...], rows: dict[str, Entry]) 
     """Return a warning for each ignored key that resembles one that is read."""
     found = []
     for key in ignored:
-        close = get_close_matches(key, OWN, n=1, cutoff=ALIKE_OWN) or get_close_matches(
-            key, _read_keys() - set(rows), n=1, cutoff=ALIKE
+        close = (
+            get_close_matches(key, OWN, n=1, cutoff=ALIKE_OWN)
+            or get_close_matches(key, _read_keys() - set(rows), n=1, cutoff=ALIKE)
+            or sorted(other for other in _read_keys() if _one_letter_off(key, other))
         )
         if close:
             found.append(f"{path}:{rows[key].line}: {key} is not read; did you mean {close[0]}?")
     return found
 
 
-def _read_keys() -> set[str]:
-    """Return the names of all keys that are read."""
+def _one_letter_off(one: str, other: str) -> bool:
+    """Return whether a letter is wrong, missing or too many in a word, or two are swapped."""
+    short, long = sorted((one, other), key=len)
+    apart = (k for k, letters in enumerate(zip(short, long, strict=False)) if len({*letters}) > 1)
+    at = next(apart, len(short))
+    if len(long) > len(short):
+        return short[at:] == long[at + 1 :]
+    swapped = long[at : at + 2] == short[at : at + 2][::-1] and long[at + 2 :] == short[at + 2 :]
+    return swapped or long[at + 1 :] == short[at + 1 :]
+
+
+def _read_keys(rows: Mapping[str, Entry] | None = None) -> set[str]:
+    """Return the names of all keys that are read, of a configuration if it is given."""
     formats = {"MESH_FORMAT", "MESH_OUT_FORMAT"}
-    return {*OURS, *ROLE_KEYS, *FILES, *WORDS, *LISTS, *formats}
+    return {*OURS, *ROLE_KEYS, *FILES, *WORDS, *LISTS, *formats, *radial_keys(rows or {})}
 
 
 def _with_ending(path: Path, case: Case) -> Path:
@@ -199,6 +223,7 @@ class _Reader:
     def __init__(self, rows: dict[str, Entry], problems: list[Problem]) -> None:
         self.rows, self.problems = rows, problems
         self.named: dict[str, str] = {}
+        self.warnings: list[str] = []
 
     def word(self, key: str, default: str) -> str:
         """Return the value of a key, without quotes."""
@@ -237,6 +262,7 @@ class _Reader:
                 case = row.put(case, row.kind.read(entry.value))
             except CaseError as problem:
                 self.note(entry, str(problem))
+        case = radial_settings(case, self.rows, self.note, self.warnings)
         mover = "DV_MARKER" if self.names("DV_MARKER") else "MARKER_DEFORM_MESH"
         moving = self.names(mover)
         self.named |= {name: ROLES[role].key for name, role in case.roles.items()}
@@ -276,7 +302,7 @@ class _Reader:
                 listed = ", ".join(filter(None, allowed))
                 said = f"{shown(words[key])} is not supported; supported: {listed}"
                 self.note(self.rows[key], said)
-        for key in ("MOTION", "DEFORMATION_FILENAME"):
+        for key in ELSEWHERE:
             if key in self.rows:
                 said = "belongs into a case file (slideviz run); here DV_KIND says what moves"
                 self.note(self.rows[key], said)
