@@ -139,12 +139,7 @@ class ExactFit:
             factors = [factor.lower for factor in self._factors.values()]
             with enough_threads(20.0 * max(len(lower) for lower in factors) ** 2):
                 return condition(*factors)
-        if self._rows is None:
-            return 1.0
-        place = self._problem.features[:, self._rows.nodes], self._rows.normals
-        return saddle_condition(
-            matrix(self._problem.basis, place), row_terms(self._problem, self._rows)
-        )
+        return 1.0 if self._rows is None else condition_with_terms(self._problem, self._rows)
 
 
 def parts(rows: ConstraintRows) -> list[IntArray]:
@@ -194,6 +189,12 @@ def saddle_fit(problem: Problem, rows: ConstraintRows) -> tuple[Interpolant, boo
     solved = solve_saddle(matrix(problem.basis, place), row_terms(problem, rows), rows.right)
     d = problem.values.shape[1]
     return gathered(rows, solved.weights, solved.tail.reshape(-1, d)), solved.rank_deficient
+
+
+def condition_with_terms(problem: Problem, rows: ConstraintRows) -> float:
+    """Return the condition number of the system of ``rows`` with the polynomial."""
+    place = problem.features[:, rows.nodes], rows.normals
+    return saddle_condition(matrix(problem.basis, place), row_terms(problem, rows))
 
 
 def saddle_doubt(problem: Problem, rows: ConstraintRows, found: Interpolant) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import matrix
-from slideviz.rbf.exact import gathered, row_names, saddle_fit
+from slideviz.rbf.exact import condition_with_terms, gathered, row_names, saddle_fit
 from slideviz.rbf.kernels import KERNELS, PLAIN
 from slideviz.rbf.problem import Interpolant, Problem
 from slideviz.rbf.selection import favour, newton
@@ -176,11 +176,15 @@ class GreedyLevel:
             return right
         return right - self._among.values(self._problem, self.settled)
 
-    def solve(self, target: FloatArray) -> None:
-        """Make ``now`` meet the target (r, m) in the chosen rows."""
+    def _rows(self, target: FloatArray) -> ConstraintRows:
+        """Return the chosen rows, with their data from the target (r, m)."""
         all_, chosen = self._among.rows, self.chosen
         normals = None if all_.normals is None else all_.normals[chosen]
-        rows = ConstraintRows(all_.nodes[chosen], normals, target[chosen])
+        return ConstraintRows(all_.nodes[chosen], normals, target[chosen])
+
+    def solve(self, target: FloatArray) -> None:
+        """Make ``now`` meet the target (r, m) in the chosen rows."""
+        rows = self._rows(target)
         if self._tailed:
             found, self.singular = saddle_fit(self._problem, rows)
         else:
@@ -188,7 +192,7 @@ class GreedyLevel:
             for factor in self._grown:
                 weights[factor.turn] = factor.weights()
             found = gathered(rows, weights)
-        self.now = replace(found, levels=(row_names(all_)[chosen],))
+        self.now = replace(found, levels=(row_names(self._among.rows)[self.chosen],))
 
     def pick(
         self,
@@ -280,6 +284,8 @@ class GreedyLevel:
 
     def condition(self) -> float:
         """Return an estimate of the condition number of the system of all blocks."""
+        if self._tailed:
+            return condition_with_terms(self._problem, self._rows(self._among.rows.right))
         factors = [factor.lower for factor in self._grown]
         with enough_threads(20.0 * max(len(lower) for lower in factors) ** 2):
             return condition(*factors)

@@ -134,6 +134,13 @@ def bent_passage():
     return mesh, roles, motions(mesh, "blade")
 
 
+def pushed_inflow():
+    """Along the axis at the reference: there no direction of a wall has more than one block."""
+    mesh = builders.passage((3, 4, 4), 60.0)
+    roles = dict.fromkeys(mesh.marker_names, "sliding") | {"inflow": "moving"}
+    return mesh, roles, (Translate("inflow", (0.0, 0.0, 0.05)),)
+
+
 def on_axis():
     mesh = builders.wedge(6)
     roles = {"BLOCK": "moving", "outer": "sliding", "per1": "periodic", "per2": "periodic"}
@@ -146,7 +153,7 @@ def plate():
     return mesh, roles, (Translate("", (0.03, 0.04)), Rotate(("below", "above"), 8.0))
 
 
-SHAPES = {f.__name__: f for f in (annulus, sphere, bent_passage, on_axis, plate)}
+SHAPES = {f.__name__: f for f in (annulus, sphere, bent_passage, pushed_inflow, on_axis, plate)}
 
 
 @pytest.mark.parametrize("reduction", [None, REDUCED], ids=["exact", "reduced"])
@@ -161,7 +168,7 @@ def test_curved_boundaries_nodes_on_the_axis_and_coinciding_ones(shape, sliding,
     check(case, mesh)
 
 
-@pytest.mark.parametrize("shape", ["annulus", "sphere", "bent_passage"])
+@pytest.mark.parametrize("shape", ["annulus", "sphere", "bent_passage", "pushed_inflow"])
 def test_curved_boundaries_in_several_steps(shape):
     mesh, roles, motion = SHAPES[shape]()
     check(Case(roles=roles, motions=motion, sliding="ds", steps=3), mesh)

@@ -8,15 +8,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import slideviz as sv
-from slideviz.case.model import Case
+from slideviz.case.model import Case, Translate
 from slideviz.case.reduction import Reduction
 from slideviz.rbf import exact, level
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import Basis, matrix
+from slideviz.rbf.exact import ExactFit
+from slideviz.rbf.greedy import GreedyFit
 from slideviz.rbf.level import GrowingFactor
 from slideviz.rbf.selection import newton
 from slideviz.rbf.solve import NOTHING, extend, factorise
 from slideviz.samples.table import write_sample
+from tests import builders
 from tests.slow import one_of_each_fast
 
 
@@ -87,6 +90,41 @@ def test_blocks_change_no_result(tmp_path, monkeypatch, name, periodic, reductio
         assert one.control_nodes == other.control_nodes
         # An estimate from below, with random vectors: better for the smaller systems.
         assert 0.5 < one.condition / other.condition < 5
+
+
+@pytest.mark.parametrize("kernel", ["wendland-c2", "thin-plate"])
+@pytest.mark.parametrize("reduction", [None, Reduction(tolerance=1e-3)], ids=["exact", "reduced"])
+@pytest.mark.parametrize("angle_deg", [0.0, 20.0], ids=["blocks", "slanted"])
+def test_the_condition_number_is_that_of_the_dense_system(
+    monkeypatch, angle_deg, reduction, kernel
+):
+    """With all rows of direct sliding, and the polynomial; an estimate is a lower bound."""
+    mesh = builders.square(6)
+    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
+    mesh = mesh.with_points(mesh.points @ np.array([[c, s], [-s, c]]))
+    roles = dict.fromkeys(mesh.marker_names, "sliding") | {"BLOCK": "moving"}
+    motion = (Translate("BLOCK", (0.05, 0.02)),)
+    case = Case(roles=roles, motions=motion, sliding="ds", reduction=reduction, kernel=kernel)
+    dense: list[float] = []
+
+    def seen(fit):
+        problem, rows = fit._problem, fit._rows if reduction is None else fit._among.rows
+        chosen = slice(None) if reduction is None else fit._level.chosen
+        features, normals = problem.features[:, rows.nodes[chosen]], rows.normals[chosen]
+        system = matrix(problem.basis, (features, normals))
+        if kernel == "thin-plate":
+            terms = [[1.0, *x] for x in features[:2].T]
+            tail = np.stack([np.outer(t, n).ravel() for t, n in zip(terms, normals, strict=True)])
+            system = np.block([[system, tail], [tail.T, np.zeros((6, 6))]])
+        dense.append(np.linalg.cond(system, 1))
+        return ask(fit)
+
+    fit = ExactFit if reduction is None else GreedyFit
+    ask = fit.condition
+    monkeypatch.setattr(fit, "condition", seen)
+    (step,) = sv.deform(case, mesh)
+    assert dense
+    assert 0.7 * dense[-1] < step.condition < 1.001 * dense[-1]
 
 
 def test_slanted_walls_are_solved_together(tmp_path, monkeypatch):

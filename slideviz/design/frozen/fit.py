@@ -235,7 +235,7 @@ class FrozenFit:
             self._factors[level] = index, factor
             every = np.arange(len(index))
             return self._measured([every], [factor], (place, None), f"{stage} system {level}"), 0
-        blocks = self._chosen(
+        blocks = self._fixed(
             f"{stage} blocks {level}",
             lambda: parts(ConstraintRows(rows.nodes, normals, np.empty((0, 1)))),
         )
