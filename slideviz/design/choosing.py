@@ -10,13 +10,16 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.deformation.setup import Setup, elastic_body, idw_weights
-from slideviz.deformation.solver import Progress, all_steps, require_memory
+from slideviz.deformation.solver import Progress, all_steps, free_memory, require_memory
 from slideviz.deformation.stepping import Stepping, cartesian, followed, moved_by, one_step
 from slideviz.design.frozen.step import FrozenStep
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.problem import Lag, Levels, Problem, Solution, Watch
 
 Tell = Callable[[Progress], None]
+
+BYTES = 64
+"""Free memory for each entry of a factor, above which factors are kept for further calls."""
 
 
 def choose_steps(
@@ -54,6 +57,8 @@ def choose_steps(
         ]
     weights = idw_weights(case, mesh.dim) if case.method == "idw" else None
     body = elastic_body(mesh, kept.frame, kept.axis) if case.method == "elastic" else None
+    rows = [len(level) for found in solutions for levels in found.stages for level in levels]
+    reuse = BYTES * sum(n**2 for n in rows) < free_memory()
     steps = tuple(
         FrozenStep(
             setup=kept,
@@ -68,6 +73,7 @@ def choose_steps(
             doubt=solution.doubt,
             weights=weights,
             body=body,
+            reuse=reuse,
         )
         for k, (part, solution) in enumerate(zip(parts, solutions, strict=True))
     )

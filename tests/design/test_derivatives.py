@@ -13,6 +13,7 @@ import slideviz as sv
 from slideviz.baselines import multigrid
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.reduction import Reduction
+from slideviz.design.frozen import fit
 from slideviz.design.frozen.interpolation import WAYS
 from slideviz.errors import DeformError
 from slideviz.mesh.axis_frame import axis_basis
@@ -312,3 +313,26 @@ def test_a_step_along_the_gradient_changes_a_real_objective_as_predicted(
     assert change == pytest.approx(predicted, rel=0.02)
     halfway = (deformer.vjp(step / 2, sensitivity) * step).sum()
     assert change == pytest.approx(halfway, rel=1e-4)
+
+
+@pytest.mark.parametrize("sliding", ["ps", "ds"])
+def test_points_and_derivatives_at_one_design_share_its_factors(monkeypatch, sliding):
+    mesh, roles, motion = bent_passage()
+    case = Case(roles=roles, motions=motion, sliding=sliding, steps=3)
+    deformer, other = sv.Deformer(mesh, case), sv.Deformer(mesh, case)
+    design = 1.1 * deformer.displacement
+    weights = np.cos(mesh.points)
+    calls: list[int] = []
+    extend = fit.extend
+    monkeypatch.setattr(fit, "extend", lambda *rest: calls.append(1) or extend(*rest))
+    other.deform(0.9 * design)
+    calls.clear()
+    points = deformer.deform(design)
+    assert len(calls) >= 2
+    calls.clear()
+    forward, back = deformer.jvp(design, design), deformer.vjp(design, weights)
+    assert not calls
+    assert forward.tobytes() == other.jvp(design, design).tobytes()
+    assert calls
+    assert points.tobytes() == other.deform(design).tobytes()
+    assert back.tobytes() == other.vjp(design, weights).tobytes()

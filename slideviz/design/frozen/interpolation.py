@@ -103,7 +103,7 @@ class Interpolation(Method):
             self._features,
             setup.coords.shape[1],
             chosen=self._step.choices,
-            fixed=self._keep,
+            fixed=self._step.factors(value(self._coords)),
             refined=self._step.refined > 0.0,
             checked=setup.reduction is None and self._step.condition > CHECKED,
         )

@@ -106,8 +106,12 @@ class FrozenStep:
         Settings of inverse distance weighting, if that is the method.
     body : Body or None
         The elastic body, if the method is linear elasticity.
+    reuse : bool
+        Whether a later step keeps the factors of the last positions that it began at.
     choices, constants : Kept
         Discrete choices; and, used in the first step only, what depends on positions only.
+    last : Kept
+        The last positions that a later step began at, and its factors there.
     """
 
     setup: Setup
@@ -122,8 +126,25 @@ class FrozenStep:
     doubt: float = 0.0
     weights: Weights | None = None
     body: Body | None = None
+    reuse: bool = False
     choices: Kept = made_by(default_factory=Kept)
     constants: Kept = made_by(default_factory=Kept)
+    last: Kept = made_by(default_factory=Kept)
+
+    def factors(self, coords: FloatArray) -> Kept:
+        """Return the store of the factors of systems at positions ``coords`` (n, d).
+
+        An optimiser asks for points, ``jvp`` and ``vjp`` of one design: factors are most of the
+        work of each.
+        """
+        if self.first:
+            return self.constants
+        at, kept = self.last.things.get("at", (None, Kept()))
+        if at is None or not np.array_equal(at, coords):
+            kept = Kept()
+        if self.reuse:
+            self.last.things["at"] = coords.copy(), kept
+        return kept
 
     def run(self, before: StepState, target: Array) -> StepState:
         """Return the state after this step.
