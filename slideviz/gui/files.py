@@ -83,7 +83,16 @@ class Files(QObject):
             self.open_path(path)
 
     def open_path(self, path: Path, zone: int | None = None) -> None:
-        """Ask about unsaved work, then start the job that opens a mesh or case."""
+        """Ask about unsaved work, then start the job that opens a mesh or case.
+
+        What is no file at all is told without a question.
+        """
+        try:
+            jobs.require_openable(Path(path))
+        except SlidevizError as error:
+            self.window.banner.tell_error(error)
+            log.error("%s", error)
+            return
         if self.ask_about_unsaved(lambda: self.open_path(path, zone)):
             path = Path(path).absolute()
             self.window.running.start_job(

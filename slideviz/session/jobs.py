@@ -13,10 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from slideviz.case.model import Case
-from slideviz.errors import Cancelled, CaseError, SlidevizError
+from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
 from slideviz.mesh.coarse import coarse_surfaces
 from slideviz.mesh.enclosing import enclosing_of
+from slideviz.mesh.io.file_checks import require_ordinary
 from slideviz.mesh.io.private import private_folder
+from slideviz.mesh.io.source import unreadable
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
@@ -66,6 +68,14 @@ class Opened:
     kept: bool = False
     camera: Camera | None = None
     coarse: tuple[Surface, ...] = ()
+
+
+def require_openable(path: Path) -> None:
+    """Raise SlidevizError where a path is no ordinary file, before any question about it."""
+    try:
+        require_ordinary(path, MeshError)
+    except (OSError, ValueError) as problem:
+        raise unreadable(path, problem) from problem
 
 
 def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) -> Opened:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -149,8 +150,7 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
         found.append(Requirement("Nothing moves yet: type how far in the motion.", "motion"))
     for place, motion in enumerate(case.motions):
         if isinstance(motion, FromFile) and not motion.path.is_file():
-            text = f"The displacement file {motion.path} does not exist."
-            found.append(Requirement(text, "motion", motion=place))
+            found.append(Requirement(_lacks_file(motion.path), "motion", motion=place))
     if case.periodic == "moving" and case.sliding == "none":
         text = "Moving periodic vertices need sliding: choose pseudo or direct."
         found.append(Requirement(text, "method"))
@@ -162,6 +162,15 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
     if not found and session.intersection:
         found = [Requirement(session.intersection, "motion")]
     return tuple(found)
+
+
+def _lacks_file(path: Path) -> str:
+    """Return a sentence on a displacement file that is none."""
+    if path == Path():
+        return "A motion lacks its displacement file: choose it."
+    if path.is_dir():
+        return f"{path} is a folder: choose the displacement file in it."
+    return f"The displacement file {path} does not exist."
 
 
 def moves_nothing(motion: Motion) -> bool:

@@ -8,7 +8,7 @@ from qtpy.QtWidgets import QApplication, QToolTip
 
 from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.fields import NumberBox, NumberField, short_text
+from slideviz.gui.widgets.fields import NumberBox, NumberField, TextField, short_text
 from slideviz.gui.widgets.vector_field import VectorField
 
 NONE = Qt.KeyboardModifier.NoModifier
@@ -245,3 +245,24 @@ def test_a_word_for_the_lowest_number_can_be_typed(qtbot):
     box.selectAll()
     QTest.keyClicks(box, "12")
     assert told[-1] == 12
+
+
+@pytest.mark.parametrize("kind", ["text", "number", "whole"])
+def test_ctrl_z_and_ctrl_y_act_on_what_is_typed(driver, kind):
+    """And not on the window, whose last change may be about something that is not seen."""
+    store, window = driver.window.store, driver.window
+    box = {"text": TextField, "number": NumberField, "whole": NumberBox}[kind]()
+    box.setParent(window)
+    box.show()
+    box.setFocus()
+    driver.qtbot.waitUntil(box.hasFocus)
+    edit = box.lineEdit() if kind == "whole" else box
+    edit.selectAll()
+    QTest.keyClicks(box, "7")
+    store.redo = store.undo = lambda: pytest.fail("the window was asked")
+    window.actions_.by_name["redo"].setEnabled(True)
+    window.actions_.by_name["undo"].setEnabled(True)
+    QTest.keyClick(box, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert edit.text() != "7"
+    QTest.keyClick(box, Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier)
+    assert edit.text() == "7"

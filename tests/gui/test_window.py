@@ -799,6 +799,13 @@ def test_what_is_harmless_is_counted_beside_the_button_and_not_over_the_view(rea
     assert ready.window.banner.text.text() == "the solver stopped early"
 
 
+def test_what_is_no_file_is_told_without_a_question_about_unsaved_work(ran, tmp_path):
+    for path, words in ((tmp_path, "this is a folder"), (tmp_path / "no.su2", "no such file")):
+        ran.window.files.open_path(path)
+        assert words in ran.window.banner.text.text()
+        assert not ran.window.runner.busy
+
+
 def test_opening_while_running_cancels_the_run(ready, passage_file, answers):
     answers("ask_unsaved", "discard")
     ready.window.store.change(changes.set_case, steps=2000)

@@ -130,7 +130,7 @@ def test_essence_takes_unnamed_boundaries_as_fixed():
     )
 
 
-def test_what_is_missing_is_told_in_the_order_of_work(session):
+def test_what_is_missing_is_told_in_the_order_of_work(session, tmp_path):
     def first(state):
         found = changes.run_requirements(state)
         return (found[0].text, found[0].place) if found else None
@@ -139,8 +139,12 @@ def test_what_is_missing_is_told_in_the_order_of_work(session):
     assert first(session) == ("No boundary moves: give one the role “moving”.", "boundaries")
     session = changes.set_role(session, ("left",), "moving")
     assert first(session) == ("“left” has no motion: add one.", "motion")
-    wrong = changes.add_motion(session, FromFile(Path("/no/such/file.txt")))
-    assert "does not exist" in first(wrong)[0]
+    for path, words in (
+        (Path("/no/such/file.txt"), "The displacement file /no/such/file.txt does not exist."),
+        (Path(), "A motion lacks its displacement file: choose it."),
+        (tmp_path, f"{tmp_path} is a folder: choose the displacement file in it."),
+    ):
+        assert first(changes.add_motion(session, FromFile(path)))[0] == words
     session = changes.add_motion(session, Rotate("left", 3.0))
     assert first(session) is None
     session = changes.set_role(session, ("bottom", "top"), "periodic")

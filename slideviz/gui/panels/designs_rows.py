@@ -6,7 +6,6 @@ from qtpy.QtCore import Qt
 from qtpy.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
-    QLineEdit,
     QStackedWidget,
     QTableView,
     QWidget,
@@ -16,6 +15,7 @@ from slideviz.case.model import Case
 from slideviz.gui.panels.designs_model import DesignsModel
 from slideviz.gui.widgets.build import Do, hint_label, in_column, in_row, push_button
 from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import TextField
 from slideviz.mesh.model import Mesh
 from slideviz.session.design_table import DesignTable, column_choices
 
@@ -41,7 +41,7 @@ class DesignRows(QWidget):
         super().__init__()
         self._mesh: Mesh | None = None
         self.column = Choice({}, "What varies: a number of a motion, or a setting.", "column")
-        self.values = QLineEdit()
+        self.values = TextField()
         self.values.setObjectName("values")
         self.values.setPlaceholderText(RANGE)
         self.values.setToolTip("A range, as -8 to 0 in 9, or values with commas between them.")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from qtpy.QtWidgets import QFormLayout, QLabel, QLineEdit, QPushButton, QSizePolicy, QWidget
+from qtpy.QtWidgets import QFormLayout, QLabel, QPushButton, QSizePolicy, QWidget
 
 from slideviz.case.model import Ffd, FromFile, Motion, Radial, Rotate, Scale, Target, Translate
 from slideviz.gui.widgets.build import boxed, grow_fields, in_row
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.fields import NumberField, not_zero
+from slideviz.gui.widgets.fields import NumberField, TextField, not_zero
 from slideviz.gui.widgets.vector_field import VectorField, a_direction
 from slideviz.session.motions import Axis
 from slideviz.terms import MOTION_KINDS
@@ -70,7 +70,7 @@ class MotionForm(QWidget):
             names="ijk",
             tip="The control point, counted from 0 along each direction of the box; -1 is all.",
         )
-        self.path = QLineEdit()
+        self.path = TextField()
         self.path.setToolTip("A line for each node: its number and its displacement.")
         self.browse = QPushButton("…")
         self.browse.setMaximumWidth(30)

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from qtpy.QtCore import QLocale, QSignalBlocker, Qt, Signal
+from qtpy.QtCore import QEvent, QLocale, QSignalBlocker, Qt, Signal
 from qtpy.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QValidator, QWheelEvent
 from qtpy.QtWidgets import (
     QApplication,
@@ -51,7 +51,30 @@ def _say_kept(field: QWidget, problem: str, value: str) -> None:
         window.say(f"Not taken: {problem}; the value is still {value}.")
 
 
-class NumberField(QLineEdit):
+def _redoes(field: QLineEdit, event: QEvent) -> bool:
+    """Return whether an event is Ctrl+Y, which does in a field again what was undone there.
+
+    On Linux Qt does so by Ctrl+Shift+Z only, and the window would take Ctrl+Y.
+    """
+    kinds = (QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress)
+    if event.type() not in kinds or not isinstance(event, QKeyEvent):
+        return False
+    if (event.key(), event.modifiers()) != (Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier):
+        return False
+    event.accept()
+    if event.type() == QEvent.Type.KeyPress:
+        field.redo()
+    return True
+
+
+class TextField(QLineEdit):
+    """A field for a text, in which Ctrl+Z and Ctrl+Y act on what is typed."""
+
+    def event(self, event: QEvent) -> bool:
+        return _redoes(self, event) or super().event(event)
+
+
+class NumberField(TextField):
     """A field for a number, typed as such or as an expression, which its value then replaces.
 
     It shows six digits, and all of them while it is edited. An invalid text is marked at once. If
@@ -296,6 +319,9 @@ class NumberBox(QSpinBox):
             with QSignalBlocker(self):
                 self.setValue(self.value())
             self._look()
+
+    def event(self, event: QEvent) -> bool:
+        return _redoes(self.lineEdit(), event) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if self.fault and event.key() == Qt.Key.Key_Escape:
