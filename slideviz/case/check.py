@@ -196,12 +196,11 @@ def _value_problems(case: Case) -> Iterator[str]:
 
 
 def _radius_problems(case: Case, mesh: Mesh) -> Iterator[str]:
-    part = (case.support_radius or mesh.extent) / mesh.extent
-    if not FACTORS[0] < part < FACTORS[1]:
-        low, high = (f"{mesh.extent * factor:g}" for factor in FACTORS)
+    low, high = (mesh.extent * factor for factor in FACTORS)
+    if case.support_radius is not None and not low < case.support_radius < high:
         yield (
             f"SUPPORT_RADIUS: {case.support_radius!r} does not fit {mesh.name}, whose extent is "
-            f"{mesh.extent:g}; needed is a length above {low} and below {high}"
+            f"{mesh.extent:g}; needed is a length above {low:g} and below {high:g}"
         )
 
 

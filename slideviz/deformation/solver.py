@@ -13,7 +13,7 @@ import numpy as np
 from slideviz.argument_types import check_types
 from slideviz.case.model import Case
 from slideviz.deformation.setup import Setup, make_setup
-from slideviz.deformation.stepping import Stepping, renumbered
+from slideviz.deformation.stepping import Stepping, problem_at, renumbered
 from slideviz.deformation.steps import Progress, Step, Trial
 from slideviz.errors import DeformError, UnsoundError
 from slideviz.mesh.model import IntArray, Mesh
@@ -192,14 +192,20 @@ def require_memory(setup: Setup, case: Case) -> None:
 def _systems(setup: Setup, case: Case) -> list[int]:
     """Return the number of unknowns of each dense system whose factors are in memory together.
 
+    At most: parts of the boundary that supports do not connect have systems of their own.
+
     Direct sliding has one system for each axis where normals lie along axes. Where boundaries are
     curved, it solves a further one, for all boundary nodes.
     """
-    counts = setup.classes.counts()
-    known = counts["moving"] + counts["fixed"]
-    nodes = known + counts["sliding_edge"] + counts["sliding_surface"]
-    normals = setup.constraints(setup.coords)[1] if case.sliding == "ds" else ()
-    if not len(normals):
+    goal = setup.coords[setup.known] + setup.target
+    problem = problem_at(setup, setup.coords, goal)
+    label, moves = problem.reach
+    known, nodes = (
+        int(moves[label[setup.same_as[each]]].sum())
+        for each in (problem.known, np.concatenate([problem.known, problem.edge, problem.surface]))
+    )
+    normals = problem.normals[moves[label[setup.same_as[problem.normal_nodes]]]]
+    if case.sliding != "ds" or not len(normals):
         return [nodes]
     dim = setup.coords.shape[1]
     along = np.concatenate([np.eye(dim), normals])

@@ -133,6 +133,24 @@ def sum_rotational(x, c, w, period_over_pi, scale, out):  # type: ignore[no-unty
         out[0, i], out[1, i], out[2, i] = s0, s1, s2
 
 
+@njit(parallel=True, **OPTIONS)
+def near_boxes(x, low, high, reach, out):  # type: ignore[no-untyped-def]
+    """Write to out (N,) whether targets x (k, N) are at most ``reach`` from a box.
+
+    Boxes have the lowest and highest coordinates ``low`` and ``high`` (k, b).
+    """
+    for i in prange(x.shape[1]):
+        out[i] = False
+        for b in range(low.shape[1]):
+            square = 0.0
+            for k in range(x.shape[0]):
+                off = max(low[k, b] - x[k, i], x[k, i] - high[k, b], 0.0)
+                square += off * off
+            if square <= reach * reach:
+                out[i] = True
+                break
+
+
 A2 = SHAPE * SHAPE
 BLOCK = 256
 """Control nodes in a block of ``sum_any``, whose distances stay in the first-level cache."""
@@ -164,7 +182,9 @@ def _apply(kind, q, count):  # type: ignore[no-untyped-def]
         for j in range(count):
             x = min(max(q[j], 1e-300), 1.0)
             a, b, log = x * x, x * x * x, np.log(x)
-            if kind == 5:
+            if x >= 1.0:
+                q[j] = 0.0  # exactly, where the formulas leave rounding
+            elif kind == 5:
                 q[j] = 1.0 + 80.0 / 3.0 * a - 40.0 * b + 15.0 * a * a - 8.0 / 3.0 * a * b
                 q[j] += 20.0 * a * log
             elif kind == 6:

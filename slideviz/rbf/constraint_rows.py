@@ -48,12 +48,15 @@ class ConstraintRows:
         nodes = np.concatenate([self.nodes, more.nodes])
         return ConstraintRows(nodes, None, np.concatenate([self.right, more.right]))
 
+    def only(self, index: IntArray) -> ConstraintRows:
+        """Return the rows with the numbers ``index`` (k,)."""
+        normals = None if self.normals is None else self.normals[index]
+        return ConstraintRows(self.nodes[index], normals, self.right[index])
+
     def by_position(self, coords: FloatArray) -> ConstraintRows:
         """Return the rows ordered by the coordinates (n, d) of their nodes."""
         at = coords[self.nodes]
-        order = np.lexsort([np.arange(len(at)), *at.T[::-1]])
-        normals = None if self.normals is None else self.normals[order]
-        return ConstraintRows(self.nodes[order], normals, self.right[order])
+        return self.only(np.lexsort([np.arange(len(at)), *at.T[::-1]]))
 
 
 def full_rows(problem: Problem, nodes: IntArray, values: FloatArray) -> ConstraintRows:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray
+from slideviz.mesh.fans import components
+from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf import compiled
 from slideviz.rbf.kernels import KERNELS
 
@@ -66,6 +67,12 @@ def evaluate(
     tick
         Called between chunks with the fraction done; may raise to stop.
     """
+    near = reached(basis, targets, controls, weights)
+    if near is not None:
+        out = np.zeros((targets.shape[1], weights.shape[1]))
+        if len(near):
+            out[near] = evaluate(basis, targets[:, near], controls, weights, tick)
+        return out
     rotational, kind = basis.period > 0, KERNELS[basis.kernel].code
     rows = 4 if rotational or kind or len(targets) == 4 else 3
     c, w = padded_rows(controls, rows), padded_rows(weights.T, 3)
@@ -87,6 +94,80 @@ def evaluate(
         out[start : start + size] = result[: weights.shape[1]].T
         tick(min(1.0, (start + size) / total))
     return out
+
+
+WIDER = 4
+"""Targets are looked at one by one where they are so many times as many as the control nodes."""
+
+BOX = 0.5
+"""Edge of a box over the support radius: a box of four dimensions has no diagonal above R."""
+
+SLACK = 1.0 + 1e-9
+"""Factor of the support radius beyond which a sum is zero, whatever rounding does to distances."""
+
+
+def reached(
+    basis: Basis, targets: FloatArray, controls: FloatArray, weights: FloatArray
+) -> IntArray | None:
+    """Return the targets (m,) that a support with a weight reaches; None: all, or not looked at.
+
+    The sums at all others are exactly zero. Parameters as of `evaluate`, weights (..., n, d).
+    """
+    heavy = np.any(weights != 0.0, axis=(*range(weights.ndim - 2), weights.ndim - 1))
+    x, c = _plain(basis, targets), _plain(basis, controls)
+    wide = x.shape[1] >= WIDER * c.shape[1]
+    if not (KERNELS[basis.kernel].compact and wide and heavy.any()):
+        return None
+    ends = [(each.min(axis=1), each.max(axis=1)) for each in (x, c)]
+    widest = np.max([ends[0][1] - ends[1][0], ends[1][1] - ends[0][0]], axis=0)
+    if np.linalg.norm(widest) < basis.radius:
+        return None
+    low, high, _ = boxes(basis, controls[:, heavy])
+    near = np.empty(x.shape[1], np.bool_)
+    with compiled.one_at_a_time(near.size * low.shape[1]):
+        compiled.near_boxes(np.ascontiguousarray(x), low, high, SLACK * basis.radius, near)
+    return None if near.all() else np.flatnonzero(near)
+
+
+def _plain(basis: Basis, features: FloatArray) -> FloatArray:
+    """Return the rows of features whose Euclidean distance is at most that of the basis."""
+    return features[[0, 3]] if basis.period > 0 else features
+
+
+def boxes(basis: Basis, features: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Return boxes with nodes in them, lowest and highest (k, b), and the box of each node, (n,).
+
+    No box is wider than `BOX` support radii along an axis.
+    """
+    x = _plain(basis, features)
+    start = x.min(axis=1, keepdims=True)
+    if np.linalg.norm(x.max(axis=1) - start[:, 0]) < basis.radius:
+        return start, x.max(axis=1, keepdims=True), np.zeros(x.shape[1], np.int64)
+    cells = np.floor((x - start) / (BOX / SLACK * basis.radius)).T
+    box = np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1)
+    low = np.full((len(x), int(box.max()) + 1), np.inf)
+    high = -low
+    for row, values in enumerate(x):
+        np.minimum.at(low[row], box, values)
+        np.maximum.at(high[row], box, values)
+    return low, high, box
+
+
+def connected(basis: Basis, features: FloatArray) -> IntArray:
+    """Return labels (n,) of nodes; nodes whose labels differ are in no common support.
+
+    Not even by way of other nodes: the system of all is one for each label.
+    """
+    if not (features.shape[1] and KERNELS[basis.kernel].compact):
+        return np.zeros(features.shape[1], np.int64)
+    low, high, box = boxes(basis, features)
+    from scipy.spatial import cKDTree  # takes long to load
+
+    middle, reach = ((low + high) / 2).T, SLACK * basis.radius
+    a, b = cKDTree(middle).query_pairs(2.0 * reach, output_type="ndarray").T
+    gap = np.maximum(np.maximum(low[:, a] - high[:, b], low[:, b] - high[:, a]), 0.0)
+    near = np.linalg.norm(gap, axis=0) <= reach
+    return components(len(middle), a[near], b[near])[box]
 
 
 def matrix(

@@ -24,6 +24,8 @@ class ExactFit:
 
     Rows are sorted by position, so that the pivot guard leaves out the same rows however nodes
     are numbered. Each system of pseudo sliding is the leading block of the next: one factor grows.
+    Nodes that no support connects with one that moves have no weight, and are left out
+    (`Problem.reach`).
 
     Attributes
     ----------
@@ -54,11 +56,10 @@ class ExactFit:
 
     def add(self, rows: ConstraintRows) -> None:
         """Add rows, solve with all rows added so far, and set ``found``."""
-        rows, done = rows.by_position(self._problem.coords), 0
+        problem, rows = self._problem, rows.by_position(self._problem.coords)
         if self._rows is not None:
-            done, rows = len(self._rows.nodes), self._rows.followed_by(rows)
+            rows = self._rows.followed_by(rows)
         self._rows = rows
-        problem = self._problem
         with self._watch.phase("solve") as tick:
             if KERNELS[problem.basis.kernel].polynomial:
                 self.found, deficient = saddle_fit(problem, rows)
@@ -67,30 +68,42 @@ class ExactFit:
                 self.stages += ((row_names(rows),),)
                 return
             weights = np.zeros_like(rows.right)
-            dropped = [self._solve(rows, part, done, weights, tick) for part in parts(rows)]
+            label, moves = problem.reach
+            active, names = moves[label[rows.nodes]], row_names(rows)
+            solved = [
+                part[label[rows.nodes[part]] == each]
+                for part in parts(rows)
+                for each in np.unique(label[rows.nodes[part]])
+                # What never moves counts where the system is kept for other data.
+                if moves[each] or problem.lasting
+            ]
+            dropped = [self._solve(rows, part, weights, tick) for part in solved]
         left_out = np.concatenate(dropped)
         self.dropped = np.unique(rows.nodes[left_out])
-        self.found = gathered(rows, weights)
-        self.stages += ((np.delete(row_names(rows), left_out, axis=0),),)
+        some = np.flatnonzero(active)
+        self.found = gathered(rows.only(some), weights[some])
+        known = np.setdiff1d(np.arange(len(names)) if problem.lasting else some, left_out)
+        self.stages += ((names[known],),)
 
     def _solve(
-        self, rows: ConstraintRows, part: IntArray, done: int, weights: FloatArray, tick: Tick
+        self, rows: ConstraintRows, part: IntArray, weights: FloatArray, tick: Tick
     ) -> IntArray:
         """Write the weights of the rows ``part``, one block, to ``weights`` (r, m).
 
-        Rows below ``done`` are in the block's factor already. Returns the rows that the solution
-        does not meet because the pivot guard left them out.
+        Returns the rows that the solution does not meet because the pivot guard left them out.
         """
-        problem, new, right = self._problem, part[part >= done], rows.right[part]
+        first = int(part[0])
+        before = self._factors.get(first, NOTHING)
+        done = len(before.kept) + len(before.dropped)
+        problem, new, right = self._problem, part[done:], rows.right[part]
 
         def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
             normals = None if rows.normals is None else rows.normals[index]
             return problem.features[:, rows.nodes[index]], normals
 
         system = matrix(problem.basis, place(new), place(part), tick)
-        first = int(part[0])
         with enough_threads(len(system) * len(part) ** 2 / 3):
-            factor = extend(self._factors.get(first, NOTHING), system, tick)
+            factor = extend(before, system, tick)
             found = factor.solve(right)
         self._factors[first] = factor
         largest = float(np.abs(rows.right).max(initial=0.0))

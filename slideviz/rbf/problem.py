@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from dataclasses import field as made_by
+from functools import cached_property
 from time import perf_counter
 from typing import Literal
 
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.evaluate import Basis, Tick, no_tick
+from slideviz.rbf.evaluate import Basis, Tick, connected, no_tick
 from slideviz.rbf.field import Field, RadialField
 from slideviz.terms import Selection
 
@@ -159,6 +160,20 @@ class Problem:
     before: Solution | None = None
     stages: tuple[Levels, ...] = ()
     lasting: bool = False
+
+    @cached_property
+    def reach(self) -> tuple[IntArray, np.ndarray]:
+        """Return labels (n,) of boundary nodes that supports connect, and which labels move, (k,).
+
+        All of them where no node is displaced.
+        """
+        nodes = np.concatenate([self.known, self.edge, self.surface, self.normal_nodes])
+        nodes = np.unique(self.same_as[nodes])
+        label = np.zeros(self.features.shape[1], np.int64)
+        label[nodes] = connected(self.basis, self.features[:, nodes])
+        moves = np.zeros(int(label.max(initial=0)) + 1, bool)
+        moves[label[self.same_as[self.known[self.values.any(axis=1)]]]] = True
+        return label, moves if moves.any() else ~moves
 
     def behind(self, nodes: IntArray) -> FloatArray:
         """Return the errors (m, d) that the interpolants of all steps before left at nodes (m,)."""

@@ -51,8 +51,8 @@ def _rest(at, moved, start, before):  # type: ignore[no-untyped-def]
 
 
 @njit(**_OPTIONS)
-def place(found, first, out):  # type: ignore[no-untyped-def]
-    """Write values (b, k d) of b nodes and k designs to ``out`` (k, n, d), from node ``first`` on.
+def place(found, nodes, out):  # type: ignore[no-untyped-def]
+    """Write values (b, k d) at ``nodes`` (b,) of k designs to ``out`` (k, n, d).
 
     In one thread, so that several threads may call it at once.
     """
@@ -60,7 +60,7 @@ def place(found, first, out):  # type: ignore[no-untyped-def]
     for k in range(out.shape[0]):
         for i in range(found.shape[0]):
             for j in range(d):
-                out[k, first + i, j] = found[i, k * d + j]
+                out[k, nodes[i], j] = found[i, k * d + j]
 
 
 @njit(parallel=True, **_OPTIONS)

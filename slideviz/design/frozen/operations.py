@@ -12,7 +12,7 @@ from slideviz.design.frozen.loops import place
 from slideviz.design.frozen.tape import Array, Linear, Link, Variable, recorded, value
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.threads import in_parts
-from slideviz.rbf.evaluate import Basis, evaluate, matrix
+from slideviz.rbf.evaluate import Basis, evaluate, matrix, reached
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.frame_slopes import coords_slopes, features_slopes, points_slopes
 from slideviz.rbf.frames import Frame
@@ -179,18 +179,23 @@ def many(
     wide = np.ascontiguousarray(np.moveaxis(weights.reshape(-1, n, d), 0, 1).reshape(n, -1))
     total = targets.shape[1]
     out = np.empty((wide.shape[1] // d, total, d)) if room is None else room
+    near = reached(basis, targets, controls, weights)
+    if near is None:
+        near = np.arange(total)
+    else:
+        out[:] = 0.0
     size = min(ROWS, max(64, PAIRS // max(1, n)))
 
     def fill(part: slice) -> None:
         found = np.empty((size, wide.shape[1]))
         for first in range(part.start, part.stop, size):
-            here = slice(first, min(part.stop, first + size))
+            here = near[first : min(part.stop, first + size)]
             values = matrix(basis, (targets[:, here], None), (controls, None))
             np.matmul(values, wide, out=found[: len(values)])
-            place(found[: len(values)], first, out)
+            place(found[: len(values)], here, out)
 
     with enough_threads(0.0):  # the threads are those of the parts
-        in_parts(fill, total)
+        in_parts(fill, len(near))
     return out.reshape(*ahead, total, d)
 
 
