@@ -71,6 +71,11 @@ def _told(arguments: argparse.Namespace, mesh: Mesh, counts: MeshCounts, found: 
         ]
     if fault:
         report["ffd_fault"] = fault
+    if mesh.interfaces:
+        report["interfaces"] = [
+            {"marker": i.marker, "zone": i.zone, "other": i.other, "nodes": len(i.nodes)}
+            for i in mesh.interfaces
+        ]
     if save_json(arguments.json, report):
         return DONE
     zone = f", zone {mesh.zone} of {mesh.zones}" if mesh.zones > 1 else ""
@@ -87,6 +92,8 @@ def _told(arguments: argparse.Namespace, mesh: Mesh, counts: MeshCounts, found: 
     print("markers:" if mesh.markers else "no markers")
     if mesh.markers:
         print(table([(m["name"], m["elements"], "elements") for m in report["markers"]]))
+    for interface in mesh.interfaces:
+        print(f"  {interface.marker} is {interface.describe()}")
     for pair in report["periodic_pairs"]:
         print(f"  {' and '.join(pair['markers'])} match: {pair['type']}, {pair['description']}")
     if boxes:

@@ -15,6 +15,7 @@ from slideviz.deformation.steps import Progress, Step, Trial
 from slideviz.errors import DeformError, Note, UnsoundError
 from slideviz.mesh.check import within
 from slideviz.mesh.halo import Halo
+from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, Mesh, sealed
 from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.threads import in_parts
@@ -115,10 +116,15 @@ class Stepping:
             warnings += [f"step {index}: {text}" for text in solution.warnings]
             least = max(least, (solution.doubt, solution.refined, index, solution.condition))
             misfit, apart = self._misfit(step)
-            warnings += apart
             yield replace(
                 step,
-                warnings=(*warnings, *remarks, *_doubt_warning(*least)),
+                warnings=(
+                    *warnings,
+                    *remarks,
+                    *_doubt_warning(*least),
+                    *apart,
+                    *torn_interfaces(mesh, points),
+                ),
                 periodic_misfit=misfit,
             )
             seconds = {}

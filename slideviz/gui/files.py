@@ -16,6 +16,7 @@ from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
 from slideviz.errors import SlidevizError
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import questions
+from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.files import is_source, usual_ending
 from slideviz.session import changes, jobs
@@ -219,10 +220,11 @@ class Files(QObject):
             return
         self.settings.setValue("folder", str(path.parent))
         last = frame is session.frames[-1]
+        torn = torn_interfaces(session.mesh, frame.mesh.points)
         self.saving, self.after_save = True, then
         self.window.running.start_job(
             f"Saving {path.name}",
-            lambda saved: self._mesh_saved(saved, last),
+            lambda saved: self._mesh_saved(saved, last, torn),
             partial(jobs.save_mesh, base=session.mesh),
             path,
             frame,
@@ -244,15 +246,16 @@ class Files(QObject):
         )
         return None
 
-    def _mesh_saved(self, path: Path, last: bool) -> None:
+    def _mesh_saved(self, path: Path, last: bool, torn: tuple[str, ...]) -> None:
         if last:
             self._saved_to = path
             self.window.store.change(changes.saved_mesh)
         self.window.say(f"Saved {path}")
         mesh = self.window.store.session.mesh
-        lost = left_out(path, mesh) if mesh is not None else ""
-        if lost:
-            self.window.banner.tell(f"Saved. {lost}")
+        said = [left_out(path, mesh)] if mesh is not None else []
+        said += [f"{each[0].upper()}{each[1:]}." for each in torn]
+        if any(said):
+            self.window.banner.tell(" ".join(["Saved.", *filter(None, said)]))
         if self.after_save is not None:
             QTimer.singleShot(0, self.after_save)
 

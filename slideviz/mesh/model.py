@@ -196,6 +196,21 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
+class Interface:
+    """A boundary whose ``nodes`` (k,) are in the places of nodes of ``other`` in another zone."""
+
+    marker: str
+    zone: int
+    other: str
+    nodes: IntArray
+
+    def describe(self) -> str:
+        """Return the interface in words."""
+        count = len(self.nodes)
+        return f"an interface with {self.other} of zone {self.zone} ({count} nodes in common)"
+
+
+@dataclass(frozen=True, eq=False)
 class Origin:
     """What a mesh keeps of its file besides points, cells and boundaries, to write it back.
 
@@ -244,6 +259,8 @@ class Mesh:
         Copies of cells beyond the periodic sides, which only follow the cells they copy.
     remarks : tuple of str
         Warnings of the reader, a sentence each.
+    interfaces : tuple of Interface
+        The boundaries that coincide with boundaries of other zones of the file.
     part : Part or None
         For a mesh that is only a part of another (its skin, where that is larger than memory):
         where its points and cells are in the whole.
@@ -259,6 +276,7 @@ class Mesh:
     source: Path | None = None
     halo: Halo | None = None
     remarks: tuple[str, ...] = ()
+    interfaces: tuple[Interface, ...] = ()
     part: Part | None = None
 
     def __post_init__(self) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.check import LARGEST, first_fault, printable
+from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.io.su2b.elements import BLOCK, ElementBlock, element_block, require_used
 from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace, find_zone
-from slideviz.mesh.io.su2b.read import point_block, read_elements
+from slideviz.mesh.io.su2b.read import boundaries_elsewhere, point_block, read_elements
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Part, frozen_array
 from slideviz.mesh.ranks import ALONE, Alone
 from slideviz.mesh.threads import Tick
@@ -73,7 +74,8 @@ def read_skin(
             numbers, points = _points_of(
                 source, place, numbers, map(_ticking(progress, 0.6, 1.0, len(parts)), do(parts))
             )
-    return Mesh(
+        others = list(boundaries_elsewhere(source, place))
+    skin = Mesh(
         points,
         _renumbered(cells, numbers),
         tuple(Marker(m.name, _renumbered(m.cells, numbers)) for m in markers),
@@ -88,6 +90,7 @@ def read_skin(
             place.cells.count,
         ),
     )
+    return replace(skin, interfaces=find_interfaces(skin, others))
 
 
 def _ticking(tick: Tick, begin: float, end: float, count: int) -> Callable[[Any], Any]:

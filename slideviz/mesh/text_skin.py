@@ -9,7 +9,9 @@ from pathlib import Path
 
 from slideviz.errors import MeshError
 from slideviz.mesh.check import printable
-from slideviz.mesh.io.su2.text import Text
+from slideviz.mesh.interfaces import find_interfaces
+from slideviz.mesh.io.su2.keyword_blocks import boxes_elsewhere
+from slideviz.mesh.io.su2.text import Text, boundaries_elsewhere
 from slideviz.mesh.model import Mesh, Origin
 from slideviz.mesh.ranks import ALONE, Alone
 from slideviz.mesh.skin import read_skin
@@ -24,18 +26,27 @@ def skin_of_text(text: Text, path: Path, tick: Tick, ranks: Alone = ALONE) -> Me
     zone = text.zone
     with naming_text(text, path):
         skin = read_skin(path, None, tick, ranks)
-    return replace(
+    skin = replace(
         skin,
         markers=tuple(
             replace(marker, name=given.name)
             for marker, given in zip(skin.markers, zone.markers, strict=True)
         ),
+    )
+    others = boundaries_elsewhere(text.lines, text.sections, zone, tick)
+    return replace(
+        skin,
         name=printable(text.path.name),
         zone=zone.bounds.number,
         zones=zone.bounds.zones,
         source=text.path.resolve(),
         remarks=zone.remarks,
-        origin=Origin(ffd=text.boxes(), ffd_at=zone.ffd_at, ffd_elsewhere=text.boxes_elsewhere),
+        interfaces=find_interfaces(skin, others),
+        origin=Origin(
+            ffd=text.boxes(),
+            ffd_at=zone.ffd_at,
+            ffd_elsewhere=boxes_elsewhere(text.sections, zone.bounds),
+        ),
     )
 
 

@@ -124,11 +124,13 @@ def guess_by_name(name: str) -> Guess | None:
 def guess_roles(mesh: Mesh, pairs: Sequence[Pair] = ()) -> dict[str, Guess]:
     """Return a guess for each boundary whose name or match hints at a role, in the mesh's order.
 
+    Interfaces with other zones are fixed: these zones do not move along.
     A match makes two boundaries periodic only where neither name hints at another role: opposite
     sides of every box match each other. It does not where the mesh is a box that matches along all
     axes.
     """
     guesses = {name: found for name in mesh.marker_names if (found := guess_by_name(name))}
+    guesses |= {i.marker: Guess("fixed", f"it is {i.describe()}") for i in mesh.interfaces}
     unnamed = [p for p in pairs if p.first not in guesses and p.second not in guesses]
     box = _is_box(mesh, unnamed)
     for pair in pairs:

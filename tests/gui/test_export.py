@@ -24,10 +24,12 @@ from slideviz.gui.dialogs import exports as export
 from slideviz.gui.dialogs.film import FilmDialog
 from slideviz.gui.dialogs.film_form import FilmForm, length_words
 from slideviz.gui.dialogs.picture import PictureDialog
+from slideviz.gui.panels.boundaries import BoundariesPanel
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import fitted, framed, to_image
 from slideviz.mesh.quality import quality
 from slideviz.session import changes, jobs, jobs_export, pieces
+from tests.mesh.test_interfaces import moved, zones
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
@@ -530,6 +532,24 @@ def test_every_format_is_written_and_what_is_lost_is_said(ran, answers, tmp_path
         assert ("does not hold" in told) is (name not in (".su2", ".vtu", ".med")), name
         assert ("quality" in told) is (name in (".msh", ".inp", ".vol")), name
         assert ("names of the boundaries" in told) is (name in (".vtk", ".xdmf")), name
+
+
+def test_a_saved_mesh_that_no_longer_fits_another_zone_is_told(driver, answers, tmp_path):
+    path = zones(tmp_path)
+    driver.open(path)
+    assert driver.session.case.roles["BLOCK"] == "fixed"
+    panel = driver.window.docks_.panel(BoundariesPanel)
+    row = driver.session.mesh.marker_names.index("BLOCK")
+    assert "interface with core of zone 2" in panel.table.item(row, 0).toolTip()
+    assert "A guess: it is an interface" in panel.table.cellWidget(row, 2).toolTip()
+    moved(path).write(tmp_path / "c.cfg")
+    driver.open(tmp_path / "c.cfg")
+    driver.window.start_run()
+    driver.settle()
+    answers("ask_save", tmp_path / "out.su2")
+    driver.window.files.save_mesh()
+    driver.settle()
+    assert "Saved. Zone 2 no longer fits: BLOCK" in driver.window.banner.text.text()
 
 
 def test_formats_for_the_mesh_are_offered(opened, driver, sample_folder):

@@ -184,7 +184,10 @@ class BoundariesPanel(Panel):
         shown = name not in session.view.hidden
         item.setCheckState(Qt.CheckState.Checked if shown else Qt.CheckState.Unchecked)
         item.setForeground(QBrush() if shown else self.palette().placeholderText())
-        item.setToolTip(wrapped(f"{name}\nThe check mark shows or hides it in the view."))
+        about = "".join(
+            f"\nIt is {each.describe()}." for each in session.mesh.interfaces if each.marker == name
+        )
+        item.setToolTip(wrapped(f"{name}{about}\nThe check mark shows or hides it in the view."))
         choice.show_value(role)
         for index, each in enumerate(ROLES):
             choice.setItemText(index, f"{each} ?" if guess and each == role else each)

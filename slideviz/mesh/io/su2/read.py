@@ -6,12 +6,14 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from slideviz.mesh.check import printable
+from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.io.source import Source
 from slideviz.mesh.io.su2.keyword_blocks import boxes_elsewhere, find_blocks, find_bounds
 from slideviz.mesh.io.su2.lines import Rows, number_of
 from slideviz.mesh.io.su2.numbers import parse_cells, parse_points
 from slideviz.mesh.io.su2.scan import Progress, scan
 from slideviz.mesh.io.su2.send_receive import find_halo
+from slideviz.mesh.io.su2.text import boundaries_elsewhere
 from slideviz.mesh.io.su2.zone import find_zone
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh, Origin
 
@@ -109,7 +111,13 @@ def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
         source=raw.path.resolve(),
     )
     halo, remarks = find_halo(lines, found, mesh)
-    return replace(mesh, halo=halo, remarks=(*found.remarks, *remarks))
+    others = boundaries_elsewhere(lines, sections, found, progress)
+    return replace(
+        mesh,
+        halo=halo,
+        remarks=(*found.remarks, *remarks),
+        interfaces=find_interfaces(mesh, others),
+    )
 
 
 def _shares(sizes: list[int], progress: Progress) -> list[Progress]:

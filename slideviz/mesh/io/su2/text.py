@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from slideviz.errors import MeshError
 from slideviz.mesh.io.source import open_source
-from slideviz.mesh.io.su2.keyword_blocks import boxes_elsewhere, find_blocks, find_bounds, is_ffd
+from slideviz.mesh.io.su2.keyword_blocks import KeywordBlock, find_blocks, find_bounds, is_ffd
 from slideviz.mesh.io.su2.lines import Lines, number_of
+from slideviz.mesh.io.su2.numbers import fill_points, parse_cells
 from slideviz.mesh.io.su2.scan import Progress, scan
 from slideviz.mesh.io.su2.zone import TextZone, find_zone
+from slideviz.mesh.model import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,13 +28,13 @@ class Text:
         The lines of the file.
     zone : TextZone
         Where the zone's parts are.
-    boxes_elsewhere : dict of str to int
-        Boxes for free-form deformation in other zones, and the numbers of these.
+    sections : list of KeywordBlock
+        All sections of the file.
     """
 
     lines: Lines
     zone: TextZone
-    boxes_elsewhere: dict[str, int]
+    sections: list[KeywordBlock]
 
     @property
     def path(self) -> Path:
@@ -69,4 +75,44 @@ def find_text(path: Path, zone: int | None, progress: Progress = lambda _: None)
     lines = scan(open_source(path), progress)
     sections = find_blocks(lines)
     bounds = find_bounds(lines, sections, zone)
-    return Text(lines, find_zone(lines, sections, bounds), boxes_elsewhere(sections, bounds))
+    return Text(lines, find_zone(lines, sections, bounds), sections)
+
+
+def boundaries_elsewhere(
+    lines: Lines, sections: list[KeywordBlock], zone: TextZone, progress: Progress
+) -> Iterator[tuple[int, str, FloatArray]]:
+    """Yield zone, name and nodes (k, d) of each boundary of the other zones, as far as readable.
+
+    ``progress`` is called with 1 while they are read; it may raise to stop.
+    """
+    for number in range(1, zone.bounds.zones + 1):
+        if number == zone.bounds.number:
+            continue
+        try:
+            other = find_zone(lines, sections, find_bounds(lines, sections, number))
+            if other.dim == zone.dim:
+                yield from _boundaries_of(lines, other, lambda _: progress(1.0))
+        except MeshError:  # the zone that is asked for can be right all the same
+            continue
+
+
+def _boundaries_of(
+    lines: Lines, zone: TextZone, progress: Progress
+) -> Iterator[tuple[int, str, FloatArray]]:
+    """Yield number, name and nodes (k, d) of each boundary of a zone."""
+    count = number_of(zone.points)
+    nodes = {
+        part.name: parse_cells(lines, part.rows, zone.dim - 1, count, progress).nodes
+        for part in zone.markers
+    }
+    places = {name: np.empty((len(some), zone.dim)) for name, some in nodes.items()}
+    for piece in zone.points:  # not all points of the zone at once
+        points = np.empty((piece.rows, zone.dim))
+        fill_points(lines, piece, points)
+        progress(1.0)
+        for name, some in nodes.items():
+            here = slice(*np.searchsorted(some, [piece.row, piece.row + piece.rows]))
+            places[name][here] = points[some[here] - piece.row]
+    for name, points in places.items():
+        if len(points):
+            yield zone.bounds.number, name, points

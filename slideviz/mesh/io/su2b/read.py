@@ -6,13 +6,15 @@ With the mesh is kept what is needed to write the file again. `su2b.elements` re
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from slideviz.errors import MeshError
 from slideviz.mesh.check import first_fault, printable
+from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.io.su2.scan import Progress
 from slideviz.mesh.io.su2b.elements import BLOCK, element_blocks
 from slideviz.mesh.io.su2b.layout import MAGIC, BinaryFile, ElementTable, ZonePlace, find_zone
@@ -95,8 +97,9 @@ def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
             tuple(marker.raw for marker in place.markers),
             cells,
         )
+        others = list(boundaries_elsewhere(source, place))
     points.flags.writeable = False
-    return Mesh(
+    mesh = Mesh(
         points=points,
         cells=cells,
         markers=markers,
@@ -106,6 +109,36 @@ def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
         source=path.resolve(),
         origin=form,
     )
+    return replace(mesh, interfaces=find_interfaces(mesh, others))
+
+
+def boundaries_elsewhere(
+    source: BinaryFile, place: ZonePlace
+) -> Iterator[tuple[int, str, FloatArray]]:
+    """Yield zone, name and nodes (k, d) of each boundary of other zones, as far as readable."""
+    for number in range(1, source.zones + 1):
+        if number == place.number:
+            continue
+        try:
+            zone = find_zone(source, number)
+            nodes = [
+                (m.name, read_elements(source, zone, m.elements, zone.dim - 1, _untold)[0].nodes)
+                for m in zone.markers
+                if zone.dim == place.dim and m.elements.count
+            ]
+            places = [np.empty((len(some), zone.dim)) for _, some in nodes]
+            for first, block in point_blocks(source, zone) if nodes else ():
+                for (_, some), points in zip(nodes, places, strict=True):
+                    here = slice(*np.searchsorted(some, [first, first + len(block)]))
+                    points[here] = block[some[here] - first]
+        except MeshError:  # the zone that is asked for can be right all the same
+            continue
+        for (name, _), points in zip(nodes, places, strict=True):
+            yield number, name, points
+
+
+def _untold(_: int) -> None:
+    """Take the number of elements of a block."""
 
 
 def point_blocks(

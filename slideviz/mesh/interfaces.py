@@ -1,0 +1,59 @@
+"""Interfaces: boundaries of a zone that have nodes in the places of another zone's boundary."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray, Interface, Mesh, frozen_array
+from slideviz.mesh.nearest import nearest
+
+COINCIDENT = 1e-6
+"""Nodes of two zones nearer than this part of the mesh's extent are in one place."""
+ROUNDING = 1e-12
+"""Part of the mesh's extent by which nodes of an interface may move unseen."""
+
+
+def find_interfaces(
+    mesh: Mesh, others: Iterable[tuple[int, str, FloatArray]]
+) -> tuple[Interface, ...]:
+    """Return the interfaces of a mesh with boundaries of other zones of its file.
+
+    Boundaries are one interface where all nodes of any element are in the places of nodes of the
+    other one.
+
+    Parameters
+    ----------
+    others
+        Zone, name and nodes (k, d) of each boundary of the other zones.
+    """
+    found, near = [], COINCIDENT * mesh.extent
+    nodes_of = {marker.name: marker.nodes for marker in mesh.markers}
+    for zone, name, points in others:
+        low, high = points.min(axis=0) - near, points.max(axis=0) + near
+        for marker in mesh.markers:
+            nodes = nodes_of[marker.name]
+            places = mesh.points[nodes]
+            if not ((places >= low) & (places <= high)).all(axis=1).any():
+                continue
+            shared = np.zeros(len(mesh.points), bool)
+            shared[nodes] = np.isfinite(nearest(points, places, near, near)[0])
+            if any(shared[table].all(axis=1).any() for _, table in marker.cells.by_type.values()):
+                here = frozen_array(np.flatnonzero(shared), np.int64)
+                found.append(Interface(marker.name, zone, name, here))
+    return tuple(found)
+
+
+def torn_interfaces(mesh: Mesh, points: FloatArray) -> tuple[str, ...]:
+    """Return a sentence for each interface whose nodes are elsewhere in ``points`` (n, d)."""
+    found = []
+    for each in mesh.interfaces:
+        gap = np.linalg.norm(points[each.nodes] - mesh.points[each.nodes], axis=1)
+        if gap.max(initial=0.0) > ROUNDING * mesh.extent:
+            found.append(
+                f"zone {each.zone} no longer fits: {each.marker}, which is an interface with its "
+                f"{each.other}, has moved by up to {gap.max():.3g}; keep it fixed, or deform zone "
+                f"{each.zone} alike"
+            )
+    return tuple(found)
