@@ -11,7 +11,7 @@ from pathlib import Path
 
 from qtpy.QtCore import QSettings, QSize, Qt, QTimer
 from qtpy.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
-from qtpy.QtWidgets import QDockWidget, QGridLayout, QLabel, QWidget
+from qtpy.QtWidgets import QDockWidget, QGridLayout, QLabel, QLineEdit, QSpinBox, QWidget
 
 from slideviz.case.motion_words import mesh_words
 from slideviz.color_scheme import ColorScheme
@@ -272,6 +272,8 @@ class MainWindow(Services):
     def start_run(self) -> None:
         """Start a run; if the mesh stays in its file, ask for the deformed mesh's file first."""
         session = self.store.session
+        if isinstance(self.focusWidget(), QLineEdit | QSpinBox):
+            self.view.setFocus()  # a field would keep Home, End and Space from the player
         if not session.in_file or self.runner.busy or changes.run_requirements(session):
             self.running.start_run()
             return

@@ -13,7 +13,7 @@ from slideviz.case.boxes import boxes_for, ffd_displacements
 from slideviz.case.displacement import Displacements, read_displacements
 from slideviz.case.given import key_of
 from slideviz.case.model import Case, FromFile, Target, moves
-from slideviz.case.motion import moved_together
+from slideviz.case.motion import displacements, moved_together
 from slideviz.case.motion_words import direction_words
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -92,6 +92,15 @@ def boxes_hint(session: Session) -> str:
     if not count:
         return ""
     return f"{count} FFD boxes: B shows them" if count > 1 else "An FFD box: B shows it"
+
+
+def largest_prescribed(case: Case, mesh: Mesh) -> float:
+    """Return the largest displacement that the motions prescribe; 0 where they have mistakes."""
+    try:
+        vectors = displacements(case, mesh).vectors
+    except (OSError, SlidevizError):
+        return 0.0
+    return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
 
 
 class Ghosts:

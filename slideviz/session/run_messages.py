@@ -10,6 +10,7 @@ import numpy as np
 
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Ffd, FromFile, Motion, Radial, Rotate, Scale, Translate, moves
+from slideviz.deformation.reduction import LOOSE
 from slideviz.deformation.remedies import MOST_NAMES, beyond_pitch, fixed_beside, remedies
 from slideviz.errors import Note
 from slideviz.mesh.model import Mesh
@@ -182,6 +183,30 @@ def moves_nothing(motion: Motion) -> bool:
     if isinstance(motion, Scale):
         return all(factor == 1 for factor in motion.factors)
     return isinstance(motion, Radial) and motion.factor == 1 and motion.distance == 0
+
+
+def loose_words(case: Case, extent: float, largest: float) -> str:
+    """Return a sentence where the typed tolerance is not far below the largest displacement.
+
+    Parameters
+    ----------
+    case
+    extent
+        The extent of the mesh.
+    largest
+        The largest displacement that the motions prescribe; 0 where it is not known.
+    """
+    given = case.reduction
+    if given is None or given.auto or case.method != "rbf" or not largest > 0.0:
+        return ""
+    tolerance = given.relative * extent if given.relative else given.tolerance
+    if tolerance <= LOOSE * largest:
+        return ""
+    is_ = "not below" if tolerance >= largest else "more than a tenth of"
+    return (
+        f"This is {is_} the largest displacement, {largest:.3g}: cells near the boundary may be "
+        f"inverted. A hundredth of it is {largest / 100:.2g}."
+    )
 
 
 def _problems(session: Session) -> list[str]:

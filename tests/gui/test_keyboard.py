@@ -154,9 +154,24 @@ def test_links_beside_run_lead_to_the_field_that_does_nothing_or_is_wrong(opened
     assert field.selectedText() == "3.."
 
 
+def test_the_keys_of_the_player_reach_it_after_a_run_that_began_in_a_field(opened):
+    opened.window.store.change(changes.add_motion, Rotate("airfoil", 1.0))
+    opened.window.store.change(changes.set_case, steps=2)
+    field = opened.window.motions.editor.angle
+    field.setFocus()
+    QTest.keyClicks(field, "1")
+    QTest.keyClick(field, Qt.Key.Key_F5)
+    opened.settle()
+    for key, step in ((Qt.Key.Key_Home, 0), (Qt.Key.Key_End, 2)):
+        QTest.keyClick(QApplication.focusWidget(), key)
+        assert opened.session.view.frame == step
+
+
 def test_a_new_motion_is_for_the_boundary_without_one_or_for_all_about_their_centroid(opened):
     opened.role("outflow", "moving")
     opened.window.store.change(changes.add_motion, Translate("airfoil", (0.01, 0.0)))
+    # The link is about this boundary, whatever is selected.
+    opened.window.store.change(changes.select, ("airfoil", "outflow"))
     assert "“outflow” has no motion: add one." in opened.window.run_panel.text.text()
     link(opened)
     assert opened.session.case.motions[1:] == (Translate("outflow", (0.0, 0.0)),)

@@ -13,7 +13,8 @@ from slideviz.deformation.remedies import beyond_pitch
 from slideviz.deformation.solver import deform
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.session.run_messages import ended, exact_cost, help_for, inverted_words
+from slideviz.session.motions import largest_prescribed
+from slideviz.session.run_messages import ended, exact_cost, help_for, inverted_words, loose_words
 from slideviz.session.state import Run, StepFrame
 from tests.builders import sector
 
@@ -125,6 +126,28 @@ def test_a_rotation_beyond_the_pitch_is_named_in_degrees(run, passage):
         turned = case.change(motions=(Rotate("inner", angle, (0.0, 0.0)),))
         assert beyond_pitch(turned, mesh).startswith(words)
         assert bool(beyond_pitch(turned, mesh)) == bool(words)
+
+
+@pytest.mark.parametrize(
+    ("reduction", "words"),
+    [
+        (Reduction(tolerance=0.01), ""),
+        (Reduction(tolerance=0.05), "This is more than a tenth of the largest displacement, 0.2: "),
+        (Reduction(relative=0.1), "This is not below the largest displacement, 0.2: cells near"),
+        (Reduction(auto=True, tolerance=1.0), ""),
+        (None, ""),
+    ],
+)
+def test_a_tolerance_above_the_motion_is_told_before_a_run(passage, reduction, words):
+    case, motion = passage.case, Translate("airfoil", (0.0, 0.2))
+    largest = largest_prescribed(case.change(motions=(motion,)), passage.mesh)
+    assert largest == pytest.approx(0.2)
+    text = loose_words(case.change(reduction=reduction), 2.0, largest)
+    assert text.startswith(words)
+    assert bool(text) == bool(words)
+    assert text.endswith("A hundredth of it is 0.002." if words else "")
+    assert loose_words(case.change(reduction=reduction), 2.0, 0.0) == ""
+    assert largest_prescribed(case.change(motions=()), passage.mesh) == 0.0
 
 
 def test_a_large_exact_run_is_told_beforehand(monkeypatch):

@@ -23,6 +23,7 @@ from slideviz.gui.widgets.build import (
     hint_label,
     in_column,
     in_row,
+    set_style,
     tool_button,
 )
 from slideviz.gui.widgets.choice import Choice
@@ -31,8 +32,8 @@ from slideviz.gui.widgets.fields import NumberField, number_text
 from slideviz.gui.widgets.panel import Panel
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes
-from slideviz.session.motions import found_text
-from slideviz.session.run_messages import Requirement
+from slideviz.session.motions import found_text, largest_prescribed
+from slideviz.session.run_messages import Requirement, loose_words
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.terms import LEVEL_CRITERIA, DataReduction, labels
@@ -112,7 +113,11 @@ class MethodPanel(Panel):
             for name, field in part.form.fields.items():
                 setattr(part, name, field)
         self.found, self.tolerance_hint, self.reason = hint_label(), hint_label(), hint_label()
+        self.loose = hint_label()
+        set_style(self.loose, "bad", True)
         self.tolerance_hint.setWordWrap(False)
+        # The largest prescribed displacement, and the mesh, roles and motions that it is of.
+        self._largest: tuple[tuple[object, ...], float] = ((), 0.0)
         self._complete_form()
         parts = (self.form, self.reason, self.more, None)
         in_column(*parts, on=self.area.widget(), margins=(6, 6, 6, 4))
@@ -130,6 +135,7 @@ class MethodPanel(Panel):
         wide = fields["tolerance"]
         self._tolerance_row = boxed(in_row(wide, self.tolerance_hint, wide=[wide]))
         form.setWidget(row, role, self._tolerance_row)
+        form.insertRow(row + 1, "", self.loose)
 
     def _connect(self) -> None:
         self.form.changed.connect(self._set)
@@ -182,7 +188,7 @@ class MethodPanel(Panel):
     def sync(self, session: Session) -> None:
         """Fill the panel from the session's case."""
         if session.mesh is not self._mesh:
-            self._mesh, self._reduction = session.mesh, None
+            self._mesh, self._reduction, self._largest = session.mesh, None, ((), 0.0)
             self.watch.restore()
             # Once for each mesh: it takes 10 ms where there are 250,000 cells.
             self._extent = session.mesh.extent if session.mesh is not None else 0.0
@@ -208,19 +214,30 @@ class MethodPanel(Panel):
         return replace(given, tolerance=float(f"{absolute:.6g}"))
 
     def _sync_hints(self, session: Session) -> None:
-        """Show the hints: the tolerance relative to the extent, idle settings, the period found."""
+        """Show the hints: the tolerance and the motion, idle settings, the period found."""
         case, extent = session.case, self._extent
         tolerance = self.form.fields["tolerance"]
         assert isinstance(tolerance, NumberField)
         part = f"{tolerance.value / extent:.3g} of the extent" if extent else ""
         self.tolerance_hint.setText(part)
-        self.form.setRowVisible(self._tolerance_row, get_reduction(case) == "YES")
+        typed = get_reduction(case) == "YES"
+        self.form.setRowVisible(self._tolerance_row, typed)
+        largest = self._largest_of(session) if typed and session.mesh is not None else 0.0
+        self.loose.setText(loose_words(case, extent, largest))
+        self.form.setRowVisible(self.loose, bool(self.loose.text()))
         reasons = (("Sliding", nothing_slides(case)), ("Periodicity", no_pair(case)))
         why = "\n".join(f"{title}: {why}." for title, why in reasons if why)
         self.reason.setText(why if session.mesh is not None else "Open a mesh first.")
         self.reason.setVisible(bool(self.reason.text()))
         self.found.setText(found_text(session))
         self.form.setRowVisible(self.found, bool(self.found.text()))
+
+    def _largest_of(self, session: Session) -> float:
+        """Return the largest prescribed displacement, computed once for each set of motions."""
+        key = (session.mesh, session.case.roles, session.case.motions)
+        if key != self._largest[0]:
+            self._largest = key, largest_prescribed(session.case, session.mesh)
+        return self._largest[1]
 
 
 def _position(form: QFormLayout, field: QWidget) -> tuple[int, QFormLayout.ItemRole]:
