@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, Interface, Mesh, frozen_array
+from slideviz.mesh.model import FloatArray, ZoneInterface, Mesh, frozen_array
 from slideviz.mesh.nearest import nearest
 
 COINCIDENT = 1e-6
@@ -17,7 +17,7 @@ ROUNDING = 1e-12
 
 def find_interfaces(
     mesh: Mesh, others: Iterable[tuple[int, str, FloatArray]]
-) -> tuple[Interface, ...]:
+) -> tuple[ZoneInterface, ...]:
     """Return the interfaces of a mesh with boundaries of other zones of its file.
 
     Boundaries are one interface where all nodes of any element are in the places of nodes of the
@@ -41,7 +41,7 @@ def find_interfaces(
             shared[nodes] = np.isfinite(nearest(points, places, near, near)[0])
             if any(shared[table].all(axis=1).any() for _, table in marker.cells.by_type.values()):
                 here = frozen_array(np.flatnonzero(shared), np.int64)
-                found.append(Interface(marker.name, zone, name, here))
+                found.append(ZoneInterface(marker.name, zone, name, here))
     return tuple(found)
 
 

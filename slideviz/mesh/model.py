@@ -196,7 +196,7 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class Interface:
+class ZoneInterface:
     """A boundary whose ``nodes`` (k,) are in the places of nodes of ``other`` in another zone."""
 
     marker: str
@@ -259,7 +259,7 @@ class Mesh:
         Copies of cells beyond the periodic sides, which only follow the cells they copy.
     remarks : tuple of str
         Warnings of the reader, a sentence each.
-    interfaces : tuple of Interface
+    interfaces : tuple of ZoneInterface
         The boundaries that coincide with boundaries of other zones of the file.
     part : Part or None
         For a mesh that is only a part of another (its skin, where that is larger than memory):
@@ -276,7 +276,7 @@ class Mesh:
     source: Path | None = None
     halo: Halo | None = None
     remarks: tuple[str, ...] = ()
-    interfaces: tuple[Interface, ...] = ()
+    interfaces: tuple[ZoneInterface, ...] = ()
     part: Part | None = None
 
     def __post_init__(self) -> None:
