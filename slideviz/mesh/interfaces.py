@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, ZoneInterface, Mesh, frozen_array
+from slideviz.mesh.model import FloatArray, Mesh, ZoneInterface, frozen_array
 from slideviz.mesh.nearest import nearest
 
 COINCIDENT = 1e-6
