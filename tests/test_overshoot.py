@@ -4,11 +4,13 @@ import re
 
 import numpy as np
 import pytest
-from builders import annulus, grid, layered, square
+from builders import annulus, far_field, grid, layered, square
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.reduction import Reduction
+from slideviz.deformation import output
+from slideviz.deformation.streaming import stream
 from slideviz.errors import UnsoundError
 from slideviz.rbf import methods
 
@@ -86,3 +88,36 @@ def test_a_body_that_turns_far_from_its_axis_is_no_overshoot():
     *_, last = sv.deform(case, mesh)
     assert sv.quality(last.mesh, mesh).inverted == 0
     *_, last = sv.deform(case.change(motions=(Translate("BLOCK", (1e-9, 0.0)),)), square(6))
+
+
+def stretched(folder, **settings):
+    """A case whose block is stretched across, in a far field sixty times as wide, and its mesh."""
+    sv.write(folder / "mesh.su2b", far_field(60.0))
+    motion = sv.Scale("body", (1.0, 1.2))
+    roles = {"body": "moving", "far": "fixed"}
+    file = folder / "mesh.su2b"
+    return sv.Case(roles=roles, motions=(motion,), mesh_file=file, **settings), sv.read(file)
+
+
+def test_nodes_that_stray_are_named_with_the_remedy(tmp_path, monkeypatch):
+    case, mesh = stretched(tmp_path, influence_factor=2.5)
+    *_, last = sv.deform(case, mesh)
+    length = np.linalg.norm(last.mesh.points - mesh.points, axis=1)
+    node = int(np.argmax(length))
+    (said,) = last.warnings
+    assert length[node] > 10 * length[mesh.marker("body").nodes].max()
+    assert said.startswith(f"node {node} at (0, -18.1283) goes {length[node]:.3g} far, 20.3 times")
+    assert "INFLUENCE_FACTOR= AUTO, or RBF_KERNEL= wendland-c0" in said
+    for better in ({"influence_factor": "auto"}, {"kernel": "wendland-c0"}):
+        assert [*sv.deform(case.change(**better), mesh)][-1].warnings == ()
+    # A radius that is small already is to be smaller yet.
+    monkeypatch.setattr("slideviz.deformation.growth.STRAY", 3.0)
+    (small,) = [*sv.deform(case.change(influence_factor="auto"), mesh)][-1].warnings
+    factor = float(small.split("INFLUENCE_FACTOR= ")[1].split(",")[0])
+    assert [*sv.deform(case.change(influence_factor=factor), mesh)][-1].warnings == ()
+    monkeypatch.undo()
+    # A streamed run says the same, of nodes that are not in its skin.
+    monkeypatch.setattr(output, "CHUNK", 50)
+    done = stream(case, tmp_path / "out.su2b")
+    assert node not in done.skin.part.points
+    assert done.steps[-1].warnings == (said,)

@@ -7,10 +7,13 @@ with cells of a height of 1e-6 between the two.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import reduce
+
 import numpy as np
 
 from slideviz.deformation.setup import Setup
-from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.threads import PART, in_parts
 from slideviz.rbf.problem import Solution
 
@@ -25,6 +28,9 @@ themselves, so that they do not count for the reach of the motion."""
 STEEP = 100.0
 """Neighbouring boundary nodes explain an overshoot where the difference of their displacements over
 their distance is this times the largest displacement over the mesh's extent."""
+
+STRAY = 10.0
+"""A node strays where it goes more than this times as far as the farthest boundary node."""
 
 HOPELESS = 0.1
 """A system was not solved where its solution misses the displacement of a control node by more than
@@ -112,6 +118,74 @@ def overshoot_of_rest(
         f"would go {length:.3g} far, {length / largest:.3g} times the largest displacement that is "
         f"asked for ({largest:.3g}): {_cause(setup, mesh, moved)}"
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Farthest:
+    """The node of a mesh that went farthest.
+
+    Attributes
+    ----------
+    length : float
+        How far, in the mesh's length unit.
+    node : int
+        Its number; of several, the lowest.
+    point : (d,) float64
+        Its undeformed place.
+    """
+
+    length: float
+    node: int
+    point: FloatArray
+
+    def further(self, other: Farthest) -> Farthest:
+        """Return the one of two that went farther."""
+        return max(self, other, key=lambda each: (each.length, -each.node))
+
+
+def farthest_node(
+    before: FloatArray, after: FloatArray, numbers: IntArray | None = None
+) -> Farthest:
+    """Return the node that went farthest, of points (n, d) with ``numbers`` (n,), or 0, 1, ..."""
+    parts: list[Farthest] = []
+
+    def measure(part: slice) -> None:
+        length = np.linalg.norm(after[part] - before[part], axis=1)
+        k = int(np.argmax(length))
+        node = part.start + k
+        number = node if numbers is None else int(numbers[node])
+        parts.append(Farthest(float(length[k]), number, before[node]))
+
+    in_parts(measure, len(before))
+    return reduce(Farthest.further, parts)
+
+
+def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) -> list[str]:
+    """Return the warning that a node strays from the motion, or [].
+
+    Parameters
+    ----------
+    mesh, after
+        The mesh, or its skin, and its points (n, d) after the step.
+    found : Farthest
+        Of the whole mesh.
+    """
+    nodes = np.concatenate([setup.known, setup.classes.sliding])
+    most = float(np.linalg.norm(after[nodes] - mesh.points[nodes], axis=1).max(initial=0.0))
+    if not found.length > STRAY * most > 0.0:
+        return []
+    where = ", ".join(f"{value:.6g}" for value in found.point)
+    ratio, radius = found.length / most, setup.basis.radius
+    smaller = f"{0.8 * STRAY / ratio * radius / mesh.extent:.2g}"
+    factor = "AUTO" if setup.fitted_radius < radius else smaller
+    sentence = (
+        f"node {found.node} at ({where}) goes {found.length:.3g} far, {ratio:.3g} "
+        f"times as far as the farthest boundary node ({most:.3g}): the interpolation, whose "
+        f"support radius is {radius:.3g}, continues the turning or stretching of the boundary "
+        "beyond it; use a smaller support radius, such as INFLUENCE_FACTOR= "
+        f"{factor}, or RBF_KERNEL= wendland-c0"
+    )
+    return [sentence]
 
 
 def _reach(setup: Setup, shift: FloatArray, largest: float, kinds: tuple[str, ...]) -> float:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.deformation.growth import Farthest, farthest_node
 from slideviz.deformation.rest import Rest
 from slideviz.deformation.solver import folded_at
 from slideviz.mesh.io.cleanup import draft
@@ -39,12 +40,15 @@ class PointFiles:
     after: BinaryFile
     place: ZonePlace
 
-    def cells_of(self, block: ElementBlock) -> tuple[Mesh, Mesh]:
-        """Return the cells of a block as two meshes, undeformed and deformed."""
+    def cells_of(self, block: ElementBlock) -> tuple[Mesh, Mesh, IntArray]:
+        """Return the cells of a block as two meshes, undeformed and deformed.
+
+        And the numbers (n,) of their points in the whole mesh.
+        """
         nodes, flat = nodes_of(block)
         cells = Cells.from_types(block.types, flat)
         base = Mesh(self.points(self.before, nodes), cells, name=self.before.name)
-        return base, base.with_points(self.points(self.after, nodes))
+        return base, base.with_points(self.points(self.after, nodes)), nodes
 
     def points(self, source: BinaryFile, nodes: IntArray) -> FloatArray:
         """Return the points (k, d) of ascending nodes (k,); neighbours are read in one piece."""
@@ -96,6 +100,8 @@ class MeasuredBlock:
         Orientations that occur: 1, -1 (numbered the other way round), or both.
     inverted : dict of int to (int, (n,) int64)
         VTK type and nodes of inverted cells, by their number: those with the lowest numbers.
+    farthest : Farthest
+        The node that went farthest.
     """
 
     ids: Index
@@ -105,12 +111,15 @@ class MeasuredBlock:
     old: NDArray[np.uint8]
     signs: NDArray[np.int8]
     inverted: dict[int, tuple[int, IntArray]]
+    farthest: Farthest
 
 
 def measured(
-    block: ElementBlock, base: Mesh, moved: Mesh, metric: Metric, listed: int
+    block: ElementBlock, base: Mesh, moved: Mesh, numbers: IntArray, metric: Metric, listed: int
 ) -> MeasuredBlock:
     """Return the quality of a block, given as meshes ``base`` (undeformed) and ``moved``.
+
+    ``numbers`` (n,) are those of their points in the whole mesh.
 
     At most ``listed`` inverted cells are in it, those with the lowest numbers.
     """
@@ -128,6 +137,7 @@ def measured(
             int(block.ids[k]): (int(block.types[k]), block.nodes[ends[k] : ends[k + 1]].copy())
             for k in lowest
         },
+        farthest_node(base.points, moved.points, numbers),
     )
 
 
@@ -140,6 +150,8 @@ class QualityCollector:
     ----------
     inverted : dict of int to (int, (n,) int64)
         VTK type and nodes of inverted cells, by their number: those with the lowest numbers.
+    farthest : Farthest
+        The node that went farthest.
     """
 
     def __init__(self, stack: ExitStack, folder: Path, count: int, metric: Metric) -> None:
@@ -148,11 +160,17 @@ class QualityCollector:
         self._files = [Scratch(stack, folder, count, kind) for kind in kinds]
         self._values, self._before, self._status, self._old = (f.array for f in self._files)
         self._signs = np.zeros(0, np.int8)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the blocks that were added, before others are."""
         self.inverted: dict[int, tuple[int, IntArray]] = {}
+        self.farthest = Farthest(-1.0, 0, np.empty(0))
 
     def add(self, found: MeasuredBlock, listed: int) -> None:
         """Add a block; the ``listed`` inverted cells with the lowest numbers so far are kept."""
         self._signs = ways_of(np.concatenate([self._signs, found.signs]))
+        self.farthest = self.farthest.further(found.farthest)
         ids = found.ids
         self._values[ids], self._status[ids] = found.values, found.status
         self._before[ids], self._old[ids] = found.before, found.old

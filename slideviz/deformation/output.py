@@ -161,7 +161,7 @@ class Output:
         metric = self._metric
         if self._rating is None:
             self._rating = QualityCollector(self._stack, self._path.parent, count, metric)
-        self._rating.inverted.clear()
+        self._rating.reset()
         given = self._mesh_file, self._zone, partial.path, metric, listed
         with self._watch.phase("quality") as tick, self._ranks.sharing(measuring, *given) as do:
             for (_, end), found in zip(parts(count), do(parts(count)), strict=True):

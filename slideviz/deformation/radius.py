@@ -30,12 +30,17 @@ def support_radius(case: Case, mesh: Mesh, boundary: Boundary, moved: Displaceme
     case, boundary
         With the roles that boundaries have, and the facets of all of them.
     moved : Displacements
-        The prescribed displacements, from which ``INFLUENCE_FACTOR= AUTO`` is found.
+        The prescribed displacements.
     """
     if case.support_radius is not None:
         return case.support_radius
     if case.influence_factor:
         return case.influence_factor * mesh.extent
+    return fitted_radius(case, mesh, boundary, moved)
+
+
+def fitted_radius(case: Case, mesh: Mesh, boundary: Boundary, moved: Displacements) -> float:
+    """Return the support radius of ``INFLUENCE_FACTOR= AUTO``; parameters as `support_radius`."""
     sizes = np.ptp(moving_bodies(case, mesh, boundary, moved), axis=1)
     farthest = np.linalg.norm(moved.vectors, axis=1).max(initial=0.0)
     needed = max(BODIES * sizes.max(initial=0.0), DISPLACEMENTS * farthest)

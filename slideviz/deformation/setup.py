@@ -15,7 +15,7 @@ from slideviz.case.model import Case
 from slideviz.case.motion import displacements, require_valid
 from slideviz.deformation.classes import find_classes, find_period, roles_of_copies
 from slideviz.deformation.prescribed import displaced, image_tolerance, prescribed
-from slideviz.deformation.radius import support_radius
+from slideviz.deformation.radius import fitted_radius, support_radius
 from slideviz.deformation.reduction import find_reduction, loose_warnings
 from slideviz.errors import MeshError
 from slideviz.mesh.cached_boundary import boundary_of
@@ -80,6 +80,8 @@ class Setup:
         Periodic pairs of markers.
     solve : callable
         Solves one step by the method of the case.
+    fitted_radius : float
+        The support radius that fits the motion, whatever the case says.
     halo : Halo or None
         Copies that follow their donors.
     warnings : tuple of str
@@ -103,6 +105,7 @@ class Setup:
     tracks: Tracks
     pairs: tuple[Pair, ...]
     solve: Callable[[Problem, Watch], Solution]
+    fitted_radius: float
     halo: Halo | None
     warnings: tuple[str, ...]
 
@@ -249,6 +252,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
         tracks=tracks,
         pairs=pairs,
         solve=_method(case, mesh, frame, axis),
+        fitted_radius=fitted_radius(case, mesh, boundary, moved),
         halo=mesh.halo,
         warnings=(*mesh.remarks, *notes, *warnings, *loose, *idle_settings(case)),
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.case.boxes import moved_boxes
 from slideviz.case.model import Case
-from slideviz.deformation.growth import unsoundness
+from slideviz.deformation.growth import farthest_node, stray_warning, unsoundness
 from slideviz.deformation.setup import Setup
 from slideviz.deformation.steps import Progress, Step, Trial
 from slideviz.errors import DeformError, Note, UnsoundError
@@ -114,6 +114,10 @@ class Stepping:
             elif not remarks:
                 remarks = _dropped_warning(setup, solution, index, mesh)
             warnings += [f"step {index}: {text}" for text in solution.warnings]
+            stray = []
+            if self.rate is None and self.case.method == "rbf":
+                farthest = farthest_node(mesh.points, points)
+                stray = stray_warning(setup, mesh, points, farthest)
             least = max(least, (solution.doubt, solution.refined, index, solution.condition))
             misfit, apart = self._misfit(step)
             yield replace(
@@ -124,6 +128,7 @@ class Stepping:
                     *_doubt_warning(*least),
                     *apart,
                     *torn_interfaces(mesh, points),
+                    *stray,
                 ),
                 periodic_misfit=misfit,
             )

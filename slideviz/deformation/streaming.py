@@ -20,6 +20,7 @@ from slideviz import __version__
 from slideviz.case.model import Case
 from slideviz.deformation.course import Course
 from slideviz.deformation.given_mesh import given_for, require_su2
+from slideviz.deformation.growth import Farthest, stray_warning
 from slideviz.deformation.measuring import folded_steps
 from slideviz.deformation.output import Output
 from slideviz.deformation.rest import Rest
@@ -176,7 +177,7 @@ def stream(
         out.finish(None if moved is rest.skin.origin.ffd else moved)
     return StreamedRun(
         rest.skin,
-        _of_whole(rest.steps, rest.skin),
+        _of_whole(rest, rating.farthest),
         rating.quality(),
         rating.undeformed(),
         folded,
@@ -264,10 +265,16 @@ def about_run(case: Case) -> str:
     return hashlib.sha256(f"{text}{state.st_size} {state.st_mtime_ns}".encode()).hexdigest()
 
 
-def _of_whole(steps: Sequence[Step], skin: Mesh) -> tuple[Step, ...]:
-    """Return the steps of the skin, with the ``node_counts`` of the whole mesh."""
+def _of_whole(rest: Rest, farthest: Farthest) -> tuple[Step, ...]:
+    """Return the steps of the skin, with the ``node_counts`` of the whole mesh.
+
+    The last one warns of the node of the whole mesh that went farthest, if it strays.
+    """
+    skin, last = rest.skin, rest.steps[-1]
     assert skin.part is not None
     more = skin.part.n_points - len(skin.points)
+    stray = stray_warning(rest.setup, skin, last.mesh.points, farthest)
+    steps = (*rest.steps[:-1], replace(last, warnings=(*last.warnings, *stray)))
     return tuple(
         replace(
             step,

@@ -159,7 +159,7 @@ def _cut_cells(
         going_on()
         place = files.place
         block = elements_between(files.before, place, place.cells, place.dim, first, count)
-        base, now = files.cells_of(block)
+        base, now = files.cells_of(block)[:2]
         level = sign * section.distance(now.points)
         level[np.abs(level) <= near] = 0.0
         chosen = np.flatnonzero(sides_of(now.cells, level))

@@ -189,11 +189,7 @@ def worst_frame(
         rows = _elements(files, ids)
         types = np.array([vtk for vtk, _ in rows], np.uint8)
         nodes = np.concatenate([nodes for _, nodes in rows])
-        used = np.unique(nodes)
-        base, now = files.cells_of(ElementBlock(0, types, nodes, ids))
-        low = int(used[0])
-        # Where nodes are close to each other, the points between are there, too (`nodes_of`).
-        numbers = np.arange(low, low + len(base.points)) if len(base.points) > len(used) else used
+        base, now, numbers = files.cells_of(ElementBlock(0, types, nodes, ids))
     return measured_part(base, now, numbers, ids, files, metric)
 
 

@@ -8,7 +8,7 @@ from slideviz.case.keys import KEYS
 from slideviz.case.motion import displacements
 from slideviz.deformation.radius import BODIES, DISPLACEMENTS, EXTENTS, moving_bodies
 from slideviz.deformation.setup import make_setup
-from slideviz.errors import CaseError
+from slideviz.errors import ArgumentError
 from slideviz.mesh.cached_boundary import boundary_of
 from tests.builders import far_field
 
@@ -68,7 +68,7 @@ def test_one_marker_of_two_bodies_is_two_bodies():
 
 
 def test_a_word_that_is_not_auto_is_told():
-    with pytest.raises(CaseError, match="influence_factor is 'large'; needed is a number"):
+    with pytest.raises(ArgumentError, match="influence_factor is 'large'; needed is a number"):
         sv.Case(influence_factor="large")
 
 
