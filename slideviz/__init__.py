@@ -12,9 +12,12 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from slideviz.case.model import (
+        Bump,
         Case,
+        Cst,
         Ffd,
         FromFile,
+        HicksHenne,
         Prescribed,
         Radial,
         Rotate,
@@ -33,12 +36,15 @@ if TYPE_CHECKING:
     from slideviz.mesh.quality_derivative import QualityDerivative
 
 _HOME = {
+    "Bump": "case.model",
     "Case": "case.model",
     "Cells": "mesh.model",
     "ConditionWarning": "errors",
+    "Cst": "case.model",
     "Deformer": "design.deformer",
     "Ffd": "case.model",
     "FromFile": "case.model",
+    "HicksHenne": "case.model",
     "Marker": "mesh.model",
     "Mesh": "mesh.model",
     "Prescribed": "case.model",
@@ -61,12 +67,15 @@ _HOME = {
 }
 
 __all__ = [
+    "Bump",
     "Case",
     "Cells",
     "ConditionWarning",
+    "Cst",
     "Deformer",
     "Ffd",
     "FromFile",
+    "HicksHenne",
     "Marker",
     "Mesh",
     "Prescribed",

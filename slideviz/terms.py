@@ -124,15 +124,27 @@ NODE_TYPES: dict[NodeType, Term] = {
 }
 """The types of boundary nodes in the view: as the roles, with sliding edges and control nodes."""
 
-MotionKind = Literal["translate", "rotate", "scale", "radial", "ffd", "file"]
+MotionKind = Literal[
+    "translate", "rotate", "scale", "radial", "hicks-henne", "cst", "bump", "ffd", "file"
+]
 MOTION_KINDS: dict[MotionKind, Term] = {
     "translate": Term("translate"),
     "rotate": Term("rotate"),
     "scale": Term("scale"),
     "radial": Term("push radially"),
+    "hicks-henne": Term("Hicks-Henne"),
+    "cst": Term("airfoil by CST"),
+    "bump": Term("bump upwards"),
     "ffd": Term("free-form box"),
     "file": Term("displacement file"),
 }
+
+Side = Literal["upper", "lower"]
+SIDES: dict[Side, Term] = {
+    "upper": Term("upper", "Where the normal into the flow points towards +y."),
+    "lower": Term("lower", "Where the normal into the flow points towards -y."),
+}
+"""The sides of an airfoil."""
 
 FfdBlending = Literal["BEZIER", "BSPLINE_UNIFORM"]
 FFD_BLENDINGS: dict[FfdBlending, Term] = {

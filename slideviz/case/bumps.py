@@ -1,4 +1,4 @@
-"""Bumps on the surface of an airfoil, as functions of x along a chord from 0 to 1.
+"""Bumps on the surface of an airfoil: functions of x along a chord from 0 to 1, and motions.
 
 Hicks and Henne 1978, *Wing design by numerical optimization*; Kulfan 2008, *Universal parametric
 geometry representation method* (class and shape transformation, CST); as SU2 8 has them.
@@ -11,6 +11,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from slideviz.case.displacement import Displacements
+from slideviz.case.model import Case, Cst, HicksHenne, OnAirfoil, moves, named
+from slideviz.case.motion_text import term_of
 from slideviz.errors import CaseError
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -18,12 +21,8 @@ from slideviz.mesh.topology import vertex_normals
 
 EPS = 1e-16
 """What SU2 adds to coordinates of `surface_bump`."""
-
-
-def require_peak(peak: float) -> None:
-    """Raise CaseError where a bump cannot have its peak at x = ``peak``."""
-    if not 0.0 < peak < 1.0:
-        raise CaseError(f"the peak is at x = {peak:g}; it must lie between 0 and 1")
+LEVEL = 1e-12
+"""A node is on neither side where y is less than this part of its normal: that is rounding."""
 
 
 def hicks_henne(x: FloatArray, peak: float) -> FloatArray:
@@ -38,9 +37,7 @@ def kulfan(x: FloatArray, k: float, n: float) -> FloatArray:
 
     Where x is below 0, it counts as 0.
     """
-    i, degree = int(k) - 1, int(n) - 1
-    if not 0 <= i <= degree:
-        raise CaseError(f"there is no coefficient {k:g} of {n:g}; the first must be 1 to {n:g}")
+    i, degree = (value - 1 for value in term_of(k, n))
     x = np.maximum(x, 0.0)
     shape = math.comb(degree, i) * x**i * (1.0 - x) ** (degree - i)
     return np.sqrt(x) * (1.0 - x) * shape
@@ -74,3 +71,62 @@ def normals_at(mesh: Mesh, markers: Iterable[str], nodes: IntArray) -> FloatArra
             place = np.searchsorted(nodes, at)
             out[place] = -normals
     return out
+
+
+def bump_displacements(case: Case, mesh: Mesh, names: Iterable[str]) -> dict[object, Displacements]:
+    """Return the displacements of the nodes of the moving markers ``names``, by airfoil motion.
+
+    Raises
+    ------
+    CaseError
+        A motion with a height moves no node: none is on its side, along its chord.
+    """
+    found: dict[object, Displacements] = {}
+    problems = []
+    for place, motion in enumerate(case.motions, start=1):
+        mine = [name for name in names if isinstance(motion, OnAirfoil) and moves(motion, name)]
+        if not mine or not isinstance(motion, OnAirfoil):
+            continue
+        nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in mine]))
+        shape = _shape(motion, mesh, mine, nodes)
+        vectors = np.zeros((len(nodes), mesh.dim))
+        vectors[:, 1] = motion.height * shape
+        found[motion] = Displacements(nodes, vectors)
+        if not shape.any():
+            of = " or ".join(repr(name) for name in named(motion.marker)) or "a moving marker"
+            side = "" if not hasattr(motion, "side") else f" on its {motion.side} side"
+            low, high = motion.chord
+            problems.append(
+                f"motion {place}: no node of {of} is{side} between x = {low:g} and {high:g}; "
+                "give x of the leading and of the trailing edge"
+            )
+    if problems:
+        raise CaseError("\n".join(problems))
+    return found
+
+
+def _shape(motion: OnAirfoil, mesh: Mesh, markers: list[str], nodes: IntArray) -> FloatArray:
+    """Return the displacement (m,) of nodes along y by a height of 1."""
+    low, high = motion.chord
+    t = (mesh.points[nodes, 0] - low) / (high - low)
+    along = (t > 0.0) & (t < 1.0)
+    if isinstance(motion, Cst):
+        shape = np.where(along, kulfan(np.where(along, t, 0.0), *motion.term), 0.0)
+    else:
+        shape = np.where(along, hicks_henne(np.where(along, t, 0.0), motion.peak), 0.0)
+    if not isinstance(motion, HicksHenne | Cst):
+        return shape
+    sign = side_of(normals_at(mesh, markers, nodes))
+    there = sign > 0.0 if motion.side == "upper" else sign < 0.0
+    outwards = sign if isinstance(motion, HicksHenne) else 1.0
+    return np.where(there, outwards * shape, 0.0)
+
+
+def side_of(normals: FloatArray) -> FloatArray:
+    """Return 1 for the upper side of an airfoil, -1 for the lower one, by normals (m, d): (m,).
+
+    0 where the normal is level up to rounding.
+    """
+    upwards = normals[:, 1]
+    level = np.abs(upwards) <= LEVEL * np.linalg.norm(normals, axis=1)
+    return np.where(level, 0.0, np.sign(upwards))

@@ -16,6 +16,7 @@ from slideviz.case.model import (
     Ffd,
     FromFile,
     Motion,
+    OnAirfoil,
     Prescribed,
     Radial,
     Rotate,
@@ -155,7 +156,7 @@ def _motion_problems(motion: Motion, dim: int) -> Iterator[str]:
     except (CaseError, TypeError, ValueError) as problem:
         yield str(problem).removeprefix("motion 1: ")
         return
-    if isinstance(motion, Ffd):
+    if isinstance(motion, Ffd | OnAirfoil):
         return
     needed = f"the mesh has {dim} dimensions"
     if isinstance(motion, Translate):

@@ -1,16 +1,17 @@
-"""Displacements from files and FFD boxes, which are found before the motions are performed."""
+"""Displacements that are found before the motions are performed: by files, boxes and bumps."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from slideviz.case.boxes import ffd_displacements
+from slideviz.case.bumps import bump_displacements
 from slideviz.case.displacement import Displacements, read_displacements
-from slideviz.case.model import Case, Ffd, FromFile, moves, named
+from slideviz.case.model import Case, Ffd, FromFile, OnAirfoil, moves, named
 from slideviz.errors import CaseError
 from slideviz.mesh.model import IntArray, Mesh
 
@@ -18,13 +19,23 @@ Given = Mapping[object, Displacements]
 """Displacements by the key (`key_of`) of their motion."""
 
 
-def key_of(motion: FromFile | Ffd) -> object:
+def key_of(motion: FromFile | Ffd | OnAirfoil) -> object:
     """Return the key of a motion in `Given`; motions with the same displacements share it."""
-    return motion if isinstance(motion, Ffd) else (motion.path, motion.marker)
+    return (motion.path, motion.marker) if isinstance(motion, FromFile) else motion
+
+
+def placed_displacements(
+    case: Case, mesh: Mesh, names: Iterable[str]
+) -> dict[object, Displacements]:
+    """Return the displacements by motions that depend on undeformed places, by their motion.
+
+    ``names`` are the moving markers. Raises CaseError where such a motion moves no node.
+    """
+    return ffd_displacements(case, mesh, names) | bump_displacements(case, mesh, names)
 
 
 def given_displacements(case: Case, mesh: Mesh) -> dict[object, Displacements]:
-    """Return the displacements that the case's files and FFD boxes give, by `key_of` their motion.
+    """Return the displacements by files, FFD boxes and bumps of a case, by `key_of` their motion.
 
     Raises
     ------
@@ -40,7 +51,7 @@ def given_displacements(case: Case, mesh: Mesh) -> dict[object, Displacements]:
     files: dict[object, Displacements] = {}
     problems: list[str] = []
     try:
-        files |= ffd_displacements(case, mesh, on)
+        files |= placed_displacements(case, mesh, on)
     except CaseError as problem:
         problems.append(str(problem))
     for motion in case.motions:

@@ -24,6 +24,7 @@ from slideviz.terms import (
     PERIODIC_MODES,
     PERIODIC_TYPES,
     ROLES,
+    SIDES,
     SLIDING,
     FfdBlending,
     FileFormat,
@@ -32,6 +33,7 @@ from slideviz.terms import (
     PeriodicMode,
     PeriodicType,
     Role,
+    Side,
     Sliding,
 )
 
@@ -132,6 +134,58 @@ class Ffd:
         check_fields(self)
 
 
+@dataclass(frozen=True)
+class HicksHenne:
+    """Raise one side of an airfoil outwards by a bump (Hicks and Henne 1978).
+
+    It is ``height`` at ``peak``, a part of the ``chord`` between two x, and 0 at its ends. Nodes
+    move along y, from their undeformed places, whatever motions come before; the upper side is
+    where normals into the flow point to +y.
+    """
+
+    marker: Target
+    height: float
+    peak: float = 0.5
+    side: Side = field(default="upper", metadata=SIDES)
+    chord: tuple[float, float] = (0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        require_chosen(self)
+
+
+@dataclass(frozen=True)
+class Cst:
+    """Add ``height`` times a class and shape function to y of one side of an airfoil (Kulfan 2008).
+
+    The function is the square root of t times (1 - t), times Bernstein polynomial k of n (from 1)
+    of ``term``, with t from 0 to 1 along the ``chord``; otherwise as `HicksHenne`.
+    """
+
+    marker: Target
+    height: float
+    term: tuple[int, int] = (1, 1)
+    side: Side = field(default="upper", metadata=SIDES)
+    chord: tuple[float, float] = (0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        require_chosen(self)
+
+
+@dataclass(frozen=True)
+class Bump:
+    """Raise all sides of an airfoil towards +y by a bump; otherwise as `HicksHenne`."""
+
+    marker: Target
+    height: float
+    peak: float = 0.5
+    chord: tuple[float, float] = (0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
 @dataclass(frozen=True, eq=False)
 class Prescribed:
     """Displace nodes (k,) by vectors (k, d), given by a program; it cannot be in a case file.
@@ -159,7 +213,8 @@ class Prescribed:
 
 
 _ROLES = 'a role for each marker, as {"blade": "moving"}'
-Motion = Translate | Rotate | Scale | Radial | Ffd | FromFile | Prescribed
+OnAirfoil = HicksHenne | Cst | Bump
+Motion = Translate | Rotate | Scale | Radial | OnAirfoil | Ffd | FromFile | Prescribed
 
 
 def named(target: Target) -> tuple[str, ...]:

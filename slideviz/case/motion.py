@@ -27,6 +27,7 @@ from slideviz.case.model import (
     Ffd,
     FromFile,
     Motion,
+    OnAirfoil,
     Point,
     Prescribed,
     Radial,
@@ -182,8 +183,8 @@ def displacement_of(
     nodes : (k,) int64
         Their indices; needed for displacements of files, boxes and programs only.
     files : mapping of object to Displacements
-        The displacements of files and boxes, by `slideviz.case.given.key_of` their motion; a motion
-        that is not among them displaces nothing.
+        The displacements of files, boxes and bumps, by `slideviz.case.given.key_of` their motion; a
+        motion that is not among them displaces nothing.
     """
     total = np.zeros_like(points)
     for motion in motions:
@@ -197,7 +198,7 @@ def _change(
     """Return the displacement (k, d) by one motion of the nodes of a marker, now at ``points``."""
     if isinstance(motion, Prescribed):
         return _prescribed(motion, points, nodes)
-    if not isinstance(motion, FromFile | Ffd):
+    if not isinstance(motion, FromFile | Ffd | OnAirfoil):
         return _increment(motion, points)
     key = key_of(motion)
     if not files or nodes is None or key not in files:

@@ -9,9 +9,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from slideviz.case.model import (
+    Bump,
+    Cst,
     Ffd,
     FromFile,
+    HicksHenne,
     Motion,
+    OnAirfoil,
     Point,
     Prescribed,
     Radial,
@@ -22,9 +26,18 @@ from slideviz.case.model import (
     named,
 )
 from slideviz.case.values import Kind, axis_text, path_text, read_axis, read_vector, vector_text
-from slideviz.case.words import Word, is_none, name_text, nearest, number, shown, words_of
+from slideviz.case.words import (
+    Word,
+    is_none,
+    name_text,
+    nearest,
+    not_one_of,
+    number,
+    shown,
+    words_of,
+)
 from slideviz.errors import CaseError
-from slideviz.terms import MOTION_KINDS
+from slideviz.terms import MOTION_KINDS, SIDES
 
 VERBS = tuple(MOTION_KINDS)
 ALL_MOVING = "*"
@@ -109,6 +122,8 @@ def _read_motion(group: list[Word]) -> Motion:
         return _read_file(marker, rest)
     if verb == "ffd":
         return _read_ffd(marker, rest)
+    if verb in _BUMPS:
+        return _read_bump(marker, verb, rest)
     if verb == "translate":
         return Translate(marker, read_vector(_flat(rest), "the shift"))
     if verb == "rotate":
@@ -229,6 +244,61 @@ def _read_ffd(marker: Target, rest: list[Word]) -> Ffd:
     return Ffd(marker, name, (i, j, k), (dx, dy, dz))
 
 
+_BUMPS = {
+    "hicks-henne": "hicks-henne, upper, peak, height, or besides x0, x1 of the chord",
+    "cst": "cst, upper, k, n, height, or besides x0, x1 of the chord",
+    "bump": "bump, peak, height, x0, x1",
+}
+
+
+def _read_bump(marker: Target, verb: str, rest: list[Word]) -> OnAirfoil:
+    words = _flat(rest)
+    sided = verb != "bump"
+    numbers = [number(word.text) for word in words[sided:]]
+    before = 3 if verb == "cst" else 2
+    if len(numbers) not in ((before, before + 2) if sided else (4,)):
+        raise CaseError(f"needed is {_BUMPS[verb]}")
+    low, high = (*numbers[before:], 0.0, 1.0)[:2]
+    if not low < high:
+        raise CaseError(f"the chord goes from x = {low:g} to {high:g}; give the lower one first")
+    *shape, height = numbers[:before]
+    if verb != "cst":
+        require_peak(shape[0])
+    if verb == "bump":
+        return Bump(marker, height, shape[0], (low, high))
+    side = next((one for one in SIDES if one == words[0].text.lower()), None)
+    if side is None:
+        raise CaseError(not_one_of(words[0].text, SIDES))
+    if verb == "cst":
+        return Cst(marker, height, term_of(*shape), side, (low, high))
+    return HicksHenne(marker, height, shape[0], side, (low, high))
+
+
+def require_peak(peak: float) -> None:
+    """Raise CaseError where a bump cannot have its peak at x = ``peak`` of a chord."""
+    if not 0.0 < peak < 1.0:
+        raise CaseError(f"the peak is at x = {peak:g}; it must lie between 0 and 1")
+
+
+def term_of(k: float, n: float) -> tuple[int, int]:
+    """Return term k of n of an airfoil's shape as whole numbers; raises CaseError if none is."""
+    if k != int(k) or n != int(n) or not 1 <= k <= n:
+        raise CaseError(f"there is no term {k:g} of {n:g}; needed are whole numbers, 1 to n of n")
+    return int(k), int(n)
+
+
+def _bump_text(head: str, motion: OnAirfoil) -> str:
+    chord = _numbers(motion.chord)
+    if isinstance(motion, Bump):
+        return f"({head}, bump, {_numbers((motion.peak, motion.height))}, {chord})"
+    tail = "" if motion.chord == (0.0, 1.0) else f", {chord}"
+    if isinstance(motion, Cst):
+        k, n = motion.term
+        return f"({head}, cst, {motion.side}, {k}, {n}, {float(motion.height)!r}{tail})"
+    numbers = _numbers((motion.peak, motion.height))
+    return f"({head}, hicks-henne, {motion.side}, {numbers}{tail})"
+
+
 def _motion_text(motion: Motion) -> str:
     if isinstance(motion, Prescribed):
         raise CaseError(
@@ -240,6 +310,8 @@ def _motion_text(motion: Motion) -> str:
         i, j, k = motion.index
         at = f"{name_text(motion.box)}, {i}, {j}, {k}"
         return f"({head}, ffd, {at}, {_numbers(motion.vector)})"
+    if isinstance(motion, OnAirfoil):
+        return _bump_text(head, motion)
     if isinstance(motion, FromFile):
         path = path_text(motion.path)
         # Commas and spaces separate here, unlike in a value that is a path only.
@@ -284,6 +356,9 @@ GRAMMAR = (
     "(BLADE, scale, FACTORS, centroid)             FACTORS: one, or one for each axis",
     "(BLADE, scale, FACTORS, (px, py[, pz]))",
     "(HUB, radial, FACTOR, dr, AXIS, (px, py, pz))  radius r becomes FACTOR r + dr; 2D: no AXIS",
+    "(WING, hicks-henne, SIDE, peak, h[, x0, x1])  SIDE: upper or lower; peak: part of the chord",
+    "(WING, cst, SIDE, k, n, h[, x0, x1])          term k of n; chord from x0 to x1, else 0 to 1",
+    "(WING, bump, peak, h, x0, x1)                 both sides, towards +y",
     "(BLADE, ffd, BOX, i, j, k, dx, dy, dz)        control point of a box; -1: all of an index",
     "(BLADE, file, path)                           node, dx, dy[, dz] in each line",
     "(*, VERB, ...)                                all moving boundaries, as one body",

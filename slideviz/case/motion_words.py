@@ -6,10 +6,13 @@ import math
 from collections.abc import Sequence
 
 from slideviz.case.model import (
+    Bump,
     Case,
+    Cst,
     Ffd,
     FromFile,
     Motion,
+    OnAirfoil,
     Point,
     Prescribed,
     Radial,
@@ -64,6 +67,8 @@ def _in_full(motion: Motion, dim: int, extent: float) -> str:
         return f"push radially by {_push(motion)}"
     if isinstance(motion, Ffd):
         return f"move {_control(motion)} by {vector_words(motion.vector[:dim])}"
+    if isinstance(motion, OnAirfoil):
+        return f"raise {_bump(motion, f'by {motion.height:.4g}')}"
     if isinstance(motion, Prescribed):
         return f"displace {len(motion.nodes):,} nodes as given"
     return f"displace as in {motion.path.name or '(no file yet)'}"
@@ -124,6 +129,8 @@ def _briefly(motion: Motion) -> str:
         return f"radially {_push(motion)}"
     if isinstance(motion, Ffd):
         return f"{_control(motion)} {vector_words(motion.vector)}"
+    if isinstance(motion, OnAirfoil):
+        return _bump(motion, f"{motion.height:+.4g}")
     if isinstance(motion, Prescribed):
         return f"{len(motion.nodes):,} nodes as given"
     return motion.path.name or "(no file yet)"
@@ -135,6 +142,9 @@ def _exactly(motion: Motion) -> str:
         return str(motion.path)
     if isinstance(motion, Ffd):
         return f"{_control(motion)} {vector_words(motion.vector, '.15g')}"
+    if isinstance(motion, OnAirfoil):
+        chord = f", chord {vector_words(motion.chord, '.15g')}" * (motion.chord != (0.0, 1.0))
+        return _bump(motion, f"{motion.height:+.15g}", ".15g") + chord
     if isinstance(motion, Prescribed):
         return _briefly(motion)
     if isinstance(motion, Translate):
@@ -192,6 +202,14 @@ def _push(motion: Radial) -> str:
     parts = [f"{100.0 * (motion.factor - 1.0):+.4g} %"] if motion.factor != 1.0 else []
     parts += [f"{motion.distance:+.4g}"] if motion.distance or not parts else []
     return " and ".join(parts)
+
+
+def _bump(motion: OnAirfoil, by: str, form: str = ".4g") -> str:
+    """Return what a motion raises of an airfoil, in words, with the height as in ``by``."""
+    if isinstance(motion, Cst):
+        return f"{motion.side} side {by} × CST {motion.term[0]} of {motion.term[1]}"
+    what = "both sides" if isinstance(motion, Bump) else f"{motion.side} side"
+    return f"{what} {by} at {format(100.0 * motion.peak, form)} % chord"
 
 
 def _control(motion: Ffd) -> str:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from slideviz.case.boxes import boxes_for, ffd_displacements
+from slideviz.case.boxes import boxes_for
 from slideviz.case.displacement import Displacements, read_displacements
-from slideviz.case.given import key_of
+from slideviz.case.given import key_of, placed_displacements
 from slideviz.case.model import Case, FromFile, Target, moves
 from slideviz.case.motion import displacements, moved_together
 from slideviz.case.motion_words import direction_words
@@ -34,6 +34,16 @@ def centroid(mesh: Mesh, names: Iterable[str]) -> tuple[float, ...]:
     nodes = np.unique(np.concatenate([*found, np.empty(0, np.int64)]))
     middle = mesh.points[nodes].mean(axis=0) if len(nodes) else np.zeros(mesh.dim)
     return tuple(round(float(v), digits) + 0.0 for v in middle)
+
+
+def chord_of(mesh: Mesh, names: Iterable[str]) -> tuple[float, float]:
+    """Return from which x to which x some boundaries go, rounded to `DIGITS`; 0 to 1 for none."""
+    found = [mesh.marker(name).nodes for name in names if name in mesh.marker_names]
+    x = mesh.points[np.concatenate([*found, np.empty(0, np.int64)]), 0]
+    if not len(x) or not x.min() < x.max():
+        return 0.0, 1.0
+    digits = DIGITS - math.ceil(math.log10(np.ptp(x)))
+    return round(float(x.min()), digits) + 0.0, round(float(x.max()), digits)
 
 
 def radial(axis: Axis, point: tuple[float, ...]) -> tuple[float, float, float] | None:
@@ -130,7 +140,7 @@ class Ghosts:
             if isinstance(motion, FromFile) and (read := self._read(motion, on)) is not None:
                 files[key_of(motion)] = read
         with suppress(SlidevizError):
-            files |= ffd_displacements(case, self.mesh, on)
+            files |= placed_displacements(case, self.mesh, on)
         points = self.mesh.points
         moved = moved_together(case.motions, points, on, files)
         return {name: points[nodes] + moved[name] for name, nodes in on.items()}

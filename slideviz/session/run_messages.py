@@ -9,7 +9,18 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, Ffd, FromFile, Motion, Radial, Rotate, Scale, Translate, moves
+from slideviz.case.model import (
+    Case,
+    Ffd,
+    FromFile,
+    Motion,
+    OnAirfoil,
+    Radial,
+    Rotate,
+    Scale,
+    Translate,
+    moves,
+)
 from slideviz.deformation.reduction import LOOSE
 from slideviz.deformation.remedies import MOST_NAMES, beyond_pitch, fixed_beside, remedies
 from slideviz.errors import Note
@@ -180,6 +191,8 @@ def moves_nothing(motion: Motion) -> bool:
         return not any(motion.vector)
     if isinstance(motion, Rotate):
         return motion.angle_deg == 0
+    if isinstance(motion, OnAirfoil):
+        return motion.height == 0
     if isinstance(motion, Scale):
         return all(factor == 1 for factor in motion.factors)
     return isinstance(motion, Radial) and motion.factor == 1 and motion.distance == 0

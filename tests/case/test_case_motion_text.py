@@ -4,7 +4,18 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.model import Ffd, FromFile, Prescribed, Radial, Rotate, Scale, Translate
+from slideviz.case.model import (
+    Bump,
+    Cst,
+    Ffd,
+    FromFile,
+    HicksHenne,
+    Prescribed,
+    Radial,
+    Rotate,
+    Scale,
+    Translate,
+)
 from slideviz.case.motion_text import GRAMMAR, read_motions, write_motions
 from slideviz.errors import CaseError
 
@@ -43,6 +54,14 @@ X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
         ('(*, ffd, "my box", -1, 1, 0, 1, 2, 3)', Ffd("", "my box", (-1, 1, 0), (1.0, 2.0, 3.0))),
         ("(B, ffd, BOX, 2, 1, 0.5, -1)", Ffd("B", "BOX", (2, 1, -1), (0.5, -1.0, 0.0))),
         ("(B, ffd, BOX, (2, 1, 0), (0, 1, 0))", Ffd("B", "BOX", (2, 1, 0), (0.0, 1.0, 0.0))),
+        ("(B, hicks-henne, upper, 0.3, 0.02)", HicksHenne("B", 0.02, 0.3)),
+        (
+            "(B, Hicks-Henne, LOWER, 0.3, -1e-2, 2, 4)",
+            HicksHenne("B", -0.01, 0.3, "lower", (2.0, 4.0)),
+        ),
+        ("(B, cst, lower, 2, 6, 0.1)", Cst("B", 0.1, (2, 6), "lower")),
+        ("(*, cst, upper, 1, 1, 0.1, -1, 1)", Cst("", 0.1, (1, 1), "upper", (-1.0, 1.0))),
+        ("(B, bump, 0.5, 0.1, 0.2, 0.9)", Bump("B", 0.1, 0.5, (0.2, 0.9))),
         ("(B, file, a\\b.txt)", FromFile(Path("a/b.txt"), "B")),
         ('(B, file, "my, (file).txt")', FromFile(Path("my, (file).txt"), "B")),
         ("(*, file, b.txt)", FromFile(Path("b.txt"))),
@@ -83,6 +102,9 @@ def test_examples_of_the_reference_are_read():
             "dx, dy[, dz]": "1, 2",
             "degrees": "5",
             "px, py[, pz]": "1, 2",
+            "SIDE, peak, h[, x0, x1]": "upper, 0.5, 1",
+            "SIDE, k, n, h[, x0, x1]": "lower, 1, 2, 1, 0, 1",
+            "peak, h, x0, x1": "0.5, 1, 0, 1",
             "px, py, pz": "1, 2, 3",
             "px, py": "1, 2",
             "AXIS": "0, 1, 0",
@@ -105,7 +127,7 @@ def test_examples_of_the_reference_are_read():
         ('(B, file, "a)', "the quotation mark .* is not closed"),
         (
             "(B)",
-            "motion 1: needed are a marker and one of translate, rotate, scale, radial, ffd, file",
+            "motion 1: needed are a marker and one of translate, rotate, scale, radial, hicks",
         ),
         ("(B, translate, 1, 0) ; ()", "motion 2: needed are a marker and one of"),
         ('("", translate, 1, 0)', "motion 1: it does not begin with the name of a marker"),
@@ -119,6 +141,14 @@ def test_examples_of_the_reference_are_read():
         ("(B, ffd, BOX, 1, 2, x, 4, 5, 6)", "'x' is not a number"),
         ("(B, ffd, BOX, 1, -2, 0, 4, 5, 6)", r"point \(1, -2, 0\) is none; needed are whole"),
         ("(B, ffd, BOX, 1, 0.5, 0, 4, 5, 6)", r"point \(1, 0.5, 0\) is none; needed are whole"),
+        ("(B, hicks-henne, upper, 0.5)", "needed is hicks-henne, upper, peak, height, or besides"),
+        ("(B, hicks-henne, 0.5, 0.1, 0.2)", "'0.5' is not one of upper | lower"),
+        ("(B, hicks-henne, uper, 0.5, 0.1)", "'uper' is not one of .*; did you mean upper?"),
+        ("(B, hicks-henne, upper, 1.5, 0.1)", "the peak is at x = 1.5; it must lie between 0 and"),
+        ("(B, hicks-henne, upper, 0.5, 0.1, 1, 0)", "the chord goes from x = 1 to 0; give the lo"),
+        ("(B, cst, upper, 3, 2, 0.1)", "there is no term 3 of 2; needed are whole numbers, 1 to n"),
+        ("(B, cst, upper, 1.5, 2, 0.1)", "there is no term 1.5 of 2; needed are whole numbers"),
+        ("(B, bump, 0.5, 0.1)", "needed is bump, peak, height, x0, x1"),
         ("(B, translate, 1)", "the shift has 1 values; needed are 2 or 3 numbers"),
         ("(B, translate, 1, 2, 3, 4)", "the shift has 4 values"),
         ("(B, translate, 1, y)", "'y' is not a number"),

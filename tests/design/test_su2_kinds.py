@@ -286,7 +286,7 @@ def test_gradient_for_the_angle_that_the_restart_lacks_is_told(here, capsys):
         ("HICKS_HENNE", (1, 1.0), "the peak is at x = 1; it must lie between 0 and 1"),
         ("HICKS_HENNE_CAMBER", "(0.0)", "the peak is at x = 0; it must lie between 0 and 1"),
         ("SURFACE_BUMP", (0.2, 0.5, 0.6), "the peak is at x = 0.6; it must lie between 0.2 and 0"),
-        ("CST", (1, 4, 3), "there is no coefficient 4 of 3; the first must be 1 to 3"),
+        ("CST", (1, 4, 3), "there is no term 4 of 3; needed are whole numbers, 1 to n of n"),
         ("NACA_4DIGITS", (2, 0, 12), "NACA_4DIGITS: the second digit is 0; the largest camber"),
         ("PARABOLIC", (1.0, 12), "PARABOLIC: the centre is 1; it must not be 0 or 1"),
         ("TRANSLATE_GRID", (0, 0, 0), "TRANSLATE_GRID: its direction has no length; give one"),

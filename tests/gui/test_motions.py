@@ -5,7 +5,17 @@ import pytest
 from qtpy.QtTest import QTest
 
 import slideviz as sv
-from slideviz.case.model import Ffd, FromFile, Radial, Rotate, Scale, Translate
+from slideviz.case.model import (
+    Bump,
+    Cst,
+    Ffd,
+    FromFile,
+    HicksHenne,
+    Radial,
+    Rotate,
+    Scale,
+    Translate,
+)
 from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import with_boxes
 from slideviz.gui.dialogs.motion_table import TableDialog
@@ -16,6 +26,7 @@ from slideviz.session.motion_table import TableRows
 from slideviz.session.motions import Ghosts
 from slideviz.session.run_messages import run_requirements
 from slideviz.terms import SHOWN
+from tests.builders import airfoil
 from tests.slow import one_of_each_fast
 
 pytestmark = pytest.mark.usefixtures("unpainted")
@@ -321,3 +332,38 @@ def test_motion_of_a_box_is_shown_edited_and_kept_and_takes_whole_numbers(boxed,
     np.testing.assert_allclose(moved[:, 1], 0.1 * 3 * u**2 * (1 - u), atol=1e-14)
     boxed.session.case.write(tmp_path / "kept.cfg")
     assert sv.Case.read(tmp_path / "kept.cfg").motions == (motion,)
+
+
+def test_bumps_on_an_airfoil_are_shown_edited_and_kept(driver, tmp_path):
+    sv.write(tmp_path / "wing.su2", airfoil(24, 3).with_points(2.0 * airfoil(24, 3).points + 1.0))
+    driver.open(tmp_path / "wing.su2")
+    driver.role("airfoil", "moving")
+    driver.add_motion(HicksHenne)
+    form = editor(driver)
+    assert driver.session.case.motions == (HicksHenne("airfoil", 0.0, chord=(1.0, 3.0)),)
+    assert [form.side.isVisible(), form.peak.isVisible(), form.term.isVisible()] == [1, 1, 0]
+    assert texts(form.chord) == ["1", "3"]
+    driver.type(form.peak, "120")
+    driver.type(form.peak, "30")
+    driver.type(form.raised, "0.02")
+    driver.choose(form.side, "lower")
+    motion = HicksHenne("airfoil", 0.02, 0.3, "lower", (1.0, 3.0))
+    assert driver.session.case.motions == (motion,)
+    assert listed(driver) == "1.  airfoil: raise lower side by 0.02 at 30 % chord"
+    moved = Ghosts(driver.session.mesh).moved(driver.session.case)["airfoil"]
+    assert moved[:, 1].min() < driver.session.mesh.points[:24, 1].min()
+    driver.choose(form.kind, Cst)
+    assert driver.session.case.motions == (Cst("airfoil", 0.0, chord=(1.0, 3.0)),)
+    driver.type(form.term.fields[1], "4")
+    driver.type(form.term.fields[0], "5")
+    assert driver.session.case.motions[0].term == (1, 4)
+    driver.type(form.term.fields[0], "2")
+    driver.type(form.raised, "0.1")
+    driver.type(form.chord.fields[0], "4")
+    assert driver.session.case.motions == (Cst("airfoil", 0.1, (2, 4), chord=(1.0, 3.0)),)
+    driver.choose(form.kind, Bump)
+    assert not form.side.isVisible()
+    driver.type(form.raised, "0.05")
+    assert driver.session.case.motions == (Bump("airfoil", 0.05, 0.5, (1.0, 3.0)),)
+    driver.session.case.write(tmp_path / "kept.cfg")
+    assert sv.Case.read(tmp_path / "kept.cfg").motions == driver.session.case.motions

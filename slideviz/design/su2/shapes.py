@@ -8,14 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from slideviz.case.bumps import hicks_henne, kulfan, normals_at, require_peak, surface_bump
+from slideviz.case.bumps import hicks_henne, kulfan, normals_at, side_of, surface_bump
+from slideviz.case.motion_text import require_peak
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.variables import DesignVariable
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-
-LEVEL = 1e-12
-"""A node is on neither side where y is less than this part of its normal: that is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +37,7 @@ class Surface:
     @cached_property
     def side(self) -> FloatArray:
         """Return 1 for nodes (m,) of the upper side, -1 for those of the lower one; 0 between."""
-        upwards = self.normals[:, 1]
-        level = np.abs(upwards) <= LEVEL * np.linalg.norm(self.normals, axis=1)
-        return np.where(level, 0.0, np.sign(upwards))
+        return side_of(self.normals)
 
     def along_y(self, shift: FloatArray) -> FloatArray:
         """Return displacements (m, d) of the nodes by ``shift`` (m,) along y."""

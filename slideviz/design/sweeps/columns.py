@@ -2,8 +2,8 @@
 
 The name of a number is ``BLADE.translate.y``: marker, kind of motion, and number; or, by the place
 of the motion in ``MOTION``, ``motion2.y``, which is needed where two motions of one kind move the
-same marker. The name of a box's number has the control point, ``BLADE.ffd.BOX.1.0.0.y``. The name
-of a key is that of ``--set``, ``STEPS``.
+same marker. The name of a box's number has the control point, ``BLADE.ffd.BOX.1.0.0.y``, that of a
+bump its side, ``WING.hicks-henne.upper.height``. The name of a key is that of ``--set``, ``STEPS``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 from slideviz.case.cfg import set_key
 from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, Ffd, FromFile, Motion, Prescribed, named
+from slideviz.case.model import Case, Cst, Ffd, FromFile, HicksHenne, Motion, Prescribed, named
 from slideviz.case.words import nearest, number, shown
 from slideviz.errors import CaseError
 
@@ -212,10 +212,13 @@ def _usual(name: str) -> str:
 
 def _head(motion: Motion) -> str:
     """Return the begin of the names of a motion's numbers: ``BLADE.translate``."""
-    head = f"{'+'.join(named(motion.marker)) or '*'}.{type(motion).__name__.lower()}"
+    kind = "hicks-henne" if isinstance(motion, HicksHenne) else type(motion).__name__.lower()
+    head = f"{'+'.join(named(motion.marker)) or '*'}.{kind}"
     if isinstance(motion, Ffd):
         return ".".join([head, motion.box, *map(str, motion.index)])
-    return head
+    if isinstance(motion, HicksHenne | Cst):
+        head = f"{head}.{motion.side}"
+    return f"{head}.{motion.term[0]}" if isinstance(motion, Cst) else head
 
 
 def _parts(motion: Motion, at: int) -> Iterator[tuple[str, NumberPlace]]:
@@ -223,7 +226,7 @@ def _parts(motion: Motion, at: int) -> Iterator[tuple[str, NumberPlace]]:
     if isinstance(motion, FromFile | Prescribed):
         return
     for field in fields(motion):
-        if field.name == "index":  # which control point it is does not vary
+        if field.name in ("index", "term", "chord"):  # what it moves does not vary
             continue
         value = getattr(motion, field.name)
         if _is_number(value):

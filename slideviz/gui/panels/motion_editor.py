@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QFileDialog, QWidget
 
 from slideviz.case.model import (
+    Bump,
+    Cst,
     Ffd,
     FromFile,
+    HicksHenne,
     Motion,
+    OnAirfoil,
     Radial,
     Rotate,
     Scale,
@@ -50,6 +55,7 @@ class MotionEditor(MotionForm):
         self._dim = 3
         self._targets: tuple[Target, ...] = ()
         self._centroid: Callable[[Target], tuple[float, ...]] = lambda _: (0.0,) * self._dim
+        self._chord: Callable[[Target], tuple[float, float]] = lambda _: (0.0, 1.0)
         self._machine: Axis | None = None
         self._boxes: tuple[str, ...] = ()
         self._as_point = False
@@ -61,6 +67,7 @@ class MotionEditor(MotionForm):
         self.kind.chosen.connect(self._kind_chosen)
         self.about.chosen.connect(self._about_chosen)
         self.box.chosen.connect(lambda _: self._tell())
+        self.side.chosen.connect(lambda _: self._tell())
         for field in self._rows.values():
             if isinstance(field, NumberField | VectorField):
                 field.changed.connect(lambda _: self._tell())
@@ -105,11 +112,40 @@ class MotionEditor(MotionForm):
             self.index.show_value(motion.index)
             self.vector.show_value(motion.vector)
             return {"box", "index", "vector"}
+        if isinstance(motion, OnAirfoil):
+            return self._show_bump(motion)
         if not isinstance(motion, FromFile):
             return set()
         if str(motion.path) != self.path.text() and not self.path.hasFocus():
             self.path.setText("" if motion.path == Path() else str(motion.path))
         return {"path"}
+
+    def _show_bump(self, motion: OnAirfoil) -> set[str]:
+        """Fill the fields for a bump on an airfoil; return the names of their rows."""
+        self.raised.show_value(motion.height)
+        self.chord.show_value(motion.chord)
+        shown = {"raised", "chord"}
+        if not isinstance(motion, Bump):
+            self.side.show_value(motion.side)
+            shown.add("side")
+        if isinstance(motion, Cst):
+            self.term.show_value(motion.term)
+            return shown | {"term"}
+        self.peak.show_value(round(100.0 * motion.peak, 10))
+        return shown | {"peak"}
+
+    def _bump(self, motion: OnAirfoil) -> OnAirfoil:
+        """Return the bump on an airfoil that the fields describe, in place of ``motion``."""
+        low, high = motion.chord if self.chord.problem else self.chord.value
+        values: dict[str, Any] = {"height": self.raised.value, "chord": (low, high)}
+        if isinstance(motion, Cst):
+            k, n = motion.term if self.term.problem else self.term.value
+            values["term"] = (int(k), int(n))
+        else:
+            values["peak"] = round(self.peak.value / 100.0, 14)
+        if not isinstance(motion, Bump):
+            values["side"] = self.side.currentData()
+        return replace(motion, marker=self._targets[self.marker.currentData()], **values)
 
     def _show_place(self, motion: Rotate | Scale | Radial, dim: int) -> set[str]:
         """Fill the fields for a motion's fixed point and axis; return the names of their rows."""
@@ -181,7 +217,8 @@ class MotionEditor(MotionForm):
     def _kind_chosen(self, kind: type) -> None:
         if self._motion is not None and type(self._motion) is not kind:
             marker = self._motion.marker
-            motion = new_motion(kind, marker, self._dim, self._machine, self._boxes)
+            chord = self._chord(marker)
+            motion = new_motion(kind, marker, self._dim, self._machine, self._boxes, chord)
             self.changed.emit(motion)
 
     def _about_chosen(self, what: str) -> None:
@@ -219,6 +256,9 @@ class MotionEditor(MotionForm):
             Rotate: self.angle,
             Scale: self.factors.fields[0],
             Radial: self.percent,
+            HicksHenne: self.raised,
+            Cst: self.raised,
+            Bump: self.raised,
             Ffd: self.index.fields[0],
             FromFile: self.path,
         }.get(type(self._motion))
@@ -229,6 +269,10 @@ class MotionEditor(MotionForm):
     def set_centroid(self, centroid: Callable[[Target], tuple[float, ...]]) -> None:
         """Set the function that returns a target's centroid, offered as the first fixed point."""
         self._centroid = centroid
+
+    def set_chord(self, chord: Callable[[Target], tuple[float, float]]) -> None:
+        """Set the function that returns from which x to which x a target goes."""
+        self._chord = chord
 
     def set_extent(self, extent: float) -> None:
         """Set the size of the mesh; coordinates that are rounding errors beside it show as 0."""
@@ -260,6 +304,8 @@ class MotionEditor(MotionForm):
         elif kind is Radial:
             factor = round(1.0 + self.percent.value / 100.0, 14)
             motion = Radial(marker, factor, self.distance.value, axis, point)
+        elif isinstance(self._motion, OnAirfoil):
+            motion = self._bump(self._motion)
         elif isinstance(self._motion, Ffd):
             motion = self._ffd(marker, self._motion)
         else:

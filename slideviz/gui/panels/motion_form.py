@@ -7,13 +7,25 @@ from pathlib import Path
 
 from qtpy.QtWidgets import QFormLayout, QLabel, QPushButton, QSizePolicy, QWidget
 
-from slideviz.case.model import Ffd, FromFile, Motion, Radial, Rotate, Scale, Target, Translate
+from slideviz.case.model import (
+    Bump,
+    Cst,
+    Ffd,
+    FromFile,
+    HicksHenne,
+    Motion,
+    Radial,
+    Rotate,
+    Scale,
+    Target,
+    Translate,
+)
 from slideviz.gui.widgets.build import boxed, grow_fields, in_row
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField, TextField, not_zero
 from slideviz.gui.widgets.vector_field import VectorField, a_direction
 from slideviz.session.motions import Axis
-from slideviz.terms import MOTION_KINDS
+from slideviz.terms import MOTION_KINDS, SIDES
 
 ABOUT = {
     "centroid": "its centroid",
@@ -70,6 +82,24 @@ class MotionForm(QWidget):
             names="ijk",
             tip="The control point, counted from 0 along each direction of the box; -1 is all.",
         )
+        self.side = Choice({side: term.label for side, term in SIDES.items()}, "Which side moves.")
+        self.side.explain({side: term.tip for side, term in SIDES.items()})
+        self.term = VectorField(
+            (1.0, 1.0),
+            a_term,
+            names=("term", "of"),
+            tip="The term of the shape function, counted from 1 at the leading edge, and how many.",
+        )
+        self.peak = NumberField(
+            50.0, a_peak, tip="Where the bump is highest, in percent of the chord."
+        )
+        self.raised = NumberField(tip="How far it is raised, in the mesh's length unit.")
+        self.chord = VectorField(
+            (0.0, 1.0),
+            a_chord,
+            names=("x from", "to"),
+            tip="x of the leading and of the trailing edge: the airfoil lies along x.",
+        )
         self.path = TextField()
         self.path.setToolTip("A line for each node: its number and its displacement.")
         self.browse = QPushButton("…")
@@ -95,6 +125,11 @@ class MotionForm(QWidget):
             ("about", "About", self.about),
             ("point", "Point", self.point),
             ("axis", "Axis", self.axis),
+            ("side", "Side", self.side),
+            ("term", "Shape", self.term),
+            ("peak", "Peak at (%)", self.peak),
+            ("raised", "Raised by", self.raised),
+            ("chord", "Chord", self.chord),
             ("path", "File", file),
         ):
             self._rows[name] = widget
@@ -104,7 +139,7 @@ class MotionForm(QWidget):
         widest = max(label.sizeHint().width() for label in labels)
         for label in labels:
             label.setMinimumWidth(widest)
-        for choice in (self.kind, self.marker, self.about, self.box):
+        for choice in (self.kind, self.marker, self.about, self.box, self.side):
             choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     def show_rows(self, names: set[str]) -> None:
@@ -123,6 +158,9 @@ KINDS: dict[type, str] = {
     Rotate: MOTION_KINDS["rotate"].label,
     Scale: MOTION_KINDS["scale"].label,
     Radial: MOTION_KINDS["radial"].label,
+    HicksHenne: MOTION_KINDS["hicks-henne"].label,
+    Cst: MOTION_KINDS["cst"].label,
+    Bump: MOTION_KINDS["bump"].label,
     Ffd: MOTION_KINDS["ffd"].label,
     FromFile: MOTION_KINDS["file"].label,
 }
@@ -135,18 +173,39 @@ def control_point(values: Sequence[float]) -> str:
     return "" if whole else "needed are whole numbers from 0, or -1 for all"
 
 
+def a_term(values: Sequence[float]) -> str:
+    """Return why numbers are no term of a shape function; empty if they are."""
+    k, n = values
+    whole = k == int(k) and n == int(n) and 1 <= k <= n
+    return "" if whole else "needed are whole numbers, and a term from 1 to how many there are"
+
+
+def a_peak(value: float) -> str:
+    """Return why a bump cannot have its peak at this percentage of the chord; empty if it can."""
+    return "" if 0.0 < value < 100.0 else "the peak lies between 0 and 100 % of the chord"
+
+
+def a_chord(values: Sequence[float]) -> str:
+    """Return why a chord cannot go from one x to another; empty if it can."""
+    return "" if values[0] < values[1] else "the trailing edge has the larger x"
+
+
 def new_motion(
     kind: type,
     marker: Target,
     dim: int,
     machine: Axis | None = None,
     boxes: Sequence[str] = (),
+    chord: tuple[float, float] = (0.0, 1.0),
 ) -> Motion:
     """Return a motion of a kind with zero displacement, to be edited.
 
     Rotations and radial motions are about ``machine``, the axis about which the mesh repeats, if
-    there is one; a free-form deformation moves a control point of the first of ``boxes``.
+    there is one; a free-form deformation moves a control point of the first of ``boxes``, a bump
+    is one of an airfoil along ``chord``.
     """
+    if kind in (HicksHenne, Cst, Bump):
+        return kind(marker, 0.0, chord=chord)
     axis, origin = machine or ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
     if kind is Translate:
         return Translate(marker, (0.0,) * dim)

@@ -32,6 +32,7 @@ from slideviz.session.motions import (
     box_names,
     boxes_hint,
     centroid,
+    chord_of,
     machine_axis,
     new_target,
     targets,
@@ -134,6 +135,12 @@ class MotionPanel(Panel):
         self._mesh, self._extent = mesh, mesh.extent if mesh is not None else 0.0
         self.editor.set_centroid(self._centroid)
         self.editor.set_extent(self._extent)
+        self.editor.set_chord(self._chord)
+
+    def _chord(self, target: Target) -> tuple[float, float]:
+        """Return from which x to which x a target goes."""
+        moving = self.store.session.case.markers_with("moving")
+        return (0.0, 1.0) if self._mesh is None else chord_of(self._mesh, named(target) or moving)
 
     def _centroid(self, target: Target) -> tuple[float, ...]:
         """Return the centroid of a target: the boundaries it names, or all moving ones."""
@@ -185,9 +192,9 @@ class MotionPanel(Panel):
     def _add_for(self, target: Target, kind: type) -> None:
         """Add a motion with zero displacement, and put the cursor into its first field."""
         session = self.store.session
-        motion = new_motion(
-            kind, target, session.mesh.dim, machine_axis(session), box_names(session)
-        )
+        boxes, machine = box_names(session), machine_axis(session)
+        chord = self._chord(target)
+        motion = new_motion(kind, target, session.mesh.dim, machine, boxes, chord)
         self.store.change(changes.add_motion, motion)
         self.editor.focus()
 

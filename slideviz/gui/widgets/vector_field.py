@@ -25,7 +25,7 @@ class VectorField(QWidget):
         self,
         values: Sequence[float] = (0.0, 0.0, 0.0),
         allowed: Callable[[Sequence[float]], str] | None = None,
-        names: str = "xyz",
+        names: Sequence[str] = "xyz",
         tip: str = "",
     ) -> None:
         super().__init__()
