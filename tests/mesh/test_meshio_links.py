@@ -81,6 +81,21 @@ def test_numbers_stored_or_mapped_elsewhere_are_refused(folder):
             here(folder / name)
 
 
+@pytest.mark.parametrize("ending", [".med", ".cgns"])
+@pytest.mark.parametrize(
+    "shape", [{"shape": (1 << 31,)}, {"shape": (3,), "chunks": (1 << 31,), "compression": "gzip"}]
+)
+def test_datasets_without_bytes_in_the_file_are_not_read(folder, ending, shape):
+    if "chunks" in shape:
+        shape = shape | {"maxshape": (None,)}
+    with h5py.File(folder / f"a{ending}", "w") as file:
+        file.create_dataset("zeros", data=np.zeros(10**6), compression="gzip")
+        file.create_dataset("a/b", dtype="i1", **shape)
+    said = "'/a/b' is said to have 2,147 MB, and the file has 0 bytes for it; the file is damaged"
+    with pytest.raises(MeshError, match=said):
+        here(folder / f"a{ending}")
+
+
 def test_abaqus_includes_only_what_lies_beside_it(folder):
     meshio.Mesh(POINTS, TRIANGLE).write(folder / "part.inp")
     whole = (folder / "part.inp").read_text()

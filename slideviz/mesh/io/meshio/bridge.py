@@ -6,6 +6,7 @@ names are read only if they are in its own folder, external links of HDF5 not at
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Iterator
@@ -44,6 +45,10 @@ _FLAT = 1e-9
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 """First bytes of an HDF5 file."""
+_MOST_SHRUNK = 1_100
+"""Bytes that a byte of a compressed dataset has at most: zlib's 1,032, and some more."""
+_UNWRITTEN = 1 << 20
+"""Bytes of a dataset that may be missing in its file: HDF5 fills them."""
 _INCLUDE = re.compile(rb"^\*INCLUDE\b[^=\n]*=([^\n]*)", re.IGNORECASE | re.MULTILINE)
 _MOST_FILES = 100
 """Most files that are searched for names of further files: two may name each other."""
@@ -206,7 +211,7 @@ def _place(path: Path) -> Path:
 
 
 def _require_no_links(path: Path) -> None:
-    """Raise MeshError if an HDF5 file has a link to, or numbers in, another file."""
+    """Raise MeshError if an HDF5 file has a link to, or numbers in, another file, or lacks them."""
     import h5py
 
     with h5py.File(path, "r") as file:
@@ -220,6 +225,7 @@ def _require_no_links(path: Path) -> None:
                 thing = None if other else group.get(name)
                 if isinstance(thing, h5py.Dataset):
                     other = _storage(thing)
+                    _require_stored(path, thing)
                 if other is not None:
                     raise path_error(
                         path,
@@ -231,6 +237,18 @@ def _require_no_links(path: Path) -> None:
                     if key not in seen:  # a group may contain one of its own parents
                         seen.add(key)
                         groups.append(thing)
+
+
+def _require_stored(path: Path, data: h5py.Dataset) -> None:
+    """Raise MeshError if reading a dataset takes far more memory than the file has bytes for it."""
+    stored = data.id.get_storage_size()
+    needed = data.dtype.itemsize * max(data.size or 0, math.prod(data.chunks or (0,)))
+    if not data.external and not data.is_virtual and needed > _MOST_SHRUNK * stored + _UNWRITTEN:
+        raise path_error(
+            path,
+            f"{printable(data.name)!r} is said to have {needed / 1e6:,.0f} MB, and the file has "
+            f"{stored:,} bytes for it; the file is damaged: export it again",
+        )
 
 
 def _storage(data: h5py.Dataset) -> str | None:
