@@ -78,7 +78,8 @@ def _wait(read: int) -> None:
         number = os.read(read, 1)[0]
     try:
         # As long as this module is not loaded, there is nothing to clean up.
-        cleanup, left = sys.modules.get("slideviz.mesh.io.cleanup"), "nothing half-written is left"
+        cleanup = sys.modules.get("slideviz.mesh.io.cleanup")
+        left = "it leaves nothing half-written"
         if cleanup is not None and hasattr(cleanup, "left"):  # it may be being loaded
             left = cleanup.left()
             cleanup.clean_up()

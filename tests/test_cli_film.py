@@ -224,5 +224,5 @@ def test_interrupted_it_leaves_nothing_and_says_so(case, tmp_path):
         assert process.wait() == 130
     assert drafts == [".tmp"]
     assert b"step 1 of" in told
-    assert b"cancelled; nothing half-written is left" in told
+    assert b"cancelled; it leaves nothing half-written" in told
     assert [path.name for path in tmp_path.iterdir()] == ["case"]

@@ -18,8 +18,8 @@ from slideviz.mesh.io.cleanup import PREFIX, draft
 from slideviz.samples.table import write_sample
 
 SAID = {
-    signal.SIGINT: "slideviz: cancelled; nothing half-written is left\n",
-    signal.SIGTERM: "slideviz: ended by SIGTERM; nothing half-written is left\n",
+    signal.SIGINT: "slideviz: cancelled; it leaves nothing half-written\n",
+    signal.SIGTERM: "slideviz: ended by SIGTERM; it leaves nothing half-written\n",
 }
 
 

@@ -10,10 +10,13 @@ import json
 import os
 from collections.abc import Mapping
 from contextlib import suppress
+from hashlib import blake2b
 from pathlib import Path
+from typing import Any
 
 from slideviz.errors import Note, SlidevizError
 from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.io.file_checks import read_json
 
 Folded = Mapping[int, tuple[int, int]]
 """VTK type and first inverted step of the inverted cells with the lowest numbers, by number."""
@@ -24,28 +27,37 @@ def note_finished(about: str, files: list[Path], report: dict, folded: Folded) -
 
     ``about`` is the hash of case, mesh and version (`slideviz.deformation.streaming.about_run`).
     """
-    note = {
+    note: dict[str, Any] = {
         "about": about,
         "files": _states(files),
         "report": report,
         "harmless": [text for text in report["warnings"] if isinstance(text, Note)],
         "folded": [[cell, *row] for cell, row in folded.items()],
     }
-    with suppress(OSError, SlidevizError), atomic_write(_note_of(files[0])) as file:
-        file.write(json.dumps(note).encode())
+    note["digest"] = _digest(note)
+    with suppress(OSError, SlidevizError):
+        _note_of(files[0]).unlink(missing_ok=True)  # it might be a link to another file
+        with atomic_write(_note_of(files[0])) as file:
+            file.write(json.dumps(note).encode())
 
 
 def finished(about: str, files: list[Path]) -> tuple[dict, Folded] | None:
     """Return report and inverted cells of a finished run; None if there is no valid note of it."""
     try:
-        note = json.loads(_note_of(files[0]).read_bytes())
-        if note["about"] != about or note["files"] != _states(files):
+        note = read_json(_note_of(files[0]))
+        is_whole = note.pop("digest") == _digest(note)
+        if not is_whole or note["about"] != about or note["files"] != _states(files):
             return None
         report, harmless = note["report"], note["harmless"]
         report["warnings"] = [Note(t) if t in harmless else t for t in report["warnings"]]
         return report, {cell: (vtk, step) for cell, vtk, step in note["folded"]}
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
+
+
+def _digest(note: dict[str, Any]) -> str:
+    """Return a digest of a note: one that was changed since it was written does not count."""
+    return blake2b(json.dumps(note, sort_keys=True).encode(), digest_size=16).hexdigest()
 
 
 def _note_of(output: Path) -> Path:

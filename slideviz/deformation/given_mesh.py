@@ -24,14 +24,14 @@ from slideviz.errors import MeshError
 from slideviz.mesh.check import printable
 from slideviz.mesh.io.atomic import reason_of
 from slideviz.mesh.io.binary_copy import fill, planned
-from slideviz.mesh.io.cleanup import draft
+from slideviz.mesh.io.cleanup import draft, open_temporary
 from slideviz.mesh.io.files import format_of
 from slideviz.mesh.io.su2.lines import Piece
 from slideviz.mesh.io.su2.text import Text, find_text
 from slideviz.mesh.io.su2.write import box_edits, moved_rows, patched_blocks, require_text_names
 from slideviz.mesh.io.su2b.copying import checksums
 from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace, find_zone
-from slideviz.mesh.io.su2b.partial import finish_head, partial_file
+from slideviz.mesh.io.su2b.partial import BINARY, finish_head, partial_file
 from slideviz.mesh.io.su2b.write import (
     OTHER_ZONES,
     lost_of_text,
@@ -153,11 +153,11 @@ def given_mesh(
     plan = planned(_streamable(path, zone, tick), is_result=False)
     with draft(folder) as ours:
         try:
-            ours.touch(mode=0o600)
+            open_temporary(ours, new=True).close()
             require_room(ours, path, plan.size)
             os.truncate(ours, plan.size)
             head = fill(plan, ours, part_of(tick, SCANNED, COPIED))
-            with ours.open("r+b") as file:
+            with open_temporary(ours) as file:
                 file.write(head)
         except OSError as problem:
             raise MeshError(
@@ -220,7 +220,7 @@ def given_for(
     plan, left = planned(text, is_result=not is_text), bytes_left(output)
     state = path.stat()
     about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {plan.size}"
-    with partial_file(output, plan.size, about, resume=resume, more=".binary") as copy:
+    with partial_file(output, plan.size, about, resume=resume, more=BINARY) as copy:
         is_left = (
             copy.done > 0
             and checksums(copy.path, part_of(tick, SCANNED, COPIED), ranks) == copy.sums

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from slideviz.deformation.growth import Farthest, farthest_node
 from slideviz.deformation.rest import Rest
 from slideviz.deformation.solver import folded_at
-from slideviz.mesh.io.cleanup import draft
+from slideviz.mesh.io.cleanup import draft, open_temporary
 from slideviz.mesh.io.su2b.elements import ElementBlock
 from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
@@ -234,7 +234,7 @@ class Scratch:
 
     def __init__(self, stack: ExitStack, folder: Path, count: int, kind: type) -> None:
         path = stack.enter_context(draft(folder))
-        with path.open("w+b") as file:
+        with open_temporary(path, new=True) as file:
             size = max(count * np.dtype(kind).itemsize, 1)
             file.truncate(size)
             if hasattr(os, "posix_fallocate"):  # else a full disk would end the process

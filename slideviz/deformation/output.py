@@ -214,7 +214,7 @@ def moving(
     """
     with path.open("rb") as file:
         source, place = _zone(path, file, zone)
-        out = os.open(partial, os.O_WRONLY | (os.O_DSYNC if synced else 0))
+        out = os.open(partial, os.O_WRONLY | os.O_NOFOLLOW | (os.O_DSYNC if synced else 0))
         try:
             yield lambda part: move(source, place, rest, out, part)
         finally:

@@ -33,6 +33,7 @@ from slideviz.deformation.solver import (
 )
 from slideviz.deformation.stepping import Stepping
 from slideviz.errors import CaseError, NodeError
+from slideviz.mesh.io.su2b.partial import keep_earlier
 from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.ranks import ALONE, Alone
@@ -121,6 +122,7 @@ def stream(
     assert case.mesh_file is not None
     path = case.mesh_file
     require_stream(case)
+    keep_earlier(output)
     total = max(1, case.steps)
     is_text = (file_format or output.suffix.lower().removeprefix(".")) == "su2"
     first = "text" if require_su2(path, case.mesh_format) == "su2" else "read"

@@ -67,6 +67,6 @@ def read_results(path: Path) -> DesignTable:
             numbers = {name: read(row[name]) for name, (_, read) in NUMBERS.items() if row[name]}
             if numbers or row["problem"]:
                 found.append(DesignRow(number, **numbers, problem=row["problem"]))  # type: ignore[arg-type]
-    except (OSError, ValueError, KeyError) as problem:
+    except (OSError, ValueError, KeyError, TypeError, csv.Error) as problem:
         raise CaseError(f"{path}: is no table of results ({problem})") from problem
     return DesignTable(tuple(head[own]), tuple(tuple(c[own]) for c in lines)).with_results(found)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -22,6 +23,7 @@ from slideviz.deformation.solver import folded_at
 from slideviz.deformation.steps import Progress
 from slideviz.deformation.streaming import stream
 from slideviz.errors import CaseError, MeshError, NodeError, UnsoundError
+from slideviz.mesh.io import cleanup
 from slideviz.mesh.io.su2b import copying
 from slideviz.mesh.io.su2b.layout import MAGIC
 from slideviz.mesh.io.su2b.partial import names_of
@@ -177,7 +179,7 @@ def test_resume_says_that_it_streams(tmp_path, monkeypatch, capsys):
         assert (said in capsys.readouterr().err) is is_said
 
 
-@pytest.mark.parametrize("change", ["mesh", "quality", "case", "note"])
+@pytest.mark.parametrize("change", ["mesh", "quality", "case", "note", "deep", "keys"])
 def test_resume_does_again_what_is_not_as_it_was_left(tmp_path, monkeypatch, capsys, change):
     monkeypatch.chdir(tmp_path)
     made(tmp_path, "square", 25)
@@ -191,7 +193,11 @@ def test_resume_does_again_what_is_not_as_it_was_left(tmp_path, monkeypatch, cap
     elif change == "case":
         call += ["--steps", "3"]
     else:
-        Path(".out.su2b.finished").write_text("no note")
+        note = Path(".out.su2b.finished")
+        known = json.loads(note.read_text())
+        del known["report"]["warnings"], known["report"]["control_nodes"]
+        deep = "[" * 10**5
+        note.write_text({"note": "no note", "deep": deep, "keys": json.dumps(known)}[change])
     capsys.readouterr()
     assert run(call) == 0
     assert "there is nothing to go on with" in capsys.readouterr().err
@@ -240,6 +246,71 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
         assert out.read_bytes() == whole
         assert not list(tmp_path.glob(".*"))
         out.write_bytes(b"older")
+
+
+@pytest.mark.parametrize(
+    "text", ["[" * 10**5, "{}", "[]", '{"about": 3, "sums": 4}', '{"about": "{}", "sums": [1e999]}']
+)
+def test_a_damaged_note_begins_anew(tmp_path, monkeypatch, text):
+    monkeypatch.setattr(output, "CHUNK", 60)
+    case, out = made(tmp_path, "square", 8, ("STEPS=1",)), tmp_path / "out.su2b"
+    with monkeypatch.context() as patch:
+        patch.setattr(output, "move", killed_at(output.move, 60))
+        with pytest.raises(KilledError):
+            stream(case, out)
+    _, note = names_of(out)
+    about = json.loads(note.read_text())["about"]
+    note.write_text(text.replace("{}", about) if "e999" in text else text)
+    told: list[str] = []
+    stream(case, out, note=told.append, resume=True)
+    assert "there is nothing to go on with" in told[0]
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_an_early_end_tells_of_what_an_earlier_run_has_done(tmp_path, monkeypatch):
+    monkeypatch.setattr(output, "CHUNK", 60)
+    case, out = made(tmp_path, "square", 8, ("STEPS=1",)), tmp_path / "out.su2b"
+    with monkeypatch.context() as patch:
+        patch.setattr(output, "move", killed_at(output.move, 60))
+        with pytest.raises(KilledError):
+            stream(case, out)
+    ours, _ = names_of(out)
+    assert cleanup.left() == cleanup.NOTHING_LEFT  # as in a new process
+    told = []
+    with monkeypatch.context() as patch:
+        patch.setattr(streaming, "given_for", lambda *_, **__: told.append(cleanup.left()))
+        with pytest.raises(TypeError):
+            stream(case, out)
+    assert told == [f"what an earlier run has done is kept in {ours}; go on with --resume"]
+    stream(case, out, resume=True)
+    assert cleanup.left() == cleanup.NOTHING_LEFT
+
+
+@pytest.mark.parametrize("made_by", ["su2b", "su2", "note", "finished", "pipe"])
+def test_temporary_files_do_not_follow_links(tmp_path, capsys, monkeypatch, made_by):
+    monkeypatch.chdir(tmp_path)
+    ending = "su2" if made_by == "su2" else "su2b"
+    write_sample("square", tmp_path, 8, file_format=ending)
+    Path("precious").write_text("precious")
+    names = {
+        "su2b": ".out.su2b.partial",
+        "su2": ".out.su2.partial.binary",
+        "note": ".out.su2b.partial.json.new",
+        "finished": ".out.su2b.finished",
+        "pipe": ".out.su2b.partial",
+    }
+    if made_by == "pipe":
+        os.mkfifo(names[made_by])
+    else:
+        Path(names[made_by]).symlink_to("precious")
+    refused = made_by not in ("note", "finished")
+    call = ["run", "square.cfg", "-o", f"out.{ending}", "--steps", "1", "--stream", "-q"]
+    assert run(call) == int(refused)
+    kind = "device or pipe" if made_by == "pipe" else "symbolic link, whose target would be"
+    said = rf"out\.{ending}: cannot be written: .*{names[made_by]} is a {kind}.*remove"
+    assert bool(re.search(said, capsys.readouterr().err)) is refused
+    assert Path("precious").read_text() == "precious"
+    assert not Path("precious").stat().st_mode & 0o111
 
 
 def flip(path, at):

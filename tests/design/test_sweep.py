@@ -19,6 +19,7 @@ from slideviz.design.sweeps.row import DesignRow
 from slideviz.design.sweeps.worker import Answer, Packed, Task, hold, packed, work
 from slideviz.errors import CaseError, DeformError
 from slideviz.samples.table import sample
+from slideviz.session.design_files import read_results
 
 
 @pytest.fixture(scope="module")
@@ -302,8 +303,10 @@ def test_results_of_something_else_are_refused(passage, here, tmp_path):
     with pytest.raises(CaseError, match=r"results.csv:5: is no row of a sweep"):
         sv.sweep(passage.case, DESIGNS, here, **asked)
     (tmp_path / "sweep.json").unlink()
-    with pytest.raises(CaseError, match="is missing or not readable"):
-        sv.sweep(passage.case, DESIGNS, here, **asked)
+    for text in ("", "[" * 10**5, '{"mesh": 3}', "[]"):
+        (tmp_path / "sweep.json").write_text(text)
+        with pytest.raises(CaseError, match="is missing or not readable"):
+            sv.sweep(passage.case, DESIGNS, here, **asked)
     rows = list(sv.sweep(passage.case, DESIGNS, here, **asked | {"resume": False, "force": True}))
     assert not any(row.earlier for row in rows)
 
@@ -438,3 +441,25 @@ def test_a_lock_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / "sweep.lock").mkdir()
     with pytest.raises(CaseError, match=r"sweep\.lock: cannot be written: .*folder"):
         FolderLock(tmp_path)
+    (tmp_path / "sweep.lock").rmdir()
+    (tmp_path / "precious").write_text("precious")
+    (tmp_path / "sweep.lock").symlink_to(tmp_path / "precious")
+    with pytest.raises(CaseError, match=r"sweep\.lock is a symbolic link, whose target would be"):
+        FolderLock(tmp_path)
+    assert (tmp_path / "precious").read_text() == "precious"
+
+
+def test_fields_of_endless_length_are_told(passage, here, tmp_path):
+    long = "x" * 200_000
+    for head, row, line in ((f"STEPS,{long}", "1,2", 1), ("STEPS", long, 2)):
+        (tmp_path / "a.csv").write_text(f"{head}\n{row}\n")
+        with pytest.raises(CaseError, match=rf"a.csv:{line}: is no line of values \(field larger"):
+            read_designs(passage.case, tmp_path / "a.csv")
+    asked = {"mesh": passage.mesh, "folder": tmp_path, "resume": True}
+    list(sv.sweep(passage.case, {"STEPS": [1]}, here, **asked))
+    table = tmp_path / "results.csv"
+    table.write_text(f"{table.read_text()}{long}\n")
+    with pytest.raises(CaseError, match=r"results.csv: is no table of a sweep \(field larger"):
+        sv.sweep(passage.case, {"STEPS": [1]}, here, **asked)
+    with pytest.raises(CaseError, match=r"results.csv: is no table of results \(field larger"):
+        read_results(table)

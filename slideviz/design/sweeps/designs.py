@@ -109,7 +109,10 @@ def _read_csv(case: Case, path: Path) -> Designs:
         )
     (first, head), *rest = lines
     separator = max(_SEPARATORS, key=head.count) if "," not in head else ","
-    words = _split(head, separator)
+    try:
+        words = _split(head, separator)
+    except CaseError as problem:
+        raise CaseError(f"{path}:{first}: {problem}") from None
     own = own_columns(words)
     names = [column_name(name) for name in words[own]]
     problems: list[tuple[int, str]] = []
@@ -120,8 +123,8 @@ def _read_csv(case: Case, path: Path) -> Designs:
         columns = _known(case, names)
     designs: list[Design] = []
     for at, (line, content) in enumerate(rest, start=1):
-        cells = [cell.strip() for cell in _split(content, separator)[own]]
         try:
+            cells = [cell.strip() for cell in _split(content, separator)[own]]
             if len(cells) != len(names):
                 raise CaseError(
                     f"has {len(cells)} values, and the head {len(names)} columns; give as many"
@@ -175,5 +178,8 @@ def _filled(text: str) -> list[tuple[int, str]]:
 
 
 def _split(line: str, separator: str) -> list[str]:
-    """Return the cells of a line of CSV."""
-    return next(csv.reader(StringIO(line), delimiter=separator, skipinitialspace=True))
+    """Return the cells of a line of CSV; raise CaseError if it cannot be one."""
+    try:
+        return next(csv.reader(StringIO(line), delimiter=separator, skipinitialspace=True))
+    except csv.Error as problem:
+        raise CaseError(f"is no line of values ({problem}); check its quotation marks") from problem

@@ -10,6 +10,7 @@ from typing import BinaryIO
 
 from slideviz.errors import CaseError
 from slideviz.mesh.io.atomic import reason_of
+from slideviz.mesh.io.cleanup import open_temporary
 
 NAME = "sweep.lock"
 _TAKEN = (errno.EAGAIN, errno.EACCES)
@@ -45,7 +46,7 @@ class FolderLock:
         import fcntl  # POSIX only
 
         while True:
-            file = self._path.open("a+b", buffering=0)
+            file = open_temporary(self._path, new=True, buffering=0)
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as problem:

@@ -29,6 +29,7 @@ from slideviz.design.sweeps.row import NUMBERS, DesignRow
 from slideviz.errors import CaseError
 from slideviz.ffd.section import boxes_of
 from slideviz.mesh.io.atomic import atomic_write, reason_of
+from slideviz.mesh.io.file_checks import read_json
 from slideviz.mesh.model import Mesh
 
 RESULTS, SOURCES = "results.csv", "sweep.json"
@@ -119,7 +120,10 @@ class SweepResults:
                 os.truncate(self.path, len(whole))
         except OSError as problem:
             raise CaseError(f"{self.path}: cannot be read: {reason_of(problem)}") from problem
-        head, *lines = [*csv.reader(StringIO(whole.decode("utf-8", "replace")))] or [[]]
+        try:
+            head, *lines = [*csv.reader(StringIO(whole.decode("utf-8", "replace")))] or [[]]
+        except csv.Error as problem:
+            raise CaseError(f"{self.path}: is no table of a sweep ({problem}); {_REMEDY}") from None
         if head != self._head:
             names = ", ".join(head[own_columns(head)])
             raise CaseError(
@@ -205,8 +209,8 @@ class SweepResults:
         """Raise CaseError where the results in the folder depend on something else."""
         path = self._folder / SOURCES
         try:
-            before = json.loads(path.read_bytes())
-            if not isinstance(before, dict):
+            before = read_json(path)
+            if not isinstance(before, dict) or not all(isinstance(x, str) for x in before.values()):
                 raise ValueError
         except (OSError, ValueError):
             raise CaseError(

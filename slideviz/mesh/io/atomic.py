@@ -69,8 +69,8 @@ def atomic_write(
                 # Some file systems report a full disk only now; and without it a power cut
                 # after the renaming could leave an empty file.
                 os.fsync(file.fileno())
-            if mode is not None:
-                temporary.chmod(mode)
+                if mode is not None:
+                    os.fchmod(file.fileno(), mode)
             temporary.replace(real)
     except OSError as problem:
         # The block may have failed to read some other file, which is not ours to explain.

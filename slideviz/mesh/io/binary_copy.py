@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from slideviz.mesh.check import LARGEST, too_large, within
 from slideviz.mesh.elements import SIZES
+from slideviz.mesh.io.cleanup import open_temporary
 from slideviz.mesh.io.in_order import in_order
 from slideviz.mesh.io.su2.lines import Piece, number_of
 from slideviz.mesh.io.su2.numbers import (
@@ -200,7 +201,7 @@ def fill(plan: Plan, path: Path, progress: Progress, ranks: Alone = ALONE) -> by
         for name, m in zip(plan.names(), zone.markers, strict=True)
     ]
     lines.raw.require_same()
-    with path.open("r+b") as file:
+    with open_temporary(path) as file:
         for at, content in (
             (plan.begin, np.array([plan.number, zone.dim], "<i4").tobytes()),
             (plan.begin + 8, np.array(text.n_cells, conn).tobytes()),
@@ -224,7 +225,7 @@ def _filling(plan: Plan, path: Path, synced: bool) -> Iterator[Callable[[_Task],
     These are the results of `_put_cells` or `_put_points`, (k, ...). ``synced``: the bytes are on
     the disk when the function returns.
     """
-    out = os.open(path, os.O_WRONLY)
+    out = os.open(path, os.O_WRONLY | os.O_NOFOLLOW)
 
     def work(task: _Task) -> IntArray:
         kind, first, end = task

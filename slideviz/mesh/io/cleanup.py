@@ -7,12 +7,14 @@ the next one that writes to the same folder.
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Protocol
+from typing import BinaryIO, Protocol
 
 PREFIX = ".slideviz-"
 """Beginning of the names of all drafts."""
@@ -30,7 +32,7 @@ class Process(Protocol):
         """Return its exit code when it has ended."""
 
 
-NOTHING_LEFT = "nothing half-written is left"
+NOTHING_LEFT = "it leaves nothing half-written"
 """The answer of `left` where no partial file is kept."""
 _drafts: set[Path] = set()
 """Files and folders to remove when the program ends early."""
@@ -70,6 +72,29 @@ def draft(folder: Path, is_folder: bool = False) -> Iterator[Path]:
         _drafts.discard(path)
 
 
+def open_temporary(path: Path, *, new: bool = False, buffering: int = -1) -> BinaryIO:
+    """Return a temporary file, open for reading and writing; never through a symbolic link.
+
+    With ``new`` it is made if there is none, for its owner only.
+
+    Raises
+    ------
+    OSError
+        It cannot be opened, or is a symbolic link, a device or a pipe.
+    """
+    try:
+        opened = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_CREAT * new, 0o600)
+    except OSError as problem:
+        if problem.errno != errno.ELOOP:
+            raise
+        said = f"{path} is a symbolic link, whose target would be overwritten; remove the link"
+        raise OSError(errno.ELOOP, said, str(path)) from problem
+    if not stat.S_ISREG(os.fstat(opened).st_mode):
+        os.close(opened)
+        raise OSError(errno.EINVAL, f"{path} is a device or pipe; remove it", str(path))
+    return open(opened, "r+b", buffering)  # noqa: PTH123
+
+
 @contextmanager
 def ended(process: Process) -> Iterator[None]:
     """Context at whose end the process is killed, if it still runs, and waited for."""
@@ -93,8 +118,9 @@ def clean_up() -> None:
 
 @contextmanager
 def removed_at_stop(path: Path) -> Iterator[None]:
-    """Context in which a file is removed if the program ends, unless `keep` is called for it."""
+    """Context in which a file is removed if the program ends, unless `keep` is called in it."""
     _drafts.add(path)
+    _kept.pop(path, None)
     try:
         yield
     finally:
@@ -110,7 +136,8 @@ def keep(path: Path, words: str) -> None:
 
 def left() -> str:
     """Return the words of `keep` on the latest partial file that stays, else `NOTHING_LEFT`."""
-    return next(reversed(_kept.values()), NOTHING_LEFT)
+    kept = (words for path, words in reversed(_kept.items()) if path.exists())
+    return next(kept, NOTHING_LEFT)
 
 
 def is_alive(pid: str) -> bool:

@@ -10,11 +10,13 @@ many names.
 from __future__ import annotations
 
 import errno
+import json
 import os
 import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from slideviz.errors import SlidevizError
 from slideviz.mesh.check import printable
@@ -91,6 +93,20 @@ def require_ordinary(path: Path, error: type[SlidevizError]) -> int:
     if not stat.S_ISREG(found.st_mode):
         raise error(f"{printable(path)}: this is a device or pipe; choose an ordinary file")
     return found.st_size
+
+
+def read_json(path: Path) -> Any:
+    """Return the content of a JSON file.
+
+    Raises
+    ------
+    OSError, ValueError
+        It cannot be read, is no JSON, or nested too deep.
+    """
+    try:
+        return json.loads(path.read_bytes())
+    except RecursionError as problem:
+        raise ValueError("nested too deep") from problem
 
 
 def require_length(path: Path, error: type[SlidevizError], what: str, most: int) -> None:

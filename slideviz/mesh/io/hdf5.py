@@ -12,12 +12,15 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from slideviz.mesh.check import path_error
 from slideviz.mesh.io.atomic import atomic_write, reason_of
+from slideviz.mesh.io.cleanup import open_temporary
 
 if TYPE_CHECKING:
+    from io import FileIO
+
     import h5py
     from _typeshed import WriteableBuffer
 
@@ -40,7 +43,7 @@ class Hdf5Draft:
 
     def __init__(self, path: Path, draft: Path) -> None:
         self._path = path
-        self._file = draft.open("r+b", buffering=0)
+        self._file = cast("FileIO", open_temporary(draft, buffering=0))
         self._problem: OSError | None = None
 
     def require(self) -> None:

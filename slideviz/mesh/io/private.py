@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+
+from slideviz.mesh.io.cleanup import open_temporary
 
 
 def private_folder(folder: Path) -> Path:
@@ -24,7 +27,7 @@ def private_file(path: Path) -> None:
     Raises
     ------
     OSError
-        It cannot be made, or is somebody else's.
+        It cannot be made, is somebody else's, or a symbolic link.
     """
-    path.touch(mode=0o600)
-    path.chmod(0o600)
+    with open_temporary(path, new=True) as file:
+        os.fchmod(file.fileno(), 0o600)

@@ -16,6 +16,7 @@ from threading import Event
 from typing import BinaryIO
 
 from slideviz.errors import MeshError
+from slideviz.mesh.io.cleanup import open_temporary
 from slideviz.mesh.ranks import ALONE, Alone, Make
 from slideviz.mesh.threads import Tick
 
@@ -121,7 +122,7 @@ def _copying(source: Path, ours: Path) -> Iterator[Callable[[Piece], None]]:
 
     When it returns, the bytes are on the disk.
     """
-    with source.open("rb") as given, ours.open("r+b") as file:
+    with source.open("rb") as given, open_temporary(ours) as file:
 
         def copy(task: Piece) -> None:
             at, end = task

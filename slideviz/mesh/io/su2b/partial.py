@@ -20,12 +20,14 @@ from typing import BinaryIO
 
 from slideviz.errors import MeshError
 from slideviz.mesh.io.atomic import mode_of, reason_of
-from slideviz.mesh.io.cleanup import keep, removed_at_stop
-from slideviz.mesh.io.file_checks import require_no_input
+from slideviz.mesh.io.cleanup import keep, open_temporary, removed_at_stop
+from slideviz.mesh.io.file_checks import read_json, require_no_input
 from slideviz.mesh.io.su2b.copying import Piece, copying
 from slideviz.mesh.ranks import ALONE, Alone
 from slideviz.mesh.threads import Tick
 
+BINARY = ".binary"
+"""End of the name of the partial file that is a binary copy of a text."""
 HEAD = 8
 """Bytes that are zeros until the end."""
 
@@ -70,7 +72,9 @@ class Partial:
         os.fsync(self.file.fileno())
         self.sums = list(sums)
         fresh = self._note.with_suffix(".new")
-        fresh.write_text(json.dumps({"about": self._about, "sums": self.sums}))
+        fresh.unlink(missing_ok=True)  # it might be a link to another file
+        with fresh.open("x") as file:
+            json.dump({"about": self._about, "sums": self.sums}, file)
         fresh.replace(self._note)
         if self.sums:
             keep(self.path, _kept_words(self.path))
@@ -81,6 +85,13 @@ def names_of(path: Path, more: str = "") -> tuple[Path, Path]:
     real = Path(os.path.realpath(path))
     name = f".{real.name}.partial{more}"
     return real.with_name(name), real.with_name(f"{name}.json")
+
+
+def keep_earlier(path: Path) -> None:
+    """Let it be said at an early end that partial files of an earlier run are there, if any are."""
+    for ours, note in (names_of(path), names_of(path, BINARY)):
+        if ours.exists() and note.exists():
+            keep(ours, f"what an earlier run has done is kept in {ours}; go on with --resume")
 
 
 @contextmanager
@@ -114,7 +125,7 @@ def partial_file(
     try:
         mode = mode_of(Path(os.path.realpath(path)))
         sums = _noted(note, about) if resume else []
-        with open(os.open(ours, os.O_RDWR | os.O_CREAT, 0o600), "r+b") as file:  # noqa: PTH123
+        with open_temporary(ours, new=True) as file:
             _lock(file, path)
             with removed_at_stop(ours):
                 try:
@@ -178,7 +189,8 @@ def partial_copy(
         with copying(source, partial.path, copied, ranks, is_left=is_left) as partial.ready:
             yield partial
         finish_head(partial.file, head)
-        partial.path.chmod(0o644 & ~_umask() if partial.mode is None else partial.mode)
+        mode = 0o644 & ~_umask() if partial.mode is None else partial.mode
+        os.fchmod(partial.file.fileno(), mode)
         partial.path.replace(os.path.realpath(path))
         _removed(partial._note)  # not its name, which may be another's by now
 
@@ -199,9 +211,9 @@ def _kept_words(ours: Path) -> str:
 def _noted(note: Path, about: str) -> list[int]:
     """Return the checksums in a note on the same work ``about``; empty if there is no such note."""
     try:
-        kept = json.loads(note.read_text())
+        kept = read_json(note)
         return [int(one) for one in kept["sums"]] if kept["about"] == about else []
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, OverflowError):
         return []
 
 
