@@ -287,6 +287,8 @@ _VIEW = Menu("view", "&View", entries=(
 ))
 
 _HELP = Menu("help", "&Help", entries=(
+    Command("manual", "&Manual", "Read and search the pages of the documentation.",
+            lambda window: window.help.manual(), ("Shift+F1",)),
     Command("shortcuts", "&Keyboard and mouse", "Show all keys and what the mouse does.",
             lambda window: window.help.shortcuts(), ("F1",)),
     Command("case_keys", "Case &keys", "Show and search the keys of a case file.",

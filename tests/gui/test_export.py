@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from qtpy.QtCore import Qt, QTimer
+from qtpy.QtCore import Qt, QTimer, QUrl
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QDialog
 
@@ -28,7 +28,7 @@ from slideviz.gui.panels.boundaries import BoundariesPanel
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import fitted, framed, to_image
 from slideviz.mesh.quality import quality
-from slideviz.session import changes, jobs, jobs_export, pieces
+from slideviz.session import changes, jobs, jobs_export, manual, pieces
 from tests.mesh.test_interfaces import moved, zones
 
 pytestmark = pytest.mark.usefixtures("unpainted")
@@ -605,6 +605,31 @@ def test_every_action_says_in_a_sentence_what_it_does_and_can_be_found_with_its_
     assert {one.shortcut().toString() for one in window.actions_.by_name.values()} - {""} <= keys
     dialog.search.setText("whole mesh fill")
     assert [row.text(0) for row in rows if not row.isHidden()] == ["Fit all"]
+
+
+def test_the_manual_is_read_and_searched(opened, monkeypatch):
+    opened.activate()
+    QTest.keyClick(opened.window, Qt.Key.Key_F1, Qt.KeyboardModifier.ShiftModifier)
+    dialog = opened.window.help._shown["manual"]
+    assert "slideviz moves the boundaries of a mesh" in dialog.pages.toPlainText()
+    dialog.search.setText("first-mesh.md")
+    assert all(section.isHidden() for section in dialog._items())
+    dialog.search.setText("halves a step")
+    shown = [one for one in dialog._items() if not one.isHidden()]
+    pages = [page for one in shown for page in dialog._items(one) if not page.isHidden()]
+    assert [page.text(0) for page in pages] == ["A cell is inverted: what now"]
+    dialog.tree.setCurrentItem(pages[0])
+    assert dialog.pages.toPlainText().startswith("A cell is inverted: what now")
+    QTest.keyClick(dialog.search, Qt.Key.Key_Return)
+    assert dialog.pages.textCursor().selectedText() == "halves a step"
+    dialog.pages.setSource(QUrl("tolerance.md"))
+    assert dialog.pages.toPlainText().startswith("Choose a tolerance")
+    dialog.pages.backward()
+    assert dialog.pages.toPlainText().startswith("A cell is inverted")
+    dialog.reject()
+    monkeypatch.setattr(manual, "PLACES", ())
+    opened.window.help.manual()
+    assert "was not installed" in opened.window.banner.text.text()
 
 
 def test_case_keys_can_be_searched_and_there_are_details_for_a_report(opened):

@@ -27,6 +27,7 @@ from slideviz.gui.widgets.faults import versions
 from slideviz.gui.widgets.icons import logo
 from slideviz.gui.widgets.labels import fixed_font
 from slideviz.gui.widgets.services import Services
+from slideviz.session.manual import manual_folder
 
 LOG_LINES = 40
 """Number of the log's last lines in a bug report."""
@@ -67,6 +68,16 @@ class Help(QObject):
         from slideviz.case.cfg import describe_keys
 
         self._show("keys", lambda: TextDialog(self.window, "Case keys", describe_keys()))
+
+    def manual(self) -> None:
+        """Show the manual."""
+        from slideviz.gui.dialogs.manual import ManualDialog
+
+        folder = manual_folder()
+        if folder is None:
+            self.window.banner.tell("The manual was not installed with this copy of slideviz.")
+            return
+        self._show("manual", lambda: ManualDialog(self.window, folder))
 
     def about(self) -> None:
         """Show the dialog with version, libraries and licence."""

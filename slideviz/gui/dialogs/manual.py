@@ -1,0 +1,129 @@
+"""The manual in the window: the pages of the documentation, with a search."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from qtpy.QtCore import QSize, Qt, QUrl
+from qtpy.QtGui import QImage, QTextCursor, QTextDocument
+from qtpy.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QLineEdit,
+    QSplitter,
+    QTextBrowser,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QWidget,
+)
+
+from slideviz.gui.widgets.build import dialog_buttons, in_column, in_row, push_button
+from slideviz.session.manual import manual_pages, page_text, page_title
+
+PATH = Qt.ItemDataRole.UserRole
+LARGEST = 740
+"""Largest width of a picture in a page, in pixels."""
+
+
+class Pages(QTextBrowser):
+    """A browser of the manual's pages, whose links lead to other pages."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setOpenExternalLinks(True)
+        self.sourceChanged.connect(lambda _: self._space())
+
+    def loadResource(self, kind: int, url: QUrl) -> object:
+        path = Path(url.toLocalFile())
+        if path.suffix in (".md", ".rst", ""):
+            return page_text(path)
+        picture = QImage(str(path))
+        if picture.width() > LARGEST:
+            return picture.scaledToWidth(LARGEST, Qt.TransformationMode.SmoothTransformation)
+        return super().loadResource(kind, url)
+
+    def _space(self) -> None:
+        """Put space around the page, and above its headings."""
+        self.document().setDocumentMargin(14.0)
+        block = self.document().begin()
+        while block.isValid():
+            form = block.blockFormat()
+            if form.headingLevel() > 1:
+                form.setTopMargin(18.0)
+                QTextCursor(block).setBlockFormat(form)
+            block = block.next()
+
+    def show_page(self, path: Path) -> None:
+        """Show a page."""
+        self.setSource(QUrl.fromLocalFile(str(path)), QTextDocument.ResourceType.MarkdownResource)
+
+
+class ManualDialog(QDialog):
+    """The dialog with a list of the manual's pages, a page, and a search in all of them."""
+
+    def __init__(self, parent: QWidget, folder: Path) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Manual")
+        self.resize(QSize(1120, 760).boundedTo(parent.screen().availableSize()))
+        self.pages = Pages()
+        self.search = QLineEdit()
+        self.search.setPlaceholderText("Find pages with these words (Enter: the next place)")
+        self.search.setClearButtonEnabled(True)
+        self.search.textChanged.connect(self._filter)
+        self.search.returnPressed.connect(self._next)
+        self.tree = QTreeWidget()
+        self.tree.setHeaderHidden(True)
+        self.tree.setIndentation(14)
+        self._fill(folder)
+        self.tree.currentItemChanged.connect(lambda item, _: item and self._show(item))
+        back = push_button("Back", "The page before.", self.pages.backward)
+        self.pages.backwardAvailable.connect(back.setEnabled)
+        back.setEnabled(False)
+        split = QSplitter()
+        split.addWidget(self.tree)
+        split.addWidget(self.pages)
+        split.setSizes([300, 820])
+        buttons = dialog_buttons(self, QDialogButtonBox.StandardButton.Close)
+        for button in (back, *buttons.buttons()):
+            button.setAutoDefault(False)  # Enter belongs to the search
+        head = in_row(self.search, back, wide=[self.search])
+        self.setLayout(in_column(head, split, buttons, wide=[split]))
+        self.pages.show_page(folder / "index.md")
+        self.search.setFocus()
+
+    def _fill(self, folder: Path) -> None:
+        above: list[QTreeWidget | QTreeWidgetItem] = [self.tree]
+        for level, path in manual_pages(folder):
+            del above[level + 1 :]
+            item = QTreeWidgetItem(above[level], [page_title(path)])
+            item.setData(0, PATH, str(path))
+            above.append(item)
+        self.tree.expandAll()
+
+    def _show(self, item: QTreeWidgetItem) -> None:
+        self.pages.show_page(Path(item.data(0, PATH)))
+
+    def _items(self, item: QTreeWidgetItem | None = None) -> list[QTreeWidgetItem]:
+        top = item or self.tree.invisibleRootItem()
+        return [top.child(k) for k in range(top.childCount())]
+
+    def _filter(self, words: str) -> None:
+        """Show the pages whose text has the words, below their sections."""
+        words = words.strip().lower()
+        for section in self._items():
+            found = [
+                words in page_text(Path(one.data(0, PATH))).lower()
+                for one in (section, *self._items(section))
+            ]
+            for one, there in zip(self._items(section), found[1:], strict=True):
+                one.setHidden(not there)
+            section.setHidden(not any(found))
+
+    def _next(self) -> None:
+        """Select the next place of the words in the page; at its end, the first."""
+        words = self.search.text().strip()
+        if words and not self.pages.find(words):
+            self.pages.moveCursor(self.pages.textCursor().MoveOperation.Start)
+            self.pages.find(words)
