@@ -82,8 +82,10 @@ def _fill_samples(window: MainWindow, menu: QMenu) -> None:
 
 
 def _fill_panels(window: MainWindow, menu: QMenu) -> None:
-    for dock in window.docks.values():
+    for name, dock in window.docks.items():
         act = dock.toggleViewAction()
+        if name == "designs":  # of its command, which does the same
+            act.setText(f"{dock.windowTitle()}\t{COMMANDS[name].keys[0]}")
         act.setStatusTip(f"Show or hide the panel {dock.windowTitle()}.")
         menu.addAction(act)
     menu.addSeparator()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from qtpy.QtCore import Qt, QTimer, QUrl
+from qtpy.QtGui import QShortcut
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QDialog
 
@@ -603,6 +604,11 @@ def test_every_action_says_in_a_sentence_what_it_does_and_can_be_found_with_its_
     assert {("Run", "F5"), ("Copy picture", "Ctrl+Shift+C"), ("Undo", "Ctrl+Z")} <= said
     keys = {row.text(1) for row in rows}
     assert {one.shortcut().toString() for one in window.actions_.by_name.values()} - {""} <= keys
+    # Those of the panels, which hold for the one that has the focus, are there, too.
+    panels = {shortcut.key() for shortcut in window.findChildren(QShortcut)}
+    panels |= {act.shortcut() for act in window.motions.actions_.values()}
+    told = {key for row in rows for key in row.text(1).split(", ")}
+    assert {key.toString() for key in panels} - {""} <= told
     dialog.search.setText("whole mesh fill")
     assert [row.text(0) for row in rows if not row.isHidden()] == ["Fit all"]
 

@@ -33,6 +33,22 @@ LOG_LINES = 40
 """Number of the log's last lines in a bug report."""
 
 CLOSE = QDialogButtonBox.StandardButton.Close
+PANELS = (
+    ("Boundaries: choose the role", "F2, Return, Alt+Down", ""),
+    ("Motions: duplicate", "Ctrl+D", ""),
+    ("Motions: copy, paste", "Ctrl+C, Ctrl+V", "As in a case file."),
+    ("Motions: perform it earlier, later", "Ctrl+Up, Ctrl+Down", ""),
+    ("Motions: remove", "Del", ""),
+    ("Runs: give it a name", "F2", ""),
+    ("Sections: remove", "Del", ""),
+    ("Worst cells: fly to the cell", "Return", ""),
+    ("Worst cells: remove the mark", "Esc", ""),
+    ("Worst cells: copy", "Ctrl+C", "The selected rows, or all."),
+    ("Histogram: show all cells", "Esc", ""),
+    ("A field: take back what was typed, do it again", "Ctrl+Z, Ctrl+Y", ""),
+    ("A list: its menu", "Menu", ""),
+)
+"""The keys of the panels, for the panel that has the focus: action, keys, what it does."""
 MOUSE = (
     ("Drag", "turn a 3D mesh, move a 2D one"),
     ("Shift+Drag, middle button", "move"),
@@ -42,10 +58,8 @@ MOUSE = (
     ("Click", "select the boundary in front"),
     ("Ctrl+Click", "select one more, or one less"),
     ("Ctrl+Click on a run", "show it beside the one that is shown"),
-    ("F2 on a run", "give it a name"),
     ("Right click", "roles of the boundary, hide, isolate"),
-    ("F2 or Alt+Down on a boundary", "choose its role"),
-    ("Menu key or right click on a motion", "duplicate, copy, paste, order, remove"),
+    ("Right click on a motion", "duplicate, copy, paste, order, remove"),
     ("Drop a file", "open it"),
 )
 """What the mouse does, and where."""
@@ -113,6 +127,7 @@ class ShortcutsDialog(QDialog):
         self.tree.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         for title, rows in shortcut_rows(window):
             self._add(title, rows)
+        self._add("In the panels", list(PANELS))
         self._add("Mouse", [(what, keys, "") for keys, what in MOUSE])
         header = self.tree.header()
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)

@@ -35,8 +35,8 @@ class Pages(QTextBrowser):
         self.setOpenExternalLinks(True)
         self.sourceChanged.connect(lambda _: self._space())
 
-    def loadResource(self, kind: int, url: QUrl) -> object:
-        path = Path(url.toLocalFile())
+    def loadResource(self, kind: int, url: QUrl | str) -> object:
+        path = Path(QUrl(url).toLocalFile())
         if path.suffix in (".md", ".rst", ""):
             return page_text(path)
         picture = QImage(str(path))
@@ -77,7 +77,7 @@ class ManualDialog(QDialog):
         self.tree.setHeaderHidden(True)
         self.tree.setIndentation(14)
         self._fill(folder)
-        self.tree.currentItemChanged.connect(lambda item, _: item and self._show(item))
+        self.tree.currentItemChanged.connect(lambda item, _: self._show(item))
         back = push_button("Back", "The page before.", self.pages.backward)
         self.pages.backwardAvailable.connect(back.setEnabled)
         back.setEnabled(False)
@@ -86,7 +86,7 @@ class ManualDialog(QDialog):
         split.addWidget(self.pages)
         split.setSizes([300, 820])
         buttons = dialog_buttons(self, QDialogButtonBox.StandardButton.Close)
-        for button in (back, *buttons.buttons()):
+        for button in (back, buttons.button(QDialogButtonBox.StandardButton.Close)):
             button.setAutoDefault(False)  # Enter belongs to the search
         head = in_row(self.search, back, wide=[self.search])
         self.setLayout(in_column(head, split, buttons, wide=[split]))
@@ -102,12 +102,14 @@ class ManualDialog(QDialog):
             above.append(item)
         self.tree.expandAll()
 
-    def _show(self, item: QTreeWidgetItem) -> None:
-        self.pages.show_page(Path(item.data(0, PATH)))
+    def _show(self, item: QTreeWidgetItem | None) -> None:
+        if item is not None:
+            self.pages.show_page(Path(item.data(0, PATH)))
 
     def _items(self, item: QTreeWidgetItem | None = None) -> list[QTreeWidgetItem]:
         top = item or self.tree.invisibleRootItem()
-        return [top.child(k) for k in range(top.childCount())]
+        children = (top.child(k) for k in range(top.childCount()))
+        return [child for child in children if child is not None]
 
     def _filter(self, words: str) -> None:
         """Show the pages whose text has the words, below their sections."""

@@ -222,7 +222,7 @@ class MethodPanel(Panel):
         self.tolerance_hint.setText(part)
         typed = get_reduction(case) == "YES"
         self.form.setRowVisible(self._tolerance_row, typed)
-        largest = self._largest_of(session) if typed and session.mesh is not None else 0.0
+        largest = self._largest_of(session) if typed else 0.0
         self.loose.setText(loose_words(case, extent, largest))
         self.form.setRowVisible(self.loose, bool(self.loose.text()))
         reasons = (("Sliding", nothing_slides(case)), ("Periodicity", no_pair(case)))
@@ -234,9 +234,11 @@ class MethodPanel(Panel):
 
     def _largest_of(self, session: Session) -> float:
         """Return the largest prescribed displacement, computed once for each set of motions."""
-        key = (session.mesh, session.case.roles, session.case.motions)
+        mesh = session.mesh
+        key = (mesh, session.case.roles, session.case.motions)
         if key != self._largest[0]:
-            self._largest = key, largest_prescribed(session.case, session.mesh)
+            found = 0.0 if mesh is None else largest_prescribed(session.case, mesh)
+            self._largest = key, found
         return self._largest[1]
 
 
