@@ -335,6 +335,22 @@ def layered(n: int = 12, first: float = 1e-6) -> Mesh:
     return grid((n, n), place=place)
 
 
+def layered_cylinder(layers: int = 10, n: int = 24, first: float = 1e-6) -> Mesh:
+    """Layers around ``wall``, a cylinder between ``hub`` and ``shroud``; the first is ``first``."""
+    growth = (1.0 / first) ** (1.0 / (layers - 1))
+    r = 1.0 + np.r_[0.0, np.cumsum(first * growth ** np.arange(layers))]
+
+    def place(p: np.ndarray) -> np.ndarray:
+        at, angle = r[p[:, 0].astype(int)], 2.0 * np.pi * p[:, 1] / n
+        return np.stack([at * np.cos(angle), at * np.sin(angle), p[:, 2] / 2.0], axis=1)
+
+    rules: list[Rule] = [
+        (name, lambda p, axis=axis, end=end: bool(np.all(p[:, axis] == end)))
+        for name, axis, end in (("wall", 0, 0), ("far", 0, layers), ("hub", 2, 0), ("shroud", 2, 2))
+    ]
+    return grid((layers, n, 2), place=place, rules=rules, wrap=1)
+
+
 def permuted(mesh: Mesh, order: np.ndarray) -> Mesh:
     """The same mesh with node ``order[i]`` of the old one as node i."""
     new = np.empty(len(order), np.int64)

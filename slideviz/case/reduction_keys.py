@@ -91,7 +91,8 @@ REDUCTION_ROWS = (
         REDUCTION,
         one_of(DATA_REDUCTIONS, {"TRUE": "YES", "FALSE": "NO"}),
         "Interpolate with some of the boundary nodes only; with NO the keys below do nothing. AUTO "
-        "does so where they are more than 2000, to a thousandth of the largest displacement.",
+        "does so where they are more than 2000, to a thousandth of the largest displacement, or "
+        "half of the first layer's height beside sliding boundaries.",
         put_reduction,
         get_reduction,
         "AUTO",

@@ -116,7 +116,7 @@ def run(arguments: argparse.Namespace) -> int:
     seconds["total"] = time.perf_counter() - begin
     folded = folded_cells(steps, mesh, found)
     report = run_report(case, mesh, steps, seconds, quality=found, undeformed=before, folded=folded)
-    advice = advice_for(case, mesh, found)
+    advice = advice_for(case, steps[-1].layers, mesh, found)
     files = {"mesh": output, CELLS: qualities}
     return tell(arguments, report, files, found, before, folded, advice=advice)
 

@@ -132,11 +132,13 @@ def _print_run(
             print(f"{name}: {path}")
 
 
-def advice_for(case: Case, mesh: Mesh | None = None, found: Quality | None = None) -> str:
+def advice_for(
+    case: Case, layers: float, mesh: Mesh | None = None, found: Quality | None = None
+) -> str:
     """Return what may help against inverted cells: the remedies of the window, with keys.
 
-    Without a mesh in memory, with its quality ``found`` after the run, neither the pitch nor
-    boundaries beside the cells are named.
+    ``layers`` is that of the last ``Step``. Without a mesh in memory, with its quality ``found``
+    after the run, neither the pitch nor boundaries beside the cells are named.
     """
     from slideviz.deformation.remedies import beyond_pitch, fixed_beside, remedies
 
@@ -147,7 +149,7 @@ def advice_for(case: Case, mesh: Mesh | None = None, found: Quality | None = Non
             return ""
         beside = fixed_beside(case, mesh, found.inverted_cells())
         pitch = beyond_pitch(case, mesh)
-    ideas = "; ".join(remedy.keys for remedy in remedies(case, beside, pitch))
+    ideas = "; ".join(remedy.keys for remedy in remedies(case, beside, pitch, layers))
     return f"{pitch[:1].lower()}{pitch[1:]}; what may help: {ideas}".removeprefix("; ")
 
 

@@ -100,7 +100,7 @@ def run_streamed(
     if arguments.resume and (known := finished(about, made)):
         say("note", f"{output}: is finished, of this case, mesh and version; nothing is done")
         save_report(arguments, known[0])
-        return tell_warnings(*known, advice_for(case), quiet=arguments.quiet)
+        return tell_warnings(*known, advice_for(case, 0.0), quiet=arguments.quiet)
     with Bar(not arguments.quiet) as bar:
         done = stream(
             case,
@@ -132,5 +132,5 @@ def run_streamed(
     )
     note_finished(about, made, report, done.folded)
     files = {"mesh": output, CELLS: qualities}
-    advice = advice_for(case)
+    advice = advice_for(case, done.steps[-1].layers)
     return tell(arguments, report, files, done.quality, done.undeformed, done.folded, advice=advice)

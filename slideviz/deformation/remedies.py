@@ -26,7 +26,9 @@ class Remedy:
     window: str
 
 
-def remedies(case: Case, beside: Sequence[str] = (), pitch: str = "") -> tuple[Remedy, ...]:
+def remedies(
+    case: Case, beside: Sequence[str] = (), pitch: str = "", layers: float = 0.0
+) -> tuple[Remedy, ...]:
     """Return the remedies that a case has not tried yet, the most promising first.
 
     Parameters
@@ -37,10 +39,21 @@ def remedies(case: Case, beside: Sequence[str] = (), pitch: str = "") -> tuple[R
         Fixed boundaries with nodes of inverted cells, from `fixed_beside`.
     pitch
         Sentence from `beyond_pitch`.
+    layers
+        Of the ``Step`` with inverted cells.
     """
     found, roles = [], set(case.roles.values())
     if case.method != "rbf":
         found.append(Remedy("METHOD= rbf", "radial basis functions as the method"))
+    if layers:
+        yes = "DATA_REDUCTION= YES with " if case.reduction and case.reduction.auto else ""
+        why = "half of the smallest distance between moving and sliding nodes"
+        found.append(
+            Remedy(
+                f"{yes}DATA_RED_TOLERANCE= {layers:.2g}, {why}",
+                f"a data reduction with the tolerance {layers:.2g}, {why}",
+            )
+        )
     if pitch:
         found.append(Remedy(*["a motion below the pitch"] * 2))
     slides = {"sliding", "periodic"} & roles

@@ -16,7 +16,12 @@ from slideviz.case.motion import displacements, require_valid
 from slideviz.deformation.classes import find_classes, find_period, roles_of_copies
 from slideviz.deformation.prescribed import displaced, image_tolerance, prescribed
 from slideviz.deformation.radius import fitted_radius, support_radius
-from slideviz.deformation.reduction import find_reduction, loose_warnings
+from slideviz.deformation.reduction import (
+    find_reduction,
+    loose_warnings,
+    needed_by_layers,
+    sliding_gap,
+)
 from slideviz.errors import MeshError
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size, within
@@ -68,6 +73,8 @@ class Setup:
         Nodes that could be control nodes; periodic images count as one.
     reduction : GreedySettings or None
         Settings of the greedy selection; None: all candidates are control nodes.
+    layers : float
+        As of a ``Step``.
     axis : (n,) bool
         Nodes on the axis of a cylindrical frame.
     held : (h,) int64
@@ -98,6 +105,7 @@ class Setup:
     images: IntArray
     candidates: int
     reduction: GreedySettings | None
+    layers: float
     axis: np.ndarray
     held: IntArray
     boundary: Boundary
@@ -218,8 +226,11 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
     )
     largest = float(np.linalg.norm(target, axis=1).max(initial=0.0))
     candidates = _candidates(classes, known)
-    reduction = find_reduction(case, mesh.extent, largest, candidates)
-    loose = loose_warnings(case, reduction, largest, mesh.extent)
+    moves, slides = np.zeros((2, len(mesh.points)), bool)
+    moves[classes.moving], slides[classes.sliding] = True, True
+    gap = sliding_gap(mesh.points, boundary.facets, moves, slides)
+    reduction = find_reduction(case, mesh.extent, largest, candidates, gap)
+    loose = loose_warnings(case, reduction, largest, mesh.extent, gap)
     tracks = find_tracks(
         boundary,
         fans,
@@ -245,6 +256,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
         images=images,
         candidates=candidates,
         reduction=reduction,
+        layers=needed_by_layers(reduction, gap),
         axis=axis,
         held=hold_on_axis(*directions(classes, normals), axis)[2],
         boundary=boundary,

@@ -186,6 +186,7 @@ class Stepping:
             control=solution.control,
             candidates=self.setup.candidates,
             tolerance=self.setup.reduction.tolerance if self.setup.reduction else None,
+            layers=self.setup.layers,
             part=part,
             support_radius=self.setup.basis.radius if self.case.method == "rbf" else None,
             field=solution.field if self.rate is not None else None,

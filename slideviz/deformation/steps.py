@@ -95,6 +95,9 @@ class Step:
         Nodes that could have been control nodes; periodic images count as one.
     tolerance : float or None
         The tolerance of the data reduction, in the mesh's length unit; None where there was none.
+    layers : float
+        The tolerance that layers at moving boundaries need where it is smaller than ``tolerance``
+        (`slideviz.deformation.reduction.LAYER`); else 0.
     periodic_misfit : float or None
         Largest difference of the displacements of periodic images so far, in the mesh's length
         unit. It is rounding only, since more raises. None where images need not move alike.
@@ -120,6 +123,7 @@ class Step:
     control: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
     candidates: int = 0
     tolerance: float | None = None
+    layers: float = 0.0
     periodic_misfit: float | None = None
     part: float = 1.0
     support_radius: float | None = None

@@ -96,7 +96,9 @@ def help_for(run: Run, mesh: Mesh | None, folding: str = "") -> str:
     if run.last is not None:
         beside = fixed_beside(run.case, mesh, run.last.quality.inverted_cells())
     pitch = beyond_pitch(run.case, mesh)
-    helps = "; ".join(remedy.window for remedy in remedies(run.case, beside, pitch))
+    step = run.last.step if run.last is not None else None
+    layers = step.layers if step is not None else 0.0
+    helps = "; ".join(remedy.window for remedy in remedies(run.case, beside, pitch, layers))
     words = (_last_valid_words(run), f"{pitch}." if pitch else "", f"What may help: {helps}.")
     return " ".join(filter(None, words))
 

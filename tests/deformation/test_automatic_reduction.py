@@ -5,10 +5,15 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.reduction import AUTO, Reduction
+from slideviz.cli.run_outcome import advice_for
 from slideviz.deformation import reduction, setup
 from slideviz.deformation.solver import Step
+from slideviz.deformation.streaming import stream
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
+from slideviz.session.run_messages import help_for
+from slideviz.session.state import Run, StepFrame
+from tests import builders
 
 
 @pytest.fixture(scope="module")
@@ -72,3 +77,57 @@ def test_a_tolerance_that_it_does_not_use_is_remarked(passage):
 def test_a_relative_tolerance_is_a_length_of_the_step(passage):
     asked = passage.case.change(reduction=Reduction(relative=1e-3), steps=1)
     assert _last(asked, passage.mesh).tolerance == pytest.approx(1e-3 * passage.mesh.extent)
+
+
+def _layers(monkeypatch):
+    """A cylinder that changes its shape between sliding walls, with layers of 1e-6."""
+    monkeypatch.setattr(reduction, "EXACT_NODES", 10)
+    roles = {"wall": "moving", "far": "fixed", "hub": "sliding", "shroud": "sliding"}
+    motions = sv.Scale("wall", (1.1, 0.95, 1.0)), sv.Translate("wall", (0.1, 0.0, 0.0))
+    return builders.layered_cylinder(), sv.Case(roles=roles, motions=motions, sliding="ps")
+
+
+@pytest.mark.parametrize("sliding", ["ps", "ds"])
+def test_it_stays_below_half_of_the_first_layer_beside_sliding_walls(monkeypatch, sliding):
+    mesh, case = _layers(monkeypatch)
+    found = _last(case.change(sliding=sliding), mesh)
+    assert found.tolerance == pytest.approx(0.5e-6)
+    assert (found.layers, quality(found.mesh, mesh).inverted) == (0.0, 0)
+    assert quality(found.mesh, mesh).min > 0.85
+    # A thousandth of the motion, as AUTO without layers, is two hundred layers.
+    loose = case.change(sliding=sliding, reduction=Reduction(tolerance=2e-4))
+    bad = _last(loose, mesh)
+    assert bad.layers == pytest.approx(0.5e-6)
+    assert not any("too little for" in text for text in bad.warnings)
+    state = quality(bad.mesh, mesh)
+    assert state.inverted > 0
+    keys = "what may help: DATA_RED_TOLERANCE= 5e-07, half of the smallest distance"
+    assert advice_for(loose, bad.layers, mesh, state).startswith(keys)
+    shown = help_for(Run(1, loose, (StepFrame(bad.mesh, state, bad),), "done"), mesh)
+    assert "What may help: a data reduction with the tolerance 5e-07, half of" in shown
+
+
+def test_layers_that_it_cannot_follow_are_told(monkeypatch):
+    mesh, case = _layers(monkeypatch)
+    monkeypatch.setattr(reduction, "SMALLEST", 1e-3)
+    found = _last(case, mesh)
+    (said,) = [text for text in found.warnings if "too little for" in text]
+    assert said.startswith("sliding nodes are 1e-06 from moving ones, too little for DATA_REDUCT")
+    assert said.endswith("use DATA_REDUCTION= NO, or YES with DATA_RED_TOLERANCE= 5e-07")
+    assert "YES with DATA_RED_TOLERANCE= 5e-07" in advice_for(case, found.layers)
+
+
+def test_a_fixed_wall_beside_layers_changes_no_tolerance(monkeypatch):
+    mesh, case = _layers(monkeypatch)
+    roles = case.roles | {"hub": "fixed", "shroud": "fixed"}
+    assert setup.make_setup(case.change(roles=roles), mesh).reduction.tolerance > 9e-5
+
+
+def test_a_streamed_run_stays_below_half_of_the_first_layer_too(tmp_path, monkeypatch):
+    mesh, case = _layers(monkeypatch)
+    sv.write(tmp_path / "mesh.su2b", mesh)
+    case = case.change(mesh_file=tmp_path / "mesh.su2b")
+    last = _last(case, mesh)
+    done = stream(case, tmp_path / "out.su2b")
+    assert done.steps[-1].tolerance == last.tolerance < 1e-6
+    assert sv.read(tmp_path / "out.su2b").points.tobytes() == last.mesh.points.tobytes()
