@@ -222,7 +222,7 @@ STEPS = Menu("steps", "&Steps", "Show another step of the deformation.", (
 
 
 def _theme(theme: str, tip: str) -> Command:
-    return Command(f"theme_{theme}", theme.capitalize(), tip,
+    return Command(f"theme_{theme}", f"&{theme.capitalize()}", tip,
                    lambda window: window.set_theme(theme), checked=lambda now: now.theme == theme)
 
 

@@ -2,9 +2,10 @@
 
 import itertools
 
+import numpy as np
 import pytest
 from qtpy.QtCore import Qt
-from qtpy.QtGui import QContextMenuEvent
+from qtpy.QtGui import QContextMenuEvent, QImage
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QAbstractItemView, QApplication, QMenu, QTableView
 
@@ -109,6 +110,43 @@ def test_the_tab_key_leaves_every_table_and_comes_around(opened):
         QTest.keyClick(window.focusWidget(), Qt.Key.Key_Tab)
         seen.add(window.focusWidget())
     assert window.method.sliding in seen
+
+
+def seen_pixels(widget):
+    """Return the colors of a widget as it is painted, (height, width, 3)."""
+    image = widget.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
+    pixels = np.frombuffer(image.constBits(), np.uint8)
+    return pixels.reshape(image.height(), image.width(), 4)[..., :3].astype(int)
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_focus_is_seen_wherever_the_tab_key_leads(opened, theme):
+    window, reason, seen = opened.window, Qt.FocusReason.TabFocusReason, []
+    window.set_theme(theme)
+    for dock in ("runs", "histogram", "designs", "log"):
+        window.docks_.bring_to_front(dock)
+    window.boundaries.table.setFocus(reason)
+    while (at := window.focusWidget()) not in seen:
+        seen.append(at)
+        if at is not window.view:
+            focused = seen_pixels(at)
+            window.view.setFocus(reason)
+            differs = np.abs(focused - seen_pixels(at)).max(axis=2) > 20
+            assert differs.sum() > 12, at.objectName()
+            at.setFocus(reason)
+        QTest.keyClick(at, Qt.Key.Key_Tab)
+    assert window.motions.add in seen, "a tool button"
+    # The link beside Run is one of them, and Return follows it; without a link it is not.
+    assert window.run_panel.text in seen
+    while window.focusWidget() is not window.run_panel.text:
+        QTest.keyClick(window.focusWidget(), Qt.Key.Key_Tab)
+    QTest.keyClick(window.run_panel.text, Qt.Key.Key_Return)
+    assert opened.session.case.motions == (Translate("airfoil", (0.0, 0.0)),)
+    assert window.motions.editor.vector.fields[0].hasFocus()
+    window.store.change(changes.replace_motion, 0, Translate("airfoil", (0.01, 0.0)))
+    assert window.run_panel.text.focusPolicy() == Qt.FocusPolicy.NoFocus
+    titles = [action.text() for action in window.actions_.menus["theme"].actions()]
+    assert all("&" in title for title in titles)
 
 
 FIRST = {

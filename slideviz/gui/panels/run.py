@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import html
 
-from qtpy.QtCore import Qt, Signal
-from qtpy.QtWidgets import QLabel, QPushButton, QSizePolicy
+from qtpy.QtCore import Signal
+from qtpy.QtWidgets import QPushButton, QSizePolicy
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.build import QuietBar, in_column, in_row, push_button, set_style
 from slideviz.gui.widgets.command import Command
 from slideviz.gui.widgets.icons import icon
-from slideviz.gui.widgets.labels import wrapped
+from slideviz.gui.widgets.labels import LinkLabel, wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window
 from slideviz.session import changes
@@ -56,12 +56,10 @@ class RunPanel(Panel):
         self._remedy: tuple[Run | None, str, str] = (None, "", "")
         self.run = self._button(COMMANDS["run"], "#ffffff")
         self.cancel = self._button(COMMANDS["cancel"], "#3b4652")
-        self.text = QLabel()
-        self.text.setWordWrap(True)
+        self.text = LinkLabel()
         self.text.setMinimumHeight(34)
         # A long sentence wraps; it must not make all panels on this side wider.
         self.text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.text.setTextFormat(Qt.TextFormat.RichText)
         self.text.linkActivated.connect(self._link)
         self.bar = QuietBar()
         self.bar.setRange(0, 1000)

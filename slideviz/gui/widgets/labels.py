@@ -8,7 +8,15 @@ import html
 from typing import TypeAlias
 
 from qtpy.QtCore import QModelIndex, QPersistentModelIndex, QSize, Qt
-from qtpy.QtGui import QFont, QFontDatabase, QFontMetrics, QPainter, QPaintEvent, QResizeEvent
+from qtpy.QtGui import (
+    QFocusEvent,
+    QFont,
+    QFontDatabase,
+    QFontMetrics,
+    QPainter,
+    QPaintEvent,
+    QResizeEvent,
+)
 from qtpy.QtWidgets import (
     QAbstractItemView,
     QFrame,
@@ -27,6 +35,28 @@ def rich_label(text: str) -> QLabel:
     label = QLabel(text)
     label.setTextFormat(Qt.TextFormat.RichText)
     return label
+
+
+class LinkLabel(QLabel):
+    """A word-wrapped label for rich text, whose links are reached by the tab key too."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setWordWrap(True)
+        self.setTextFormat(Qt.TextFormat.RichText)
+
+    def setText(self, text: str) -> None:
+        super().setText(text)
+        keyboard = Qt.TextInteractionFlag.LinksAccessibleByKeyboard
+        flags = Qt.TextInteractionFlag.LinksAccessibleByMouse
+        # Without a link, the tab key passes over the label.
+        self.setTextInteractionFlags(flags | keyboard if "<a " in text else flags)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        # Qt would give the focus to the label first, and to a link by the next Tab.
+        if event.reason() in (Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason):
+            self.focusNextPrevChild(event.reason() == Qt.FocusReason.TabFocusReason)
 
 
 def fixed_font() -> QFont:

@@ -66,6 +66,8 @@ QToolBar {{ border: none; spacing: 2px; padding: 2px 4px; }}
 QToolButton {{ padding: 3px; border-radius: 4px; border: 1px solid transparent; }}
 QToolButton:hover {{ background: {hover}; }}
 QToolButton:checked {{ background: {checked}; border: 1px solid {line}; }}
+QToolButton:focus, QPlainTextEdit:focus, QListView:focus, QTreeView:focus,
+QTableView:focus {{ border: 1px solid {accent}; }}
 QStatusBar {{ border-top: 1px solid {line}; }}
 QStatusBar::item {{ border: none; }}
 QMainWindow::separator {{ width: 5px; height: 5px; background: {Window}; }}
