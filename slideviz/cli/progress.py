@@ -36,26 +36,22 @@ def note_compilation(quiet: bool) -> Iterator[None]:
     if quiet:
         yield
         return
-    from numba.core import event
+    from slideviz.mesh.caching import compilation_watched
 
-    class Listener(event.Listener):  # type: ignore[misc]
-        noted = False
+    noted: list[bool] = []
 
-        def on_start(self, _: object) -> None:
-            if not self.noted:
-                self.noted = True
-                say_compiling()
+    def note() -> None:
+        if not noted:
+            noted.append(True)
+            say_compiling()
 
-        def on_end(self, _: object) -> None:
-            pass
-
-    with event.install_listener("numba:compile", Listener()):
+    with compilation_watched(note):
         yield
 
 
 def say_compiling() -> None:
     """Print to stderr that loops are being compiled."""
-    words = "compiling loops that are used for the first time: some seconds, once"
+    words = "compiling loops that are used for the first time: up to half a minute, once"
     control(f"{_WIPE if sys.stderr.isatty() else ''}slideviz: {words}\n")
 
 

@@ -53,6 +53,7 @@ def launch(path: Path | None = None, run: bool = False) -> int:
             window.show()
             window.recovery.look(crashes)
             QTimer.singleShot(0, lambda: prepare_drawing(window.view, window.scene.stage))
+            window.warmup.watch()
             QTimer.singleShot(WARM_UP_MS, window.warmup.start)
             if path is not None:
                 QTimer.singleShot(0, lambda: window.files.open_path(path))

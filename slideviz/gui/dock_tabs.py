@@ -63,7 +63,7 @@ class DockTabs(QObject):
             bar.removeEventFilter(self)
             bar.installEventFilter(self)
             for index in range(bar.count()):
-                bar.setTabToolTip(index, TIP)
+                bar.setTabToolTip(index, f"{bar.tabText(index)}\n{TIP}")
 
     def _set_title(self, dock: QDockWidget, titled: bool) -> None:
         # An empty widget in place of the title bar hides it.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -22,6 +22,7 @@ from slideviz.gui.panels.run import RunPanel
 from slideviz.gui.panels.runs import RunsPanel
 from slideviz.gui.panels.sections import sections_panel
 from slideviz.gui.panels.worst import WorstPanel
+from slideviz.gui.widgets.build import PanelScroll
 from slideviz.gui.widgets.services import Services
 
 Panel = TypeVar("Panel", bound=QWidget)
@@ -31,14 +32,23 @@ BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
 LEFT_WIDTH, RIGHT_WIDTH = 356, 316
 """Least width in pixels of the docks on each side, on a screen at least `ROOMY` wide."""
 
-NARROWEST = {LEFT: 300, RIGHT: 264}
+NARROWEST = {LEFT: 236, RIGHT: 224}
 """Least width in pixels of the docks on each side, on a narrow screen."""
+
+LOW = 600
+"""Height of the window in pixels below which the boundaries are a tab beside motion and method."""
 
 ROOMY = 1280
 """Width of a screen in pixels below which the least widths shrink in proportion."""
 
 FRAME = 40
 """Height in pixels of a screen that is left for the window's title bar."""
+
+HEIGHTS = {
+    LEFT: {"boundaries": 240, "motion": 330, "run": 90},
+    RIGHT: {"histogram": 410, "runs": 290},
+}
+"""Initial height of the docks on each side, relative to one another."""
 
 FIRST = {LEFT: "boundaries", RIGHT: "histogram"}
 """The dock whose width is set for each side before the window is shown."""
@@ -58,8 +68,8 @@ def room_for(window: QWidget) -> QRect:
 class DockRow:
     """A row of the table of docks: name, title, area, and the function that makes its panel.
 
-    ``after`` names the dock that it is tabbed with. ``named``: it has no title bar, as its content
-    says what it is. ``shown``: it is visible at first.
+    ``after`` names the dock that it is tabbed with, ``after_low`` that in a low window. ``named``:
+    it has no title bar, as its content says what it is. ``shown``: it is visible at first.
     """
 
     name: str
@@ -67,13 +77,14 @@ class DockRow:
     area: Qt.DockWidgetArea
     make: Callable[[Services], QWidget]
     after: str = ""
+    after_low: str = ""
     named: bool = False
     shown: bool = True
 
 
 DOCKS: tuple[DockRow, ...] = (
     DockRow("boundaries", "Boundaries", LEFT, lambda w: BoundariesPanel(w.store)),
-    DockRow("motion", "Motion", LEFT, lambda w: MotionPanel(w.store)),
+    DockRow("motion", "Motion", LEFT, lambda w: MotionPanel(w.store), after_low="boundaries"),
     DockRow("method", "Method", LEFT, lambda w: MethodPanel(w.store), "motion"),
     DockRow("run", "Run", LEFT, lambda w: RunPanel(w.store), named=True),
     DockRow("histogram", "Histogram", RIGHT, lambda w: HistogramPanel(w.store)),
@@ -102,6 +113,7 @@ class Docks(QObject):
         self.window = window
         self._widths: dict[Side, int] = {}
         self._hidden: QByteArray | None = None
+        self._low = False
         part = min(1.0, window.screen().availableGeometry().width() / ROOMY)
         self.least = {
             side: max(NARROWEST[side], round(part * width))
@@ -127,7 +139,8 @@ class Docks(QObject):
         dock = QDockWidget(row.title, self.window)
         dock.setObjectName(row.title.lower())
         panel = row.make(self.window)
-        dock.setWidget(panel)
+        fixed = row.named or panel.findChild(PanelScroll) is not None
+        dock.setWidget(panel if fixed else PanelScroll(panel))
         # A window made small and large again must not leave names and fields cut off.
         if row.area != BOTTOM:
             dock.setMinimumWidth(self.least[row.area])
@@ -162,8 +175,11 @@ class Docks(QObject):
             dock = self.by_name[row.name]
             if window.dockWidgetArea(dock) == Side.NoDockWidgetArea and not dock.isFloating():
                 window.addDockWidget(row.area, dock)  # a dock that an older version did not have
+        tabs = window.tabifiedDockWidgets(self.by_name["boundaries"])
+        self._low = self.by_name["motion"] in tabs
         # After Qt has laid the docks out.
         QTimer.singleShot(0, self, self.follow)
+        QTimer.singleShot(0, self, self._follow_height)
 
     def _fit_screen(self) -> None:
         """Shrink and move the window so that all of it is on the screen."""
@@ -180,32 +196,58 @@ class Docks(QObject):
         self._arrange()
         self._share_room()
 
-    def _arrange(self) -> None:
-        window = self.window
-        for row in DOCKS:
-            dock = self.by_name[row.name]
+    def _after(self, row: DockRow) -> str:
+        """Return the name of the dock that a dock is tabbed with at the window's height."""
+        return (self._low and row.after_low) or row.after
+
+    def _arrange(self, side: Side | None = None) -> None:
+        """Put the docks of a side to their places, as they are shown; or all, as at first."""
+        window, rows = self.window, [row for row in DOCKS if side in (None, row.area)]
+        docks = {row: self.by_name[row.name] for row in rows}
+        shown = {row: row.shown if side is None else not docks[row].isHidden() for row in rows}
+        front = [dock for dock in docks.values() if side is not None and _is_in_front(dock)]
+        self._low = window.height() < LOW
+        for dock in docks.values():
             dock.setFloating(False)
             # Without this, Qt leaves orphaned tab bars over the panels.
             window.removeDockWidget(dock)
-        for row in DOCKS:
-            if row.after:
-                window.tabifyDockWidget(self.by_name[row.after], self.by_name[row.name])
+        for row in rows:
+            if self._after(row):
+                window.tabifyDockWidget(self.by_name[self._after(row)], docks[row])
             else:
-                window.addDockWidget(row.area, self.by_name[row.name])
-            self.by_name[row.name].setVisible(row.shown)
-        for row in DOCKS:
-            if not row.after and any(other.after == row.name for other in DOCKS):
-                self.by_name[row.name].raise_()
+                window.addDockWidget(row.area, docks[row])
+            docks[row].setVisible(shown[row])
+        for row in rows:
+            if not self._after(row) and any(self._after(other) == row.name for other in rows):
+                docks[row].raise_()
+        for dock in front:
+            dock.raise_()
 
-    def _share_room(self) -> None:
-        window = self.window
-        heights = {"boundaries": 240, "motion": 330, "run": 90}
-        docks = [self.by_name[name] for name in heights]
+    def _share_room(self, side: Side | None = None) -> None:
         self._share_width()
-        window.resizeDocks(docks, list(heights.values()), Qt.Orientation.Vertical)
-        right = [self.by_name[row.name] for row in DOCKS if row.area == RIGHT and not row.after]
-        if right:
-            window.resizeDocks(right, [410, 290][: len(right)], Qt.Orientation.Vertical)
+        for area, heights in HEIGHTS.items():
+            rows = [row for row in DOCKS if row.name in heights and not self._after(row)]
+            docks = [self.by_name[row.name] for row in rows if side in (None, area)]
+            # The room of the boundaries is that of the motions, too, where these are tabs.
+            wanted = [heights[row.name] for row in rows]
+            wanted[0] += sum(heights.values()) - sum(wanted)
+            self.window.resizeDocks(docks, wanted[: len(docks)], Qt.Orientation.Vertical)
+
+    def _follow_height(self) -> None:
+        """Make the boundaries a tab in a low window, unless the user has moved these panels."""
+        low, rows = self.window.height() < LOW, [row for row in DOCKS if row.area == LEFT]
+        if low != self._low and all(self._is_usual(row, rows) for row in rows):
+            self._arrange(LEFT)
+            self._share_room(LEFT)
+
+    def _is_usual(self, row: DockRow, rows: Sequence[DockRow]) -> bool:
+        """Return whether a dock has its initial place, among those of its side."""
+        window, dock = self.window, self.by_name[row.name]
+        first = {one.name: self._after(one) or one.name for one in rows}
+        tab = {name: first[after] for name, after in first.items()}
+        beside = {self.by_name[name] for name in tab if tab[name] == tab[row.name]}
+        here = window.dockWidgetArea(dock) == row.area and not dock.isFloating()
+        return here and {dock, *window.tabifiedDockWidgets(dock)} == beside
 
     def _shares(self) -> dict[Side, int]:
         """Return the width in pixels that each side has unless the user has changed it."""
@@ -237,6 +279,8 @@ class Docks(QObject):
         resized = event.type() == QEvent.Type.Resize
         if resized and self._widths and self._as_wide_as(self._widths):
             QTimer.singleShot(0, self, self._share_width)
+        if resized:
+            QTimer.singleShot(0, self, self._follow_height)
         return False
 
     def _as_wide_as(self, widths: Mapping[Side, int]) -> bool:
@@ -279,7 +323,7 @@ class Docks(QObject):
         dock.raise_()
         at = self.window.focusWidget()
         if at is None or not dock.isAncestorOf(at):
-            dock.widget().setFocus()
+            self.panels[name].setFocus()
 
 
 def _is_in_front(dock: QDockWidget) -> bool:

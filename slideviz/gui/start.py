@@ -23,7 +23,14 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.commands import COMMANDS
-from slideviz.gui.widgets.build import boxed, hint_label, in_column, in_row, push_button
+from slideviz.gui.widgets.build import (
+    FoldingRow,
+    boxed,
+    hint_label,
+    in_column,
+    in_row,
+    push_button,
+)
 from slideviz.gui.widgets.cards import SIZE, card
 from slideviz.gui.widgets.icons import icon, logo
 from slideviz.gui.widgets.labels import ElidedLabel, rich_label, wrapped
@@ -39,8 +46,12 @@ COLUMNS = 4
 
 NARROWEST = 126
 """Least width of a card in pixels, for its name."""
+
 TRIED = "passage"
 """The sample that is deformed by one click."""
+
+TRY = "Try it: deform a blade passage"
+"""The text of the button for that; only its beginning where the page is narrow."""
 
 
 class StartPage(QScrollArea):
@@ -66,10 +77,9 @@ class StartPage(QScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAsNeeded)
         self.page = QWidget()
         self.page.setMaximumWidth(WIDEST)
-        outer = in_row(None, self.page, None)
-        outer.setStretchFactor(self.page, 100)
-        self.setWidget(boxed(outer))
-        outer.setContentsMargins(24, 12, 24, 12)
+        self._outer = in_row(None, self.page, None)
+        self._outer.setStretchFactor(self.page, 100)
+        self.setWidget(boxed(self._outer))
         self.hint = hint_label("Files can also be dropped anywhere on this window.")
         self._recent = in_column(spacing=0)
         self.recent_buttons: list[QPushButton] = []
@@ -93,9 +103,9 @@ class StartPage(QScrollArea):
         title.setWordWrap(True)
         return in_row(picture, 10, title, wide=[title])
 
-    def _make_buttons(self, can_try: bool) -> QHBoxLayout:
+    def _make_buttons(self, can_try: bool) -> FoldingRow:
         self.attempt = push_button(
-            "Try it: deform a blade passage",
+            TRY,
             "Open the sample “passage” and deform it at once.",
             lambda: self.try_wanted.emit(TRIED),
             "run",
@@ -111,7 +121,7 @@ class StartPage(QScrollArea):
         for button in (self.attempt, self.open):
             button.setAutoDefault(True)  # the Enter key, too
             button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        return in_row(self.attempt, self.open, None, spacing=10)
+        return FoldingRow([self.attempt], [self.open], spacing=10, apart=False)
 
     def _make_cards(self, samples: dict[str, str]) -> QGridLayout:
         self._cards = QGridLayout()
@@ -173,6 +183,9 @@ class StartPage(QScrollArea):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
+        narrow = self.width() < 3 * NARROWEST
+        self._outer.setContentsMargins(8 if narrow else 24, 12, 8 if narrow else 24, 12)
+        self.attempt.setText(TRY.partition(":")[0] if narrow else TRY)
         if self.sample_buttons:
             self._place_cards()
 

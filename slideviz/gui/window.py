@@ -40,7 +40,7 @@ from slideviz.gui.viewport.section_views import SectionViews
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.banner import Banner
-from slideviz.gui.widgets.build import in_column
+from slideviz.gui.widgets.build import in_column, reveal
 from slideviz.gui.widgets.command import Now
 from slideviz.gui.widgets.faults import Faults
 from slideviz.gui.widgets.icons import redraw_icons
@@ -116,6 +116,7 @@ class MainWindow(Services):
         self.section_reader.said.connect(self._say_reading)
         self.warmup = WarmupThread(self)
         self.warmup.compiling.connect(self.preparing.setVisible)
+        self.warmup.compiling.connect(self.run_panel.set_compiling)
         self._keep_session(kept)
         plain_labels(self)
         self.sync_actions()
@@ -181,8 +182,11 @@ class MainWindow(Services):
     def _make_status(self) -> None:
         self.mesh_text = QLabel()
         self._measured: Mesh | None = None
-        self.preparing = QLabel("Preparing… ")
-        self.preparing.setToolTip("The numerics are compiled, once after each installation.")
+        self.preparing = QLabel("Compiling, once… ")
+        self.preparing.setToolTip(
+            "The numerics are compiled, once after each installation: half a minute. What needs "
+            "them waits meanwhile."
+        )
         self.preparing.hide()
         self.statusBar().addPermanentWidget(self.preparing)
         self.statusBar().addPermanentWidget(self.mesh_text)
@@ -334,6 +338,7 @@ class MainWindow(Services):
         # For Qt a field behind a tab is visible: what is typed would change it unseen.
         while moved and self.docks_.is_behind(self.focusWidget()):
             moved = super().focusNextPrevChild(forwards) and self.focusWidget() is not first
+        reveal(self.focusWidget())
         return moved
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:

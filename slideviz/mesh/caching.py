@@ -12,13 +12,13 @@ import hashlib
 import io
 import pickle
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import environment
+from numba.core import environment, event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.environment import Environment
 from numba.core.runtime import rtsys
@@ -122,6 +122,24 @@ def njit(**options: Any) -> Callable[[Callable], Any]:
         return dispatcher
 
     return compiled
+
+
+@contextmanager
+def compilation_watched(compiling: Callable[[], None]) -> Iterator[None]:
+    """Context that calls ``compiling`` whenever a loop is compiled, in whatever thread.
+
+    It is not called when a loop comes from the cache on disk.
+    """
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, _: object) -> None:
+            compiling()
+
+        def on_end(self, _: object) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Listener()):
+        yield
 
 
 def _sealed(content: bytes) -> bytes:

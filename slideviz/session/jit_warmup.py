@@ -9,6 +9,7 @@ from typing import Any
 
 from slideviz.case.model import Case, Translate
 from slideviz.errors import Cancelled, SlidevizError
+from slideviz.mesh.caching import compilation_watched
 from slideviz.mesh.io.source import Source
 from slideviz.mesh.io.su2.read import read_su2
 from slideviz.mesh.io.su2.write import su2_blocks
@@ -42,20 +43,8 @@ def warm_up(compiling: Callable[[], None], stopped: Stopped) -> None:
         Returns whether to stop; called between and during the deformations, for compilation itself
         cannot be interrupted.
     """
-    from numba.core import event
-
-    class Listener(event.Listener):  # type: ignore[misc]
-        def on_start(self, _: object) -> None:
-            compiling()
-
-        def on_end(self, _: object) -> None:
-            pass
-
     # An error here is one in the user's run too, where it gets a message.
-    with (
-        contextlib.suppress(Cancelled, SlidevizError),
-        event.install_listener("numba:compile", Listener()),
-    ):
+    with contextlib.suppress(Cancelled, SlidevizError), compilation_watched(compiling):
         _write_and_read()
         _look()
         for name, settings in _RUNS:

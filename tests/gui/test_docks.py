@@ -1,5 +1,6 @@
 """The docks: every control can be reached in a small window, and a layout comes back."""
 
+import itertools
 import subprocess
 import sys
 
@@ -10,6 +11,7 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QWidget
 
 from slideviz.case.reduction import Reduction
+from slideviz.gui import docks as docks_module
 from slideviz.gui.docks import LEFT_WIDTH, RIGHT_WIDTH
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.choice import Choice
@@ -201,6 +203,56 @@ def test_the_layout_can_be_put_back(start, qtbot, monkeypatch):
     assert second.docks["sections"].isVisibleTo(second)
     assert not second.docks["log"].isVisible()
     assert not second.docks["motion"].visibleRegion().isEmpty()
+
+
+def overlaps(window):
+    """Return what lies over something else, or is cut by the edge of the window."""
+    docks = {n: d for n, d in window.docks.items() if not d.visibleRegion().isEmpty()}
+    places = {name: dock.geometry() for name, dock in docks.items() if not dock.isFloating()}
+    places["view"] = window.centralWidget().geometry()
+    cut = {name for name, place in places.items() if not window.rect().contains(place)}
+    pairs = itertools.combinations(places, 2)
+    return cut | {(one, other) for one, other in pairs if places[one].intersects(places[other])}
+
+
+def test_nothing_overlaps_in_a_small_window_where_boundaries_are_a_tab(
+    start, qtbot, monkeypatch, sample_folder
+):
+    monkeypatch.setattr(docks_module, "ROOMY", 5000)  # as on a small screen
+    window = start()
+    window.setMinimumSize(1, 1)
+    docks = window.docks
+    for size in ((720, 450), (720, 410), (1280, 800), (720, 410)):
+        window.resize(*size)
+        settled(qtbot, window)
+        assert (window.width(), window.height()) == size
+        low = size[1] < 600
+        beside = window.tabifiedDockWidgets(docks["boundaries"])
+        assert set(beside) == ({docks["motion"], docks["method"]} if low else set())
+        assert is_titled(docks["boundaries"]) != low
+        assert overlaps(window) == set()
+        assert run_is_seen(window)
+    window.files.open_path(sample_folder / "passage" / "passage.cfg")
+    qtbot.waitUntil(lambda: not window.runner.busy)
+    for dock in ("motion", "method", "worst", "curves", "sections", "display", "designs"):
+        window.docks_.bring_to_front(dock)
+        settled(qtbot, window)
+        assert overlaps(window) == set(), dock
+        assert run_is_seen(window)
+    port = window.motions.parentWidget()
+    assert window.motions.width() <= port.width(), "no field is beyond the edge"
+    # The panel in front stays that; where the user has moved a panel, the height changes nothing.
+    docks["designs"].hide()
+    window.docks_.bring_to_front("method")
+    window.resize(1280, 800)
+    settled(qtbot, window)
+    assert not docks["method"].visibleRegion().isEmpty()
+    assert not docks["boundaries"].visibleRegion().isEmpty()
+    window.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, docks["method"])
+    window.resize(720, 410)
+    settled(qtbot, window)
+    assert window.tabifiedDockWidgets(docks["boundaries"]) == []
+    assert run_is_seen(window)
 
 
 def test_sides_follow_the_window_until_they_are_moved_also_after_a_restart(

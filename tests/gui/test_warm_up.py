@@ -6,9 +6,11 @@ import subprocess
 import sys
 from threading import Event, current_thread, main_thread
 
+import numba
 import pytest
 
 from slideviz.session import jit_warmup
+from slideviz.session.jobs import Doing
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
@@ -56,6 +58,37 @@ def test_preparing_is_told_only_while_something_is_compiled(window, qtbot, work)
     first = window.warmup.thread_
     window.warmup.start()
     assert window.warmup.thread_ is first
+
+
+def test_a_job_that_waits_for_compilation_says_so(window, qtbot, work):
+    text, end = window.run_panel.text, Event()
+    window.running.start_job("Reading a.su2", lambda _: None, lambda *_: end.wait(20))
+    window.warmup.start()
+    assert text.text() == "Reading a.su2"
+    work.compile.set()
+    qtbot.waitUntil(lambda: text.text() == "Reading a.su2 (compiling, once)")
+    window.run_panel.show_doing(Doing("Measuring the cells", 0.5))
+    assert text.text() == "Measuring the cells (compiling, once)"
+    work.end.set()
+    qtbot.waitUntil(lambda: text.text() == "Measuring the cells")
+    end.set()
+    qtbot.waitUntil(lambda: not window.runner.busy)
+    gc.unfreeze()
+
+
+def test_what_a_job_compiles_before_the_warm_up_is_told(window, qtbot, work):
+    window.warmup.watch()
+    numba.njit(lambda x: x + 1)(2)
+    qtbot.waitUntil(window.preparing.isVisible)
+    assert "once" in window.preparing.text()
+    window.warmup.start()
+    work.compile.set()
+    work.end.set()
+    qtbot.waitUntil(lambda: not window.preparing.isVisible())
+    numba.njit(lambda x: x + 2)(2)
+    qtbot.wait(50)
+    assert not window.preparing.isVisible(), "nothing would end it"
+    gc.unfreeze()
 
 
 def test_closing_does_not_wait_for_it(window, work):

@@ -1025,7 +1025,7 @@ def test_all_panels_fit_1280_x_800_and_links_lead_to_them(ready):
     assert (window.width(), window.height()) == (1280, 800)
     for name in ("motion", "method"):
         window.docks[name].raise_()
-        panel = window.docks[name].widget()
+        panel = window.docks_.panels[name]
         ready.qtbot.waitUntil(lambda panel=panel: not panel.visibleRegion().isEmpty())
         assert panel.height() >= panel.minimumSizeHint().height()
         assert panel.width() >= panel.minimumSizeHint().width()

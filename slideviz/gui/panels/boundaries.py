@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 
 from qtpy.QtCore import QItemSelectionModel, QPoint, QSignalBlocker, Qt, Signal
-from qtpy.QtGui import QAction, QBrush, QContextMenuEvent, QKeyEvent
+from qtpy.QtGui import QAction, QBrush, QContextMenuEvent, QKeyEvent, QResizeEvent
 from qtpy.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -32,6 +32,9 @@ from slideviz.terms import ROLES, labels
 NAME, COUNT, ROLE = 0, 1, 2
 """The columns of the table."""
 
+NARROW = 290
+"""Width of the table in pixels below which it has no room for the numbers of elements."""
+
 
 class BoundariesTable(QTableWidget):
     """The table of the boundaries; the tab key leaves it instead of going through the cells.
@@ -54,6 +57,12 @@ class BoundariesTable(QTableWidget):
         """Return the row a key acts on: the current row if selected, else the first selected."""
         rows = sorted({index.row() for index in self.selectionModel().selectedRows()})
         return rows[0] if rows and self.currentRow() not in rows else self.currentRow()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        narrow = self.width() < NARROW
+        self.setColumnHidden(COUNT, narrow)
+        self.setColumnWidth(ROLE, 112 if narrow else 136)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         if event.reason() == QContextMenuEvent.Reason.Keyboard:
@@ -108,7 +117,6 @@ class BoundariesPanel(Panel):
         header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
         header.setSectionResizeMode(COUNT, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(ROLE, QHeaderView.ResizeMode.Fixed)
-        header.resizeSection(ROLE, 136)
         header.setHighlightSections(False)
         name = table.horizontalHeaderItem(NAME)
         name.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)

@@ -76,6 +76,7 @@ class CurvesPanel(Panel):
 
     def _make_head(self) -> QHBoxLayout:
         self.kind = Choice(KINDS, name="curve_kind")
+        self.kind.setMinimumContentsLength(4)
         self.kind.explain(TIPS)
         self.kind.chosen.connect(lambda _: self._other_plot())
         self.save = push_button("Save…", "Save the plot as PNG, SVG or PDF.", self._save)

@@ -14,7 +14,14 @@ from qtpy.QtGui import QIcon, QImage, QPixmap, QValidator
 from qtpy.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QPushButton, QWidget
 
 from slideviz.gui.commands import COMMANDS
-from slideviz.gui.widgets.build import PanelScroll, check_box, grow_fields, in_row, push_button
+from slideviz.gui.widgets.build import (
+    PanelScroll,
+    check_box,
+    grow_fields,
+    in_column,
+    in_row,
+    push_button,
+)
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.command import Now
 from slideviz.gui.widgets.fields import NumberBox, NumberField, number_text
@@ -141,7 +148,10 @@ class DisplayPanel(Panel):
         super().__init__(store)
         self._period = Period()
         self._key: tuple[object, ...] = ()
-        self.form = QFormLayout(PanelScroll(self).widget())
+        content = QWidget()
+        in_column(PanelScroll(content), on=self)
+        self.form = QFormLayout(content)
+        self.form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
         self.form.setContentsMargins(6, 6, 6, 4)
         grow_fields(self.form, 5)
         self._make_colours()

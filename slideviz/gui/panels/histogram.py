@@ -10,12 +10,12 @@ from functools import partial
 import numpy as np
 from qtpy.QtCore import QRectF, Qt, QTimer, Signal
 from qtpy.QtGui import QColor, QKeySequence, QMouseEvent, QPainter, QPaintEvent, QPen, QShortcut
-from qtpy.QtWidgets import QHBoxLayout, QLabel
+from qtpy.QtWidgets import QLabel
 
 from slideviz.color_scheme import SELECTED_COLOUR
 from slideviz.gui.responsiveness.settings import SELECTING_MS
 from slideviz.gui.responsiveness.timers import later
-from slideviz.gui.widgets.build import check_box, in_column, in_row, push_button
+from slideviz.gui.widgets.build import FoldingRow, check_box, in_column, push_button
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write_plot, is_seen
 from slideviz.gui.widgets.plot_image import Draw
@@ -156,7 +156,7 @@ class HistogramPanel(Panel):
         escape.activated.connect(self.clear_range)
         self.follow(_concerned)
 
-    def _make_buttons(self) -> QHBoxLayout:
+    def _make_buttons(self) -> FoldingRow:
         self.log = check_box("log", "Counts on a logarithmic axis, which shows a few bad cells.")
         self.log.setChecked(True)
         self.whole = check_box(
@@ -173,7 +173,7 @@ class HistogramPanel(Panel):
             "show_all_cells",
         )
         self.save = push_button("Save…", "Save the histogram as PNG, SVG or PDF.", self._save)
-        return in_row(self.log, self.whole, None, self.show_all, self.save)
+        return FoldingRow((self.log, self.whole), (self.show_all, self.save))
 
     # State to widgets ------------------------------------------------------------------
 

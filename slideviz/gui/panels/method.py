@@ -107,7 +107,8 @@ class MethodPanel(Panel):
         self._mesh: Mesh | None = None
         self._extent = 0.0
         self._reduction: Reduction | None = None
-        self.area = PanelScroll(self)
+        self.area = PanelScroll(QWidget())
+        in_column(self.area, on=self)
         self.form, self.more = KeyForm("main"), MoreSettings()
         for part in (self, self.more):
             for name, field in part.form.fields.items():

@@ -49,7 +49,8 @@ class RunPanel(Panel):
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
-        self._busy = ""
+        self._busy = self._doing = ""
+        self._compiling = False
         self._key: tuple[object, ...] = ()
         self._missing: tuple[Requirement, ...] = ()
         self._cost = ""
@@ -171,7 +172,7 @@ class RunPanel(Panel):
         self.bar.setRange(0, 1000)
         self.bar.setValue(0)
         if what:
-            self.text.setText(html.escape(what))
+            self._tell_doing(what)
             self.text.setToolTip("")
         self.sync(self.store.session)
 
@@ -179,12 +180,22 @@ class RunPanel(Panel):
         """Show the progress of the job."""
         if not self._busy:
             return
-        self.text.setText(html.escape(doing.text))
+        self._tell_doing(doing.text)
         if doing.fraction is None:
             self.bar.setRange(0, 0)
         else:
             self.bar.setRange(0, 1000)
             self.bar.setValue(round(1000 * doing.fraction))
+
+    def set_compiling(self, compiling: bool) -> None:
+        """Show with the progress of a job whether it may wait for compilation."""
+        self._compiling = compiling
+        if self._busy and self.cancel.isEnabled():
+            self._tell_doing(self._doing)
+
+    def _tell_doing(self, text: str) -> None:
+        self._doing = text
+        self.text.setText(html.escape(f"{text} (compiling, once)" if self._compiling else text))
 
     def show_cancelling(self) -> None:
         """Show that the job was asked to stop."""

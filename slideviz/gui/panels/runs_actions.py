@@ -10,7 +10,7 @@ from qtpy.QtWidgets import QApplication, QMenu, QToolButton, QWidget
 
 from slideviz.gui.commands import COMPARE
 from slideviz.gui.panels.runs_tree import RunTree
-from slideviz.gui.widgets.build import in_row, tool_button
+from slideviz.gui.widgets.build import FoldingRow, tool_button
 from slideviz.gui.widgets.command import Command
 from slideviz.gui.widgets.plot_canvas import ask_and_write
 from slideviz.gui.widgets.runs_menu import fill_compare
@@ -32,8 +32,8 @@ class RunActions:
     Attributes
     ----------
     buttons : dict of str to QToolButton
-    row : QHBoxLayout
-        The layout of the buttons.
+    row : FoldingRow
+        The buttons.
     """
 
     def __init__(self, panel: QWidget, tree: RunTree, store: Store) -> None:
@@ -46,8 +46,8 @@ class RunActions:
         for name, button in self.buttons.items():
             button.setObjectName(f"runs_{name}")
             button.setIconSize(QSize(18, 18))
-        shown = (None if one is None else self.buttons[one.name] for one in RUN_COMMANDS)
-        self.row = in_row(self.buttons["compare"], *shown, spacing=2)
+        every, left = list(self.buttons.values()), 1 + RUN_COMMANDS.index(None)
+        self.row = FoldingRow(every[:left], every[left:], spacing=2)
 
     @property
     def _window(self) -> Services:

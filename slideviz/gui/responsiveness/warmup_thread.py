@@ -11,6 +11,7 @@ import pyvista as pv
 from qtpy.QtCore import QObject, QTimer, Signal
 
 from slideviz.gui.responsiveness.threads import start_thread
+from slideviz.mesh.caching import compilation_watched
 from slideviz.scene.actors import VALUES
 from slideviz.scene.stage import Stage
 from slideviz.session import jit_warmup
@@ -57,7 +58,12 @@ class WarmupThread(QObject):
         super().__init__(parent)
         self._stop = Event()
         self._compiles = False
+        self._watched = contextlib.ExitStack()
         self.thread_: Thread | None = None
+
+    def watch(self) -> None:
+        """Tell of compilation in other threads too, as of a job, until all loops are compiled."""
+        self._watched.enter_context(compilation_watched(self._begun))
 
     def start(self) -> None:
         """Start the thread, unless it was started before."""
@@ -67,6 +73,7 @@ class WarmupThread(QObject):
     def close(self) -> None:
         """Ask the thread to end, without waiting."""
         self._stop.set()
+        self._watched.close()
         self.blockSignals(True)
 
     def _run(self) -> None:
@@ -79,6 +86,7 @@ class WarmupThread(QObject):
             return
         # The imported modules stay: scanning them would take 100 ms per garbage collection.
         gc.freeze()
+        self._watched.close()
         if self._compiles:
             self._tell(False)
 

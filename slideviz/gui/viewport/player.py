@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from qtpy.QtCore import QElapsedTimer, QSignalBlocker, Qt, QTimer
+from qtpy.QtCore import QElapsedTimer, QSignalBlocker, QSize, Qt, QTimer
 from qtpy.QtGui import QAction, QActionGroup, QResizeEvent, QTextDocument
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QSlider, QToolButton, QWidget
 
@@ -30,6 +30,9 @@ SPEEDS = (0.5, 1.0, 2.0, 4.0)
 
 NARROW = 540
 """Width in pixels below which the player hides speed and loop and shortens its text."""
+
+NARROWEST = 330
+"""Width in pixels below which the player also hides the slider and the buttons of both ends."""
 
 
 def step_ms(steps: int, speed: float = 1.0) -> float:
@@ -151,12 +154,17 @@ class Player(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        narrow = self.width() < NARROW
+        narrow, narrowest = self.width() < NARROW, self.width() < NARROWEST
+        for part in (self.slider, self.buttons["first"], self.buttons["last"]):
+            part.setHidden(narrowest)
         if narrow != self._narrow:
             self._narrow = narrow
             for button in (self.loop, self.speed_button):
                 button.setHidden(narrow)
             self.sync(self.store.session)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(0, super().minimumSizeHint().height())
 
     @property
     def playing(self) -> bool:

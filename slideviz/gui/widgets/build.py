@@ -7,7 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from qtpy.QtCore import QPoint, QRect, Qt, SignalInstance
+from qtpy.QtCore import QEvent, QPoint, QRect, QSize, Qt, SignalInstance
+from qtpy.QtGui import QResizeEvent
 from qtpy.QtWidgets import (
     QBoxLayout,
     QCheckBox,
@@ -93,31 +94,86 @@ def grow_fields(form: QFormLayout, spacing: int = 4) -> None:
     form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
 
 
-class PanelScroll(QScrollArea):
-    """The scroll area that fills a panel; a field reached by the tab key is scrolled into view.
+class FoldingRow(QWidget):
+    """A row with some parts at the left and some at the right, which are below where it is narrow.
 
-    ``widget()`` is the empty widget for the panel's content.
+    Parameters
+    ----------
+    left, right : sequence of QWidget
+    spacing : int
+        Space between the parts in pixels; negative: the style's.
+    apart : bool
+        Whether the parts at the right are at the end of the row.
     """
 
-    def __init__(self, panel: QWidget) -> None:
+    def __init__(
+        self,
+        left: Sequence[QWidget],
+        right: Sequence[QWidget],
+        spacing: int = -1,
+        apart: bool = True,
+    ) -> None:
+        super().__init__()
+        rights = (None, *right) if apart else (*right, None)
+        self._halves = [in_row(*left, None, spacing=spacing), in_row(*rights, spacing=spacing)]
+        self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._row.setContentsMargins(0, 0, 0, 0)
+        self._row.setSpacing(max(spacing, 2))
+        for half in self._halves:
+            self._row.addLayout(half)
+        self._row.setStretch(1, 1)
+
+    def _fold(self) -> None:
+        widths = [half.minimumSize().width() for half in self._halves]
+        wide = sum(widths) + self._row.spacing() <= self.width()
+        kind = QBoxLayout.Direction
+        self._row.setDirection(kind.LeftToRight if wide else kind.TopToBottom)
+
+    def minimumSizeHint(self) -> QSize:
+        widths = [half.minimumSize().width() for half in self._halves]
+        return QSize(max(widths), super().minimumSizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fold()
+
+    def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.LayoutRequest:
+            self._fold()
+        return super().event(event)
+
+
+class PanelScroll(QScrollArea):
+    """A scroll area for a panel; a field reached by the tab key is scrolled into view."""
+
+    def __init__(self, content: QWidget) -> None:
         super().__init__()
         self.setWidgetResizable(True)
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setWidget(QWidget())
-        in_column(self, on=panel)
+        self.setWidget(content)
+        # Opaque children would leave nothing of a dock's visible region.
+        for part in (self.viewport(), content):
+            part.setAutoFillBackground(False)
 
     def focusNextPrevChild(self, forwards: bool) -> bool:
         moved = super().focusNextPrevChild(forwards)
-        inside = self.widget()
-        field = inside.focusWidget() if inside is not None else None
-        if moved and inside is not None and field is not None:
+        if moved:
+            reveal(self.window().focusWidget())
+        return moved
+
+
+def reveal(field: QWidget | None) -> None:
+    """Scroll a field, if there is one, into view in the scroll areas of panels around it."""
+    area = field
+    while field is not None and area is not None:
+        inside = area.widget() if isinstance(area, PanelScroll) else None
+        if inside is not None and isinstance(area, PanelScroll):
             # Qt itself scrolls only the text cursor into view.
             place = QRect(field.mapTo(inside, QPoint(0, 0)), field.size())
             for y in (place.bottom(), place.top()):
-                self.ensureVisible(place.left(), y, 0, 6)
-        return moved
+                area.ensureVisible(place.left(), y, 0, 6)
+        area = area.parentWidget()
 
 
 # Buttons -----------------------------------------------------------------------------------
