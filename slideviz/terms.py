@@ -153,6 +153,15 @@ FFD_BLENDINGS: dict[FfdBlending, Term] = {
 }
 """The basis functions by which control points of an FFD box move the nodes inside."""
 
+FfdSystem = Literal["CARTESIAN", "CYLINDRICAL", "SPHERICAL", "POLAR"]
+FFD_SYSTEMS: dict[FfdSystem, Term] = {
+    "CARTESIAN": Term("Cartesian"),
+    "CYLINDRICAL": Term("cylindrical"),
+    "SPHERICAL": Term("spherical"),
+    "POLAR": Term("polar"),
+}
+"""The coordinates in which an FFD box is straight: (r, θ, x) or (r, θ, φ) about an axis along x."""
+
 # Method ------------------------------------------------------------------------------------
 
 Sliding = Literal["none", "ps", "ds"]

@@ -3,13 +3,15 @@
 Sederberg and Parry 1986, *Free-form deformation of solid geometric models*: a point of the box is
 the sum of its control points, each times the product of one blending function in each direction,
 at the point's parametric coordinates (u, v, w). In 2D the box is one cell thick, from z = -1/2 to
-1/2, and its points lie in the middle, w = 1/2, as SU2 has it.
+1/2, and its points lie in the middle, w = 1/2, as SU2 has it. All this is done in the coordinates q
+of the box's coordinate system (`slideviz.ffd.coordinates`), which mostly are x, y, z.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -17,6 +19,7 @@ import numpy as np
 
 from slideviz.errors import CaseError
 from slideviz.ffd.blending import blending
+from slideviz.ffd.coordinates import CARTESIAN, CoordinateSystem
 from slideviz.mesh.model import FloatArray, IntArray, frozen_array
 
 if TYPE_CHECKING:
@@ -84,6 +87,10 @@ class Box:
     embedded : mapping of str to (nodes, uvw)
         For each marker that the mesh file lists for the box, nodes (m,) and parametric
         coordinates (m, 3).
+    system : CoordinateSystem
+        Of the coordinates q in which control points are blended.
+    level, parent : int, str
+        Of a nested box: 1 or more, and the name of the box whose control points move its own.
     """
 
     name: str
@@ -91,6 +98,9 @@ class Box:
     orders: Index | None
     corners: FloatArray
     embedded: Mapping[str, tuple[IntArray, FloatArray]] = field(default_factory=dict)
+    system: CoordinateSystem = CARTESIAN
+    level: int = 0
+    parent: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen_array(self.points, np.float64))
@@ -102,11 +112,17 @@ class Box:
         i, j, k = (count - 1 for count in self.points.shape[:3])
         return i, j, k
 
+    @cached_property
+    def q(self) -> FloatArray:
+        """Return the coordinates (I, J, K, 3) of the control points in the box's system."""
+        return self.system.q_of(self.points)
+
     def describe(self, dim: int) -> str:
         """Return degrees, blending and the number of surface points in words, for 2D or 3D."""
         words = f"degree {' x '.join(map(str, self.degrees[:dim]))}, "
         words += "Bézier" if self.orders is None else "uniform B-splines of order "
         words += " x ".join(map(str, (self.orders or ())[:dim]))
+        words += f", in {self.parent}" if self.parent else ""
         count = sum(len(nodes) for nodes, _ in self.embedded.values())
         return words + f", {count:,} surface points of {', '.join(self.embedded)}" * bool(count)
 
@@ -123,15 +139,15 @@ class Box:
 
     def at(self, uvw: FloatArray) -> FloatArray:
         """Return the points (m, 3) at parametric coordinates (m, 3)."""
-        return self.embed(np.arange(len(uvw)), uvw).sums(self.points)
+        return self.system.points_of(self.embed(np.arange(len(uvw)), uvw).sums(self.q))
 
     def slopes(self, uvw: FloatArray) -> FloatArray:
-        """Return the derivatives (m, 3, 3) of points with respect to (u, v, w), the last axis."""
+        """Return the derivatives (m, 3, 3) of q with respect to (u, v, w), the last axis."""
         functions = self.factors(uvw)
         columns = []
         for axis in range(3):
             u, v, w = (both[axis == k] for k, both in enumerate(functions))
-            columns.append(_sums(u, v, w, self.points))
+            columns.append(_sums(u, v, w, self.q))
         return np.stack(columns, axis=-1)
 
     def change(self, index: Index, vector: tuple[float, ...]) -> FloatArray:
@@ -161,8 +177,8 @@ class Box:
         return ""
 
     def moved(self, change: FloatArray) -> Box:
-        """Return the box with its control points moved by ``change`` (I, J, K, 3)."""
-        return replace(self, points=self.points + change)
+        """Return the box with its control points moved by ``change`` (I, J, K, 3) of q."""
+        return replace(self, points=self.system.points_of(self.q + change))
 
 
 def _sums(u: FloatArray, v: FloatArray, w: FloatArray, lattice: FloatArray) -> FloatArray:
@@ -183,8 +199,14 @@ def lattice(corners: FloatArray, degrees: Index) -> FloatArray:
     return out
 
 
-def regular_box(name: str, corners: FloatArray, degrees: Index, orders: Index | None) -> Box:
-    """Return the undeformed box between corners (8, 3).
+def regular_box(
+    name: str,
+    corners: FloatArray,
+    degrees: Index,
+    orders: Index | None,
+    system: CoordinateSystem = CARTESIAN,
+) -> Box:
+    """Return the undeformed box between corners (8, 3), with a regular lattice in q.
 
     Raises
     ------
@@ -200,7 +222,8 @@ def regular_box(name: str, corners: FloatArray, degrees: Index, orders: Index | 
                 f"the B-splines of {letter} have the order {order}, and {degree + 1} control "
                 f"points; needed is an order from 2 to {degree + 1}"
             )
-    box = Box(name, lattice(corners, degrees), orders, corners)
+    control = system.points_of(lattice(system.q_of(corners), degrees))
+    box = Box(name, control, orders, corners, system=system)
     ends = np.array(list(product((0.0, 0.5, 1.0), repeat=3)))
     volume = np.linalg.det(box.slopes(ends))
     # The box may be left-handed, and sides may shrink to an edge.

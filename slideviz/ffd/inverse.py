@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
+from slideviz.errors import CaseError
 from slideviz.ffd.box import Box
+from slideviz.ffd.coordinates import CARTESIAN
 from slideviz.mesh.model import FloatArray
 
 INSIDE = 1e-8
@@ -44,6 +47,9 @@ def parametric(box: Box, points: FloatArray) -> tuple[FloatArray, np.ndarray]:
     """
     whole = np.zeros((len(points), 3))
     whole[:, : points.shape[1]] = points
+    if box.system.kind != "CARTESIAN":
+        straight = replace(box, points=box.q, system=CARTESIAN)
+        return parametric(straight, box.system.q_of(whole))
     control = box.points.reshape(-1, 3)
     low, high = control.min(axis=0), control.max(axis=0)
     # A point of the box is a mean of control points, with weights that are not negative.
@@ -58,6 +64,27 @@ def parametric(box: Box, points: FloatArray) -> tuple[FloatArray, np.ndarray]:
     inside = np.asarray(((uvw >= -INSIDE) & (uvw <= 1.0 + INSIDE)).all(axis=1))
     uvw[~inside] = np.nan
     return np.clip(uvw, 0.0, 1.0), inside
+
+
+def placed_again(box: Box, points: FloatArray, uvw: FloatArray) -> FloatArray:
+    """Return the parametric coordinates (m, 3) of points (m, 3) near known ones, uvw (m, 3).
+
+    They may be outside of [0, 1].
+
+    Raises
+    ------
+    CaseError
+        The box has no such point there.
+    """
+    size = np.ptp(box.points.reshape(-1, 3), axis=0)
+    found, gap = _newton(box, points, uvw, size)
+    close = CLOSE + ROUNDING * float((np.abs(points).max(initial=0.0) / size).max())
+    if (gap > close).any():
+        raise CaseError(
+            f"the FFD box {box.name!r} folds over, or loses nodes, where its parent or one inside "
+            "it moves these; move control points less"
+        )
+    return found
 
 
 def _solved(box: Box, points: FloatArray, size: FloatArray) -> FloatArray:

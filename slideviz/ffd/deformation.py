@@ -1,0 +1,358 @@
+"""Deformation of boxes and of the nodes inside by a list of moves, and its exact derivatives.
+
+SU2 8, ``CSurfaceMovement::SetSurface_Deformation``: boxes are deformed level by level in their
+order, each by its moves in the order of the list. A node in several boxes goes where the last one
+takes it. Of nested boxes, the control points of the inner one are carried by the outer one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from slideviz.errors import CaseError
+from slideviz.ffd.box import Box, Embedding
+from slideviz.ffd.inverse import parametric, placed_again
+from slideviz.ffd.moves import Move, Shift
+from slideviz.mesh.model import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What keeps boxes from being deformed too much.
+
+    Attributes
+    ----------
+    bound : float
+        OPT_LINE_SEARCH_BOUND: largest displacement of a node by a box.
+    iterations, depth : int
+        FFD_INTPREV_ITER and FFD_INTPREV_DEPTH; 0 iterations: boxes may intersect themselves.
+    """
+
+    bound: float = np.inf
+    iterations: int = 0
+    depth: int = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """A move of a box by one of the values of a design.
+
+    Attributes
+    ----------
+    box : str
+    move : Move
+    value : int
+        Place of the value in the design.
+    relaxed : bool
+        Whether the relaxation factor multiplies it.
+    """
+
+    box: str
+    move: Move
+    value: int
+    relaxed: bool = True
+
+
+@dataclass(eq=False)
+class _Rates:
+    """Derivatives of the state with respect to one value."""
+
+    value: int
+    nodes: FloatArray
+    change: dict[str, FloatArray]
+    uvw: dict[str, FloatArray]
+    amounts: dict[str, list[float]]
+    relax: float = 0.0
+
+
+@dataclass(eq=False)
+class BoxDeformation:
+    """The displacement of nodes by boxes that a design deforms.
+
+    Attributes
+    ----------
+    boxes : sequence of Box
+        Undeformed, in the order of the file.
+    inside : dict of str to Embedding
+        Nodes in each box, by their place in 0..m-1.
+    drives : sequence of Drive
+    values : (v,) float64
+        The design.
+    relax : float
+        OPT_RELAX_FACTOR.
+    count : int
+        m, the number of nodes.
+    limits : Limits
+    nodes : (m, 3) float64
+        The displacement.
+    change : dict of str to (I, J, K, 3)
+        Change of the control points of each box, in its coordinates q.
+    notes : list of str
+        What the limits did, and which nodes a later box took over.
+    """
+
+    boxes: Sequence[Box]
+    inside: dict[str, Embedding]
+    drives: Sequence[Drive]
+    values: FloatArray
+    relax: float
+    count: int
+    limits: Limits = Limits()
+    nodes: FloatArray = field(init=False)
+    change: dict[str, FloatArray] = field(init=False)
+    notes: list[str] = field(init=False, default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._by_name = {box.name: box for box in self.boxes}
+        self._carried = {box.name: self._in_parent(box) for box in self.boxes if box.parent}
+        self._tape: list[Callable[[_Rates], None]] = []
+        self._done: dict[str, list[tuple[Drive, float]]] = {}
+        self._factor, self._relax = 1.0, self.relax
+        self._embedded = dict(self.inside)
+        self.nodes = np.zeros((self.count, 3))
+        self.change = {box.name: np.zeros(box.points.shape) for box in self.boxes}
+        self._placed: set[str] = set()
+        for level in sorted({box.level for box in self.boxes}):
+            for box in self.boxes:
+                if box.level == level:
+                    self._deform(box)
+
+    def slope(self, value: int) -> FloatArray:
+        """Return the derivative (m, 3) of the displacement with respect to a value."""
+        rates = _Rates(value, np.zeros((self.count, 3)), {}, {}, {})
+        for step in self._tape:
+            step(rates)
+        return rates.nodes
+
+    def moved(self) -> dict[str, Box]:
+        """Return the deformed boxes, by name."""
+        return {box.name: box.moved(self.change[box.name]) for box in self.boxes}
+
+    def uvw(self) -> dict[str, tuple[IntArray, FloatArray]]:
+        """Return nodes (k,) and parametric coordinates (k, 3) of boxes where these have changed.
+
+        They are where the deformed box has the deformed nodes: of nested boxes, and of those that
+        have nested ones.
+        """
+        outer = {box.parent for box in self.boxes}
+        found = {}
+        for box in self.boxes:
+            if not box.parent and box.name not in outer:
+                continue
+            inside = self._embedded[box.name]
+            moved = box.moved(self.change[box.name])
+            there = self._base(box) + self.nodes[inside.nodes]
+            if there.any():
+                found[box.name] = inside.nodes, placed_again(moved, there, inside.uvw)
+        return found
+
+    def _in_parent(self, box: Box) -> Embedding:
+        """Return the control points of a nested box, embedded in its parent."""
+        parent, points = self._by_name[box.parent], box.points.reshape(-1, 3)
+        uvw, inside = parametric(parent, points)
+        if not inside.all():
+            raise CaseError(
+                f"the FFD box {box.name!r} is not inside its parent {box.parent!r}, which could "
+                "not carry it; make it smaller"
+            )
+        return parent.embed(np.arange(len(points)), uvw)
+
+    def _base(self, box: Box) -> FloatArray:
+        """Return where the undeformed box has its nodes, (k, 3)."""
+        return box.system.points_of(self.inside[box.name].sums(box.q))
+
+    def _deform(self, box: Box) -> None:
+        """Deform one box by its parent and by its moves, within the limits."""
+        if box.parent:
+            self._carry(box)
+        self._apply(box, 1.0)
+        self._place(box)
+        self._bound(box)
+        if self.limits.iterations:
+            self._unfold(box)
+
+    def _carry(self, box: Box) -> None:
+        """Move the control points of a nested box with its parent; embed its nodes anew."""
+        name, parent = box.name, box.parent
+        cage, shape = self._carried[name], box.points.shape
+        change = cage.sums(self.change[parent]).reshape(shape)
+        inside = self._embedded[name]
+        moved = self.nodes[inside.nodes]
+        if not change.any() and not moved.any():
+            return
+        self.change[name] = change
+        at = box.moved(change)
+        inside = box.embed(inside.nodes, placed_again(at, self._base(box) + moved, inside.uvw))
+        self._embedded[name] = inside
+        inverse = np.linalg.inv(at.slopes(inside.uvw))
+
+        def rates_of(rates: _Rates) -> None:
+            if parent in rates.change:
+                rates.change[name] = cage.sums(rates.change[parent]).reshape(shape)
+            shifted = rates.nodes[inside.nodes]
+            if name in rates.change:
+                shifted = shifted - inside.sums(rates.change[name])
+            rates.uvw[name] = np.einsum("mij,mj->mi", inverse, shifted)
+
+        self._tape.append(rates_of)
+
+    def _apply(self, box: Box, part: float) -> None:
+        """Apply the moves of a box, with the values times ``part``."""
+        part *= self._factor
+        for drive in self.drives:
+            if drive.box != box.name:
+                continue
+            relax = self._relax if drive.relaxed else 1.0
+            amount = relax * float(self.values[drive.value]) * part
+            points = box.q + self.change[box.name]
+            self.change[box.name] = self.change[box.name] + drive.move.change(points, amount)
+            self._done.setdefault(box.name, []).append((drive, amount))
+            self._tape.append(partial(self._moved, drive, points, amount, relax, part))
+
+    def _moved(
+        self,
+        drive: Drive,
+        points: FloatArray,
+        amount: float,
+        relax: float,
+        part: float,
+        rates: _Rates,
+    ) -> None:
+        """Carry the rates of control points through a move by value * relax * part."""
+        before = rates.change.get(drive.box)
+        rate = relax * part if rates.value == drive.value else 0.0
+        if drive.relaxed:
+            rate += rates.relax * float(self.values[drive.value]) * part
+        rates.amounts.setdefault(drive.box, []).append(rate)
+        if before is not None:
+            rates.change[drive.box] = before = drive.move.pushed(points, amount, before)
+        if rate:
+            own = rate * drive.move.slope(points, amount)
+            rates.change[drive.box] = own if before is None else before + own
+
+    def _place(self, box: Box) -> None:
+        """Displace the nodes of a box to where its control points take them now."""
+        name, inside = box.name, self._embedded[box.name]
+        done = tuple(self._done.get(name, ()))
+        shifts = all(isinstance(drive.move, Shift) for drive, _ in done)
+        if box.system.kind == "CARTESIAN" and not box.parent and shifts:
+            # One sum for each value, as a slope has.
+            total = np.zeros((len(inside.nodes), 3))
+            for drive, amount in done:
+                assert isinstance(drive.move, Shift)
+                total += amount * inside.sums(drive.move.unit)
+
+            def rates_of(rates: _Rates) -> None:
+                total = np.zeros((len(inside.nodes), 3))
+                for (drive, _), rate in zip(done, rates.amounts.get(name, ()), strict=True):
+                    if rate:
+                        assert isinstance(drive.move, Shift)
+                        total += rate * inside.sums(drive.move.unit)
+                rates.nodes[inside.nodes] = total
+
+        else:
+            q = inside.sums(box.q + self.change[name])
+            total = box.system.points_of(q) - self._base(box)
+            if not self.change[name].any():
+                total[:] = 0.0
+            slopes = box.moved(self.change[name]).slopes(inside.uvw)
+
+            def rates_of(rates: _Rates) -> None:
+                rate = np.zeros((len(inside.nodes), 3))
+                if name in rates.change:
+                    rate = inside.sums(rates.change[name])
+                if name in rates.uvw:
+                    rate = rate + np.einsum("mij,mj->mi", slopes, rates.uvw[name])
+                rates.nodes[inside.nodes] = box.system.pushed(q, rate)
+
+        self._overtake(box)
+        self.nodes[inside.nodes] = total
+        self._tape.append(rates_of)
+
+    def _overtake(self, box: Box) -> None:
+        """Note how many nodes a box takes over from boxes before it."""
+        if box.name in self._placed:
+            return
+        self._placed.add(box.name)
+        nodes = self._embedded[box.name].nodes
+        lost = int(self.nodes[nodes].any(axis=1).sum())
+        if lost and not box.parent:
+            self.notes.append(
+                f"{lost} nodes in the FFD box {box.name!r} are in one before it, too: as in SU2, "
+                "they go where the last one takes them, and lose the motion of the other"
+            )
+
+    def _bound(self, box: Box) -> None:
+        """Scale the displacement of a box back to the bound, as SU2 does: by one more pass."""
+        nodes = self._embedded[box.name].nodes
+        lengths = np.linalg.norm(self.nodes[nodes], axis=1)
+        bound, largest = self.limits.bound, float(lengths.max(initial=0.0))
+        if largest <= bound:
+            return
+        node = nodes[int(np.argmax(lengths))]
+        vector, before = self.nodes[node].copy(), self._relax
+        self._relax = before * (bound / largest - 1.0)
+
+        def rates_of(rates: _Rates) -> None:
+            growth = float(vector @ rates.nodes[node]) / largest
+            shrunk = rates.relax * (bound / largest - 1.0)
+            rates.relax = shrunk - before * bound / largest**2 * growth
+
+        self._tape.append(rates_of)
+        self._apply(box, 1.0)
+        self._place(box)
+        said = (
+            f"OPT_LINE_SEARCH_BOUND: the FFD box {box.name!r} would move a node by {largest:.6g}; "
+            f"its variables are scaled back to {bound:g}"
+        )
+        mine = [drive for drive in self.drives if drive.box == box.name]
+        if not all(drive.relaxed for drive in mine):
+            said += ", but those of several values are applied twice, as in SU2"
+        if after := self._after(box, relaxed=True):
+            said += f"; as in SU2, those of {after} get {self._relax:.6g} for OPT_RELAX_FACTOR"
+        self.notes.append(said)
+
+    def _after(self, box: Box, *, relaxed: bool = False) -> str:
+        """Return the boxes with moves that are deformed after a box, in words; "" if none is."""
+        order = sorted(self.boxes, key=lambda each: each.level)
+        names = [each.name for each in order]
+        left = names[names.index(box.name) + 1 :]
+        found = {d.box: None for d in self.drives if d.relaxed or not relaxed}
+        return ", ".join(name for name in left if name in found)
+
+    def _is_folded(self, box: Box) -> bool:
+        """Return whether a deformed box has turned inside out at any of its nodes."""
+        uvw = self._embedded[box.name].uvw
+        before = np.linalg.det(box.slopes(uvw))
+        after = np.linalg.det(box.moved(self.change[box.name]).slopes(uvw))
+        return bool((after * np.sign(before) < 0.0).any())
+
+    def _unfold(self, box: Box) -> None:
+        """Take back a part of a box's deformation until it no longer intersects itself.
+
+        SU2's bisection, after Gain and Dodgson 2001: passes with a part of the values each.
+        """
+        folded = self._is_folded(box)
+        if not folded:
+            return
+        step, total, depth = -0.5, 0.5, 0
+        for number in range(1, self.limits.iterations + 1):
+            self._apply(box, step)
+            self._place(box)
+            before, folded = folded, self._is_folded(box)
+            depth += not folded
+            if not folded and depth == self.limits.depth:
+                break
+            if number < self.limits.iterations:
+                step = step / 2.0 if before == folded else -step / 2.0
+                total += step
+        self._factor *= step
+        said = f"FFD_INTPREV: the FFD box {box.name!r} is deformed by {100.0 * total:g} % only"
+        said += ", and still intersects itself" if folded else ", as it intersected itself"
+        if after := self._after(box):
+            said += f"; as in SU2, the variables of {after} get {self._factor:g} times their values"
+        self.notes.append(said)

@@ -1,0 +1,278 @@
+"""SU2's kinds of FFD variables: which control points of a box each moves, and how.
+
+SU2 8, ``CSurfaceMovement::SetFFDCPChange`` and its neighbours. Directions 1 to 3 are those of the
+box's coordinates q: x, y, z in Cartesian ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from slideviz.ffd.box import Box
+from slideviz.ffd.moves import Move, Shift, Turn, Twist
+from slideviz.mesh.model import FloatArray
+
+Planes = tuple[frozenset[int], frozenset[int], frozenset[int]]
+"""Indices of held planes of control points in each direction i, j, k of a box."""
+NONE: Planes = (frozenset(), frozenset(), frozenset())
+
+
+@dataclass(frozen=True)
+class Request:
+    """What an FFD variable asks of its box.
+
+    Attributes
+    ----------
+    kind : str
+        A key of `KINDS`.
+    index : tuple of int
+        The indices among its parameters, as SU2 lists them; -1 means all.
+    numbers : tuple of float
+        Its other parameters.
+    length : float
+        REF_LENGTH, over which the value of FFD_TWIST is a slope.
+    """
+
+    kind: str
+    index: tuple[int, ...]
+    numbers: tuple[float, ...]
+    length: float = 1.0
+
+    @property
+    def direct(self) -> bool:
+        """Return whether the values are the shift itself, one for each coordinate."""
+        return self.kind in ("FFD_CONTROL_POINT", "FFD_CONTROL_POINT_2D") and not any(self.numbers)
+
+
+def moves_of(box: Box, request: Request, held: Planes = NONE) -> tuple[Move, ...]:
+    """Return the move of a box for each value of a variable; () where held planes leave none."""
+    return KINDS[request.kind](box, request, held)
+
+
+def index_problem(box: Box, request: Request, dim: int) -> str:
+    """Return why a variable cannot move a box; "" if it can. ``dim`` is that of the mesh."""
+    kind, index = request.kind, request.index
+    directions = _directions(box, kind)
+    if kind not in WHOLE_LINES and -1 in index:
+        return f"{kind} has no index -1; write one from 0"
+    if _is_polar(box, kind) and index[1] == -1:
+        return f"{kind} has no second index -1 in polar coordinates; write one from 0"
+    for at, axis in zip(index, directions, strict=True):
+        if unknown := box.problem((*(at if axis == k else 0 for k in range(3)),)):  # type: ignore[arg-type]
+            return unknown
+    if dim == 2 or kind in TURNS:
+        return _line_problem(request, dim) or _plane_problem(box, request, dim)
+    return ""
+
+
+def _line_problem(request: Request, dim: int) -> str:
+    """Return why a rotation has no axis; "" if it has, or for other kinds."""
+    if request.kind not in TURNS:
+        return ""
+    first, second = np.array(request.numbers).reshape(2, 3)
+    along = second - first
+    if not along.any() and request.kind != "FFD_TWIST":
+        return f"{request.kind}: its two points are one; the line between them has no direction"
+    if dim == 2 and (along[:2].any() or request.kind == "FFD_TWIST"):
+        return f"{request.kind} leaves the plane of a mesh of 2 dimensions"
+    return ""
+
+
+def _plane_problem(box: Box, request: Request, dim: int) -> str:
+    """Return why a move leaves the plane of a 2D mesh; "" if it does not, or in 3D."""
+    kind, numbers = request.kind, request.numbers
+    polar = box.system.kind in ("POLAR", "SPHERICAL")
+    moved = {
+        "FFD_CONTROL_POINT": numbers,
+        "FFD_NACELLE": (numbers[0], 0.0, numbers[-1]) if numbers else (),
+        "FFD_CAMBER": (0, 0, 1),
+        "FFD_THICKNESS": (0, 0, 1),
+        "FFD_GULL": (0, 0, 1),
+        "FFD_CAMBER_2D": (0, 1, 0),
+        "FFD_THICKNESS_2D": (0, 1, 0),
+    }.get(kind, ())
+    across = 1 if polar or box.system.kind == "CYLINDRICAL" else 2
+    if dim == 2 and moved and moved[across]:
+        said = f"{kind} with these parameters moves points out of the plane of a 2D mesh"
+        two = f"{kind}_2D"
+        return said + (f"; take {two}" if two in KINDS and across == 2 else "")
+    return ""
+
+
+def _is_polar(box: Box, kind: str) -> bool:
+    """Return whether the second index of a kind is k, not j."""
+    return kind == "FFD_CONTROL_POINT_2D" and box.system.kind == "POLAR"
+
+
+def _directions(box: Box, kind: str) -> tuple[int, ...]:
+    """Return the direction, 0 to 2, of each index of a kind."""
+    return (0, 2) if _is_polar(box, kind) else DIRECTIONS[kind]
+
+
+def _is_held(index: tuple[int, ...], held: Planes) -> bool:
+    """Return whether any index (i, j, k) is that of a held plane."""
+    return any(at in planes for at, planes in zip(index, held, strict=True))
+
+
+def _shift(box: Box, chosen: list[tuple[object, object, object]], vector: FloatArray) -> Shift:
+    """Return the shift of control points by a vector (3,), those of each entry of ``chosen``."""
+    unit = np.zeros(box.points.shape)
+    for each in chosen:
+        unit[each] += vector  # type: ignore[index]
+    return Shift(unit)
+
+
+def _all(index: tuple[int, ...]) -> tuple[object, object, object]:
+    """Return an index (i, j, k) for arrays, with slices for -1."""
+    i, j, k = (slice(None) if at < 0 else at for at in index)
+    return i, j, k
+
+
+def _control_point(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
+    index = request.index
+    lines = [axis for axis in range(3) if index[axis] == -1]
+    if len(lines) == 3 or _is_held(index, held):
+        return ()
+    free = np.ones(box.points.shape[:3], bool)
+    if len(lines) == 1:  # whole layers move whatever is held
+        np.moveaxis(free, lines[0], 0)[sorted(held[lines[0]])] = False
+    return _by(box, request, [_all(index)], free)
+
+
+def _control_point_2d(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
+    axes = _directions(box, request.kind)
+    layers = 3 - sum(axes)  # the direction of the layers that move together
+    index = [0, 0, 0]
+    index[axes[0]], index[axes[1]] = request.index
+    if _is_held(tuple(index), held):
+        return ()
+    both = []
+    for layer in (0, 1):
+        index[layers] = layer
+        both.append(_all(tuple(index)))
+    return _by(box, request, both, np.ones(box.points.shape[:3], bool))
+
+
+def _by(
+    box: Box, request: Request, chosen: list[tuple[object, object, object]], free: np.ndarray
+) -> tuple[Move, ...]:
+    """Return the shift along the variable's direction, or one along each axis without one."""
+    axes = _directions(box, request.kind)
+    if request.direct:
+        vectors = [np.eye(3)[axis] for axis in axes]
+    else:
+        vectors = [np.zeros(3)]
+        vectors[0][list(axes)] = request.numbers
+    return tuple(Shift(_shift(box, chosen, each).unit * free[..., None]) for each in vectors)
+
+
+def _pair(sign: float, flat: bool) -> Callable[[Box, Request, Planes], tuple[Move, ...]]:
+    """Return the kind that moves the first two layers, the first one by ``sign`` times as much."""
+
+    def moved(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
+        i = request.index[0]
+        vector = np.array([0.0, 1.0, 0.0] if flat else [0.0, 0.0, 1.0])
+        unit = np.zeros(box.points.shape)
+        for layer in (0, 1):
+            at = (i, layer, slice(2)) if flat else (i, request.index[1], layer)
+            if not flat and _is_held(at, held):  # type: ignore[arg-type]
+                return ()
+            unit[at] = vector if layer else sign * vector
+        return (Shift(unit),)
+
+    return moved
+
+
+def _gull(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
+    (j,) = request.index
+    if j in held[1]:
+        return ()
+    return (_shift(box, [(slice(None), j, slice(None))], np.array([0.0, 0.0, 1.0])),)
+
+
+def _nacelle(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
+    index, last = request.index, box.degrees
+    if index == (-1, -1, -1):
+        return ()
+    i, j, k = index
+    mirror = (i, last[1] - j if j >= 0 else j, k)
+    # The second pass of SU2's loop checks where the first one ended.
+    ended = (i if i >= 0 else last[0], mirror[1] if j >= 0 else 0, k if k >= 0 else last[2])
+    passes = [(index, index), (mirror, ended)][: 1 if j >= 0 and mirror == index else 2]
+    chosen = []
+    for moved, checked in passes:
+        if _is_held(checked, held):
+            break
+        chosen.append(_all(moved))
+    vector = np.array([request.numbers[0], 0.0, request.numbers[1]])
+    return (_shift(box, chosen, vector),) if chosen else ()
+
+
+def _twist(box: Box, request: Request, held: Planes) -> tuple[Move, ...]:
+    (j,) = request.index
+    if j in held[1]:
+        return ()
+    chosen = np.zeros(box.points.shape[:3], bool)
+    chosen[:, j] = True
+    chosen[sorted(held[0])] = False
+    chosen[:, :, sorted(held[2])] = False
+    first, second = np.array(request.numbers).reshape(2, 3)
+    return (Twist(chosen, first, second, j, request.length),)
+
+
+def _rotation(box: Box, request: Request, _held: Planes) -> tuple[Move, ...]:
+    return (_about(request, np.ones(box.points.shape[:3], bool), np.pi / 180.0),)
+
+
+def _control_surface(box: Box, request: Request, _held: Planes) -> tuple[Move, ...]:
+    chosen = np.zeros(box.points.shape[:3], bool)
+    chosen[:-2, 2:-2] = True
+    return (_about(request, chosen, -np.pi / 180.0),)
+
+
+def _about(request: Request, chosen: np.ndarray, rate: float) -> Turn:
+    first, second = np.array(request.numbers).reshape(2, 3)
+    return Turn(chosen, first, second - first, rate)
+
+
+def _nothing(_box: Box, _request: Request, _held: Planes) -> tuple[Move, ...]:
+    return ()
+
+
+KINDS: dict[str, Callable[[Box, Request, Planes], tuple[Move, ...]]] = {
+    "FFD_CONTROL_POINT": _control_point,
+    "FFD_CONTROL_POINT_2D": _control_point_2d,
+    "FFD_CAMBER": _pair(1.0, flat=False),
+    "FFD_CAMBER_2D": _pair(1.0, flat=True),
+    "FFD_THICKNESS": _pair(-1.0, flat=False),
+    "FFD_THICKNESS_2D": _pair(-1.0, flat=True),
+    "FFD_GULL": _gull,
+    "FFD_TWIST": _twist,
+    "FFD_ROTATION": _rotation,
+    "FFD_CONTROL_SURFACE": _control_surface,
+    "FFD_NACELLE": _nacelle,
+    "FFD_ANGLE_OF_ATTACK": _nothing,
+}
+"""The moves of each kind of FFD variable."""
+DIRECTIONS: dict[str, tuple[int, ...]] = {
+    "FFD_CONTROL_POINT": (0, 1, 2),
+    "FFD_CONTROL_POINT_2D": (0, 1),
+    "FFD_CAMBER": (0, 1),
+    "FFD_CAMBER_2D": (0,),
+    "FFD_THICKNESS": (0, 1),
+    "FFD_THICKNESS_2D": (0,),
+    "FFD_GULL": (1,),
+    "FFD_TWIST": (1,),
+    "FFD_ROTATION": (),
+    "FFD_CONTROL_SURFACE": (),
+    "FFD_NACELLE": (0, 1, 2),
+    "FFD_ANGLE_OF_ATTACK": (),
+}
+"""The direction, 0 to 2, of each index among the parameters of a kind."""
+WHOLE_LINES = ("FFD_CONTROL_POINT", "FFD_CONTROL_POINT_2D", "FFD_NACELLE")
+"""Kinds whose index may be -1, which means all."""
+TURNS = ("FFD_TWIST", "FFD_ROTATION", "FFD_CONTROL_SURFACE")
+"""Kinds that turn control points about a line through two points."""
