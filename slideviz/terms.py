@@ -125,7 +125,18 @@ NODE_TYPES: dict[NodeType, Term] = {
 """The types of boundary nodes in the view: as the roles, with sliding edges and control nodes."""
 
 MotionKind = Literal[
-    "translate", "rotate", "scale", "radial", "hicks-henne", "cst", "bump", "ffd", "file"
+    "translate",
+    "rotate",
+    "scale",
+    "radial",
+    "hicks-henne",
+    "cst",
+    "bump",
+    "ffd",
+    "ffd-camber",
+    "ffd-thickness",
+    "ffd-twist",
+    "file",
 ]
 MOTION_KINDS: dict[MotionKind, Term] = {
     "translate": Term("translate"),
@@ -136,6 +147,9 @@ MOTION_KINDS: dict[MotionKind, Term] = {
     "cst": Term("airfoil by CST"),
     "bump": Term("bump upwards"),
     "ffd": Term("free-form box"),
+    "ffd-camber": Term("camber by box"),
+    "ffd-thickness": Term("thickness by box"),
+    "ffd-twist": Term("twist by box"),
     "file": Term("displacement file"),
 }
 

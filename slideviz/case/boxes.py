@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from weakref import WeakKeyDictionary
@@ -9,13 +10,15 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from slideviz.case.displacement import Displacements
-from slideviz.case.model import Case, Ffd, moves, named
+from slideviz.case.model import BoxMotion, Case, Ffd, FfdThickness, FfdTwist, moves, named
 from slideviz.case.words import nearest
 from slideviz.errors import CaseError, Note, SlidevizError
-from slideviz.ffd.box import Box, Embedding, plane_corners, regular_box
+from slideviz.ffd.box import Box, Embedding, Index, plane_corners, regular_box
+from slideviz.ffd.coordinates import CARTESIAN, CoordinateSystem, polar_corners
 from slideviz.ffd.inverse import parametric
+from slideviz.ffd.moves import Turn
 from slideviz.ffd.section import boxes_of, with_boxes
-from slideviz.mesh.model import IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 OFF = 1e-6
 """Largest distance between a node and the point that the mesh file's parametric coordinates give
@@ -35,7 +38,14 @@ def boxes_for(case: Case, mesh: Mesh) -> dict[str, Box]:
     SlidevizError
         The boxes in the mesh file or in FFD_DEFINITION have mistakes.
     """
-    return {**defined_boxes(case, mesh), **{box.name: box for box in boxes_of(mesh)}}
+    boxes = boxes_of(mesh, system_of(case))
+    return {**defined_boxes(case, mesh), **{box.name: box for box in boxes}}
+
+
+def system_of(case: Case) -> CoordinateSystem:
+    """Return the coordinate system of the boxes of a case."""
+    plain = case.ffd_system == "CARTESIAN"  # which has no axis
+    return CARTESIAN if plain else CoordinateSystem(case.ffd_system, case.ffd_axis)
 
 
 def defined_boxes(case: Case, mesh: Mesh) -> dict[str, Box]:
@@ -48,7 +58,8 @@ def defined_boxes(case: Case, mesh: Mesh) -> dict[str, Box]:
     CaseError
         The corners, degrees or orders of a box make none.
     """
-    key = case.ffd_boxes, case.ffd_degrees, case.ffd_blending, case.ffd_orders
+    definition = case.ffd_boxes, case.ffd_degrees, case.ffd_blending, case.ffd_orders
+    key = definition, system_of(case)
     kept = _DEFINED.setdefault(mesh, {})
     if key not in kept:
         kept[key] = {
@@ -61,18 +72,27 @@ def defined_boxes(case: Case, mesh: Mesh) -> dict[str, Box]:
 def _defined(
     case: Case, dim: int, name: str, numbers: tuple[float, ...], degrees: tuple[int, int, int]
 ) -> Box:
-    corners = np.array(numbers).reshape(8, 3)
-    corners = plane_corners(corners[:4, :2]) if dim == 2 else corners
+    corners, system = np.array(numbers).reshape(8, 3), system_of(case)
     i, j, k = (*degrees[:dim], 1)[:3]
     first, second, third = (*case.ffd_orders[:dim], 2)[:3]
+    if dim == 2 and system.kind == "POLAR":  # j goes about the axis
+        corners = polar_corners(corners[:4, :2])
+        j, k, second, third = k, j, third, second
+    elif dim == 2:
+        corners = plane_corners(corners[:4, :2])
     orders = (first, second, third) if case.ffd_blending == "BSPLINE_UNIFORM" else None
     try:
-        return regular_box(name, corners, (i, j, k), orders)
+        return regular_box(name, corners, (i, j, k), orders, system)
     except CaseError as problem:
         raise CaseError(f"FFD_DEFINITION: box {name!r}: {problem}") from problem
 
 
-def ffd_problems(case: Case, mesh: Mesh, motion: Ffd) -> tuple[str, ...]:
+def box_motions(case: Case) -> tuple[BoxMotion, ...]:
+    """Return the motions of a case that move control points of boxes."""
+    return tuple(motion for motion in case.motions if isinstance(motion, BoxMotion))
+
+
+def ffd_problems(case: Case, mesh: Mesh, motion: BoxMotion) -> tuple[str, ...]:
     """Return why a motion of a box is impossible with a mesh, a sentence for each reason."""
     try:
         boxes = boxes_for(case, mesh)
@@ -81,11 +101,70 @@ def ffd_problems(case: Case, mesh: Mesh, motion: Ffd) -> tuple[str, ...]:
     if motion.box not in boxes:
         none = "none is in it, or in FFD_DEFINITION"
         return (missing_box(mesh, motion.box, boxes, none),)
-    unknown = boxes[motion.box].problem(motion.index)
+    box = boxes[motion.box]
+    unknown = box.problem(_lattice_index(motion, mesh.dim))
     found = [unknown] if unknown else []
-    if mesh.dim == 2 and motion.vector[2]:
+    if isinstance(motion, Ffd) and mesh.dim == 2 and motion.vector[2]:
         found.append(f"dz is {motion.vector[2]:g}, which leaves the plane; in 2D write 0")
+    if isinstance(motion, FfdTwist) and mesh.dim == 2:
+        found.append("a box in 2D has no span to twist along; write rotate")
+    if isinstance(motion, FfdTwist) and case.ffd_system != "CARTESIAN":
+        found.append(
+            f"ffd-twist turns control points in x, y and z, and FFD_COORD_SYSTEM is "
+            f"{case.ffd_system}; move them along θ with ffd"
+        )
+    if not isinstance(motion, Ffd | FfdTwist) and mesh.dim == 2 and case.ffd_system != "CARTESIAN":
+        found.append(f"in 2D it needs FFD_COORD_SYSTEM= CARTESIAN, which is {case.ffd_system}")
     return tuple(found)
+
+
+def _lattice_index(motion: BoxMotion, dim: int) -> Index:
+    """Return the index (i, j, k) of the control points that a motion moves; -1 means all."""
+    if isinstance(motion, Ffd):
+        return motion.index
+    if isinstance(motion, FfdTwist):
+        return -1, motion.plane, -1
+    i, j = motion.index
+    return i, (j if dim == 3 else -1), -1
+
+
+def _change_of(motion: BoxMotion, box: Box, q: FloatArray, dim: int) -> FloatArray:
+    """Return the change (I, J, K, 3) of control points, now at ``q``, by a motion."""
+    index = _lattice_index(motion, dim)
+    if isinstance(motion, Ffd):
+        return box.change(index, motion.vector)
+    if isinstance(motion, FfdTwist):
+        chosen = box.change(index, (1.0, 1.0, 1.0))[..., 0] > 0.0
+        point = (*motion.point, 0.0)[:3]
+        turn = Turn(chosen, np.array(point), np.array(motion.axis), math.pi / 180.0)
+        return turn.change(q, motion.angle_deg)
+    across = 2 if dim == 3 else 1
+    change = box.change(index, tuple(float(axis == across) * motion.amount for axis in range(3)))
+    if isinstance(motion, FfdThickness):  # from the lowest layer to the highest one
+        sides = np.linspace(-1.0, 1.0, box.points.shape[across])
+        change *= np.expand_dims(sides, [axis for axis in range(4) if axis != across])
+    return change
+
+
+def box_changes(
+    case: Case, mesh: Mesh, boxes: Mapping[str, Box]
+) -> dict[str, list[tuple[int, FloatArray, FloatArray]]]:
+    """Return how motions change control points, for each box that some move, in their order.
+
+    Place of the motion, the control points (I, J, K, 3) before it, in the box's coordinates, and
+    their change by it. Motions that do not fit their box change nothing.
+    """
+    found: dict[str, list[tuple[int, FloatArray, FloatArray]]] = {}
+    for place, motion in enumerate(case.motions):
+        if not isinstance(motion, BoxMotion) or motion.box not in boxes:
+            continue
+        box = boxes[motion.box]
+        if box.problem(_lattice_index(motion, mesh.dim)):
+            continue
+        mine = found.setdefault(motion.box, [])
+        q = mine[-1][1] + mine[-1][2] if mine else box.q
+        mine.append((place, q, _change_of(motion, box, q, mesh.dim)))
+    return found
 
 
 def missing_box(mesh: Mesh, name: str, boxes: Iterable[str], none: str) -> str:
@@ -127,7 +206,8 @@ def embedding(box: Box, mesh: Mesh, marker: str) -> tuple[Embedding, float]:
             uvw, inside = parametric(box, mesh.points[on])
         found = box.embed(nodes[inside], uvw[inside])
         size = np.ptp(box.points.reshape(-1, 3), axis=0)[: mesh.dim]
-        gap = np.abs(found.sums(box.points)[:, : mesh.dim] - mesh.points[found.nodes]) / size
+        there = box.system.points_of(found.sums(box.q))[:, : mesh.dim]
+        gap = np.abs(there - mesh.points[found.nodes]) / size
         kept[box, marker] = found, float(gap.max(initial=0.0))
     return kept[box, marker]
 
@@ -146,57 +226,77 @@ def off_points(box: Box, mesh: Mesh, marker: str) -> list[str]:
 def ffd_displacements(case: Case, mesh: Mesh, names: Iterable[str]) -> dict[object, Displacements]:
     """Return the displacements of the nodes of the moving markers ``names``, by motion of a box.
 
+    Several equal motions share one, their mean.
+
     Raises
     ------
     CaseError
         None of the nodes that a motion should move is in its box; a line for each such motion.
     """
-    motions = [motion for motion in case.motions if isinstance(motion, Ffd)]
+    motions = box_motions(case)
     boxes = boxes_for(case, mesh) if motions else {}
     on = {name: mesh.marker(name).nodes for name in names}
-    found: dict[object, Displacements] = {}
-    problems = []
-    for place, motion in enumerate(case.motions, start=1):
-        if not isinstance(motion, Ffd) or motion.box not in boxes:
-            continue
-        mine = {name: nodes for name, nodes in on.items() if moves(motion, name)}
-        moved = _moved(boxes[motion.box], mesh, motion, mine)
-        if moved is not None and len(motions) < len(case.motions) and _is_in(motion.box, mesh):
-            stays = Note(
-                f"the FFD box {motion.box!r} in the deformed mesh stays where it was, since other "
-                "motions move boundaries, too; define it anew to use it with that mesh"
-            )
-            moved = replace(moved, warnings=(*moved.warnings, stays))
-        if moved is None and mine:
-            of = " or ".join(repr(name) for name in named(motion.marker)) or "a moving marker"
-            problems.append(
-                f"motion {place}: no node of {of} is in the FFD box {motion.box!r}; move the box, "
-                "or take another boundary"
-            )
-        elif moved is not None:
-            found[motion] = moved
+    found: dict[object, list[Displacements]] = {}
+    problems = {}
+    alone = len(motions) == len(case.motions) and not any(box.level for box in boxes.values())
+    for name, changes in box_changes(case, mesh, boxes).items():
+        for place, q, change in changes:
+            motion = case.motions[place]
+            mine = {name: nodes for name, nodes in on.items() if moves(motion, name)}
+            moved = _moved(boxes[name], mesh, q, change, mine)
+            if moved is not None and not alone and _is_in(name, mesh, system_of(case)):
+                moved = replace(moved, warnings=(*moved.warnings, _stays(name)))
+            if moved is not None:
+                found.setdefault(motion, []).append(moved)
+            elif mine:
+                of = " or ".join(repr(one) for one in named(motion.marker)) or "a moving marker"
+                problems[place] = (
+                    f"motion {place + 1}: no node of {of} is in the FFD box {name!r}; move the "
+                    "box, or take another boundary"
+                )
     if problems:
-        raise CaseError("\n".join(problems))
-    return found
+        raise CaseError("\n".join(problems[place] for place in sorted(problems)))
+    return {motion: _mean(several) for motion, several in found.items()}
 
 
-def _is_in(name: str, mesh: Mesh) -> bool:
-    return any(box.name == name for box in boxes_of(mesh))
+def _stays(name: str) -> Note:
+    return Note(
+        f"the FFD box {name!r} in the deformed mesh stays where it was, since boxes are nested, or "
+        "other motions move boundaries, too; define it anew to use it with that mesh"
+    )
 
 
-def _moved(box: Box, mesh: Mesh, motion: Ffd, on: Mapping[str, IntArray]) -> Displacements | None:
-    """Return the displacements that a motion of a box gives all nodes of some markers.
+def _mean(several: list[Displacements]) -> Displacements:
+    """Return the mean of displacements of the same nodes."""
+    if len(several) == 1:
+        return several[0]
+    vectors = np.mean([each.vectors for each in several], axis=0)
+    return replace(several[0], vectors=vectors)
 
-    None where no node is in the box. ``on`` has the nodes (k,) of each marker.
+
+def _is_in(name: str, mesh: Mesh, system: CoordinateSystem) -> bool:
+    return any(box.name == name for box in boxes_of(mesh, system))
+
+
+def _moved(
+    box: Box, mesh: Mesh, q: FloatArray, change: FloatArray, on: Mapping[str, IntArray]
+) -> Displacements | None:
+    """Return the displacements that a change of control points gives all nodes of some markers.
+
+    None where no node is in the box. ``q`` (I, J, K, 3) are the control points before, ``on`` has
+    the nodes (k,) of each marker.
     """
     nodes = np.unique(np.concatenate([*on.values(), np.empty(0, np.int64)]))
     vectors = np.zeros((len(nodes), mesh.dim))
-    change = box.change(motion.index, motion.vector)
     warnings, any_inside = [], False
     for name in on:
         inside, _ = embedding(box, mesh, name)
         any_inside |= bool(len(inside.nodes))
-        vectors[np.searchsorted(nodes, inside.nodes)] = inside.sums(change)[:, : mesh.dim]
+        shift = inside.sums(change)
+        if box.system.kind != "CARTESIAN":
+            before = inside.sums(q)
+            shift = box.system.points_of(before + shift) - box.system.points_of(before)
+        vectors[np.searchsorted(nodes, inside.nodes)] = shift[:, : mesh.dim]
         warnings += off_points(box, mesh, name)
     return Displacements(nodes, vectors, tuple(warnings)) if any_inside else None
 
@@ -204,14 +304,17 @@ def _moved(box: Box, mesh: Mesh, motion: Ffd, on: Mapping[str, IntArray]) -> Dis
 def moved_boxes(case: Case, mesh: Mesh, part: float = 1.0) -> Mesh:
     """Return the mesh with its boxes deformed by the motions of the case times ``part``, 0 to 1.
 
-    Where the case has motions of other kinds too, the boxes are left as they are: no control
-    points could follow these.
+    Where the case has motions of other kinds too, or boxes are nested, they are left as they are:
+    no control points could follow these.
     """
-    motions = [motion for motion in case.motions if isinstance(motion, Ffd)]
+    motions = box_motions(case)
     if not motions or len(motions) < len(case.motions):
         return mesh
+    boxes = {box.name: box for box in boxes_of(mesh, system_of(case))}
+    if any(box.level for box in boxes.values()):
+        return mesh
     moved = []
-    for box in boxes_of(mesh):
-        changes = [box.change(each.index, each.vector) for each in motions if each.box == box.name]
-        moved += [box.moved(part * np.sum(changes, axis=0))] if changes else []
+    for name, changes in box_changes(case, mesh, boxes).items():
+        total = np.sum([change for _, _, change in changes], axis=0)
+        moved.append(boxes[name].moved(part * total))
     return with_boxes(mesh, moved) if moved else mesh

@@ -13,7 +13,7 @@ from slideviz.case.key import BOUNDARIES, FILES, MOTION, Key
 from slideviz.case.keys import KEYS
 from slideviz.case.method_keys import FACTORS
 from slideviz.case.model import (
-    Ffd,
+    BoxMotion,
     FromFile,
     Motion,
     OnAirfoil,
@@ -127,7 +127,7 @@ def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:
 
 def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return a sentence for each moving marker without motion, and each motion that is unfit."""
-    boxed = any(isinstance(motion, Ffd) for motion in case.motions)
+    boxed = any(isinstance(motion, BoxMotion) for motion in case.motions)
     of_all = ", or let (*, ffd, ...) move what is in the box of all moving markers" if boxed else ""
     found = [
         f"moving marker {marker!r} has no motion; add MOTION= ({marker}, translate, ...) or "
@@ -137,7 +137,7 @@ def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     ]
     for place, motion in enumerate(case.motions, start=1):
         problems = [*_motion_problems(motion, mesh.dim)]
-        if isinstance(motion, Ffd) and not problems:
+        if isinstance(motion, BoxMotion) and not problems:
             problems += ffd_problems(case, mesh, motion)
         elif isinstance(motion, Prescribed):
             problems += _prescribed_problems(case, mesh, motion)
@@ -148,7 +148,7 @@ def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
 def _motion_problems(motion: Motion, dim: int) -> Iterator[str]:
     if isinstance(motion, FromFile | Prescribed):
         return
-    if isinstance(motion, Ffd) and not motion.box:
+    if isinstance(motion, BoxMotion) and not motion.box:
         yield "it names no FFD box; choose one of the mesh, or define one with FFD_DEFINITION"
         return
     try:
@@ -156,7 +156,7 @@ def _motion_problems(motion: Motion, dim: int) -> Iterator[str]:
     except (CaseError, TypeError, ValueError) as problem:
         yield str(problem).removeprefix("motion 1: ")
         return
-    if isinstance(motion, Ffd | OnAirfoil):
+    if isinstance(motion, BoxMotion | OnAirfoil):
         return
     needed = f"the mesh has {dim} dimensions"
     if isinstance(motion, Translate):

@@ -7,7 +7,7 @@ from typing import Any
 
 from slideviz.case.key import MOTION, NO_DEFAULT, Key, setting
 from slideviz.case.model import Case
-from slideviz.case.values import Kind, one_of
+from slideviz.case.values import POINT, Kind, one_of
 from slideviz.case.words import (
     Word,
     groups_of,
@@ -19,7 +19,7 @@ from slideviz.case.words import (
     words_of,
 )
 from slideviz.errors import CaseError
-from slideviz.terms import FFD_BLENDINGS
+from slideviz.terms import FFD_BLENDINGS, FFD_SYSTEMS
 
 Definition = tuple[str, tuple[float, ...]]
 Degrees = tuple[int, int, int]
@@ -91,10 +91,11 @@ def _write_orders(orders: Degrees) -> str:
 def _said_where_needed(row: Key) -> Key:
     """Return the row of a key, changed so that a file has the key only where it has an effect."""
     usual = getattr(Case(), row.field)
+    needs_boxes = row.unless is without_definition
 
     def get(case: Case) -> Any:
         value = getattr(case, row.field)
-        return value if value != usual or (case.ffd_boxes and usual) else None
+        return value if value != usual or (needs_boxes and case.ffd_boxes and usual) else None
 
     return replace(row, get=get, default=row.default or NO_DEFAULT)
 
@@ -102,6 +103,11 @@ def _said_where_needed(row: Key) -> Key:
 def without_definition(case: Case) -> str:
     """Return why FFD keys besides FFD_DEFINITION have no effect in a case; "" if they have."""
     return "" if case.ffd_boxes else "FFD_DEFINITION defines no box"
+
+
+def without_axis(case: Case) -> str:
+    """Return why FFD_AXIS has no effect in a case; "" if it has."""
+    return "FFD_COORD_SYSTEM= CARTESIAN has no axis" if case.ffd_system == "CARTESIAN" else ""
 
 
 def ffd_contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
@@ -152,6 +158,24 @@ _ROWS = (
         "With FFD_BLENDING= BSPLINE_UNIFORM, the orders of the splines, 2 or more.",
         label="FFD orders",
         unless=without_definition,
+    ),
+    setting(
+        "FFD_COORD_SYSTEM",
+        MOTION,
+        one_of(FFD_SYSTEMS),
+        "ffd_system",
+        "The coordinates in which boxes are straight, those of the mesh too; their axis is along "
+        "x: r, θ, x (CYLINDRICAL), or r, θ, φ with φ from the axis (SPHERICAL, POLAR).",
+        label="FFD coordinates",
+    ),
+    setting(
+        "FFD_AXIS",
+        MOTION,
+        POINT,
+        "ffd_axis",
+        "A point on that axis.",
+        label="FFD axis",
+        unless=without_axis,
     ),
 )
 FFD_ROWS = tuple(_said_where_needed(row) for row in _ROWS)

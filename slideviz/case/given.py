@@ -11,7 +11,7 @@ import numpy as np
 from slideviz.case.boxes import ffd_displacements
 from slideviz.case.bumps import bump_displacements
 from slideviz.case.displacement import Displacements, read_displacements
-from slideviz.case.model import Case, Ffd, FromFile, OnAirfoil, moves, named
+from slideviz.case.model import BoxMotion, Case, FromFile, OnAirfoil, moves, named
 from slideviz.errors import CaseError
 from slideviz.mesh.model import IntArray, Mesh
 
@@ -19,7 +19,7 @@ Given = Mapping[object, Displacements]
 """Displacements by the key (`key_of`) of their motion."""
 
 
-def key_of(motion: FromFile | Ffd | OnAirfoil) -> object:
+def key_of(motion: FromFile | BoxMotion | OnAirfoil) -> object:
     """Return the key of a motion in `Given`; motions with the same displacements share it."""
     return (motion.path, motion.marker) if isinstance(motion, FromFile) else motion
 

@@ -17,6 +17,7 @@ from slideviz.errors import CaseError
 from slideviz.mesh.model import frozen_array
 from slideviz.terms import (
     FFD_BLENDINGS,
+    FFD_SYSTEMS,
     FILE_FORMATS,
     KERNELS,
     METHODS,
@@ -27,6 +28,7 @@ from slideviz.terms import (
     SIDES,
     SLIDING,
     FfdBlending,
+    FfdSystem,
     FileFormat,
     Method,
     Metric,
@@ -186,6 +188,58 @@ class Bump:
         check_fields(self)
 
 
+@dataclass(frozen=True)
+class FfdCamber:
+    """Shift a column of control points of a box as one, and with it the nodes inside.
+
+    ``index`` (i, j) is the column, which goes along z; in 2D that of i, along y. -1 takes all.
+    """
+
+    marker: Target
+    box: str
+    index: tuple[int, int]
+    amount: float
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
+class FfdThickness:
+    """Stretch a column of control points of a box, and with it the nodes inside.
+
+    Its first control point goes by -``amount``, its last one by ``amount``. ``index`` as in
+    `FfdCamber`.
+    """
+
+    marker: Target
+    box: str
+    index: tuple[int, int]
+    amount: float
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
+class FfdTwist:
+    """Rotate a plane j of control points of a box in 3D, and with it the nodes inside.
+
+    It turns by ``angle_deg`` about the axis through ``point`` (right-handed; any length). A
+    ``plane`` of -1 takes all.
+    """
+
+    marker: Target
+    box: str
+    plane: int
+    angle_deg: float
+    point: tuple[float, ...] = (0.0, 0.0, 0.0)
+    axis: tuple[float, float, float] = (0.0, 1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
 @dataclass(frozen=True, eq=False)
 class Prescribed:
     """Displace nodes (k,) by vectors (k, d), given by a program; it cannot be in a case file.
@@ -214,7 +268,9 @@ class Prescribed:
 
 _ROLES = 'a role for each marker, as {"blade": "moving"}'
 OnAirfoil = HicksHenne | Cst | Bump
-Motion = Translate | Rotate | Scale | Radial | OnAirfoil | Ffd | FromFile | Prescribed
+BoxMotion = Ffd | FfdCamber | FfdThickness | FfdTwist
+"""Motions of control points of boxes; those of one box act one after the other."""
+Motion = Translate | Rotate | Scale | Radial | OnAirfoil | BoxMotion | FromFile | Prescribed
 
 
 def named(target: Target) -> tuple[str, ...]:
@@ -248,7 +304,8 @@ class Case:
     * ``view``: how the window showed the case, by key; changes no result.
     * ``ffd_boxes``: boxes for free-form deformation that are not in the mesh file: name and 8
       corners (24 numbers; in 2D the first 4 corners count). ``ffd_degrees`` are their degrees,
-      ``ffd_orders`` the orders of B-splines.
+      ``ffd_orders`` the orders of B-splines. ``ffd_system`` are the coordinates in which boxes are
+      straight, those of the mesh too, about an axis along x through the point ``ffd_axis``.
     * ``source``: the file that the case was read from; ``warnings``: what reading it found.
 
     Examples
@@ -277,6 +334,8 @@ class Case:
     ffd_degrees: tuple[tuple[int, int, int], ...] = ()
     ffd_blending: FfdBlending = field(default="BEZIER", metadata=FFD_BLENDINGS)
     ffd_orders: tuple[int, int, int] = (2, 2, 2)
+    ffd_system: FfdSystem = field(default="CARTESIAN", metadata=FFD_SYSTEMS)
+    ffd_axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
     method: Method = field(default="rbf", metadata=METHODS)
     sliding: Sliding = field(default="none", metadata=SLIDING)
     periodic: PeriodicMode = field(default="none", metadata=PERIODIC_MODES)

@@ -23,8 +23,8 @@ from slideviz.case.check import (
 from slideviz.case.displacement import Displacements
 from slideviz.case.given import Given, given_displacements, key_of
 from slideviz.case.model import (
+    BoxMotion,
     Case,
-    Ffd,
     FromFile,
     Motion,
     OnAirfoil,
@@ -198,7 +198,7 @@ def _change(
     """Return the displacement (k, d) by one motion of the nodes of a marker, now at ``points``."""
     if isinstance(motion, Prescribed):
         return _prescribed(motion, points, nodes)
-    if not isinstance(motion, FromFile | Ffd | OnAirfoil):
+    if not isinstance(motion, FromFile | BoxMotion | OnAirfoil):
         return _increment(motion, points)
     key = key_of(motion)
     if not files or nodes is None or key not in files:

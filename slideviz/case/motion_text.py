@@ -9,9 +9,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from slideviz.case.model import (
+    BoxMotion,
     Bump,
     Cst,
     Ffd,
+    FfdCamber,
+    FfdThickness,
+    FfdTwist,
     FromFile,
     HicksHenne,
     Motion,
@@ -37,9 +41,24 @@ from slideviz.case.words import (
     words_of,
 )
 from slideviz.errors import CaseError
-from slideviz.terms import MOTION_KINDS, SIDES
+from slideviz.terms import MOTION_KINDS, SIDES, MotionKind
 
 VERBS = tuple(MOTION_KINDS)
+VERB_OF: dict[type, MotionKind] = {
+    Translate: "translate",
+    Rotate: "rotate",
+    Scale: "scale",
+    Radial: "radial",
+    HicksHenne: "hicks-henne",
+    Cst: "cst",
+    Bump: "bump",
+    Ffd: "ffd",
+    FfdCamber: "ffd-camber",
+    FfdThickness: "ffd-thickness",
+    FfdTwist: "ffd-twist",
+    FromFile: "file",
+}
+"""Verbs of motions, by class."""
 ALL_MOVING = "*"
 
 
@@ -124,6 +143,10 @@ def _read_motion(group: list[Word]) -> Motion:
         return _read_ffd(marker, rest)
     if verb in _BUMPS:
         return _read_bump(marker, verb, rest)
+    if verb == "ffd-twist":
+        return _read_twist(marker, rest)
+    if verb in ("ffd-camber", "ffd-thickness"):
+        return _read_column(FfdCamber if verb == "ffd-camber" else FfdThickness, marker, rest)
     if verb == "translate":
         return Translate(marker, read_vector(_flat(rest), "the shift"))
     if verb == "rotate":
@@ -235,11 +258,7 @@ def _read_ffd(marker: Target, rest: list[Word]) -> Ffd:
             "shift: ffd, BOX, 2, 1, 0, dx, dy, dz; in 2D ffd, BOX, 2, 1, dx, dy will do"
         )
     count = (len(items) - 1) // 2
-    at = [number(word.text) for word in items[1 : 1 + count]]
-    if any(value != int(value) or value < -1 for value in at):
-        text = ", ".join(word.text for word in items[1 : 1 + count])
-        raise CaseError(f"the control point ({text}) is none; needed are whole numbers from -1")
-    i, j, k = (*(int(value) for value in at), -1)[:3]
+    i, j, k = (*_whole(items[1 : 1 + count]), -1)[:3]
     dx, dy, dz = (*(number(word.text) for word in items[1 + count :]), 0.0)[:3]
     return Ffd(marker, name, (i, j, k), (dx, dy, dz))
 
@@ -299,6 +318,44 @@ def _bump_text(head: str, motion: OnAirfoil) -> str:
     return f"({head}, hicks-henne, {motion.side}, {numbers}{tail})"
 
 
+def _read_column(
+    kind: type[FfdCamber | FfdThickness], marker: Target, rest: list[Word]
+) -> FfdCamber | FfdThickness:
+    items = _flat(rest)
+    name = items[0].text if items else ""
+    if len(items) not in (3, 4) or not name:
+        raise CaseError(
+            "needed are the box, the column of control points i, j (-1 is all of a direction) and "
+            f"the amount: {VERB_OF[kind]}, BOX, 2, 1, 0.01; in 2D {VERB_OF[kind]}, BOX, 2, 0.01"
+        )
+    i, j = (*_whole(items[1:-1]), -1)[:2]
+    return kind(marker, name, (i, j), number(items[-1].text))
+
+
+def _read_twist(marker: Target, rest: list[Word]) -> FfdTwist:
+    items = _flat(rest)
+    letter = len(items) > 3 and items[3].text.lower() in ("x", "y", "z")
+    n_axis = 1 if letter else 3
+    if len(items) != 6 + n_axis or not items[0].text:
+        raise CaseError(
+            "needed are the box, the plane j of control points (-1 is all), the angle in degrees, "
+            "the axis (x, y, z or three numbers) and a point on it: ffd-twist, BOX, 2, 5.0, y, "
+            "0.25, 0, 0"
+        )
+    (plane,) = _whole(items[1:2])
+    axis, point = read_axis(items[3 : 3 + n_axis]), read_vector(items[3 + n_axis :], "the point")
+    return FfdTwist(marker, items[0].text, plane, number(items[2].text), point, axis)
+
+
+def _whole(words: list[Word]) -> list[int]:
+    """Return indices of control points, whole numbers from -1."""
+    at = [number(word.text) for word in words]
+    if any(value != int(value) or value < -1 for value in at):
+        text = ", ".join(word.text for word in words)
+        raise CaseError(f"the control point ({text}) is none; needed are whole numbers from -1")
+    return [int(value) for value in at]
+
+
 def _motion_text(motion: Motion) -> str:
     if isinstance(motion, Prescribed):
         raise CaseError(
@@ -306,12 +363,10 @@ def _motion_text(motion: Motion) -> str:
             "displacement file"
         )
     head = _target_text(motion.marker)
-    if isinstance(motion, Ffd):
-        i, j, k = motion.index
-        at = f"{name_text(motion.box)}, {i}, {j}, {k}"
-        return f"({head}, ffd, {at}, {_numbers(motion.vector)})"
     if isinstance(motion, OnAirfoil):
         return _bump_text(head, motion)
+    if isinstance(motion, BoxMotion):
+        return f"({head}, {VERB_OF[type(motion)]}, {name_text(motion.box)}, {_of_box(motion)})"
     if isinstance(motion, FromFile):
         path = path_text(motion.path)
         # Commas and spaces separate here, unlike in a value that is a path only.
@@ -332,6 +387,15 @@ def _motion_text(motion: Motion) -> str:
     if axis == "z" and in_plane:
         return f"({head}, {turn}, {place})"
     return f"({head}, {turn}, {axis}, {place})"
+
+
+def _of_box(motion: BoxMotion) -> str:
+    """Return which control points of its box a motion moves, and how, as text."""
+    if isinstance(motion, FfdTwist):
+        at = f"{motion.plane}, {float(motion.angle_deg)!r}, {axis_text(motion.axis)}"
+        return f"{at}, {vector_text(motion.point)}"
+    by = motion.vector if isinstance(motion, Ffd) else (motion.amount,)
+    return f"{', '.join(map(str, motion.index))}, {_numbers(by)}"
 
 
 def _target_text(target: Target) -> str:
@@ -360,6 +424,9 @@ GRAMMAR = (
     "(WING, cst, SIDE, k, n, h[, x0, x1])          term k of n; chord from x0 to x1, else 0 to 1",
     "(WING, bump, peak, h, x0, x1)                 both sides, towards +y",
     "(BLADE, ffd, BOX, i, j, k, dx, dy, dz)        control point of a box; -1: all of an index",
+    "(BLADE, ffd-camber, BOX, i, j, dz)            a column of control points; 2D: no j",
+    "(BLADE, ffd-thickness, BOX, i, j, dz)         its first one by -dz, its last by dz",
+    "(BLADE, ffd-twist, BOX, j, degrees, AXIS, (px, py, pz))  a plane of control points",
     "(BLADE, file, path)                           node, dx, dy[, dz] in each line",
     "(*, VERB, ...)                                all moving boundaries, as one body",
     "((BLADE, TIP), VERB, ...)                     several, as one body; in a sweep: BLADE+TIP",

@@ -6,10 +6,14 @@ import math
 from collections.abc import Sequence
 
 from slideviz.case.model import (
+    BoxMotion,
     Bump,
     Case,
     Cst,
     Ffd,
+    FfdCamber,
+    FfdThickness,
+    FfdTwist,
     FromFile,
     Motion,
     OnAirfoil,
@@ -69,6 +73,11 @@ def _in_full(motion: Motion, dim: int, extent: float) -> str:
         return f"move {_control(motion)} by {vector_words(motion.vector[:dim])}"
     if isinstance(motion, OnAirfoil):
         return f"raise {_bump(motion, f'by {motion.height:.4g}')}"
+    if isinstance(motion, BoxMotion):
+        if not isinstance(motion, FfdTwist):
+            return _of_box(motion)
+        about = f"{direction_words(motion.axis)} through {_place(motion.point, extent)}"
+        return f"{_of_box(motion)} about {about}"
     if isinstance(motion, Prescribed):
         return f"displace {len(motion.nodes):,} nodes as given"
     return f"displace as in {motion.path.name or '(no file yet)'}"
@@ -131,6 +140,8 @@ def _briefly(motion: Motion) -> str:
         return f"{_control(motion)} {vector_words(motion.vector)}"
     if isinstance(motion, OnAirfoil):
         return _bump(motion, f"{motion.height:+.4g}")
+    if isinstance(motion, BoxMotion):
+        return _of_box(motion)
     if isinstance(motion, Prescribed):
         return f"{len(motion.nodes):,} nodes as given"
     return motion.path.name or "(no file yet)"
@@ -145,6 +156,10 @@ def _exactly(motion: Motion) -> str:
     if isinstance(motion, OnAirfoil):
         chord = f", chord {vector_words(motion.chord, '.15g')}" * (motion.chord != (0.0, 1.0))
         return _bump(motion, f"{motion.height:+.15g}", ".15g") + chord
+    if isinstance(motion, FfdTwist):
+        return _of_box(motion, ".15g") + _about(motion.point) + _along(motion.axis)
+    if isinstance(motion, BoxMotion):
+        return _of_box(motion, ".15g")
     if isinstance(motion, Prescribed):
         return _briefly(motion)
     if isinstance(motion, Translate):
@@ -212,10 +227,19 @@ def _bump(motion: OnAirfoil, by: str, form: str = ".4g") -> str:
     return f"{what} {by} at {format(100.0 * motion.peak, form)} % chord"
 
 
-def _control(motion: Ffd) -> str:
+def _control(motion: BoxMotion) -> str:
     """Return the control points that a motion moves, and their box, in words."""
-    at = ", ".join("all" if index < 0 else str(index) for index in motion.index)
+    which = (motion.plane,) if isinstance(motion, FfdTwist) else motion.index
+    at = ", ".join("all" if index < 0 else str(index) for index in which)
     return f"({at}) of {motion.box or '(no box yet)'}"
+
+
+def _of_box(motion: FfdCamber | FfdThickness | FfdTwist, form: str = ".4g") -> str:
+    """Return a motion of many control points of a box in words, without axis and point."""
+    if isinstance(motion, FfdTwist):
+        return f"twist {_control(motion)} {motion.angle_deg:+{form}}°"
+    what = "camber" if isinstance(motion, FfdCamber) else "thickness"
+    return f"{what} {_control(motion)} {motion.amount:+{form}}"
 
 
 def _place(point: Point, extent: float = 0.0, form: str = ".4g", its: str = "its") -> str:

@@ -16,7 +16,7 @@ import numpy as np
 from slideviz.errors import CaseError
 from slideviz.ffd.box import Box, Embedding
 from slideviz.ffd.inverse import parametric, placed_again
-from slideviz.ffd.moves import Move, Shift
+from slideviz.ffd.moves import Move, Shift, Twist
 from slideviz.mesh.model import FloatArray, IntArray
 
 
@@ -93,6 +93,8 @@ class BoxDeformation:
         Change of the control points of each box, in its coordinates q.
     notes : list of str
         What the limits did, and which nodes a later box took over.
+    missed : set of int
+        Values whose twist has no centre, so that they do nothing.
     """
 
     boxes: Sequence[Box]
@@ -105,6 +107,7 @@ class BoxDeformation:
     nodes: FloatArray = field(init=False)
     change: dict[str, FloatArray] = field(init=False)
     notes: list[str] = field(init=False, default_factory=list)
+    missed: set[int] = field(init=False, default_factory=set)
 
     def __post_init__(self) -> None:
         self._by_name = {box.name: box for box in self.boxes}
@@ -130,7 +133,8 @@ class BoxDeformation:
 
     def moved(self) -> dict[str, Box]:
         """Return the deformed boxes, by name."""
-        return {box.name: box.moved(self.change[box.name]) for box in self.boxes}
+        changed = ((box, self.change[box.name]) for box in self.boxes)
+        return {box.name: box.moved(change) if change.any() else box for box, change in changed}
 
     def uvw(self) -> dict[str, tuple[IntArray, FloatArray]]:
         """Return nodes (k,) and parametric coordinates (k, 3) of boxes where these have changed.
@@ -141,7 +145,7 @@ class BoxDeformation:
         outer = {box.parent for box in self.boxes}
         found = {}
         for box in self.boxes:
-            if not box.parent and box.name not in outer:
+            if not box.level and box.name not in outer:
                 continue
             inside = self._embedded[box.name]
             moved = box.moved(self.change[box.name])
@@ -167,7 +171,7 @@ class BoxDeformation:
 
     def _deform(self, box: Box) -> None:
         """Deform one box by its parent and by its moves, within the limits."""
-        if box.parent:
+        if box.level:
             self._carry(box)
         self._apply(box, 1.0)
         self._place(box)
@@ -177,9 +181,10 @@ class BoxDeformation:
 
     def _carry(self, box: Box) -> None:
         """Move the control points of a nested box with its parent; embed its nodes anew."""
-        name, parent = box.name, box.parent
-        cage, shape = self._carried[name], box.points.shape
-        change = cage.sums(self.change[parent]).reshape(shape)
+        name, parent, cage = box.name, box.parent, self._carried.get(box.name)
+        change = np.zeros(box.points.shape)
+        if cage is not None:
+            change = cage.sums(self.change[parent]).reshape(change.shape)
         inside = self._embedded[name]
         moved = self.nodes[inside.nodes]
         if not change.any() and not moved.any():
@@ -191,8 +196,8 @@ class BoxDeformation:
         inverse = np.linalg.inv(at.slopes(inside.uvw))
 
         def rates_of(rates: _Rates) -> None:
-            if parent in rates.change:
-                rates.change[name] = cage.sums(rates.change[parent]).reshape(shape)
+            if cage is not None and parent in rates.change:
+                rates.change[name] = cage.sums(rates.change[parent]).reshape(change.shape)
             shifted = rates.nodes[inside.nodes]
             if name in rates.change:
                 shifted = shifted - inside.sums(rates.change[name])
@@ -209,6 +214,8 @@ class BoxDeformation:
             relax = self._relax if drive.relaxed else 1.0
             amount = relax * float(self.values[drive.value]) * part
             points = box.q + self.change[box.name]
+            if isinstance(drive.move, Twist) and drive.move.turn(points) is None:
+                self.missed.add(drive.value)
             self.change[box.name] = self.change[box.name] + drive.move.change(points, amount)
             self._done.setdefault(box.name, []).append((drive, amount))
             self._tape.append(partial(self._moved, drive, points, amount, relax, part))
@@ -239,7 +246,7 @@ class BoxDeformation:
         name, inside = box.name, self._embedded[box.name]
         done = tuple(self._done.get(name, ()))
         shifts = all(isinstance(drive.move, Shift) for drive, _ in done)
-        if box.system.kind == "CARTESIAN" and not box.parent and shifts:
+        if box.system.kind == "CARTESIAN" and not box.level and shifts:
             # One sum for each value, as a slope has.
             total = np.zeros((len(inside.nodes), 3))
             for drive, amount in done:
@@ -280,7 +287,7 @@ class BoxDeformation:
         self._placed.add(box.name)
         nodes = self._embedded[box.name].nodes
         lost = int(self.nodes[nodes].any(axis=1).sum())
-        if lost and not box.parent:
+        if lost and not box.level:
             self.notes.append(
                 f"{lost} nodes in the FFD box {box.name!r} are in one before it, too: as in SU2, "
                 "they go where the last one takes them, and lose the motion of the other"

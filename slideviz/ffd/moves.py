@@ -22,6 +22,10 @@ NORMAL = np.array([NEARLY, 1.0 + NEARLY, NEARLY])
 class Move(Protocol):
     """What happens to control points by an amount."""
 
+    @property
+    def chosen(self) -> np.ndarray:
+        """Return which control points it moves, (I, J, K) bool."""
+
     def change(self, points: FloatArray, amount: float, /) -> FloatArray:
         """Return the change (I, J, K, 3) of points."""
 
@@ -37,6 +41,11 @@ class Shift:
     """The change ``unit`` (I, J, K, 3) times the amount."""
 
     unit: FloatArray
+
+    @property
+    def chosen(self) -> np.ndarray:
+        """Return which control points it moves, (I, J, K) bool."""
+        return np.asarray(self.unit.any(axis=-1))
 
     def change(self, _points: FloatArray, amount: float) -> FloatArray:
         """Return the change (I, J, K, 3), whatever the points."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from slideviz.errors import CaseError, MeshError
 from slideviz.ffd.box import Box, Index, plane_corners, regular_box
+from slideviz.ffd.coordinates import CoordinateSystem, polar_corners
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 _LETTERS = "IJK"
@@ -32,22 +33,26 @@ Entries = dict[str, BoxEntry]
 """The keyword lines of a box, by key."""
 
 
-def read_boxes(mesh: Mesh, lines: list[str]) -> tuple[Box, ...]:
-    """Return the boxes in the lines of a section.
+def read_boxes(mesh: Mesh, lines: list[str], system: CoordinateSystem) -> tuple[Box, ...]:
+    """Return the boxes in the lines of a section, in a coordinate system.
 
     Raises
     ------
     MeshError
-        The section has a mistake, or nested boxes, which are not supported.
+        The section has a mistake.
     """
     entries = entries_of(lines)
-    boxes = tuple(_Reader(mesh, one).box() for one in entries)
+    readers = [_Reader(mesh, one, system) for one in entries]
+    boxes = tuple(reader.box() for reader in readers)
     names = [box.name for box in boxes]
     for k, name in enumerate(names):
         if name in names[:k]:
             line = entries[k]["FFD_TAG"].line
             raise _error(mesh, line, f"the FFD box {name!r} stands twice; rename one")
     _require_count(mesh, lines, names)
+    levels = next((_value(line) for line in lines if key_of(line) == "FFD_NLEVEL"), "1")
+    for reader, box in zip(readers, boxes, strict=True):
+        reader.check_nesting(box, boxes, int(levels) if levels.isdecimal() else 1)
     return boxes
 
 
@@ -107,30 +112,70 @@ def entries_of(lines: list[str]) -> list[Entries]:
 class _Reader:
     """Reads one box from its lines; all methods raise MeshError for a mistake."""
 
-    def __init__(self, mesh: Mesh, entries: Entries) -> None:
-        self.mesh, self.entries = mesh, entries
+    def __init__(self, mesh: Mesh, entries: Entries, system: CoordinateSystem) -> None:
+        self.mesh, self.entries, self.system = mesh, entries, system
         self.name = entries["FFD_TAG"].value
 
     def box(self) -> Box:
         """Return the box."""
-        for key in ("FFD_LEVEL", "FFD_PARENTS", "FFD_CHILDREN"):
-            if key in self.entries and self.count(key):
-                raise self.error(f"{key} is {self.count(key)}: nested boxes are not supported", key)
         flat = self.mesh.dim == 2
         letters = _LETTERS[: self.mesh.dim]
         i, j, k = (*(self.count(f"FFD_DEGREE_{letter}") for letter in letters), 1)[:3]
-        degrees = i, j, k
         corners = self.numbers("FFD_CORNER_POINTS", 4 if flat else 8, self.mesh.dim)
-        corners = plane_corners(corners) if flat else corners
+        orders = self.orders(letters)
+        if flat and self.is_polar():
+            j, k = k, j
+            corners = polar_corners(corners)
+            orders = orders and (orders[0], orders[2], orders[1])
+        elif flat:
+            corners = plane_corners(corners)
+        degrees = i, j, k
         try:
-            box = regular_box(self.name, corners, degrees, self.orders(letters))
+            box = regular_box(self.name, corners, degrees, orders, self.system)
         except CaseError as problem:
             raise self.error(str(problem)) from problem
         if self.count("FFD_CONTROL_POINTS"):
             box = replace(box, points=self.control_points(degrees))
         if "FFD_SURFACE_POINTS" in self.entries and self.count("FFD_SURFACE_POINTS"):
             box = replace(box, embedded=self.surface_points())
-        return box
+        level = self.count("FFD_LEVEL") if "FFD_LEVEL" in self.entries else 0
+        return replace(box, level=level, parent=(*self.tags("FFD_PARENTS"), "")[0])
+
+    def is_polar(self) -> bool:
+        """Return whether a box in 2D is one in polar coordinates: its second direction is k."""
+        entry = self.entries.get("FFD_CONTROL_POINTS")
+        rows = () if entry is None else entry.rows
+        return self.system.kind == "POLAR" or any((*row, "", "0")[2] > "1" for _, row in rows)
+
+    def tags(self, key: str) -> tuple[str, ...]:
+        """Return the names of the boxes in the rows after a key; () without it."""
+        if key not in self.entries:
+            return ()
+        return tuple(" ".join(words) for _, words in self.rows(key, self.count(key)))
+
+    def check_nesting(self, box: Box, boxes: tuple[Box, ...], levels: int) -> None:
+        """Raise MeshError where SU2 could not deform a nested box with those around it."""
+        by_name = {each.name: each for each in boxes}
+        parents = self.tags("FFD_PARENTS")
+        for name in (*parents, *self.tags("FFD_CHILDREN")):
+            if name not in by_name:
+                raise self.error(
+                    f"there is no FFD box {name!r} beside it, but {', '.join(by_name)}"
+                )
+        if len(parents) > 1:
+            said = f"FFD_PARENTS is {len(parents)}; supported is one parent"
+            raise self.error(said, "FFD_PARENTS")
+        if box.level >= levels:
+            said = f"FFD_LEVEL is {box.level}; FFD_NLEVEL must be larger, and is {levels}"
+            raise self.error(said, "FFD_LEVEL")
+        if parents and box.level <= by_name[box.parent].level:
+            said = f"FFD_LEVEL is {box.level}, as low as that of its parent {box.parent!r}"
+            raise self.error(f"{said}; make it larger", "FFD_LEVEL")
+        inner = {each.name for each in boxes if each.parent == box.name}
+        if inner != set(self.tags("FFD_CHILDREN")):
+            named = ", ".join(sorted(inner)) or "none"
+            said = f"FFD_CHILDREN must list the boxes that have it for a parent, which are {named}"
+            raise self.error(said)
 
     def orders(self, letters: str) -> Index | None:
         """Return the orders of the B-splines; None for a Bézier box."""

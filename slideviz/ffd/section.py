@@ -5,37 +5,41 @@ Only rows of control points that changed are written anew; the rest of the secti
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from slideviz.ffd.box import Box
+from slideviz.ffd.coordinates import CARTESIAN, CoordinateSystem, given_of_polar
 from slideviz.ffd.reader import Entries, entries_of, key_of, read_boxes
 from slideviz.mesh.io.su2.keyword_blocks import is_ffd
 from slideviz.mesh.io.su2.read import Document
 from slideviz.mesh.model import FloatArray, Mesh
 
 _LETTERS = "IJK"
-_BOXES: WeakKeyDictionary[Mesh, tuple[Box, ...]] = WeakKeyDictionary()
+_BOXES: WeakKeyDictionary[Mesh, dict[CoordinateSystem, tuple[Box, ...]]] = WeakKeyDictionary()
 """The boxes that were read, by mesh."""
 
 
-def boxes_of(mesh: Mesh) -> tuple[Box, ...]:
-    """Return the boxes of a mesh, in the order of its file.
+def boxes_of(mesh: Mesh, system: CoordinateSystem = CARTESIAN) -> tuple[Box, ...]:
+    """Return the boxes of a mesh, in the order of its file, in a coordinate system.
 
     Raises
     ------
     MeshError
-        The section has a mistake, or nested boxes, which are not supported.
+        The section has a mistake.
     """
-    if mesh not in _BOXES:
-        _BOXES[mesh] = read_boxes(mesh, _lines(mesh))
-    return _BOXES[mesh]
+    kept = _BOXES.setdefault(mesh, {})
+    if system not in kept:
+        kept[system] = read_boxes(mesh, _lines(mesh), system)
+    return kept[system]
 
 
-def with_boxes(mesh: Mesh, boxes: Sequence[Box], *, anew: bool = False) -> Mesh:
+def with_boxes(
+    mesh: Mesh, boxes: Sequence[Box], *, anew: bool = False, renewed: Collection[str] = ()
+) -> Mesh:
     """Return the mesh with boxes in the section that its SU2 file will have.
 
     Parameters
@@ -45,6 +49,8 @@ def with_boxes(mesh: Mesh, boxes: Sequence[Box], *, anew: bool = False) -> Mesh:
         Changed boxes, matched by name, and new ones; the mesh's other boxes stay.
     anew : bool
         Whether all boxes that the mesh had are dropped.
+    renewed : collection of str
+        Names of boxes whose surface points have other parametric coordinates than before.
     """
     lines = [] if anew else _lines(mesh)
     entries = entries_of(lines)
@@ -52,7 +58,7 @@ def with_boxes(mesh: Mesh, boxes: Sequence[Box], *, anew: bool = False) -> Mesh:
     for one in reversed(entries):  # from below, so that the lines above keep their numbers
         box = by_name.pop(one["FFD_TAG"].value, None)
         if box is not None:
-            _update(lines, one, box)
+            _update(lines, one, box, box.name in renewed)
     if not entries:
         lines = [f"FFD_NBOX= {len(boxes)}\n", "FFD_NLEVEL= 1\n"]
     elif by_name:
@@ -78,14 +84,16 @@ def _lines(mesh: Mesh) -> list[str]:
     return [line.decode("utf-8", "surrogateescape") for line in text.splitlines(keepends=True)]
 
 
-def _update(lines: list[str], entries: Entries, box: Box) -> None:
+def _update(lines: list[str], entries: Entries, box: Box, renewed: bool) -> None:
     """Write the changed control points of a box into ``lines``, in place.
 
-    Control points and surface points that the file does not list are written as a whole.
+    Control points and surface points that the file does not list are written as a whole, and so
+    are surface points that are ``renewed``.
     """
     surface = entries.get("FFD_SURFACE_POINTS")
-    if surface is not None and not surface.rows and box.embedded:
-        lines[surface.line : surface.line + 1] = _surface_lines(box)
+    if surface is not None and box.embedded and (not surface.rows or renewed):
+        last = surface.rows[-1][0] if surface.rows else surface.line
+        lines[surface.line : last + 1] = _surface_lines(box)
     control = entries["FFD_CONTROL_POINTS"]
     if not control.rows:
         lines[control.line : control.line + 1] = _control_lines(box.points)
@@ -99,13 +107,16 @@ def _update(lines: list[str], entries: Entries, box: Box) -> None:
 def _written(box: Box, dim: int) -> Iterator[str]:
     """Yield all lines of a box."""
     letters = _LETTERS[:dim]
+    polar = dim == 2 and box.system.kind == "POLAR"  # the second direction is k then
+    axes = (0, 2) if polar else (0, 1, 2)
     yield f"FFD_TAG= {box.name}\nFFD_LEVEL= 0\n"
-    for letter, degree in zip(letters, box.degrees, strict=False):
+    for letter, degree in zip(letters, (box.degrees[axis] for axis in axes), strict=False):
         yield f"FFD_DEGREE_{letter}= {degree}\n"
     yield f"FFD_BLENDING= {'BSPLINE_UNIFORM' if box.orders else 'BEZIER'}\n"
-    for letter, order in zip(letters, box.orders or (), strict=False):
+    orders = (box.orders[axis] for axis in axes) if box.orders else ()
+    for letter, order in zip(letters, orders, strict=False):
         yield f"BSPLINE_ORDER_{letter}= {order}\n"
-    corners = box.corners[: 4 if dim == 2 else 8, :dim]
+    corners = given_of_polar(box.corners) if polar else box.corners[: 4 if dim == 2 else 8, :dim]
     yield f"FFD_PARENTS= 0\nFFD_CHILDREN= 0\nFFD_CORNER_POINTS= {len(corners)}\n"
     yield from (_tabbed(corner) + "\n" for corner in corners.tolist())
     yield from _control_lines(box.points)

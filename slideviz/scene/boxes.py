@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from slideviz.case.boxes import boxes_for
-from slideviz.case.model import Case, Ffd
+from slideviz.case.boxes import box_changes, box_motions, boxes_for
+from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
 from slideviz.ffd.box import Box
 from slideviz.mesh.model import FloatArray, Mesh
@@ -50,9 +50,10 @@ class BoxLayer(Layer):
             return
         shown = "ffd" in new.view.drawn
         case = new.case
-        definition = case.ffd_boxes, case.ffd_degrees, case.ffd_blending, case.ffd_orders
+        shape = case.ffd_boxes, case.ffd_degrees, case.ffd_blending, case.ffd_orders
+        definition = shape, case.ffd_system, case.ffd_axis
         style = self.stage.scheme, self.stage.pixel_scale
-        key = (new.mesh, _ffd_motions(case), definition, style) if shown else ()
+        key = (new.mesh, box_motions(case), definition, style) if shown else ()
         if key == self._key:
             return
         self._key = key
@@ -117,10 +118,6 @@ class BoxLayer(Layer):
         set_letters(letters, self.stage.scheme, 13 * self.stage.font_scale)
 
 
-def _ffd_motions(case: Case) -> tuple[Ffd, ...]:
-    return tuple(motion for motion in case.motions if isinstance(motion, Ffd))
-
-
 def lattices(case: Case, mesh: Mesh) -> tuple[dict[str, Box], dict[str, Box]]:
     """Return the undeformed boxes, and the deformed ones of those that motions move, by name.
 
@@ -130,12 +127,12 @@ def lattices(case: Case, mesh: Mesh) -> tuple[dict[str, Box], dict[str, Box]]:
         boxes = boxes_for(case, mesh)
     except SlidevizError:
         return {}, {}
-    moved = dict(boxes)
-    for motion in _ffd_motions(case):
-        box = moved.get(motion.box)
-        if box is not None and any(motion.vector) and not box.problem(motion.index):
-            moved[motion.box] = box.moved(box.change(motion.index, motion.vector))
-    return boxes, {name: box for name, box in moved.items() if box is not boxes[name]}
+    moved = {}
+    for name, changes in box_changes(case, mesh, boxes).items():
+        total = np.sum([change for _, _, change in changes], axis=0)
+        if total.any():
+            moved[name] = boxes[name].moved(total)
+    return boxes, moved
 
 
 def lattice_shape(boxes: list[tuple[FloatArray, np.ndarray]], dim: int, lift: float) -> Any:

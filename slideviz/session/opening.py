@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from slideviz.case.model import Case, Ffd
+from slideviz.case.model import BoxMotion, Case
 from slideviz.case.reduction import Reduction
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
@@ -63,7 +63,7 @@ def open_mesh(
 
 def has_ffd(case: Case) -> bool:
     """Return whether a case has a motion of an FFD box."""
-    return any(isinstance(motion, Ffd) for motion in case.motions)
+    return any(isinstance(motion, BoxMotion) for motion in case.motions)
 
 
 def suggested_reduction(mesh: Mesh) -> Reduction:

@@ -12,6 +12,9 @@ from slideviz.case.keys import KEYS
 from slideviz.case.model import (
     Case,
     Ffd,
+    FfdCamber,
+    FfdThickness,
+    FfdTwist,
     FromFile,
     Motion,
     OnAirfoil,
@@ -191,7 +194,9 @@ def moves_nothing(motion: Motion) -> bool:
     """Return whether a motion leaves its boundary in place; False for displacement files."""
     if isinstance(motion, Translate | Ffd):
         return not any(motion.vector)
-    if isinstance(motion, Rotate):
+    if isinstance(motion, FfdCamber | FfdThickness):
+        return motion.amount == 0
+    if isinstance(motion, Rotate | FfdTwist):
         return motion.angle_deg == 0
     if isinstance(motion, OnAirfoil):
         return motion.height == 0

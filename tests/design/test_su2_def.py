@@ -405,9 +405,18 @@ def test_continuity_in_3d_finds_the_sides_that_the_surface_passes(here):
 
     side = np.array([[0.0, 0, 0], [0, 0, 1], [0, 1, 0], [0, 1, 1]])
     through = np.array([[[-1.0, 0.9, 0.9], [1.0, 0.8, 0.8]], [[-1.0, 0.1, 0.1], [1.0, 0.2, 0.1]]])
-    assert all(_meets(one[None], side) for one in through)
+    assert all(_meets(one[None], side, 3) for one in through)
     past = np.array([[[-1.0, 1.2, 0.9], [1.0, 1.2, 0.8]], [[0.1, 0.5, 0.5], [1.0, 0.5, 0.5]]])
-    assert not _meets(past, side)
+    assert not _meets(past, side, 3)
+
+
+def test_continuity_in_2d_continues_the_sides_beyond_the_box_as_su2_does():
+    from slideviz.design.su2.planes import _meets
+
+    side = np.array([[0.0, 0, -0.5], [0, 0, 0.5], [0, 1, -0.5], [0, 1, 0.5]])
+    edges = np.array([[[-1.0, 5.0, 0.0], [1.0, 6.0, 0.0]], [[0.5, 0.0, 0.0], [0.5, 1.0, 0.0]]])
+    assert _meets(edges[:1], side, 2)
+    assert not _meets(edges[1:], side, 2)
 
 
 def test_roles_follow_from_the_lists_of_su2_and_of_ours(here):
@@ -478,8 +487,8 @@ def test_roles_follow_from_the_lists_of_su2_and_of_ours(here):
         ),
         ("DV_KIND= SCALE\nDV_VALUE= 1\nSLIDING_MODE= sideways", "SLIDING_MODE: 'sideways' is not"),
         (
-            "DV_KIND= SCALE\nDV_VALUE= 1\nFFD_COORD_SYSTEM= POLAR",
-            "FFD_COORD_SYSTEM: 'POLAR' is",
+            "DV_KIND= SCALE\nDV_VALUE= 1\nFFD_COORD_SYSTEM= TORIC",
+            "FFD_COORD_SYSTEM: 'TORIC' is",
         ),
         ("DV_KIND= SCALE\nDV_VALUE= 1\nFFD_CONTINUITY= 3RD", "FFD_CONTINUITY: '3RD' is not supp"),
         (

@@ -182,7 +182,7 @@ def test_mesh_without_boxes_has_none():
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("FFD_LEVEL= 0", "FFD_LEVEL= 1", "FFD box 'MAIN': FFD_LEVEL is 1: nested boxes are not"),
+        ("FFD_LEVEL= 0", "FFD_LEVEL= 1", "FFD_LEVEL is 1; FFD_NLEVEL must be larger, and is 1"),
         ("FFD_DEGREE_J= 1", "FFD_DEGREE_J= x", "FFD_DEGREE_J= x is no whole number from 0"),
         ("FFD_DEGREE_J= 1\n", "", "FFD_DEGREE_J= is missing"),
         ("FFD_DEGREE_J= 1", "FFD_DEGREE_J= 0", "the degree of j is 0; needed is 1 or more"),

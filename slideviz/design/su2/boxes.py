@@ -3,106 +3,188 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from slideviz.case.boxes import boxes_for, defined_boxes, embedding, missing_box, off_points
+from slideviz.case.boxes import (
+    boxes_for,
+    defined_boxes,
+    embedding,
+    missing_box,
+    off_points,
+    system_of,
+)
 from slideviz.case.check import raise_all
 from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.markers import problems_of_markers
-from slideviz.design.su2.planes import idle_variables
-from slideviz.design.su2.variables import DesignVariable
+from slideviz.design.su2.planes import held_by_continuity, places_words, reach, request_of
 from slideviz.errors import CaseError
 from slideviz.ffd.box import Box, Embedding
-from slideviz.ffd.section import with_boxes
+from slideviz.ffd.deformation import BoxDeformation, Drive, Limits
+from slideviz.ffd.kinds import Planes, index_problem, moves_of
+from slideviz.ffd.moves import Move
+from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 
 @dataclass(frozen=True, eq=False)
 class MovedBoxes:
-    """FFD boxes whose control points move (a `Displacer`)."""
+    """FFD boxes that a design deforms (a `Displacer`)."""
 
     config: Su2Config
     mesh: Mesh
     nodes: IntArray
-    boxes: dict[str, Box]
-    """The boxes that variables move, by name."""
+    boxes: tuple[Box, ...]
+    """Those in which variables move nodes or that others carry, in the order of the file."""
     embedded: dict[str, Embedding]
     """The nodes in each box, by their place in ``nodes``."""
-    idle: tuple[bool, ...]
-    """For each variable, whether its control point is held, so that it has no effect."""
+    held: dict[str, Planes]
+    """Planes of control points of each box that do not move."""
     warnings: tuple[str, ...]
 
     @property
     def inside(self) -> dict[str, int]:
-        """Return how many nodes are in each box."""
-        return {name: len(found.nodes) for name, found in self.embedded.items()}
+        """Return how many nodes are in each box that variables move."""
+        names = dict.fromkeys(variable.box for variable in self.config.variables)
+        return {name: len(self.embedded[name].nodes) for name in names}
+
+    @property
+    def idle(self) -> tuple[bool, ...]:
+        """Return for each variable whether it has no effect: none of its points may move."""
+        places = range(len(self.config.variables))
+        return tuple(not any(map(reach, self._moves(place))) for place in places)
+
+    @property
+    def _places(self) -> list[tuple[int, int]]:
+        """Variable and number of the value, from 0, of each value."""
+        variables = enumerate(self.config.variables)
+        return [(place, part) for place, each in variables for part in range(len(each.values))]
+
+    def _moves(self, place: int) -> tuple[Move, ...]:
+        variable = self.config.variables[place]
+        box = next(each for each in self.boxes if each.name == variable.box)
+        return moves_of(box, request_of(self.config, variable), self.held[box.name])
+
+    @cached_property
+    def at_design(self) -> BoxDeformation:
+        """Return the deformation by this design."""
+        values = [value for variable in self.config.variables for value in variable.values]
+        return self._deformed(np.array(values), limits_of(self.config))
+
+    @cached_property
+    def _at_rest(self) -> BoxDeformation:
+        """The deformation by the design that moves nothing."""
+        return self._deformed(np.zeros(len(self._places)), Limits())
+
+    def _deformed(self, values: FloatArray, limits: Limits) -> BoxDeformation:
+        drives = []
+        for value, (place, part) in enumerate(self._places):
+            variable = self.config.variables[place]
+            one = len(variable.values) == 1
+            mine = self._moves(place)[part : part + 1]
+            drives += [Drive(variable.box, move, value, one) for move in mine]
+        return BoxDeformation(
+            self.boxes,
+            self.embedded,
+            drives,
+            values,
+            self.config.relaxation,
+            len(self.nodes),
+            limits,
+        )
 
     def displacement(self) -> FloatArray:
         """Return the displacement (m, d) of the nodes by all variables."""
-        total = np.zeros((len(self.nodes), self.mesh.dim))
-        for place, variable in enumerate(self.config.variables):
-            for part, value in enumerate(variable.values):
-                if not self.idle[place]:
-                    total += (self._rate(place) * value) * self._unit(place, part)
-        return total
+        return self.at_design.nodes[:, : self.mesh.dim]
 
     def slope(self, place: int, part: int, undeformed: bool) -> FloatArray:
-        """Return the derivative (m, d) with respect to a value, which is the same everywhere."""
-        del undeformed
-        return self._rate(place) * self._unit(place, part)
-
-    def _unit(self, place: int, part: int) -> FloatArray:
-        """Return the displacement (m, d) of the nodes by a value of 1 alone."""
-        variable = self.config.variables[place]
-        inside = self.embedded[variable.box]
-        change = self.boxes[variable.box].change(variable.index, variable.shifts[part])
-        out = np.zeros((len(self.nodes), self.mesh.dim))
-        out[inside.nodes] = inside.sums(change)[:, : self.mesh.dim]
-        return out
-
-    def _rate(self, place: int) -> float:
-        """Return OPT_RELAX_FACTOR; or 1 for several values, which SU2 does not multiply by it."""
-        return 1.0 if len(self.config.variables[place].values) > 1 else self.config.relaxation
+        """Return the derivative (m, d) with respect to a value."""
+        where = self._at_rest if undeformed else self.at_design
+        return where.slope(self._places.index((place, part)))[:, : self.mesh.dim]
 
     def boxed(self, mesh: Mesh) -> Mesh:
         """Return a deformed mesh with its FFD boxes moved by the design."""
-        moved = []
-        for name, box in self.boxes.items():
-            change = np.zeros(box.points.shape)
-            for place, variable in enumerate(self.config.variables):
-                if variable.box == name and not self.idle[place]:
-                    for value, shift in zip(variable.values, variable.shifts, strict=True):
-                        vector = np.array(shift) * (self._rate(place) * value)
-                        change += box.change(variable.index, tuple(vector.tolist()))
-            moved.append(box.moved(change))
-        return with_boxes(mesh, moved)
+        moved, renewed = self.at_design.moved(), self.at_design.uvw()
+        for name, (places, uvw) in renewed.items():
+            moved[name] = replace(moved[name], embedded=self._listed(moved[name], places, uvw))
+        return with_boxes(mesh, list(moved.values()), renewed=renewed)
+
+    def _listed(
+        self, box: Box, places: IntArray, uvw: FloatArray
+    ) -> dict[str, tuple[IntArray, FloatArray]]:
+        """Return the surface points of a box with new parametric coordinates (k, 3) of nodes."""
+        nodes, found = self.nodes[places], {}
+        for marker, (listed, before) in box.embedded.items():
+            at = np.minimum(np.searchsorted(nodes, listed), len(nodes) - 1)
+            moves = (nodes[at] == listed) & (marker in self.config.markers)
+            found[marker] = listed, np.where(moves[:, None], uvw[at], before)
+        return found
+
+
+def limits_of(config: Su2Config) -> Limits:
+    """Return what keeps boxes from being deformed too much."""
+    words = config.words
+    prevents = words["FFD_INTPREV"].upper() == "YES"
+    return Limits(
+        float(words["OPT_LINE_SEARCH_BOUND"]),
+        int(float(words["FFD_INTPREV_ITER"])) if prevents else 0,
+        int(float(words["FFD_INTPREV_DEPTH"])),
+    )
 
 
 def move_boxes(config: Su2Config, mesh: Mesh, nodes: IntArray) -> MovedBoxes:
-    """Return the boxes that the variables move, with the nodes (m,) that are inside.
+    """Return the boxes that the variables deform, with the nodes (m,) that are inside.
 
     Raises
     ------
     CaseError
-        A box has no node inside.
+        A box has no node inside, or a nested one is not inside its parent.
     """
-    known = boxes_for(config.case, mesh)
-    boxes, inside, warnings = {}, {}, []
-    for name in dict.fromkeys(variable.box for variable in config.variables):
+    known, names = boxes_for(config.case, mesh), {each.box for each in config.variables}
+    order = [box.name for box in boxes_of(mesh, system_of(config.case))]
+    boxes, inside, warnings = [], {}, []
+    for name in (*order, *(name for name in known if name not in order)):
+        # As in SU2, a box without variables takes the nodes that the file lists for it, too.
+        if name not in names and not known[name].embedded:
+            continue
         on = {marker: embedding(known[name], mesh, marker) for marker in config.markers}
-        boxes[name], inside[name] = _embedded(known[name], on, nodes)
-        if not len(inside[name].nodes):
+        box, inside[name] = _embedded(known[name], on, nodes)
+        boxes.append(box)
+        if name in names and not len(inside[name].nodes):
             raise CaseError(
                 f"{config.source}: no node of {', '.join(config.markers)} is in the FFD box "
                 f"{name!r}; correct the box or DV_MARKER"
             )
-    for box in boxes.values():
-        warnings += [text for name in config.markers for text in off_points(box, mesh, name)]
-    idle, held = idle_variables(config, mesh, boxes)
-    warnings += [*held, *_overlaps(inside)]
-    return MovedBoxes(config, mesh, nodes, boxes, inside, idle, tuple(warnings))
+        if name in names:
+            warnings += [text for each in config.markers for text in off_points(box, mesh, each)]
+    held, stuck = held_by_continuity(config, mesh, {box.name: box for box in boxes})
+    found = MovedBoxes(config, mesh, nodes, tuple(boxes), inside, held, ())
+    try:
+        notes = found.at_design.notes
+    except CaseError as problem:
+        raise CaseError(f"{config.source}: {problem}") from problem
+    return replace(found, warnings=(*warnings, *stuck, *notes, *_without_effect(found)))
+
+
+def _without_effect(found: MovedBoxes) -> list[str]:
+    """Return sentences about variables that move nothing in SU2 either."""
+    reasons: dict[str, list[int]] = {}
+    missed = {found._places[value][0] for value in found.at_design.missed}
+    for place, variable in enumerate(found.config.variables):
+        box = next(each for each in found.boxes if each.name == variable.box)
+        request = request_of(found.config, variable)
+        if place in missed:
+            why = "its segment does not meet its plane of control points"
+        elif any(map(reach, moves_of(box, request))) or variable.kind == "FFD_ANGLE_OF_ATTACK":
+            continue
+        elif variable.kind == "FFD_CONTROL_SURFACE":
+            why = "the box has no control points with i two before the last one, and j two inside"
+        else:
+            why = "three indices of -1 move nothing"
+        reasons.setdefault(f"{variable.kind}: {why}", []).append(place + 1)
+    return [f"as in SU2, {places_words(at)} will do nothing; {why}" for why, at in reasons.items()]
 
 
 def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
@@ -136,17 +218,16 @@ def problems_of_boxes(config: Su2Config, mesh: Mesh) -> list[str]:
         if variable.box not in known:
             said = missing_box(mesh, variable.box, known, "define it with FFD_DEFINITION")
             problems.append(f"variable {place}: {said}")
-        elif wrong := known[variable.box].problem(variable.index):
+            continue
+        box = known[variable.box]
+        if wrong := index_problem(box, request_of(config, variable), mesh.dim):
             problems.append(f"variable {place}: {wrong}")
-        elif mesh.dim == 2 and _leaves_plane(variable):
-            problems.append(f"variable {place}: its direction leaves the plane; write dz = 0")
+        elif mesh.dim == 2 and any(variable.values[2:]):
+            problems.append(f"variable {place}: its third value leaves the plane; write 0")
+        if box.level and config.case.ffd_system != "CARTESIAN":
+            said = f"the FFD box {box.name!r} is nested, which needs FFD_COORD_SYSTEM= CARTESIAN"
+            problems.append(f"variable {place}: {said}")
     return [f"{config.source}: {text}" for text in problems]
-
-
-def _leaves_plane(variable: DesignVariable) -> bool:
-    shifts = zip(variable.values, variable.shifts, strict=True)
-    several = len(variable.values) > 1
-    return any(dz and (value or not several) for value, (_, _, dz) in shifts)
 
 
 def _embedded(
@@ -159,14 +240,3 @@ def _embedded(
     one, first = np.unique(every, return_index=True)
     inside = box.embed(np.searchsorted(nodes, one), uvw[first])
     return (box if box.embedded else replace(box, embedded=listed)), inside
-
-
-def _overlaps(inside: dict[str, Embedding]) -> list[str]:
-    """Return a warning if nodes are in several boxes; or none."""
-    every = [found.nodes for found in inside.values()]
-    shared = sum(map(len, every)) - len(np.unique(np.concatenate([*every, np.empty(0, int)])))
-    said = (
-        f"{shared} nodes are in several of the FFD boxes {', '.join(inside)}: what these do is "
-        "added up, where SU2 takes the last"
-    )
-    return [said] if shared else []

@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
+from math import inf
 from pathlib import Path
 
 from slideviz.case.key import MOTION
 from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, require_no_mesh
 from slideviz.case.model import Case
-from slideviz.case.words import list_of, nearest, not_one_of, shown
+from slideviz.case.words import list_of, nearest, not_one_of, number, shown
 from slideviz.design.su2.radial import FUNCTION, READ_WITH_RBF, radial_keys, radial_settings
 from slideviz.design.su2.variables import DesignVariable, read_variables, supported
 from slideviz.errors import CaseError
@@ -47,13 +48,32 @@ WORDS = {
     "READ_BINARY_RESTART": "YES",
     "FFD_CONTINUITY": "",
     "FFD_SYMMETRY_PLANE": "NO",
-    "FFD_COORD_SYSTEM": "CARTESIAN",
     "FFD_FIX_I": "NONE",
     "FFD_FIX_J": "NONE",
     "FFD_FIX_K": "NONE",
+    "FFD_INTPREV": "NO",
+    "FFD_INTPREV_ITER": "10",
+    "FFD_INTPREV_DEPTH": "3",
+    "CONVEXITY_CHECK": "NO",
+    "CONVEXITY_CHECK_ITER": "10",
+    "CONVEXITY_CHECK_DEPTH": "3",
+    "OPT_LINE_SEARCH_BOUND": "1E6",
+    "REF_LENGTH": "1.0",
 }
 """Other keys of one value or list, with SU2's defaults; except FFD_CONTINUITY, which is empty:
 control points are held only if the key is given."""
+NUMBERS = {
+    "OPT_RELAX_FACTOR": -inf,
+    "OPT_LINE_SEARCH_BOUND": 0.0,
+    "REF_LENGTH": 0.0,
+    "FFD_INTPREV_ITER": 0.0,
+    "FFD_INTPREV_DEPTH": 0.0,
+    "CONVEXITY_CHECK_ITER": 0.0,
+    "CONVEXITY_CHECK_DEPTH": 0.0,
+}
+"""Keys of numbers among them, and what these must be above."""
+COUNTS = ("_ITER", "_DEPTH")
+"""Endings of those whose number is a whole one."""
 LISTS = ("DV_KIND", "DV_PARAM", "DV_VALUE", "DV_MARKER", "MARKER_DEFORM_MESH")
 NOT_HERE = ("MARKER_MOVING", "MESH_FORMAT", "MESH_OUT_FORMAT", *FILES)
 """Keys of case files that mean something else in SU2, or are read in another way."""
@@ -294,8 +314,9 @@ class _Reader:
         """Note unsupported values, a missing DV_KIND, and keys that belong in a case file."""
         for key, allowed in (
             ("FFD_CONTINUITY", ("", *CONTINUITIES)),
-            ("FFD_COORD_SYSTEM", ("CARTESIAN",)),
             ("FFD_SYMMETRY_PLANE", ("YES", "NO")),
+            ("FFD_INTPREV", ("YES", "NO")),
+            ("CONVEXITY_CHECK", ("YES", "NO")),
             ("DV_SENSITIVITY_FORMAT", ("SU2_NATIVE", "UNORDERED_ASCII")),
         ):
             if words[key].upper() not in allowed:
@@ -309,11 +330,14 @@ class _Reader:
         for key in ("FFD_FIX_I", "FFD_FIX_J", "FFD_FIX_K"):
             if any(not word.text.isdecimal() for word in list_of(words[key])):
                 self.note(self.rows[key], f"{shown(words[key])} is no list of whole numbers")
-        try:
-            float(words["OPT_RELAX_FACTOR"])
-        except ValueError:
-            entry = self.rows["OPT_RELAX_FACTOR"]
-            self.note(entry, f"{shown(entry.value)} is not a number")
+        for key, least in NUMBERS.items():
+            try:
+                value = number(words[key])
+                if value <= least or (key.endswith(COUNTS) and value != int(value)):
+                    whole = "whole number" if key.endswith(COUNTS) else "number"
+                    raise CaseError(f"{shown(words[key])} is no {whole} above {least:g}")
+            except CaseError as problem:
+                self.note(self.rows[key], str(problem))
         if "DV_KIND" not in self.rows:
             said = (
                 f"DV_KIND is missing: which design variables there are ({', '.join(supported())})"

@@ -64,16 +64,16 @@ KINDS = {
     "FFD_SETTING": Kind("boxes"),
     "FFD_CONTROL_POINT": Kind("ffd", "BOX, i, j, k, dx, dy, dz", several="dx, dy, dz"),
     "FFD_CONTROL_POINT_2D": Kind("ffd", "BOX, i, j, dx, dy", several="dx, dy"),
-    "FFD_CAMBER": Kind("ffd", "BOX, i, j", refused=NOT_YET),
-    "FFD_CAMBER_2D": Kind("ffd", "BOX, i", refused=NOT_YET),
-    "FFD_THICKNESS": Kind("ffd", "BOX, i, j", refused=NOT_YET),
-    "FFD_THICKNESS_2D": Kind("ffd", "BOX, i", refused=NOT_YET),
-    "FFD_TWIST": Kind("ffd", "BOX, j, x0, y0, z0, x1, y1, z1", refused=NOT_YET),
-    "FFD_ROTATION": Kind("ffd", "BOX, x0, y0, z0, x1, y1, z1", refused=NOT_YET),
-    "FFD_CONTROL_SURFACE": Kind("ffd", "BOX, x0, y0, z0, x1, y1, z1", refused=NOT_YET),
-    "FFD_GULL": Kind("ffd", "BOX, j", refused=NOT_YET),
-    "FFD_NACELLE": Kind("ffd", "BOX, i, j, k, dr, dx", refused=NOT_YET),
-    "FFD_ANGLE_OF_ATTACK": Kind("ffd", "BOX, one", refused=NOT_YET),
+    "FFD_CAMBER": Kind("ffd", "BOX, i, j"),
+    "FFD_CAMBER_2D": Kind("ffd", "BOX, i"),
+    "FFD_THICKNESS": Kind("ffd", "BOX, i, j"),
+    "FFD_THICKNESS_2D": Kind("ffd", "BOX, i"),
+    "FFD_TWIST": Kind("ffd", "BOX, j, x0, y0, z0, x1, y1, z1"),
+    "FFD_ROTATION": Kind("ffd", "BOX, x0, y0, z0, x1, y1, z1"),
+    "FFD_CONTROL_SURFACE": Kind("ffd", "BOX, x0, y0, z0, x1, y1, z1"),
+    "FFD_GULL": Kind("ffd", "BOX, j"),
+    "FFD_NACELLE": Kind("ffd", "BOX, i, j, k, dr, dx"),
+    "FFD_ANGLE_OF_ATTACK": Kind("ffd", "BOX, one"),
     "FFD_TWIST_2D": Kind(
         "ffd",
         "BOX, x, y",
@@ -119,20 +119,6 @@ class DesignVariable:
         """Return the parameter of a name in `Kind.form`; ``default`` where it has none."""
         names = [one for one in KINDS[self.kind].parameters if one != "BOX"]
         return dict(zip(names, self.numbers, strict=True)).get(name, default)
-
-    @property
-    def index(self) -> tuple[int, int, int]:
-        """Return the index of its control points, -1 for all of a direction."""
-        i, j, k = (int(self.parameter(letter, -1.0)) for letter in "ijk")
-        return i, j, k
-
-    @property
-    def shifts(self) -> tuple[tuple[float, float, float], ...]:
-        """Return the shift (dx, dy, dz) of its control points by each value of 1."""
-        if len(self.values) > 1:
-            axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-            return axes[: len(self.values)]
-        return ((self.parameter("dx"), self.parameter("dy"), self.parameter("dz")),)
 
 
 def supported() -> list[str]:

@@ -17,7 +17,18 @@ from typing import Any
 from slideviz.case.cfg import set_key
 from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, Cst, Ffd, FromFile, HicksHenne, Motion, Prescribed, named
+from slideviz.case.model import (
+    BoxMotion,
+    Case,
+    Cst,
+    FfdTwist,
+    FromFile,
+    HicksHenne,
+    Motion,
+    Prescribed,
+    named,
+)
+from slideviz.case.motion_text import VERB_OF
 from slideviz.case.words import nearest, number, shown
 from slideviz.errors import CaseError
 
@@ -212,10 +223,10 @@ def _usual(name: str) -> str:
 
 def _head(motion: Motion) -> str:
     """Return the begin of the names of a motion's numbers: ``BLADE.translate``."""
-    kind = "hicks-henne" if isinstance(motion, HicksHenne) else type(motion).__name__.lower()
-    head = f"{'+'.join(named(motion.marker)) or '*'}.{kind}"
-    if isinstance(motion, Ffd):
-        return ".".join([head, motion.box, *map(str, motion.index)])
+    head = f"{'+'.join(named(motion.marker)) or '*'}.{VERB_OF.get(type(motion), '')}"
+    if isinstance(motion, BoxMotion):
+        at = (motion.plane,) if isinstance(motion, FfdTwist) else motion.index
+        return ".".join([head, motion.box, *map(str, at)])
     if isinstance(motion, HicksHenne | Cst):
         head = f"{head}.{motion.side}"
     return f"{head}.{motion.term[0]}" if isinstance(motion, Cst) else head
@@ -226,7 +237,7 @@ def _parts(motion: Motion, at: int) -> Iterator[tuple[str, NumberPlace]]:
     if isinstance(motion, FromFile | Prescribed):
         return
     for field in fields(motion):
-        if field.name in ("index", "term", "chord"):  # what it moves does not vary
+        if field.name in ("index", "plane", "term", "chord"):  # what it moves does not vary
             continue
         value = getattr(motion, field.name)
         if _is_number(value):

@@ -21,7 +21,7 @@ from slideviz import __version__
 from slideviz.case.check import effective
 from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, Ffd, FromFile, Prescribed
+from slideviz.case.model import BoxMotion, Case, FromFile, Prescribed
 from slideviz.design.sweeps.columns import Value
 from slideviz.design.sweeps.designs import Designs, own_columns
 from slideviz.design.sweeps.lock import FolderLock
@@ -246,7 +246,7 @@ def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
     found = {
         "mesh": _digest(mesh.points, mesh.cells.types, mesh.cells.connectivity, *chain(*boundaries))
     }
-    if any(isinstance(motion, Ffd) for motion in written):
+    if any(isinstance(motion, BoxMotion) for motion in written):
         found["FFD_TAG section of the mesh"] = _digest(pickle.dumps(boxes_of(mesh)))
     for at, one in enumerate(given, start=1):
         found[f"displacement {at}"] = _digest(one.nodes, one.vectors)

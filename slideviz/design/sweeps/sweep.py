@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from slideviz.argument_types import check_types
-from slideviz.case.model import Case, Ffd, FromFile
+from slideviz.case.model import BoxMotion, Case, FromFile
 from slideviz.design.sweeps.designs import Design, Table, read_designs
 from slideviz.design.sweeps.processes import Processes, usable_cores
 from slideviz.design.sweeps.results import SweepResults, sources_of
@@ -161,7 +161,7 @@ class _Tasks:
 
     def __init__(self, mesh: Mesh, designs: Sequence[Design], folder: Path | None) -> None:
         self._folder = None if folder is None else Path(folder).absolute()
-        boxes = any(isinstance(m, Ffd) for design in designs for m in design.case.motions)
+        boxes = any(isinstance(m, BoxMotion) for design in designs for m in design.case.motions)
         # The text of the file, which has boxes besides what writing keeps, is much of a mesh.
         lean = replace(mesh, origin=Origin())
         self.packed: Packed = packed(mesh if boxes or folder is not None else lean)
