@@ -13,6 +13,7 @@ from slideviz.cli.options import add_shared, changed
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
+    from slideviz.deformation.steps import Step
     from slideviz.design.su2.config import Su2Config
     from slideviz.design.su2.surface import MovingSurface
     from slideviz.mesh.model import Mesh
@@ -73,6 +74,7 @@ def run_def(arguments: argparse.Namespace) -> int:
     from slideviz.cli.report import folded_cells, run_report
     from slideviz.cli.run_command import pull
     from slideviz.cli.run_outcome import CELLS, advice_for, tell, write_qualities
+    from slideviz.design.su2.convexity import convex_part
     from slideviz.design.su2.surface import at_rest, make_surface
 
     begin = time.perf_counter()
@@ -94,14 +96,18 @@ def run_def(arguments: argparse.Namespace) -> int:
     if config.variables[0].kind == "FFD_SETTING":
         return _set_boxes(arguments, config, mesh, begin)
     seconds = {"read": time.perf_counter() - begin}
-    surface = make_surface(config, mesh)
-    tell_lost(output, surface.displacer.boxed(mesh), kind)
+
+    def attempt(config: Su2Config) -> tuple[MovingSurface, list[Step]]:
+        surface = make_surface(config, mesh)
+        moves, case = surface.displacement.any(), surface.case()
+        if surface.whole or not moves:
+            return surface, [at_rest(case, surface.moved() if moves else mesh)]
+        return surface, pull(arguments, case, mesh)
+
+    tell_lost(output, make_surface(config, mesh).displacer.boxed(mesh), kind)
+    part, (surface, steps), said = convex_part(config, mesh, attempt, lambda each: each[1][-1].mesh)
     case = surface.case()
-    moves = surface.displacement.any()
-    if surface.whole or not moves:
-        steps = [at_rest(case, surface.moved() if moves else mesh)]
-    else:
-        steps = pull(arguments, case, mesh)
+    steps[-1] = replace(steps[-1], warnings=(*steps[-1].warnings, *said))
     seconds["quality"] = -time.perf_counter()
     found = quality(steps[-1].mesh, reference=mesh, metric=case.quality_metric)
     before = quality(mesh, metric=case.quality_metric)
@@ -119,6 +125,7 @@ def run_def(arguments: argparse.Namespace) -> int:
     report["design"] = {
         "variables": variable_rows(surface),
         "boxes": surface.displacer.inside,
+        "part": part,
         "ignored": list(config.ignored),
     }
     return tell(

@@ -30,9 +30,8 @@ def run_dot(arguments: argparse.Namespace) -> int:
     from slideviz.cli.places import OutputPath, require_places
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import print_remarks, save_json
-    from slideviz.design.su2.gradients import find_gradients
+    from slideviz.design.su2.gradients import design_gradients
     from slideviz.design.su2.sensitivities import sensitivity_file
-    from slideviz.design.su2.surface import make_surface
     from slideviz.errors import CaseError
 
     begin = time.perf_counter()
@@ -50,9 +49,8 @@ def run_dot(arguments: argparse.Namespace) -> int:
         OutputPath(gradient, "GRAD_OBJFUNC_FILENAME", False),
         OutputPath(arguments.json, "--json"),
     )
-    surface = make_surface(config, mesh)
     with Bar(not arguments.quiet) as bar:
-        found = find_gradients(surface, bar)
+        surface, found = design_gradients(config, mesh, bar)
     _write_surface(sensitivities, found)
     if gradient is not None:
         _write_gradient(gradient, config, found)

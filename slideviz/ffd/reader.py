@@ -51,6 +51,8 @@ def read_boxes(mesh: Mesh, lines: list[str], system: CoordinateSystem) -> tuple[
             raise _error(mesh, line, f"the FFD box {name!r} stands twice; rename one")
     _require_count(mesh, lines, names)
     levels = next((_value(line) for line in lines if key_of(line) == "FFD_NLEVEL"), "1")
+    for reader in readers:
+        reader.check_tags(names)
     for reader, box in zip(readers, boxes, strict=True):
         reader.check_nesting(box, boxes, int(levels) if levels.isdecimal() else 1)
     return boxes
@@ -152,6 +154,12 @@ class _Reader:
         if key not in self.entries:
             return ()
         return tuple(" ".join(words) for _, words in self.rows(key, self.count(key)))
+
+    def check_tags(self, names: list[str]) -> None:
+        """Raise MeshError where a parent or child is not among the names of the boxes."""
+        for name in (*self.tags("FFD_PARENTS"), *self.tags("FFD_CHILDREN")):
+            if name not in names:
+                raise self.error(f"there is no FFD box {name!r} beside it, but {', '.join(names)}")
 
     def check_nesting(self, box: Box, boxes: tuple[Box, ...], levels: int) -> None:
         """Raise MeshError where SU2 could not deform a nested box with those around it."""

@@ -99,6 +99,8 @@ def test_examples_of_the_reference_are_read():
         text = line.split("  ")[0]
         for word, value in {
             "i, j, k, dx, dy, dz": "0, -1, 1, 1, 2, 3",
+            "i, j, dz": "0, 1, 2",
+            "j, degrees": "1, 5",
             "dx, dy[, dz]": "1, 2",
             "degrees": "5",
             "px, py[, pz]": "1, 2",

@@ -20,6 +20,7 @@ from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.markers import problems_of_markers
 from slideviz.design.su2.planes import held_by_continuity, places_words, reach, request_of
+from slideviz.design.su2.variables import angle_notes
 from slideviz.errors import CaseError
 from slideviz.ffd.box import Box, Embedding
 from slideviz.ffd.deformation import BoxDeformation, Drive, Limits
@@ -165,7 +166,8 @@ def move_boxes(config: Su2Config, mesh: Mesh, nodes: IntArray) -> MovedBoxes:
         notes = found.at_design.notes
     except CaseError as problem:
         raise CaseError(f"{config.source}: {problem}") from problem
-    return replace(found, warnings=(*warnings, *stuck, *notes, *_without_effect(found)))
+    notes = [*notes, *_without_effect(found), *angle_notes(config.variables, config.relaxation)]
+    return replace(found, warnings=(*warnings, *stuck, *notes))
 
 
 def _without_effect(found: MovedBoxes) -> list[str]:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from slideviz.deformation.solver import deform
 from slideviz.deformation.steps import Progress
 from slideviz.design.deformer import Deformer
+from slideviz.design.su2.config import Su2Config
+from slideviz.design.su2.convexity import convex_part
 from slideviz.design.su2.restart import angle_sensitivity
 from slideviz.design.su2.sensitivities import (
     CLOSE,
@@ -20,9 +22,9 @@ from slideviz.design.su2.sensitivities import (
     match,
     read_sensitivities,
 )
-from slideviz.design.su2.surface import MovingSurface
+from slideviz.design.su2.surface import MovingSurface, make_surface
 from slideviz.errors import ConditionWarning, ToleranceWarning
-from slideviz.mesh.model import FloatArray, largest_coordinate
+from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 
 DIRECTIONS = 16
 """Most displacements for which control nodes are chosen at a design of zeros."""
@@ -60,6 +62,31 @@ class Gradients:
     at_design: bool
     source: str
     warnings: tuple[str, ...]
+
+
+def design_gradients(
+    config: Su2Config, mesh: Mesh, progress: Callable[[Progress], None] | None = None
+) -> tuple[MovingSurface, Gradients]:
+    """Return the moving boundaries of a configuration, and the gradients (`find_gradients`).
+
+    With CONVEXITY_CHECK both are of the part of the design that `slideviz def` does; gradients are
+    with respect to the values in the configuration.
+    """
+    if config.words["CONVEXITY_CHECK"].upper() != "YES":
+        surface = make_surface(config, mesh)
+        return surface, find_gradients(surface, progress)
+
+    def attempt(config: Su2Config) -> tuple[MovingSurface, Mesh]:
+        surface = make_surface(config, mesh)
+        if surface.whole or not surface.displacement.any():
+            return surface, surface.moved()
+        *_, last = deform(surface.case(), mesh, progress)
+        return surface, last.mesh
+
+    part, (surface, _), said = convex_part(config, mesh, attempt, lambda each: each[1])
+    found = find_gradients(surface, progress)
+    variables = part * found.variables if found.at_design else found.variables
+    return surface, replace(found, variables=variables, warnings=(*found.warnings, *said))
 
 
 def find_gradients(

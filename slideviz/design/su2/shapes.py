@@ -11,7 +11,7 @@ import numpy as np
 from slideviz.case.bumps import hicks_henne, kulfan, normals_at, side_of, surface_bump
 from slideviz.case.motion_text import require_peak
 from slideviz.design.su2.config import Su2Config
-from slideviz.design.su2.variables import DesignVariable
+from slideviz.design.su2.variables import DesignVariable, angle_notes
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
@@ -214,14 +214,8 @@ class Shapes:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Return what a variable does to the flow only, and where SU2 would do otherwise."""
-        variables, said = self.config.variables, []
-        angles = [each for each in variables if each.kind == "ANGLE_OF_ATTACK"]
-        if angles:  # of which the last one wins in SU2
-            offset = self.config.relaxation * angles[-1].value
-            said.append(
-                "ANGLE_OF_ATTACK moves no node; add its value times OPT_RELAX_FACTOR, "
-                f"{offset:.10g} degrees, to AOA of the flow"
-            )
+        variables = self.config.variables
+        said = angle_notes(variables, self.config.relaxation)
         heights = {each.numbers[2] for each in variables if each.kind == "ROTATION"}
         if self.mesh.dim == 3 and heights - {*variables[0].numbers[2:3]}:
             said.append(

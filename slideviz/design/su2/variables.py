@@ -6,7 +6,7 @@ variables as ``DV_PARAM`` has parts between semicolons, and passes over what fol
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -306,3 +306,15 @@ def _why_ignored(variable: DesignVariable, first: DesignVariable) -> str:
     if order < leading and first.kind != "ANGLE_OF_ATTACK":
         return f"its motion is lost, since {first.kind}, which stands first, begins anew after it"
     return ""
+
+
+def angle_notes(variables: Sequence[DesignVariable], relaxation: float) -> list[str]:
+    """Return what an angle of attack among variables does to the flow; or none."""
+    angles = [each for each in variables if each.kind.endswith("ANGLE_OF_ATTACK")]
+    if not angles:
+        return []
+    offset = relaxation * angles[-1].value  # the last one wins in SU2
+    what = f"{angles[-1].kind} moves no node"
+    return [
+        f"{what}; add its value times OPT_RELAX_FACTOR, {offset:.10g} degrees, to AOA of the flow"
+    ]
