@@ -387,7 +387,15 @@ POINTS_SHOWN: dict[PointsShown, Term] = {
 }
 
 Shown = Literal[
-    "edges", "undeformed", "motion_ghost", "legend", "triad", "inverted", "ffd", "perspective"
+    "edges",
+    "undeformed",
+    "motion_ghost",
+    "legend",
+    "triad",
+    "inverted",
+    "ffd",
+    "support",
+    "perspective",
 ]
 
 
@@ -454,6 +462,13 @@ SHOWN: dict[Shown, ShownTerm] = {
         shortcut="B",
         needs="boxes",
         why_not="There are no boxes: neither in the mesh file nor in the case (FFD_DEFINITION).",
+        in_bar=False,
+    ),
+    "support": ShownTerm(
+        "Support radius",
+        "Draw how far the radial functions of the moving boundaries reach: a circle or sphere "
+        "around each of these.",
+        shortcut="D",
         in_bar=False,
     ),
     "perspective": ShownTerm(

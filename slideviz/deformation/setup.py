@@ -244,7 +244,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
     second = np.flatnonzero(stands != np.arange(len(stands)))
     images = np.stack([stands[second], second], axis=1)
     angle = frame.period if frame.cylindrical else 0.0
-    basis = Basis(support_radius(case, mesh, boundary, moved), angle, case.kernel)
+    basis = Basis(support_radius(case, mesh, moved), angle, case.kernel)
     return Setup(
         frame=frame,
         basis=basis,
@@ -264,7 +264,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
         tracks=tracks,
         pairs=pairs,
         solve=_method(case, mesh, frame, axis),
-        fitted_radius=fitted_radius(case, mesh, boundary, moved),
+        fitted_radius=fitted_radius(case, mesh, moved),
         halo=mesh.halo,
         warnings=(*mesh.remarks, *notes, *warnings, *loose, *idle_settings(case)),
     )

@@ -30,6 +30,7 @@ from slideviz.scene.passages import PassageLayer
 from slideviz.scene.points import PointLayer
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
+from slideviz.scene.support import SupportLayer
 from slideviz.scene.threshold import ThresholdLayer
 from slideviz.session.colors import as_drawn
 from slideviz.session.inspect import cell_at, surroundings
@@ -69,6 +70,7 @@ class Scene:
             MarkLayer(self.stage),
             self._ghosts,
             BoxLayer(self.stage),
+            SupportLayer(self.stage),
             PassageLayer(self.stage, self._cells, self._boundaries, self._threshold),
             PointLayer(self.stage),
             InvertedLayer(self.stage, self.sections),

@@ -15,6 +15,8 @@ from slideviz.case.given import key_of, placed_displacements
 from slideviz.case.model import Case, FromFile, Target, moves
 from slideviz.case.motion import displacements, moved_together
 from slideviz.case.motion_words import direction_words
+from slideviz.deformation.prescribed import displaced
+from slideviz.deformation.radius import moving_bodies, support_radius
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
@@ -111,6 +113,36 @@ def largest_prescribed(case: Case, mesh: Mesh) -> float:
     except (OSError, SlidevizError):
         return 0.0
     return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
+
+
+def support_key(case: Case, mesh: Mesh) -> tuple[object, ...]:
+    """Return the values on which `support_of` depends."""
+    moving, boxes = case.markers_with("moving"), (case.ffd_boxes, case.ffd_degrees, case.ffd_orders)
+    given = case.method, case.influence_factor, case.support_radius
+    return mesh, moving, case.motions, boxes, case.ffd_blending, given
+
+
+def shown_case(session: Session) -> Case:
+    """Return the case of the run of which a step is shown, or else that in the panels."""
+    ran = session.frame is not None and session.frame.step is not None
+    run = session.run_shown if ran else None
+    return session.case if run is None else run.case
+
+
+def support_of(case: Case, mesh: Mesh) -> tuple[float, FloatArray]:
+    """Return the support radius of a case, and the boxes (b, 2, d) of what moves.
+
+    0 and none where the case has no such radius, or mistakes, which are reported elsewhere.
+    """
+    none = 0.0, np.empty((0, 2, mesh.dim))
+    if case.method != "rbf" or set(case.markers_with("moving")) - {*mesh.marker_names}:
+        return none
+    try:
+        moved = displaced(displacements(case, mesh), mesh)
+        boxes = moving_bodies(case, mesh, moved)
+    except (OSError, SlidevizError):
+        return none
+    return (support_radius(case, mesh, moved), boxes) if len(boxes) else none
 
 
 class Ghosts:

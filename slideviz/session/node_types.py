@@ -11,6 +11,7 @@ from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.fans import Fans, find_fans
 from slideviz.mesh.model import IntArray, Mesh
+from slideviz.session.motions import shown_case
 from slideviz.session.state import Session
 from slideviz.terms import NODE_TYPES, NodeType
 
@@ -64,9 +65,7 @@ class NodeTypes:
         if session.view.points == "control":
             return control_nodes(session)
         # A step has the types of its run's case, which the session's may have left since.
-        ran = session.frame is not None and session.frame.step is not None
-        run = session.run_shown if ran else None
-        return self._typed(session.mesh, session.case if run is None else run.case)
+        return self._typed(session.mesh, shown_case(session))
 
     def _typed(self, mesh: Mesh, case: Case) -> TypedNodes:
         roles = tuple(case.roles.get(name, "fixed") for name in mesh.marker_names)

@@ -9,7 +9,6 @@ from slideviz.case.motion import displacements
 from slideviz.deformation.radius import BODIES, DISPLACEMENTS, EXTENTS, moving_bodies
 from slideviz.deformation.setup import make_setup
 from slideviz.errors import ArgumentError
-from slideviz.mesh.cached_boundary import boundary_of
 from tests.builders import far_field
 
 
@@ -46,12 +45,11 @@ def test_only_bodies_that_are_displaced_count():
         roles={"body": "moving", "other": "moving"},
         motions=(sv.Translate("body", (0.1, 0.0)), sv.Translate("other", (0.0, 0.0))),
     )
-    boundary = boundary_of(mesh)
     setup = make_setup(both, mesh)
     body = np.ptp(mesh.points[mesh.marker("body").nodes], axis=0).max()
     assert setup.basis.radius == BODIES * body
     still = both.change(motions=(sv.Translate(("body", "other"), (0.0, 0.0)),))
-    boxes = moving_bodies(still, mesh, boundary, displacements(still, mesh))
+    boxes = moving_bodies(still, mesh, displacements(still, mesh))
     other = np.ptp(mesh.points[mesh.marker("other").nodes], axis=0).max()
     assert len(boxes) == 2
     assert make_setup(still, mesh).basis.radius == BODIES * max(body, other)

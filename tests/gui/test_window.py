@@ -420,6 +420,7 @@ def test_settings_reach_the_case_and_impossible_numbers_do_not(opened):
     opened.type(field, "auto")
     assert opened.session.case.influence_factor == 0
     assert field.text() == "automatic"
+    assert more.radius.isHidden()  # nothing moves
     kernel = more.kernel
     assert kernel.count() == 14
     assert {kernel.itemData(row) for row in range(14)} >= {"wendland-c2", "gaussian"}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from slideviz.case.model import Ffd
+from slideviz.case.model import Ffd, Rotate
 from slideviz.color_scheme import DARK, LIGHT
 from slideviz.ffd.box import CORNERS, regular_box
 from slideviz.ffd.section import with_boxes
@@ -21,11 +21,13 @@ from slideviz.scene.passages import (
     outermost,
 )
 from slideviz.scene.pick import to_display
+from slideviz.scene.support import circles
 from slideviz.scene.threshold import ThresholdLayer
 from slideviz.session import changes
 from slideviz.session.inspect import middles
 from slideviz.session.state import StepFrame
 from slideviz.terms import NODE_TYPES, ROLES
+from tests.builders import far_field
 
 LEFT = np.array([-0.004, 0.0])
 
@@ -365,3 +367,30 @@ def test_some_boundaries_fill_the_view(scene, passage):
     assert np.ptp(at[:, 1]) == pytest.approx(0.92 * scene.plotter.window_size[1], rel=0.01)
     scene.fit()
     assert scene.plotter.camera.parallel_scale == pytest.approx(whole)
+
+
+def test_the_support_radius_is_a_circle_around_what_moves(scene):
+    mesh = far_field(60.0)
+    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
+    session = changes.set_role(session, ["body"], "moving")
+    moved = changes.add_motion(session, Rotate("body", 20.0))
+    scene.open(moved, find_surfaces(mesh))
+    assert "support:circles" not in scene.plotter.actors
+    shown = changes.set_view(moved, support=True)
+    scene.update(shown)
+    found = scene.plotter.actors["support:circles"].mapper.dataset
+    np.testing.assert_allclose(np.linalg.norm(found.points[:, :2], axis=1), 15.0)
+    scene.update(changes.set_case(shown, influence_factor=0.5))
+    found = scene.plotter.actors["support:circles"].mapper.dataset
+    np.testing.assert_allclose(np.linalg.norm(found.points[:, :2], axis=1), 60.0)
+    scene.update(changes.set_case(shown, method="idw"))
+    assert "support:circles" not in scene.plotter.actors
+    scene.update(moved)
+    assert "support:circles" not in scene.plotter.actors
+
+
+def test_a_sphere_of_the_support_radius_is_three_circles():
+    points = circles(np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]), 2.0).reshape(2, 3, -1, 3)
+    for body, middle in zip(points, ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0]), strict=True):
+        np.testing.assert_allclose(np.linalg.norm(body - middle, axis=2), 2.0)
+        assert (np.ptp(body, axis=1) == 0).sum() == 3

@@ -32,7 +32,7 @@ from slideviz.gui.widgets.fields import NumberField, number_text
 from slideviz.gui.widgets.panel import Panel
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes
-from slideviz.session.motions import found_text, largest_prescribed
+from slideviz.session.motions import found_text, largest_prescribed, support_key, support_of
 from slideviz.session.run_messages import Requirement, loose_words
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -63,6 +63,9 @@ class MoreSettings(QWidget):
         self.level_end.changed.connect(self._level_end_changed)
         self.form = KeyForm("more", {"MULTILEVEL": self.levels, "LVL_SIZE": self.level_end})
         self.form.changed.connect(self.changed)
+        self.radius = hint_label()
+        row, _ = _position(self.form, self.form.fields["influence_factor"])
+        self.form.insertRow(row + 1, "", self.radius)
         self.button = tool_button(self.form.words, text="More settings", name="more")
         self.button.setCheckable(True)
         self.button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
@@ -119,6 +122,7 @@ class MethodPanel(Panel):
         self.tolerance_hint.setWordWrap(False)
         # The largest prescribed displacement, and the mesh, roles and motions that it is of.
         self._largest: tuple[tuple[object, ...], float] = ((), 0.0)
+        self._support: tuple[tuple[object, ...], float] = ((), 0.0)
         self._complete_form()
         parts = (self.form, self.reason, self.more, None)
         in_column(*parts, on=self.area.widget(), margins=(6, 6, 6, 4))
@@ -226,12 +230,26 @@ class MethodPanel(Panel):
         largest = self._largest_of(session) if typed else 0.0
         self.loose.setText(loose_words(case, extent, largest))
         self.form.setRowVisible(self.loose, bool(self.loose.text()))
+        self.more.radius.setText(self._radius_words(session))
+        self.more.form.setRowVisible(self.more.radius, bool(self.more.radius.text()))
         reasons = (("Sliding", nothing_slides(case)), ("Periodicity", no_pair(case)))
         why = "\n".join(f"{title}: {why}." for title, why in reasons if why)
         self.reason.setText(why if session.mesh is not None else "Open a mesh first.")
         self.reason.setVisible(bool(self.reason.text()))
         self.found.setText(found_text(session))
         self.form.setRowVisible(self.found, bool(self.found.text()))
+
+    def _radius_words(self, session: Session) -> str:
+        """Return the support radius in words; "" where there is none."""
+        case, mesh = session.case, session.mesh
+        if mesh is None:
+            return ""
+        key = support_key(case, mesh)
+        if key != self._support[0]:
+            self._support = key, support_of(case, mesh)[0]
+        radius = self._support[1]
+        given = "" if case.support_radius is None else ", a length of the case file"
+        return f"a radius of {radius:.4g}{given}" if radius else ""
 
     def _largest_of(self, session: Session) -> float:
         """Return the largest prescribed displacement, computed once for each set of motions."""

@@ -115,8 +115,8 @@ class NumberField(TextField):
         tip: str = "",
         words: Mapping[float, str] | None = None,
     ) -> None:
-        super().__init__(short_text(value))
         self._words = words or {}
+        super().__init__(self._words.get(value, short_text(value)))
         self._allowed = allowed or (lambda _: "")
         self._value = self._before = float(value)
         self._scale = 0.0
