@@ -426,3 +426,27 @@ def test_elasticity_that_su2_is_asked_for_is_noted(here):
     Path("a.cfg").write_text(f"{HEAD}DV_KIND= SCALE\nDV_VALUE= 1.1\nDEFORM_KIND= ELASTIC\n")
     (said,) = read_config(Path("a.cfg")).case.warnings
     assert said.startswith("DEFORM_KIND= ELASTIC: radial functions move the mesh all the same; wr")
+
+
+def turned(points, numbers, degrees):
+    """Points turned about the line through two points; the angle may be complex."""
+    first, second = np.array(numbers).reshape(2, 3)
+    unit = (second - first) / np.linalg.norm(second - first)
+    angle, arm = np.pi / 180.0 * degrees, points - first
+    along = (arm @ unit)[:, None] * unit
+    across = np.cross(unit, arm)
+    return first + np.cos(angle) * arm + (1.0 - np.cos(angle)) * along + np.sin(angle) * across
+
+
+@pytest.mark.parametrize("kind", ["ROTATION", "ROTATE_GRID"])
+def test_rotations_and_their_rates_are_those_of_a_complex_step(kind, here):
+    numbers, value = (0.1, -0.2, 0.3, 1.0, 0.5, -0.4), 25.0
+    text = f"DV_KIND= {kind}\nDV_PARAM= {numbers}\nDV_VALUE= {value}\nOPT_RELAX_FACTOR= 0.8\n"
+    found = surface(ball(), ("sphere",), text)
+    points = found.mesh.points[found.nodes]
+    expected = turned(points, numbers, 0.8 * value)
+    np.testing.assert_allclose(points + found.displacement, expected, atol=1e-15)
+    rate = turned(points, numbers, 0.8 * (value + 1e-30j)).imag / 1e-30
+    np.testing.assert_allclose(found.slope(0), rate, atol=1e-16)
+    still = turned(points, numbers, 0.8e-30j).imag / 1e-30
+    np.testing.assert_allclose(found.slope(0, undeformed=True), still, atol=1e-16)
