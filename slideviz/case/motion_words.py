@@ -227,17 +227,21 @@ def _bump(motion: OnAirfoil, by: str, form: str = ".4g") -> str:
     return f"{what} {by} at {format(100.0 * motion.peak, form)} % chord"
 
 
-def _control(motion: BoxMotion) -> str:
+def _control(motion: Ffd | FfdCamber | FfdThickness) -> str:
     """Return the control points that a motion moves, and their box, in words."""
-    which = (motion.plane,) if isinstance(motion, FfdTwist) else motion.index
-    at = ", ".join("all" if index < 0 else str(index) for index in which)
-    return f"({at}) of {motion.box or '(no box yet)'}"
+    at = ", ".join("all" if index < 0 else str(index) for index in motion.index)
+    return f"({at}) of {_box(motion)}"
+
+
+def _box(motion: BoxMotion) -> str:
+    return motion.box or "(no box yet)"
 
 
 def _of_box(motion: FfdCamber | FfdThickness | FfdTwist, form: str = ".4g") -> str:
     """Return a motion of many control points of a box in words, without axis and point."""
     if isinstance(motion, FfdTwist):
-        return f"twist {_control(motion)} {motion.angle_deg:+{form}}°"
+        planes = "all planes" if motion.plane < 0 else f"plane {motion.plane}"
+        return f"twist {planes} of {_box(motion)} {motion.angle_deg:+{form}}°"
     what = "camber" if isinstance(motion, FfdCamber) else "thickness"
     return f"{what} {_control(motion)} {motion.amount:+{form}}"
 

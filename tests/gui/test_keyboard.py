@@ -9,7 +9,7 @@ from qtpy.QtGui import QContextMenuEvent, QImage
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QAbstractItemView, QApplication, QMenu, QTableView
 
-from slideviz.case.model import Ffd, FromFile, Radial, Rotate, Scale, Translate
+from slideviz.case.model import Ffd, FfdCamber, FfdTwist, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.session import changes
 
 pytestmark = pytest.mark.usefixtures("unpainted")
@@ -155,6 +155,8 @@ FIRST = {
     Scale: lambda editor: editor.factors.fields[0],
     Radial: lambda editor: editor.percent,
     Ffd: lambda editor: editor.index.fields[0],
+    FfdCamber: lambda editor: editor.index.fields[0],
+    FfdTwist: lambda editor: editor.plane,
     FromFile: lambda editor: editor.path,
 }
 

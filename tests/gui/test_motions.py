@@ -9,6 +9,9 @@ from slideviz.case.model import (
     Bump,
     Cst,
     Ffd,
+    FfdCamber,
+    FfdThickness,
+    FfdTwist,
     FromFile,
     HicksHenne,
     Radial,
@@ -331,6 +334,58 @@ def test_motion_of_a_box_is_shown_edited_and_kept_and_takes_whole_numbers(boxed,
     u = (np.linspace(0.0, 1.0, 5) + 0.1) / 1.2
     np.testing.assert_allclose(moved[:, 1], 0.1 * 3 * u**2 * (1 - u), atol=1e-14)
     boxed.session.case.write(tmp_path / "kept.cfg")
+    assert sv.Case.read(tmp_path / "kept.cfg").motions == (motion,)
+
+
+def test_camber_and_thickness_of_a_box_are_shown_edited_and_kept(boxed, tmp_path):
+    for kind, words in ((FfdCamber, "camber"), (FfdThickness, "thickness")):
+        put(boxed)
+        boxed.add_motion(kind)
+        form = editor(boxed)
+        assert boxed.session.case.motions == (kind("low", "A", (0, -1), 0.0),)
+        assert [form.index.count, form.amount.isVisible(), form.vector.isVisible()] == [1, 1, 0]
+        assert "moves yet" in run_requirements(boxed.session)[0].text
+        boxed.type(form.index.fields[0], "2")
+        boxed.type(form.amount, "0.1")
+        boxed.choose(form.box, "B")
+        motion = kind("low", "B", (2, -1), 0.1)
+        assert boxed.session.case.motions == (motion,)
+        assert listed(boxed) == f"1.  low: {words} (2, all) of B +0.1"
+        moved = Ghosts(boxed.session.mesh).moved(boxed.session.case)["low"]
+        u = (np.linspace(0.0, 1.0, 5) + 0.1) / 1.2
+        side = 1.0 if kind is FfdCamber else 2.0 / 3.0 - 1.0  # y = 0 is a third up the box
+        np.testing.assert_allclose(moved[:, 1], side * 0.3 * u**2 * (1 - u), atol=1e-14)
+        boxed.session.case.write(tmp_path / "kept.cfg")
+        assert sv.Case.read(tmp_path / "kept.cfg").motions == (motion,)
+    form = editor(boxed)
+    assert not form.kind.model().item(form.kind.findData(FfdTwist)).isEnabled()
+
+
+def test_twist_of_a_box_is_shown_edited_and_kept(driver, sample_folder, tmp_path):
+    block, mesh = driver, sv.read(sample_folder / "hexahedron" / "mesh.su2")
+    low, high = mesh.bounds
+    ends = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]] * 2, float)
+    ends[4:, 2] = 1.0
+    box = regular_box("BOX", low + ends * (high - low), (1, 2, 1), None)
+    sv.write(tmp_path / "boxed.su2", with_boxes(mesh, [box]))
+    block.open(tmp_path / "boxed.su2")
+    block.role("BLOCK", "moving")
+    block.add_motion(FfdTwist)
+    form = editor(block)
+    assert block.session.case.motions == (FfdTwist("BLOCK", "BOX", 0, 0.0),)
+    shown = [form.plane, form.angle, form.point, form.axis, form.box]
+    assert all(field.isVisible() for field in shown)
+    assert not form.index.isVisible()
+    block.type(form.plane, "0.5")
+    assert block.session.case.motions[0].plane == 0
+    block.type(form.plane, "1")
+    block.type(form.angle, "20")
+    block.type(form.point.fields[0], "0.5")
+    block.type(form.axis.fields[1], "2")
+    motion = FfdTwist("BLOCK", "BOX", 1, 20.0, (0.5, 0.0, 0.0), (0.0, 2.0, 0.0))
+    assert block.session.case.motions == (motion,)
+    assert listed(block) == "1.  BLOCK: twist plane 1 of BOX +20° about y through (0.5, 0, 0)"
+    block.session.case.write(tmp_path / "kept.cfg")
     assert sv.Case.read(tmp_path / "kept.cfg").motions == (motion,)
 
 

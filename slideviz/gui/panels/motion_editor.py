@@ -11,9 +11,13 @@ from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QFileDialog, QWidget
 
 from slideviz.case.model import (
+    BoxMotion,
     Bump,
     Cst,
     Ffd,
+    FfdCamber,
+    FfdThickness,
+    FfdTwist,
     FromFile,
     HicksHenne,
     Motion,
@@ -82,12 +86,14 @@ class MotionEditor(MotionForm):
         if motion is None:
             return
         self._sync_targets(motion, targets)
+        self.kind.offer(FfdTwist, dim == 3)  # a section has no span to twist along
         self.kind.show_value(type(motion))
         shown = self._show_numbers(motion, dim)
         if isinstance(motion, Rotate | Scale | Radial):
             shown |= {"about"} | self._show_place(motion, dim)
-        for vector in (self.vector, self.factors, self.point, self.index):
+        for vector in (self.vector, self.factors, self.point):
             vector.set_count(dim)
+        self.index.set_count(dim - isinstance(motion, FfdCamber | FfdThickness))
         self.show_rows(shown)
 
     def _show_numbers(self, motion: Motion, dim: int) -> set[str]:
@@ -112,6 +118,18 @@ class MotionEditor(MotionForm):
             self.index.show_value(motion.index)
             self.vector.show_value(motion.vector)
             return {"box", "index", "vector"}
+        if isinstance(motion, FfdCamber | FfdThickness):
+            self._sync_boxes(motion.box)
+            self.index.show_value(motion.index)
+            self.amount.show_value(motion.amount)
+            return {"box", "index", "amount"}
+        if isinstance(motion, FfdTwist):
+            self._sync_boxes(motion.box)
+            self.plane.show_value(motion.plane)
+            self.angle.show_value(motion.angle_deg)
+            self.point.show_value(motion.point)
+            self.axis.show_value(motion.axis)
+            return {"box", "plane", "angle", "point", "axis"}
         if isinstance(motion, OnAirfoil):
             return self._show_bump(motion)
         if not isinstance(motion, FromFile):
@@ -260,6 +278,9 @@ class MotionEditor(MotionForm):
             Cst: self.raised,
             Bump: self.raised,
             Ffd: self.index.fields[0],
+            FfdCamber: self.index.fields[0],
+            FfdThickness: self.index.fields[0],
+            FfdTwist: self.plane,
             FromFile: self.path,
         }.get(type(self._motion))
         if first is not None:
@@ -306,19 +327,29 @@ class MotionEditor(MotionForm):
             motion = Radial(marker, factor, self.distance.value, axis, point)
         elif isinstance(self._motion, OnAirfoil):
             motion = self._bump(self._motion)
-        elif isinstance(self._motion, Ffd):
-            motion = self._ffd(marker, self._motion)
+        elif isinstance(self._motion, BoxMotion):
+            motion = self._of_box(marker, self._motion, axis)
         else:
             motion = FromFile(Path(self.path.text().strip()), marker)
         if motion != self._motion:
             self.changed.emit(motion)
 
-    def _ffd(self, marker: Target, before: Ffd) -> Ffd:
-        """Return the free-form deformation that the fields describe; in 2D, index k stays."""
-        at = before.index if self.index.problem else (*self.index.value, before.index[2])[:3]
-        i, j, k = (int(value) for value in at)
+    def _of_box(
+        self, marker: Target, before: BoxMotion, axis: tuple[float, float, float]
+    ) -> BoxMotion:
+        """Return the motion of a box that the fields describe; in 2D, the last index stays."""
+        box = self.box.currentData()
+        if isinstance(before, FfdTwist):
+            angle, point = self.angle.value, self.point.value
+            return FfdTwist(marker, box, int(self.plane.value), angle, point, axis)
+        last = before.index[-1]
+        at = before.index if self.index.problem else (*self.index.value, last)
+        if not isinstance(before, Ffd):
+            i, j = (int(value) for value in at[:2])
+            return type(before)(marker, box, (i, j), self.amount.value)
+        i, j, k = (int(value) for value in at[:3])
         dx, dy, dz = (*self.vector.value, 0.0)[:3]
-        return Ffd(marker, self.box.currentData(), (i, j, k), (dx, dy, dz))
+        return Ffd(marker, box, (i, j, k), (dx, dy, dz))
 
     def _browse(self) -> None:
         name, _ = QFileDialog.getOpenFileName(self, "Displacement file", self.path.text())

@@ -11,6 +11,9 @@ from slideviz.case.model import (
     Bump,
     Cst,
     Ffd,
+    FfdCamber,
+    FfdThickness,
+    FfdTwist,
     FromFile,
     HicksHenne,
     Motion,
@@ -82,6 +85,13 @@ class MotionForm(QWidget):
             names="ijk",
             tip="The control point, counted from 0 along each direction of the box; -1 is all.",
         )
+        self.plane = NumberField(
+            0.0, a_plane, tip="The plane of control points, counted from 0 along j; -1 is all."
+        )
+        self.amount = NumberField(
+            tip="How far control points move, in the mesh's length unit: with the thickness, the "
+            "last ones forwards and the first ones as far backwards."
+        )
         self.side = Choice({side: term.label for side, term in SIDES.items()}, "Which side moves.")
         self.side.explain({side: term.tip for side, term in SIDES.items()})
         self.term = VectorField(
@@ -117,7 +127,9 @@ class MotionForm(QWidget):
         for name, title, widget in (
             ("box", "Box", self.box),
             ("index", "Control point", self.index),
+            ("plane", "Plane j", self.plane),
             ("vector", "By", self.vector),
+            ("amount", "By", self.amount),
             ("angle", "Angle (°)", self.angle),
             ("factors", "Factors", self.factors),
             ("percent", "Radius by (%)", self.percent),
@@ -162,6 +174,9 @@ KINDS: dict[type, str] = {
     Cst: MOTION_KINDS["cst"].label,
     Bump: MOTION_KINDS["bump"].label,
     Ffd: MOTION_KINDS["ffd"].label,
+    FfdCamber: MOTION_KINDS["ffd-camber"].label,
+    FfdThickness: MOTION_KINDS["ffd-thickness"].label,
+    FfdTwist: MOTION_KINDS["ffd-twist"].label,
     FromFile: MOTION_KINDS["file"].label,
 }
 """Labels of the kinds of motion, by class."""
@@ -171,6 +186,11 @@ def control_point(values: Sequence[float]) -> str:
     """Return why numbers are no index of a control point; empty if they are."""
     whole = all(value == int(value) and value >= -1 for value in values)
     return "" if whole else "needed are whole numbers from 0, or -1 for all"
+
+
+def a_plane(value: float) -> str:
+    """Return why a number is none of a plane of control points; empty if it is."""
+    return control_point((value,))
 
 
 def a_term(values: Sequence[float]) -> str:
@@ -217,4 +237,8 @@ def new_motion(
         return Scale(marker, (1.0,) * dim)
     if kind is Ffd:
         return Ffd(marker, (*boxes, "")[0], (0, 0, 0 if dim == 3 else -1), (0.0, 0.0, 0.0))
+    if kind in (FfdCamber, FfdThickness):
+        return kind(marker, (*boxes, "")[0], (0, 0 if dim == 3 else -1), 0.0)
+    if kind is FfdTwist:
+        return FfdTwist(marker, (*boxes, "")[0], 0, 0.0)
     return FromFile(Path(), marker)

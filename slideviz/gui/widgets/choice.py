@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import TypeVar
 
 from qtpy.QtCore import Qt, Signal
-from qtpy.QtGui import QPaintEvent, QWheelEvent
+from qtpy.QtGui import QPaintEvent, QStandardItemModel, QWheelEvent
 from qtpy.QtWidgets import QComboBox, QStyle, QStyleOptionComboBox, QStylePainter
 
 from slideviz.gui.widgets.labels import wrapped
@@ -43,6 +43,12 @@ class Choice(QComboBox):
         index = self.findData(value)
         if index >= 0 and index != self.currentIndex():
             self.setCurrentIndex(index)
+
+    def offer(self, value: object, offered: bool) -> None:
+        """Let the entry of a value be chosen, or not."""
+        model = self.model()
+        assert isinstance(model, QStandardItemModel)
+        model.item(self.findData(value)).setEnabled(offered)
 
     def explain(self, tips: Mapping[str, str]) -> None:
         """Set the tooltips of entries, by their values."""
