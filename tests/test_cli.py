@@ -17,8 +17,10 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
+from slideviz.cli.options import changed
 from slideviz.cli.report import CYCLE_KEYS, TRIAL_KEYS
 from slideviz.deformation.steps import Trial
+from slideviz.errors import CaseError
 from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import write_sample
 
@@ -480,3 +482,97 @@ def test_a_case_is_told_from_a_mesh(tmp_path, capsys):
     write_sample("square", tmp_path, size=8)
     assert run(["info", str(tmp_path / "square.cfg")]) == 1
     assert "is a case file, not a mesh; name the mesh itself" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "said", "code"),
+    [
+        (["rn", "x"], "there is no command or file 'rn'; did you mean run?", 2),
+        (["rn"], "no such command (commands: run, ", 1),
+        (["run", "a.cfg", "--stepz", "3"], "arguments: --stepz 3; did you mean --steps?", 2),
+        (
+            ["info", "a", "--jsn=b"],
+            "arguments: --jsn=b; did you mean --json?; see `slideviz info",
+            2,
+        ),
+        (["section", "a", "--cylinder", "r=0,275"], "write a decimal point, as in 0.275", 2),
+        (["section", "a", "--cylinder", "0,275,x,0,0,0"], "a decimal point, as in 0.275", 2),
+        (["section", "a", "--plane", "z=0,5"], "'z=0,5': a comma separates numbers", 2),
+    ],
+)
+def test_what_is_misspelt_is_named_with_what_is_meant(words, said, code, capsys):
+    assert run(words) == code
+    assert said in capsys.readouterr().err
+
+
+def test_a_file_without_any_key_is_told_in_one_line(tmp_path, capsys):
+    path = tmp_path / "m.vtu"
+    path.write_text('<?xml version="1.0"?>\n' + "<a>\n" * 50)
+    assert run(["run", str(path)]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "m.vtu: is no case file, for it has no line with a key of slideviz (line 1: '<?x" in line
+
+
+def test_all_wrong_values_are_told_at_once(square, capsys):
+    sets = ["A=1", "STEPS=x", "STEPS", "SLIDING_MODE=zz", "FEATURE_ANGLE=30"]
+    words = [word for text in sets for word in ("--set", text)]
+    assert run(["run", str(square / "square.cfg"), *words]) == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.split()[1 + (k == 0)] for k, line in enumerate(lines)] == [
+        *("A=1:", "STEPS=x:", "'STEPS'", "SLIDING_MODE=zz:")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        ("BLOCK", "takes BLOCK from MARKER_MOVING, and no other marker moves"),
+        ("LOWER", "takes LOWER from MARKER_PERIODIC, which has UPPER left"),
+    ],
+)
+def test_a_list_of_markers_is_blamed_for_what_it_takes(square, names, said, capsys):
+    case = sv.Case.read(square / "square.cfg")
+    lower, upper = case.markers_with("periodic")
+    names, said = (text.replace("LOWER", lower).replace("UPPER", upper) for text in (names, said))
+    names = names.replace("BLOCK", case.markers_with("moving")[0])
+    said = said.replace("BLOCK", case.markers_with("moving")[0])
+    option = f"MARKER_SLIDING=({names})"
+    assert run(["run", str(square / "square.cfg"), "--set", option]) == 1
+    assert capsys.readouterr().err.startswith(f"slideviz: --set {option} {said}")
+    # Another option that gives it back makes it right.
+    back = f"{'MARKER_PERIODIC' if upper in said else 'MARKER_MOVING'}=({names})"
+    back = back.replace(lower, f"{lower}, {upper}") if upper in said else back
+    words = ["run", str(square / "square.cfg"), "--set", option, "--set", back]
+    assert run([*words, "--steps", "1", "-q", "-o", str(square / "out.su2")]) in (0, 3)
+
+
+def test_a_refusal_comes_alone(square, capsys):
+    case, out = str(square / "square.cfg"), str(square / "out.su2")
+    (square / "out_qual.txt").write_text("old")
+    assert run(["run", case, "-o", out, "--set", "SLIDING_MODE=none"]) == 1
+    assert "replaced" not in capsys.readouterr().err
+    assert run(["run", case, "-o", out, "--steps", "1"]) in (0, 3)
+    assert "note: there already, and replaced by this run: " in capsys.readouterr().err
+
+
+def test_a_quiet_run_that_is_finished_says_nothing(square, capsys):
+    words = ["run", str(square / "square.cfg"), "-o", str(square / "out.su2"), "--stream"]
+    assert run([*words, "-q"]) == 0
+    capsys.readouterr()
+    assert run([*words, "--resume", "-q"]) == 0
+    assert "".join(capsys.readouterr()) == ""
+    assert run([*words, "--resume"]) == 0
+    assert "is finished" in capsys.readouterr().err
+
+
+def test_a_list_of_markers_that_takes_what_a_motion_names_is_blamed():
+    case = sv.Case(
+        roles=dict.fromkeys("ab", "moving"),
+        motions=(sv.Translate("a", (1.0, 0.0)), sv.Translate("b", (1.0, 0.0))),
+    )
+    with pytest.raises(
+        CaseError, match=r"--set MARKER_FIXED=\(a\) takes a from MARKER_MOVING, but MO"
+    ):
+        changed(case, ["MARKER_FIXED=(a)"])
+    moved = changed(case, ["MARKER_FIXED=(a)", "MOTION=(b, translate, 1, 0)"])
+    assert moved.roles == {"a": "fixed", "b": "moving"}

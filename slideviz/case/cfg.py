@@ -15,7 +15,15 @@ from typing import Any
 from slideviz.case.check import contradictions
 from slideviz.case.key import GROUPS, REDUCTION, Key
 from slideviz.case.keys import KEYS
-from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, require_no_mesh
+from slideviz.case.lines import (
+    Entry,
+    Problem,
+    entries_of,
+    listed,
+    read_text,
+    require_no_mesh,
+    require_some_key,
+)
 from slideviz.case.model import Case, FromFile
 from slideviz.case.words import nearest, shown
 from slideviz.errors import CaseError
@@ -108,6 +116,7 @@ def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]
     """
     entries, problems = entries_of(text)
     require_no_mesh(path, entries)
+    require_some_key(path, entries, problems, KEYS)
     rows: dict[str, Entry] = {}
     for entry in entries:
         first = rows.setdefault(entry.key, entry)

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
     from slideviz.scene.moved import Zoom
+    from slideviz.terms import Role
 
 NONE = "no reference: relative to itself"
 """The remark, in pictures too, where there is no undeformed mesh to compare cells with: size is
@@ -156,23 +157,54 @@ def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
     Raises
     ------
     CaseError
-        A text has another form, there is no such key, or the value is wrong.
+        Texts have another form, there is no such key, a value is wrong, or a list of markers takes
+        a marker from the role that it needs; with a line for each.
     """
     from slideviz.case.cfg import set_key
-    from slideviz.case.check import idle_roles
+    from slideviz.case.check import idle_roles, raise_all
     from slideviz.errors import CaseError
 
-    before = idle_roles(case)
+    before, problems = idle_roles(case), []
+    taken: dict[str, tuple[str, Role]] = {}
     for text in texts:
         key, sign, value = text.partition("=")
         if not sign:
-            raise CaseError(f"{option} {text!r} is not of the form KEY=VALUE")
+            problems.append(f"{option} {text!r} is not of the form KEY=VALUE")
+            continue
         try:
-            case = set_key(case, key.strip(), value.strip())
+            after = set_key(case, key.strip(), value.strip())
         except CaseError as problem:
-            raise CaseError(str(problem).replace("--set", option)) from problem
+            problems.append(str(problem).replace("--set", option))
+            continue
+        for name, role in case.roles.items():
+            if after.roles.get(name, role) != role:
+                taken[name] = f"{option} {text}", role
+        case = after
+    raise_all((*problems, *_taken(case, taken)))
     kept = [warning for warning in case.warnings if warning not in before]
     return case.change(warnings=(*kept, *idle_roles(case)))
+
+
+def _taken(case: Case, taken: Mapping[str, tuple[str, Role]]) -> Iterator[str]:
+    """Yield a sentence for each marker that was taken from a role that it needs.
+
+    ``taken`` has, for markers that came into another role, the option that did it and the role
+    before.
+    """
+    from slideviz.case.model import named
+    from slideviz.terms import ROLES
+
+    periodic = case.markers_with("periodic")
+    for name, (option, role) in taken.items():
+        if case.roles.get(name) == role:
+            continue
+        it = f"{option} takes {name} from {ROLES[role].key}"
+        if role == "moving" and any(name in named(motion.marker) for motion in case.motions):
+            yield f"{it}, but MOTION still moves it; set MOTION, too, or leave {name} out"
+        elif role == "moving" and not case.markers_with("moving"):
+            yield f"{it}, and no other marker moves; leave {name} out, or set MARKER_MOVING, too"
+        elif role == "periodic" and len(periodic) % 2:
+            yield f"{it}, which has {', '.join(periodic)} left; markers repeat in pairs: name both"
 
 
 def add_zoom(call: argparse.ArgumentParser) -> None:

@@ -6,9 +6,10 @@ import argparse
 from collections.abc import Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from slideviz import __version__
+from slideviz.case.words import nearest
 
 COMMANDS = {
     "run": "run_command",
@@ -52,7 +53,11 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
         Wrong usage (code 2), or help was asked for (code 0).
     """
     if not any(word in COMMANDS for word in argv[:1]) and not _asks_help(argv):
-        return _window_parser().parse_args(argv)
+        parser = _window_parser()
+        if argv[1:] and not argv[0].startswith("-") and not Path(argv[0]).exists():
+            meant = nearest(argv[0], COMMANDS)
+            parser.error(f"there is no command or file {argv[0]!r}{meant}")
+        return parser.parse_args(argv)
     from slideviz.cli.section_options import glued
 
     # Load only the module of the command that is called, where it is the first word.
@@ -69,6 +74,16 @@ class _Parser(argparse.ArgumentParser):
 
     def __init__(self, **options: object) -> None:
         super().__init__(allow_abbrev=False, **options)  # type: ignore[arg-type]
+
+    def parse_known_args(self, *given: Any, **named: Any) -> Any:
+        """Return the arguments and no others, which end the command with a message."""
+        found, others = super().parse_known_args(*given, **named)
+        if others:
+            options = [flag for flag in self._option_string_actions if flag.startswith("--")]
+            asked = [word.partition("=")[0] for word in others if word.startswith("-")]
+            meant = nearest(asked[0], options) if asked else ""
+            self.error(f"unrecognized arguments: {' '.join(others)}{meant}")
+        return found, others
 
     def error(self, message: str) -> NoReturn:
         """Exit with code 2 and one sentence, without the list of options."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import os
 import re
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
@@ -122,8 +121,7 @@ def _print_replaced(unnamed: list[OutputPath]) -> None:
             more = f" and {len(old) - 1} more" if len(old) > 1 else ""
             old_files.append(f"{old[0]}{more} ({one.option})")
     if old_files:
-        words = f"there already, and replaced by this run: {', '.join(old_files)}"
-        print(f"slideviz: note: {words}", file=sys.stderr, flush=True)
+        say("note", f"there already, and replaced by this run: {', '.join(old_files)}")
 
 
 def _paths(one: OutputPath) -> Iterator[Path]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -25,6 +25,8 @@ _PHASES = {
     "quality": "measuring cells",
     "convert": "converting",
 }
+_BEFORE = ("read", "convert", "classify")
+"""Phases in which a run can still be refused."""
 _EVERY = 0.1
 _WIPE = "\r\033[K"
 """Control sequence that clears the line of a bar."""
@@ -67,9 +69,18 @@ class Bar:
         Text before the words of the bar.
     expected : float, optional
         Estimate of all seconds, where known; used until the first step is done.
+    begun : callable, optional
+        Called when nothing can be refused any more.
     """
 
-    def __init__(self, enabled: bool = True, head: str = "", expected: float | None = None) -> None:
+    def __init__(
+        self,
+        enabled: bool = True,
+        head: str = "",
+        expected: float | None = None,
+        begun: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._begun = begun
         self.enabled = enabled and sys.stderr.isatty()
         self._head, self._expected = head, expected
         self._next, self._phase = 0.0, ""
@@ -90,6 +101,8 @@ class Bar:
 
     def __call__(self, progress: Progress) -> None:
         """Draw the bar by the steps that are done, at most ten times a second."""
+        if progress.phase not in _BEFORE:
+            self._begun()
         now = time.monotonic()
         if not self.enabled or now < self._next:
             return
@@ -107,6 +120,8 @@ class Bar:
 
     def phase(self, progress: Progress) -> None:
         """Draw the bar for the current phase, with the seconds left of all or, else, of it."""
+        if progress.phase not in _BEFORE:
+            self._begun()
         now = time.monotonic()
         self._first = self._first or now
         if progress.phase != self._phase or not progress.fraction:

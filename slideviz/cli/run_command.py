@@ -21,6 +21,7 @@ from slideviz.cli.options import (
 )
 from slideviz.cli.run_outcome import CELLS, advice_for, tell, write_qualities
 from slideviz.cli.run_streamed import is_to_be_streamed, require_streamable, run_streamed
+from slideviz.cli.terminal import holding
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -71,6 +72,11 @@ def add_run(calls: argparse._SubParsersAction) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, write mesh, report, steps, picture; return the exit code."""
+    with holding() as arguments.begun:
+        return _run(arguments)
+
+
+def _run(arguments: argparse.Namespace) -> int:
     from slideviz import quality, read, write
     from slideviz.cli.places import tell_lost
     from slideviz.cli.report import cell_data, folded_cells, run_report
@@ -213,7 +219,7 @@ def pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
     steps: list[Step] = []
     folder = arguments.steps_dir
     series = _series(arguments.steps_file, mesh, case.quality_metric)
-    with series as add, Bar(not arguments.quiet) as bar:
+    with series as add, Bar(not arguments.quiet, begun=arguments.begun) as bar:
         for step in deform(case, mesh, bar):
             if folder:
                 assert case.mesh_file is not None

@@ -95,19 +95,20 @@ def run_streamed(
     from slideviz.deformation.streaming import about_run, stream
     from slideviz.mesh.ranks import ALONE
 
+    note = partial(say, "" if arguments.quiet else "note")
     about = about_run(case)
     made = [path for path in (output, qualities) if path]
     if arguments.resume and (known := finished(about, made)):
-        say("note", f"{output}: is finished, of this case, mesh and version; nothing is done")
+        note(f"{output}: is finished, of this case, mesh and version; nothing is done")
         save_report(arguments, known[0])
         return tell_warnings(*known, advice_for(case, 0.0), quiet=arguments.quiet)
-    with Bar(not arguments.quiet) as bar:
+    with Bar(not arguments.quiet, begun=arguments.begun) as bar:
         done = stream(
             case,
             output,
             file_format=kind,
             tell=bar.phase,
-            note=partial(say, "note"),
+            note=note,
             warn=partial(say, "warning"),
             resume=arguments.resume,
             replaces=case.mesh_file if arguments.force else None,

@@ -59,6 +59,8 @@ def plane(text: str) -> Asked:
         if word.strip() not in AXES:
             raise argparse.ArgumentTypeError(f"{text!r}: the axis is x, y or z, as in z=0.5")
         normal = AXES[word.strip()]
+        if value.count(",") == 1:
+            raise argparse.ArgumentTypeError(_comma(text, value.strip().replace(",", ".")))
         (at,) = _numbers(value, (1,), "a coordinate, as in z=0.5")
         return Asked(_section("plane", [at * part for part in normal], normal))
     values = _numbers(text, (4, 6), "nx,ny,nz,x,y,z or an axis and a coordinate, as in z=0.5")
@@ -78,6 +80,9 @@ def about_axis(row: ShapeTerms, text: str) -> Asked:
         if word.strip() not in (row.letter, row.size.word):
             raise argparse.ArgumentTypeError(f"{text!r} is not {row.size.example}")
         number = value
+    digits, _, more = axis.partition(",")
+    if digits.strip().isdecimal() and (not more or more.partition(",")[0].strip() in AXES):
+        raise argparse.ArgumentTypeError(_comma(text, f"{number.strip()}.{digits.strip()}"))
     (size,) = _numbers(number, (1,), row.size.example)
     if not axis:
         return Asked(_section(row.value, (), AXES["z"], size), False)
@@ -87,6 +92,11 @@ def about_axis(row: ShapeTerms, text: str) -> Asked:
         return Asked(_section(row.value, at, AXES[word.strip()], size))
     values = _numbers(axis, (3, 6), "x, y, z, ax,ay,az or ax,ay,az,cx,cy,cz")
     return Asked(_section(row.value, values[3:], values[:3], size))
+
+
+def _comma(text: str, number: str) -> str:
+    """Return the message that a comma stands in ``text`` where ``number`` has a point."""
+    return f"{text!r}: a comma separates numbers; write a decimal point, as in {number}"
 
 
 def limits(text: str) -> tuple[float, float]:

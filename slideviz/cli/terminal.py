@@ -9,8 +9,9 @@ from __future__ import annotations
 import os
 import sys
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from contextvars import ContextVar
 from typing import Any, TextIO
 
 from slideviz.errors import SlidevizError
@@ -108,7 +109,37 @@ def control(text: str) -> None:
     sys.stderr.flush()
 
 
+_HELD: ContextVar[list[tuple[str, str]] | None] = ContextVar("held", default=None)
+"""What `say` is to print later; None where it prints at once."""
+
+
 def say(what: str, text: str) -> None:
-    """Print a text to stderr as a ``what`` (note or warning); nothing where it is empty."""
-    if text:
+    """Print a text to stderr as a ``what`` (note or warning); nothing where one is empty."""
+    held = _HELD.get()
+    if held is not None:
+        held.append((what, text))
+    elif what and text:
         print(f"slideviz: {what}: {text}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def holding() -> Iterator[Callable[[], None]]:
+    """Context in which `say` prints nothing until the function it yields is called, or it ends.
+
+    An error that ends it before is printed alone: nothing was done that the rest could concern.
+    """
+    held: list[tuple[str, str]] = []
+    token = _HELD.set(held)
+
+    def release() -> None:
+        if _HELD.get() is held:
+            _HELD.reset(token)
+            for each in held:
+                say(*each)
+
+    try:
+        yield release
+        release()
+    finally:
+        if _HELD.get() is held:
+            _HELD.reset(token)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 def window(arguments: argparse.Namespace) -> int:
     """Open the window, with a file if one is given; return the exit code."""
+    from slideviz.case.words import nearest
     from slideviz.errors import CaseError
     from slideviz.export.offscreen import missing_screen
 
@@ -16,6 +17,7 @@ def window(arguments: argparse.Namespace) -> int:
         raise CaseError(
             f"{arguments.file}: there is no such file, and no such command "
             f"(commands: {', '.join(arguments.commands)})"
+            f"{nearest(str(arguments.file), arguments.commands)}"
         )
     why = missing_screen() if sys.platform.startswith("linux") else ""
     if why:

@@ -242,7 +242,9 @@ def write_sample(
     paths = [mesh, *([table] if made.displacement else []), case]
     there = [path for path in paths if path.exists()]
     if there and not overwrite:
-        raise CaseError(f"{there[0]}: exists already; remove it or choose another folder")
+        raise CaseError(
+            f"{there[0]}: exists already; choose another folder, or replace it with --force"
+        )
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as problem:

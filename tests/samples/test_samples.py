@@ -232,7 +232,10 @@ def test_wrong_request_is_told(arguments, sentence):
 
 def test_sample_does_not_replace_files_unasked(tmp_path):
     (tmp_path / "mesh.su2").write_text("mine")
-    with pytest.raises(CaseError, match=r"mesh\.su2: exists already; remove it or choose another"):
+    with pytest.raises(
+        CaseError,
+        match=r"mesh\.su2: exists already; .* replace it with --force",
+    ):
         write_sample("square", tmp_path, 5)
     assert (tmp_path / "mesh.su2").read_text() == "mine"
     assert [path.name for path in tmp_path.iterdir()] == ["mesh.su2"]
