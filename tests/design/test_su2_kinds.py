@@ -323,6 +323,48 @@ def test_lists_that_su2_refuses_are_refused(kinds, message, here):
         surface(bent(), ("airfoil",), f"DV_KIND= {kinds}\nDV_PARAM= {group}\nDV_VALUE= 1, 1\n")
 
 
+def test_a_chord_that_is_not_that_of_su2_is_warned_about(here):
+    henne = "DV_KIND= HICKS_HENNE\nDV_PARAM= (1, 0.5)\nDV_VALUE= 0.1\n"
+    camber = "DV_KIND= HICKS_HENNE_CAMBER\nDV_PARAM= (0.5)\nDV_VALUE= 0.1\n"
+    assert not surface(bent(), ("airfoil",), henne).warnings
+    assert not surface(bent(), ("airfoil",), camber).warnings
+    small = bent().with_points(0.3 * bent().points)
+    (said,) = surface(small, ("airfoil",), henne).warnings
+    assert said == (
+        "HICKS_HENNE: the chord is x from 0 to 1, as in SU2, and DV_MARKER goes from 0 to 0.3"
+    )
+    (said,) = surface(small, ("airfoil",), camber).warnings
+    assert said.startswith("HICKS_HENNE_CAMBER: the chord is 1 long from the leading edge, as in")
+    # Where the marker begins at the nose, SU2 takes that for the trailing edge.
+    mesh = bent()
+    lines = np.roll(mesh.marker("airfoil").cells.by_type[3][1], 12, axis=0)
+    part = sv.Marker("airfoil", sv.Cells.from_blocks([(3, lines)]))
+    turned = replace(mesh, markers=(part, mesh.marker("far")))
+    (said,) = surface(turned, ("airfoil",), camber).warnings
+    assert "it begins its search at the first node of the marker" in said
+
+
+def test_an_angle_of_attack_alone_moves_nothing_and_has_its_gradient(here, capsys):
+    sv.write("mesh.su2", bent())
+    text = SHAPES.partition("DATA_REDUCTION")[0] + (
+        "DATA_REDUCTION= YES\nDV_KIND= ANGLE_OF_ATTACK\nDV_PARAM= (1.0)\nDV_VALUE= 2.0\n"
+    )
+    points = written(text)
+    np.testing.assert_array_equal(points, bent().points)
+    write_csv("adj_cd.csv", points, np.ones_like(points), extra="SENS_AOA= 0.25\n")
+    Path("dot.cfg").write_text(text)
+    assert run(["dot", "dot.cfg", "-q"]) == 0
+    assert gradient().tolist() == [0.25]
+    assert np.loadtxt("surface_sensitivity.dat", delimiter=",")[:, 3:5].any()
+
+
+def test_deform_mesh_is_warned_about(here):
+    text = f"{HEAD}DV_KIND= SCALE\nDV_VALUE= 1.1\nDEFORM_MESH= YES\n"
+    Path("a.cfg").write_text(text)
+    (said,) = read_config(Path("a.cfg")).case.warnings
+    assert said.startswith("DEFORM_MESH= YES: SU2 would pass over the design variables; here they")
+
+
 def test_no_deformation_writes_the_mesh_back(here):
     sv.write("mesh.su2", bent())
     Path("a.cfg").write_text(

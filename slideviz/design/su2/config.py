@@ -145,8 +145,7 @@ def own_changes(texts: Iterable[str]) -> tuple[dict[str, str], list[str]]:
     CaseError
         A key is none of a configuration or of slideviz, or has no meaning here.
     """
-    every = {FUNCTION, *READ_WITH_RBF}
-    found, others, known = {}, [], _read_keys() | every
+    found, others, known = {}, [], _read_keys() | {FUNCTION, *READ_WITH_RBF}
     listed = {term.key for term in ROLES.values()} | {*ELSEWHERE}
     for text in texts:
         name, sign, value = text.partition("=")
@@ -323,6 +322,9 @@ class _Reader:
                 listed = ", ".join(filter(None, allowed))
                 said = f"{shown(words[key])} is not supported; supported: {listed}"
                 self.note(self.rows[key], said)
+        if self.word("DEFORM_MESH", "NO").upper() == "YES":
+            said = "DEFORM_MESH= YES: SU2 would pass over the design variables; here they move"
+            self.warnings.append(f"{said} DV_MARKER")
         for key in ELSEWHERE:
             if key in self.rows:
                 said = "belongs into a case file (slideviz run); here DV_KIND says what moves"

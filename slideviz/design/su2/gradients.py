@@ -221,4 +221,6 @@ def _directions(surface: MovingSurface) -> FloatArray:
         else:
             sums[k % DIRECTIONS] += unit
     moving = [each for each in sums if each.any()]
+    if not moving:  # such as an angle of attack: any displacement tells how the rest follows
+        moving = [np.full((len(surface.nodes), surface.mesh.dim), REACH * surface.mesh.extent)]
     return np.array(moving).reshape(-1, len(surface.nodes), surface.mesh.dim)

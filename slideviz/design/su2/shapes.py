@@ -15,6 +15,11 @@ from slideviz.design.su2.variables import DesignVariable, angle_notes
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
+UNIT_CHORD = ("HICKS_HENNE", "CST", "NACA_4DIGITS", "PARABOLIC")
+"""Kinds for which the airfoil lies between x = 0 and 1."""
+OFF_CHORD = 0.05
+"""How far its ends may be from there without a warning."""
+
 
 @dataclass(frozen=True, eq=False)
 class Surface:
@@ -66,6 +71,27 @@ class Surface:
         if width == 0.0:
             raise CaseError("HICKS_HENNE_CAMBER: the chord of DV_MARKER is along y; turn the mesh")
         return leading, float(np.arctan((leading[1] - trailing[1]) / width))
+
+    def chord_notes(self, kinds: set[str]) -> list[str]:
+        """Return warnings where the chord is not that which variables of some kinds expect."""
+        x, said = self.points[:, 0], []
+        unit = [kind for kind in UNIT_CHORD if kind in kinds]
+        if unit and max(abs(x.min()), abs(x.max() - 1.0)) > OFF_CHORD:
+            said.append(
+                f"{', '.join(unit)}: the chord is x from 0 to 1, as in SU2, and DV_MARKER goes "
+                f"from {x.min():.4g} to {x.max():.4g}"
+            )
+        if "HICKS_HENNE_CAMBER" in kinds:
+            leading, angle = self.chord
+            length = (x.max() - leading[0]) / max(np.cos(angle), OFF_CHORD)
+            if abs(length - 1.0) > OFF_CHORD or leading[0] - x.min() > OFF_CHORD:
+                at = ", ".join(f"{value:.4g}" for value in leading)
+                said.append(
+                    "HICKS_HENNE_CAMBER: the chord is 1 long from the leading edge, as in SU2, "
+                    f"which takes ({at}) for it, and DV_MARKER goes from {x.min():.4g} to "
+                    f"{x.max():.4g} in x; it begins its search at the first node of the marker"
+                )
+        return said
 
 
 @dataclass(frozen=True)
@@ -222,7 +248,8 @@ class Shapes:
                 "SU2 turns all ROTATION about lines through the z0 of the first variable; here "
                 "each has its own"
             )
-        return tuple(said)
+        kinds = {each.kind for each in variables if not each.ignored}
+        return (*said, *(self._surface.chord_notes(kinds) if len(self.nodes) else ()))
 
     @property
     def inside(self) -> dict[str, int]:

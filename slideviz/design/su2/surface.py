@@ -133,8 +133,12 @@ class MovingSurface:
         """Return the case with this displacement as its motion."""
         case = self.config.case
         others = set(self.mesh.marker_names) - set(self.config.markers)
-        kinds = {variable.kind for variable in self.config.variables}
-        if not others and kinds <= {*RIGID} and case.kernel == Case().kernel:
+        moving = (each for each in self.config.variables if not each.ignored)
+        if (
+            not others
+            and {each.kind for each in moving} <= {*RIGID}
+            and case.kernel == Case().kernel
+        ):
             # All boundaries move as a body does, or grow: this kernel has that exactly inside.
             case = case.change(kernel="thin-plate")
         if self.whole or not self.config.markers:
