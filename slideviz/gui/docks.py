@@ -30,16 +30,16 @@ Side = Qt.DockWidgetArea
 LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
 BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
 LEFT_WIDTH, RIGHT_WIDTH = 356, 316
-"""Least width in pixels of the docks on each side, on a screen at least `ROOMY` wide."""
+"""Least initial width in pixels of the docks on each side, in a window at least `ROOMY` wide."""
 
 NARROWEST = {LEFT: 236, RIGHT: 224}
-"""Least width in pixels of the docks on each side, on a narrow screen."""
+"""Least width in pixels of the docks on each side."""
+
+ROOMY = 1280
+"""Width of a window in pixels below which the initial widths shrink in proportion."""
 
 LOW = 600
 """Height of the window in pixels below which the boundaries are a tab beside motion and method."""
-
-ROOMY = 1280
-"""Width of a screen in pixels below which the least widths shrink in proportion."""
 
 FRAME = 40
 """Height in pixels of a screen that is left for the window's title bar."""
@@ -114,11 +114,6 @@ class Docks(QObject):
         self._widths: dict[Side, int] = {}
         self._hidden: QByteArray | None = None
         self._low = False
-        part = min(1.0, window.screen().availableGeometry().width() / ROOMY)
-        self.least = {
-            side: max(NARROWEST[side], round(part * width))
-            for side, width in ((LEFT, LEFT_WIDTH), (RIGHT, RIGHT_WIDTH))
-        }
         window.installEventFilter(self)
         window.setDockOptions(
             QMainWindow.DockOption.AnimatedDocks
@@ -143,7 +138,7 @@ class Docks(QObject):
         dock.setWidget(panel if fixed else PanelScroll(panel))
         # A window made small and large again must not leave names and fields cut off.
         if row.area != BOTTOM:
-            dock.setMinimumWidth(self.least[row.area])
+            dock.setMinimumWidth(NARROWEST[row.area])
         # Keys must not go to a field in a dock that is hidden behind another tab.
         dock.visibilityChanged.connect(lambda shown: None if shown else _leave(dock))
         self.by_name[row.name] = dock
@@ -251,8 +246,10 @@ class Docks(QObject):
 
     def _shares(self) -> dict[Side, int]:
         """Return the width in pixels that each side has unless the user has changed it."""
-        part = round(SIDE * self.window.width())
-        return {side: max(part, least) for side, least in self.least.items()}
+        width = self.window.width()
+        part, wide = round(SIDE * width), min(1.0, width / ROOMY)
+        usual = {LEFT: round(wide * LEFT_WIDTH), RIGHT: round(wide * RIGHT_WIDTH)}
+        return {side: max(part, usual[side], least) for side, least in NARROWEST.items()}
 
     def _share_width(self) -> None:
         """Set the width of both sides to their part of the window's width."""

@@ -44,7 +44,7 @@ from slideviz.gui.widgets.build import in_column, reveal
 from slideviz.gui.widgets.command import Now
 from slideviz.gui.widgets.faults import Faults
 from slideviz.gui.widgets.icons import redraw_icons
-from slideviz.gui.widgets.labels import plain_labels
+from slideviz.gui.widgets.labels import plain_labels, wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import Services
 from slideviz.mesh.io.file_checks import protected
@@ -183,10 +183,8 @@ class MainWindow(Services):
         self.mesh_text = QLabel()
         self._measured: Mesh | None = None
         self.preparing = QLabel("Compiling, once… ")
-        self.preparing.setToolTip(
-            "The numerics are compiled, once after each installation: half a minute. What needs "
-            "them waits meanwhile."
-        )
+        about = "The numerics are compiled, once after each installation. What needs them waits."
+        self.preparing.setToolTip(wrapped(about))
         self.preparing.hide()
         self.statusBar().addPermanentWidget(self.preparing)
         self.statusBar().addPermanentWidget(self.mesh_text)

@@ -53,6 +53,7 @@ class Camera:
         self.stage = stage
         self._shapes = shapes
         self._fitted: tuple[float, ...] = ()
+        self._restored: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
         self.beside: Camera | None = None
 
     @property
@@ -144,6 +145,12 @@ class Camera:
     def fitted(self) -> bool:
         """Return whether the camera has not moved since `fit`."""
         return self._fitted == self.place
+
+    @property
+    def restored(self) -> tuple[float, ...]:
+        """Return the `view` that `go` restored last, if the camera has not moved since; or ()."""
+        view, place = self._restored
+        return view if place == self.place else ()
 
     def aim(self, centre: Any, half: float, depth: float = 0.0) -> None:
         """Move the camera to look at a point with a given height of view; the direction stays.
@@ -291,4 +298,5 @@ class Camera:
         if not camera.parallel_projection:
             camera.Dolly(1.0 / wider)
         self.shift()
+        self._restored = (place, self.place) if len(place) > 10 else ((), ())
         self.stage.plotter.renderer.ResetCameraClippingRange()

@@ -20,6 +20,8 @@ from slideviz.terms import ROLES
 
 FADED = 0.3
 """Opacity of a 2D mesh while sections show the cells on them."""
+VEIL = 0.65
+"""Opacity of the veil over the halo cells of a 2D mesh: they are no cells of the domain."""
 GLASS = 0.15
 """Opacity of boundaries that enclose moving ones, while colours show roles."""
 SEE_THROUGH = 0.25
@@ -53,6 +55,7 @@ class CellLayer(Layer):
         self.order: IntArray | None = None
         self.shape: Any = None
         self.actor: Any = None
+        self._veil: tuple[Any, Any] | None = None
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
         """Draw another mesh."""
@@ -72,10 +75,14 @@ class CellLayer(Layer):
         if mesh.dim == 3:
             # A sum above 1 would give brighter colours than the colour bar has.
             self.actor.prop.ambient, self.actor.prop.diffuse = 0.6, 0.4
+        elif mesh.halo is not None:
+            veil = actors.part_shape(mesh, np.flatnonzero(mesh.halo.cells))
+            self._veil = veil, self.stage.add(veil, "halo", lighting=False, pickable=False)
+            self._veil[1].prop.opacity = VEIL
 
     def clear(self) -> None:
         """Forget the mesh; the scene removes its actors."""
-        self.shape = self.actor = self.order = None
+        self.shape = self.actor = self.order = self._veil = None
 
     def _stack(self, frame: StepFrame) -> None:
         """Draw the inverted cells of a 2D mesh last, so that overlapping cells do not hide them."""
@@ -114,6 +121,11 @@ class CellLayer(Layer):
             self.shape.cell_data[VALUES] = values
         self.actor.mapper.scalar_visibility = by_value
         self.actor.prop.color = self.stage.scheme.cell
+        if self._veil is not None:
+            veil, actor = self._veil
+            points, lift = new.frame.mesh.points, self.stage.lift(new.mesh)
+            actors.place(veil, points[veil.point_data[POINT]], 0.5 * lift)
+            actor.prop.color = self.stage.scheme.background
         inside = looks_inside(new)
         if new.mesh.dim == 3:
             see_through(self.actor, 0.12 if inside else 1.0)

@@ -363,6 +363,8 @@ def test_a_displacement_file_and_what_is_typed_are_checked_at_once(opened, tmp_p
     field = next(f for f in opened.window.motions.findChildren(NumberField) if f.isVisible())
     before = field.text()
     opened.type(field, "1..5")
+    QTest.keyClick(field, Qt.Key.Key_Escape)
+    assert field.text() == before
     said = opened.window.statusBar().currentMessage()
     assert said == f"Not taken: “1..5” is not a number; the value is still {before}."
 
@@ -878,6 +880,24 @@ def test_a_case_is_saved_and_means_the_same(opened, answers, tmp_path):
     opened.open(tmp_path / "a.cfg")
     assert opened.session.case.motions == case.motions
     assert not opened.session.unsaved_case
+
+
+def test_a_saved_view_is_shown_again_after_it_was_opened_in_a_narrower_window(
+    opened, answers, tmp_path
+):
+    window, camera = opened.window, opened.window.scene.camera
+    size = window.size()
+    camera.zoom_at(200, 200, 2.0)
+    saved = camera.place
+    answers("ask_save", tmp_path / "a.cfg")
+    window.actions_.by_name["save_case"].trigger()
+    window.resize(900, size.height())
+    opened.qtbot.wait(50)
+    opened.open(tmp_path / "a.cfg")
+    assert camera.place[9] > 1.2 * saved[9], "all its width is seen"
+    window.resize(size)
+    opened.qtbot.wait(50)
+    assert camera.place == pytest.approx(saved, abs=1e-9)
 
 
 def test_nothing_is_asked_when_nothing_changed_or_a_case_cannot_be_written(

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 import pyvista as pv
+from builders import grid, halo_text
 
+import slideviz as sv
 from slideviz.color_scheme import COLOUR_MAP, DARK, INVERTED_COLOUR, LIGHT
 from slideviz.mesh.enclosing import enclosed, is_closed
 from slideviz.mesh.quality import quality
@@ -12,6 +14,7 @@ from slideviz.scene.mesh import GLASS
 from slideviz.scene.pick import to_display
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
+from slideviz.session.changes import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.terms import ROLES
 
@@ -47,6 +50,26 @@ def test_roles_have_their_colours(scene, session):
     after = image(scene)
     assert count(after, ROLES["moving"].colour) == 0
     assert count(after, ROLES["sliding"].colour) > 200
+
+
+def test_cells_of_a_halo_are_paler_than_those_of_the_domain(scene, tmp_path):
+    up = np.array([[0.0, 0, 0], [0, 0, 0], [0, -1.0, 0]])
+    text = halo_text(grid((4, 4), [(2, 3), (2, 3)]), "y_m", "y_p", up)
+    (tmp_path / "a.su2").write_text(text)
+    mesh = sv.read(tmp_path / "a.su2")
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None)
+    session = opened(scene, changes.set_view(session, edges=False, colour_by="size-skew"))
+    inside, beyond = ((0.1, y) for y in (0.6, 1.1))
+    colors = [pixel(scene, (*at, 0.0)) for at in (inside, beyond)]
+    assert (colors[1] - colors[0]).max() > 60
+    assert scene.pick_cell(*to_display(scene.plotter, np.array([[*beyond, 0.0]]))[0]) is not None
+    # It moves with the mesh.
+    moved = mesh.with_points(mesh.points + np.array([3.0, 0.0]))
+    session = changes.add_frames(changes.start_run(session), [StepFrame(moved, quality(moved))])
+    scene.update(session)
+    scene.fit()
+    colors = [pixel(scene, (at[0] + 3.0, at[1], 0.0)) for at in (inside, beyond)]
+    assert (colors[1] - colors[0]).max() > 60
 
 
 def test_quality_is_coloured_from_0_to_1_whatever_the_values(scene, session):

@@ -152,11 +152,14 @@ class Viewing(QWidget):
             self._grid.addWidget(view, 1, column)
 
     def _resized(self, scene: Scene) -> None:
-        """Draw a view after its size changed; fit the mesh again if it was fitted before."""
-        fitted = self._leader.camera.fitted
+        """Draw a view after its size changed; fit the mesh, or show a saved view, again."""
+        camera = self._leader.camera
+        fitted, restored = camera.fitted, camera.restored
         scene.resized()
         if fitted:
-            self._leader.camera.fit()
+            camera.fit()
+        elif restored:
+            camera.go(restored)
 
     @property
     def _leader(self) -> Scene:
