@@ -77,8 +77,8 @@ class Recorded:
 
     def steps(self, count, halve):
         assert halve
-        steps, least = self.given[count]
-        return [Made(least)] * steps
+        steps, least, *inverted = self.given[count]
+        return [Made(least, inverted=sum(inverted))] * steps
 
     def quality_of(self, steps):
         return steps[-1]
@@ -105,6 +105,13 @@ def test_one_worse_number_does_not_end_the_search_where_steps_were_halved():
 def test_one_worse_number_ends_the_search_where_none_was_halved():
     found = list(all_steps(Recorded({1: (1, 0.078), 2: (2, 0.072)})))
     assert len(found) == 1
+
+
+def test_a_number_that_folds_cells_after_one_that_does_not_ends_the_search_only_twice():
+    """Turned by 60 degrees, the search ended with the first number, of minimum quality 0.011."""
+    found = list(all_steps(Recorded({1: (1, 0.011), 2: (2, 0.0, 3), 3: (3, 0.2), 5: (5, 0.201)})))
+    assert len(found) == 3
+    assert len(list(all_steps(Recorded({1: (1, 0.011), 2: (2, 0, 3), 3: (3, 0, 1)})))) == 1
 
 
 def test_a_hopeless_case_gives_the_least_folded(square):
@@ -159,3 +166,17 @@ def test_auto_is_read_and_written(tmp_path):
     (tmp_path / "bad.cfg").write_text("STEPS= 0\n")
     with pytest.raises(sv.SlidevizError, match="whole number from 1, or auto"):
         sv.Case.read(tmp_path / "bad.cfg")
+
+
+def test_the_summary_says_that_the_number_was_found_and_what_was_tried(tmp_path, capsys):
+    write_sample("square", tmp_path, 9)
+    words = ["run", str(tmp_path / "square.cfg"), "-o", str(tmp_path / "out.su2"), "--steps"]
+    run([*words, "auto", "--set", "SLIDING_MODE=none", "--set", "PERIODIC_MODE=none"])
+    out = capsys.readouterr().out
+    assert " (AUTO), sliding none" in out.splitlines()[0]
+    (line,) = [line for line in out.splitlines() if line.startswith("  steps tried: 1 (")]
+    assert "halved to" in line or "inverted" in line
+    run([*words, "2"])
+    out = capsys.readouterr().out
+    assert "AUTO)," not in out
+    assert "tried" not in out

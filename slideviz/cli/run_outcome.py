@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -106,7 +106,8 @@ def _print_run(
 
     counts, spent = report["node_counts"], report["seconds"]
     method = "" if report["method"] == "rbf" else f"method {report['method']}, "
-    print(f"{report['case']}: {counted(report['steps'], 'step')}, {method}", end="")
+    auto = " (AUTO)" if report["tried"] else ""
+    print(f"{report['case']}: {counted(report['steps'], 'step')}{auto}, {method}", end="")
     zone = f", zone {report['zone']}" if report["zones"] > 1 else ""
     print(f"sliding {report['sliding']}, periodic {report['periodic']}{zone}")
     print(quality_lines(found, before))
@@ -123,6 +124,8 @@ def _print_run(
     if report["periodic_misfit"] is not None:
         rows.append(("periodic misfit", report["periodic_misfit"]))
     print(table(rows))
+    if report["tried"]:
+        print(f"  steps tried: {', '.join(map(_trial_words, report['tried']))}")
     parts = {k: v for k, v in spent.items() if k != "total"}
     parts["start and others"] = spent["total"] - sum(parts.values())
     phases = ", ".join(f"{k} {v:.2f}" for k, v in parts.items() if v >= 0.005)
@@ -130,6 +133,13 @@ def _print_run(
     for name, path in files.items():
         if path:
             print(f"{name}: {path}")
+
+
+def _trial_words(trial: Mapping[str, Any]) -> str:
+    """Return what a number of steps gave, as ``2 (minimum 0.51)``."""
+    made = f", halved to {trial['steps']}" if trial["steps"] != trial["planned"] else ""
+    gave = f"{trial['inverted']} inverted" if trial["inverted"] else f"minimum {trial['min']:.3g}"
+    return f"{trial['planned']} ({gave}{made})"
 
 
 def advice_for(

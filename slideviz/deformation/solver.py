@@ -106,10 +106,11 @@ def _automatic(stepping: Stepping) -> Iterator[Step]:
     before came to by halving steps that fold cells. Better means fewer inverted cells, then a
     higher minimum quality. The search ends
 
-    * when the best trial has no inverted cell and no halved step, and the next one has inverted
-      cells, or raises the minimum quality by at most the part ``steps_gain`` of it;
+    * when the best trial has no inverted cell and no halved step, and the next one has none either,
+      and raises the minimum quality by at most the part ``steps_gain`` of it;
     * after two trials in a row that are no better or have no sound result. Two, because halved
-      steps are small just where it matters: equal steps catch up only with a larger number.
+      steps are small just where it matters: equal steps catch up only with a larger number, and
+      because cells that fold with some number of steps need not fold with the next.
 
     Raises
     ------
@@ -134,7 +135,7 @@ def _automatic(stepping: Stepping) -> Iterator[Step]:
         tried.append(trial)
         if best is not None and best[0].inverted == 0 and best[0].steps == best[0].planned:
             gain = stepping.case.steps_gain * best[0].min
-            if trial.inverted or trial.min - best[0].min <= gain:
+            if not trial.inverted and trial.min - best[0].min <= gain:
                 break
         if best is None or (-trial.inverted, trial.min) > (-best[0].inverted, best[0].min):
             best, worse = (trial, steps), 0
