@@ -77,7 +77,7 @@ class MotionPanel(Panel):
         self.add = tool_button("", image="add", text="Add motion", menu=menu, name="add_motion")
         self.add_actions = {}
         for kind, words in KINDS.items():
-            self.add_actions[kind] = menu.addAction(words.capitalize())
+            self.add_actions[kind] = menu.addAction(words[:1].upper() + words[1:])
             self.add_actions[kind].triggered.connect(partial(self._add, kind))
         self.add_table = menu.addAction("Displacement table…", self.new_table)
         return in_row(self.add, None, *self._make_actions(), spacing=2)
