@@ -1,4 +1,4 @@
-"""The table of the samples: cases of the thesis (chapter 4), at any size, and a blade passage."""
+"""The table of the samples: cases of the thesis (chapter 4) at any size, a passage, an airfoil."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.su2b.write import ZoneContent, file_head, zone_blocks
 from slideviz.mesh.model import Mesh
+from slideviz.samples.airfoil import airfoil_case, airfoil_mesh
 from slideviz.samples.passage import passage_case, passage_mesh
 from slideviz.samples.stator import stator_case, stator_displacement, stator_mesh, stator_zone
 from slideviz.samples.thesis import FILE, thesis_case, thesis_zone
@@ -70,7 +71,8 @@ class SampleKind:
     variants : tuple of str
         Names of its motions, the default first. ``file``: by a displacement file; ``motion``: the
         same by MOTION keys; ``translate``: that of thesis Figure 4.4, which moves the block close
-        to two sides; ``flat``: that of Figure 4.14, without a component in z.
+        to two sides; ``flat``: that of Figure 4.14, without a component in z; ``layers``: thin
+        cells at the wall.
     stream : callable or None
         Returns the same as a `StreamedSample`; None if that is not possible.
     """
@@ -95,6 +97,11 @@ def _streamed_thesis(name: str, size: int, variant: str) -> StreamedSample:
 def _passage(name: str, size: int, _variant: str) -> Sample:
     """Return the sample ``passage``, which has one variant only."""
     return Sample(name, passage_mesh(size), passage_case())
+
+
+def _airfoil(name: str, size: int, variant: str) -> Sample:
+    """Return the sample ``airfoil``, with layers or without."""
+    return Sample(name, airfoil_mesh(size, variant), airfoil_case())
 
 
 def _turbine_row(name: str, size: int, _variant: str) -> Sample:
@@ -148,6 +155,12 @@ SAMPLES: Mapping[str, SampleKind] = {
     "passage": SampleKind(
         "2D: turbine blade in a periodic passage; size: cells along the inflow (36)", 36, _passage
     ),
+    "airfoil": SampleKind(
+        "2D: airfoil turned in a far field of 50 chords; size: cells around it (96)",
+        96,
+        _airfoil,
+        ("motion", "layers"),
+    ),
     "turbine-row": SampleKind(
         "2D: supersonic vane in a cascade, layer and triangles (thesis 4.1.3); "
         "size: cells (224180)",
@@ -173,8 +186,8 @@ def sample(name: str, size: int | None = None, variant: str | None = None) -> Sa
     name : str
         One of ``SAMPLES``.
     size : int, optional
-        Cells in each direction; of the passage: cells along its inflow; of turbine row and
-        stator: all cells. The usual size when left out.
+        Cells in each direction; of the passage: cells along its inflow; of the airfoil: cells
+        around it; of turbine row and stator: all cells. The usual size when left out.
     variant : str, optional
         One of ``SAMPLES[name].variants``; the first when left out.
 

@@ -195,7 +195,7 @@ def same_mesh(one: sv.Mesh, other: sv.Mesh) -> bool:
     ("name", "variant"), [(n, v) for n in SAMPLES for v in SAMPLES[n].variants]
 )
 def test_written_sample_reads_back_bit_for_bit_wherever_it_is_moved(tmp_path, name, variant):
-    size = {"passage": 12, "turbine-row": 5_000, "stator": 5_000}.get(name, 5)
+    size = {"passage": 12, "turbine-row": 5_000, "stator": 5_000, "airfoil": 16}.get(name, 5)
     paths = write_sample(name, tmp_path / "a" / "b", size, variant)
     assert all(path.is_file() for path in paths)
     assert {path.name for path in paths} == {path.name for path in (tmp_path / "a/b").iterdir()}
@@ -209,7 +209,7 @@ def test_written_sample_reads_back_bit_for_bit_wherever_it_is_moved(tmp_path, na
     assert not case.warnings
     found = displacements(case, mesh)
     assert not found.warnings
-    assert np.abs(found.vectors).max() > 0.03 * mesh.extent
+    assert np.abs(found.vectors).max() > 0.03 * np.ptp(mesh.points[found.nodes], axis=0).max()
     if expected.displacement is not None:
         np.testing.assert_array_equal(found.nodes, expected.displacement.nodes)
         np.testing.assert_array_equal(found.vectors, expected.displacement.vectors)
@@ -222,6 +222,7 @@ def test_written_sample_reads_back_bit_for_bit_wherever_it_is_moved(tmp_path, na
         (("polar", None, "motion"), "no variant 'motion' of polar; it has file"),
         (("square", 2), "size 2 leaves no room for the block; needed are 3 cells or more"),
         (("hexahedron", -1), "size -1 leaves no room"),
+        (("airfoil", 15), "size 15 is too coarse for the airfoil; needed are 16 cells or more"),
         (("passage", 11), "size 11 is too coarse for the blade; needed are 12 cells or more"),
     ],
 )
@@ -249,7 +250,10 @@ def test_folder_that_cannot_be_made_is_told(tmp_path):
         write_sample("square", tmp_path / "file" / "x", 5)
 
 
-@pytest.mark.parametrize(("name", "size"), [("square", 25), ("polar", 25), ("hexahedron", 9)])
+KEPT = [("square", 25), ("polar", 25), ("hexahedron", 9), ("airfoil", 48)]
+
+
+@pytest.mark.parametrize(("name", "size"), KEPT)
 def test_sample_meshes_folder_holds_what_the_command_writes(tmp_path, name, size):
     folders = ROOT / "sample_meshes" / name, tmp_path
     write_sample(name, tmp_path, size)
@@ -263,6 +267,21 @@ def test_sample_meshes_folder_holds_what_the_command_writes(tmp_path, name, size
     # Not bit for bit: sine and cosine differ in the last digit between processors.
     np.testing.assert_allclose(kept.points, fresh.points, rtol=0, atol=1e-15)
     assert same_mesh(kept.with_points(fresh.points), fresh)
+
+
+@pytest.mark.parametrize("variant", ["motion", "layers"])
+def test_the_airfoil_has_square_cells_in_a_wide_far_field(variant):
+    mesh = made("airfoil", 48, variant).mesh
+    found = sv.quality(mesh, reference=mesh)
+    assert found.skew.min() > 0.75
+    body, far = (mesh.points[mesh.marker(name).nodes] for name in ("airfoil", "farfield"))
+    np.testing.assert_allclose(np.ptp(body, axis=0), [1.0, 0.122], atol=1e-3)
+    np.testing.assert_allclose(np.linalg.norm(far - [0.5, 0.0], axis=1), 50.0, rtol=0.01)
+    ring = len(body)
+    heights = np.linalg.norm(mesh.points[ring : 2 * ring] - body, axis=1)
+    lengths = np.linalg.norm(np.roll(body, -1, axis=0) - body, axis=1)
+    thin = 1e-3 if variant == "layers" else 1.0
+    np.testing.assert_allclose(np.median(heights / lengths), thin, rtol=0.1)
 
 
 def test_sample_meshes_folder_holds_the_passage():

@@ -181,12 +181,28 @@ def _stator() -> str:
     return _lines(_annulus, 20, 7) + "".join(walls + sides + blades)
 
 
+def _around(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Map to an O-mesh, u around an airfoil and v outwards."""
+    angle, half = 2 * np.pi * u, 22 * np.exp(1.05 * v)
+    thick = half * (v + (1 - v) * 0.16 * (1 - np.cos(angle)))
+    return 76 + 1.15 * half * np.cos(angle), 48 - 0.68 * thick * np.sin(angle)
+
+
+def _airfoil() -> str:
+    """Return the SVG of an airfoil in its O-mesh."""
+    along = np.linspace(0, 1, 61)
+    far = _around(along, np.ones(61))
+    rim = _path(*far, f'fill="none" stroke="{WALL}" stroke-width="1.8"')
+    return _lines(_around, 24, 7) + rim + _body(*_around(along, np.zeros(61)))
+
+
 _DRAWINGS: dict[str, Callable[[], str]] = {
     "square": lambda: _grid(_square, 10, 10) + _turned(_square, 0.34, 0.14, 20),
     "polar": lambda: _grid(_sector, 10, 8) + _turned(_sector, 0.34, 0.2, 16),
     "hexahedron": lambda: _solid(_cube, (24, -18), _turned(_cube, 0.36, 0.2, 20)),
     "cylindrical": lambda: _solid(_sector_front, (20, -20), _turned(_sector_front, 0.34, 0.22, 16)),
     "passage": lambda: _grid(_channel, 18, 8) + _blade(_channel, 0.16, 0.84, 11),
+    "airfoil": _airfoil,
     "turbine-row": _row,
     "stator": _stator,
 }
