@@ -18,6 +18,9 @@ from tools.laws.oracle import nodes_with
 SLIDES, REPEATS = 7, 30
 """Seeds of runs with sliding, fixed and periodic boundaries."""
 
+SMALL, SMALL_BODIES = 119, (9, 76, 101, 329, 597, 714, 888)
+"""Seeds of runs with small bodies in wide far fields, with many methods and kernels."""
+
 
 @pytest.mark.parametrize(
     "first",
@@ -79,6 +82,21 @@ def test_growth_sees_a_node_that_goes_too_far(monkeypatch):
         points[-1] += run.mesh.extent
 
     assert "growth" in spoilt(monkeypatch, SLIDES, far)
+
+
+def test_reach_sees_a_node_that_moves_out_of_reach(monkeypatch):
+    def nudged(run, points):
+        points[np.argmax(np.linalg.norm(points, axis=1))] *= 1.0 + 1e-12
+
+    run = random_run(SMALL)
+    assert {"body"} < {*run.mesh.marker_names}
+    assert "reach" in spoilt(monkeypatch, SMALL, nudged)
+
+
+@pytest.mark.parametrize("seed", SMALL_BODIES)
+def test_no_law_is_broken_by_small_bodies(seed):
+    found = of_seed(seed)
+    assert (found.ended, found.broken) == ("done", ())
 
 
 def test_images_see_one_that_goes_another_way(monkeypatch):

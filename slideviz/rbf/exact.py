@@ -206,6 +206,8 @@ def saddle_fit(problem: Problem, rows: ConstraintRows) -> tuple[Interpolant, boo
 
 def condition_with_terms(problem: Problem, rows: ConstraintRows) -> float:
     """Return the condition number of the system of ``rows`` with the polynomial."""
+    if not len(rows.nodes):
+        return 1.0
     place = problem.features[:, rows.nodes], rows.normals
     return saddle_condition(matrix(problem.basis, place), row_terms(problem, rows))
 

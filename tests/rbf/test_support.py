@@ -150,3 +150,16 @@ def test_a_deformer_moves_a_body_that_stays_at_its_reference():
     weights = np.random.default_rng(1).normal(size=mesh.points.shape)
     along = (weights * deformer.jvp(moved, way)).sum()
     assert (way * deformer.vjp(moved, weights)).sum() == pytest.approx(along, rel=1e-12)
+
+
+def test_a_motion_below_the_tolerance_needs_no_control_node_whatever_the_kernel():
+    for kernel in ("thin-plate", "wendland-c2"):
+        mesh, least = far_field(60.0), sv.Reduction(tolerance=1.0)
+        case = sv.Case(
+            roles={"body": "moving"},
+            motions=(sv.Translate("body", (0.01, 0.0)),),
+            kernel=kernel,
+            reduction=least,
+        )
+        *_, last = sv.deform(case, mesh)
+        assert (last.control_nodes, last.condition) == (0, 1.0)

@@ -10,9 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from slideviz.case.model import Translate
 from slideviz.deformation.steps import Step
+from slideviz.rbf.kernels import KERNELS
+from slideviz.rbf.problem import GAMMA
 from tools.laws.attempt import told, tried
 from tools.laws.cases import Run
 from tools.laws.meshes import images, renumbered
@@ -132,6 +137,38 @@ def growth_is_bounded(run: Run, steps: list[Step]) -> Iterator[str]:
             return
 
 
+def out_of_reach_keep_every_bit(run: Run, steps: list[Step]) -> Iterator[str]:
+    """Yield which node moved though no support can reach it.
+
+    Moving nodes reach others of the boundary by the support radius, these again others, and so on;
+    the correction reaches as far as its factor times the largest error.
+    """
+    case, mesh, radius = run.case, run.mesh, steps[-1].support_radius
+    if radius is None or run.period is not None or not KERNELS[case.kernel].compact:
+        return
+    gamma = GAMMA if case.reduction is None else case.reduction.gamma
+    way = np.abs([step.mesh.points - mesh.points for step in steps]).max(axis=0)
+    reach = max(radius, gamma * max(step.max_error for step in steps))
+    reach = 1.001 * reach + 4.0 * float(way.max())
+    if reach > np.linalg.norm(np.ptp(mesh.points, axis=0)):
+        return
+    boundary = np.unique(np.concatenate([marker.nodes for marker in mesh.markers]))
+    tree = cKDTree(mesh.points[boundary])
+    pairs = tree.query_pairs(reach, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(boundary),) * 2)
+    part = connected_components(graph, directed=False)[1]
+    moving = np.isin(boundary, nodes_with(case, mesh, "moving"))
+    reached = np.isin(part, part[moving & way[boundary].any(axis=1)])
+    if not reached.any():
+        return
+    far = cKDTree(mesh.points[boundary[reached]]).query(mesh.points)[0] > reach
+    for step in steps:
+        moved = far & (step.mesh.points != mesh.points).any(axis=1)
+        if moved.any():
+            yield f"step {step.index}: node {np.argmax(moved)} moved, out of reach"
+            return
+
+
 def same_run_same_bits(run: Run, steps: list[Step]) -> Iterator[str]:
     """Yield whether the same case gives other bits the second time."""
     again, problem = tried(run.case, run.mesh)
@@ -180,6 +217,7 @@ LAWS: dict[str, Callable[[Run, list[Step]], Iterator[str]]] = {
     "images": images_stay_images,
     "sliding": sliding_stay_on_surface,
     "growth": growth_is_bounded,
+    "reach": out_of_reach_keep_every_bit,
     "numbers": numbers_make_sense,
     "renumbered": numbering_does_not_matter,
     "bits": same_run_same_bits,

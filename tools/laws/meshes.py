@@ -24,7 +24,8 @@ def random_mesh(rng: Rng) -> Made:
         (shapes.ring, 0.27),
         (shapes.around, 0.15),
         (shapes.special, 0.08),
-        (shapes.sample, 0.1),
+        (shapes.sample, 0.04),
+        (shapes.small, 0.06),
     )
     chances = [chance for _, chance in makers]
     made = makers[rng.choice(len(makers), p=chances)][0](rng)

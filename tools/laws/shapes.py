@@ -1,4 +1,4 @@
-"""The makers of random meshes: boxes, annular passages, O-grids, samples, and special ones."""
+"""The makers of random meshes: boxes, annular passages, O-grids, small bodies, samples, others."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray
 from slideviz.samples import table
+from slideviz.samples.airfoil import airfoil_mesh
 from tests import builders
 from tools.laws import draw
 from tools.laws.draw import Rng
@@ -133,6 +134,17 @@ def special(rng: Rng) -> Made:
         return Made(mesh, (("sphere",),), tuple(sides))
     mesh = builders.channel(2 * int(rng.integers(2, 8)))
     return Made(mesh, (("bump",), ("y_p",)), (Period((("x_m", "x_p"),), np.array([2.0, 0.0])),))
+
+
+def small(rng: Rng) -> Made:
+    """Return one or two small bodies in a far field of 20 to 1,000 times their size."""
+    size = float(10.0 ** rng.uniform(1.3, 3))
+    if rng.random() < 0.3:
+        mesh = airfoil_mesh(int(rng.integers(16, 30)), str(rng.choice(["motion", "layers"])))
+        return Made(mesh, (("airfoil",),))
+    bodies = int(rng.integers(1, 3))
+    mesh = builders.far_field(size, bodies, int(rng.integers(2, 7)))
+    return Made(mesh, (("body",), ("other",))[:bodies])
 
 
 def sample(rng: Rng) -> Made:
