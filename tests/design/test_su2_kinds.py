@@ -13,7 +13,7 @@ from slideviz.design.su2.config import read_config
 from slideviz.design.su2.surface import make_surface
 from slideviz.errors import CaseError
 from slideviz.mesh.topology import find_boundary, vertex_normals
-from tests.builders import airfoil, cube, sphere_in_box
+from tests.builders import airfoil, cube, halo_text, sector, sphere_in_box
 from tests.design.test_su2_dot import (
     differences,
     gradient,
@@ -229,6 +229,22 @@ def test_grid_kinds_move_every_node(kind, here, capsys):
     table = np.loadtxt("surface_sensitivity.dat", delimiter=",")
     np.testing.assert_allclose(table[:, :2], mesh.points, atol=1e-14)
     np.testing.assert_array_equal(table[:, 3:5], weights)
+
+
+def test_grid_kinds_move_a_halo_with_the_mesh(here, capsys):
+    plain = sector(6, 30.0)
+    turn = np.array([[0.0, 0, 0], [0, 0, np.pi / 6], [0, 0, 0]])
+    Path("mesh.su2").write_text(halo_text(plain, "per1", "per2", turn))
+    text = "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nDV_KIND= ROTATE_GRID\n"
+    text += "DV_PARAM= (0.5, 0, 0, 0.5, 0, 1)\nDV_VALUE= 90\n"
+    mesh = sv.read("mesh.su2")
+    assert mesh.halo is not None
+    moved = written(text)
+    x, y = mesh.points.T
+    np.testing.assert_allclose(moved, np.stack([0.5 - y, x - 0.5], axis=1), atol=1e-14)
+    assert (
+        "of the halo in mesh.su2 (SEND_RECEIVE) stay as they are; they" in capsys.readouterr().err
+    )
 
 
 SHAPES = """\

@@ -141,12 +141,15 @@ class MovingSurface:
         ):
             # All boundaries move as a body does, or grow: this kernel has that exactly inside.
             case = case.change(kernel="thin-plate")
+        nodes, vectors = self.nodes, self.displacement
         if self.whole or not self.config.markers:
             every = dict.fromkeys(self.mesh.marker_names, "moving")
             case = case.change(roles=every, sliding="none", periodic="none")
-        listed = [self.mesh.marker(name).nodes for name in case.markers_with("moving")]
-        nodes = np.unique(np.concatenate(listed)) if self.whole else self.nodes
-        motions = (Prescribed(nodes, self.displacement[np.searchsorted(self.nodes, nodes)]),)
+        if self.whole:  # the mesh is moved already
+            listed = [marker.nodes for marker in self.mesh.markers]
+            nodes = np.unique(np.concatenate([np.empty(0, np.int64), *listed]))
+            vectors = np.zeros((len(nodes), self.mesh.dim))
+        motions = (Prescribed(nodes, vectors),)
         return case.change(motions=motions, warnings=(*case.warnings, *self.warnings))
 
 
@@ -168,6 +171,9 @@ def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
     nodes = np.arange(len(mesh.points)) if group == "grid" else nodes
     displacer = DISPLACERS[group](config, mesh, nodes)
     left = [] if group == "ffd" else _left_behind(config, mesh)
+    if group == "grid" and mesh.halo is not None:
+        said = f"the transformations of the halo in {mesh.name} (SEND_RECEIVE) stay as they are"
+        left.append(f"{said}; they do not fit where the axis or the vector of its period moves")
     return MovingSurface(config, mesh, nodes, displacer, (*displacer.warnings, *left))
 
 
