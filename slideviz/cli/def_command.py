@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from slideviz.cli.options import add_shared, changed
+from slideviz.cli.terminal import holding
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -69,6 +70,11 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
 
 def run_def(arguments: argparse.Namespace) -> int:
     """Deform a mesh by a configuration of SU2, write it with its boxes; return the exit code."""
+    with holding() as arguments.begun:
+        return _run_def(arguments)
+
+
+def _run_def(arguments: argparse.Namespace) -> int:
     from slideviz import quality, write
     from slideviz.cli.places import OutputPath, require_places, tell_lost
     from slideviz.cli.report import folded_cells, run_report
