@@ -150,7 +150,7 @@ def test_titles_of_runs_of_one_method_say_what_sets_them_apart(session):
     session = changes.start_run(changes.set_case(session, kernel="wendland-c4"))
     session = changes.end_run(changes.add_frames(session, session.runs[0].frames[:1]), "done")
     wide = PictureOptions((3000, 300), title=True)
-    assert title_of(session, wide).startswith("Run 2, no sliding, wendland-c4: min")
+    assert title_of(session, wide).startswith("Run 2, no sliding, CP C4: min")
     other = changes.start_run(changes.set_case(session, sliding="ps"))
     other = changes.add_frames(other, session.runs[0].frames[:1])
     assert title_of(other, wide).startswith("Run 3, pseudo sliding: min")
