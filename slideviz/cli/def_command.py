@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from slideviz.cli.options import add_shared, changed
-from slideviz.cli.terminal import holding
+from slideviz.cli.terminal import holding, say
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -56,7 +55,7 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     if not arguments.quiet and config.ignored:
         count = len(config.ignored)
         words = f"{count} other key{'s' * (count > 1)} of SU2 in {arguments.case} not needed here"
-        print(f"slideviz: note: {words}", file=sys.stderr)
+        say("note", words)
     file = config.case.mesh_file
     assert file is not None
     if not file.exists() and (arguments.case.parent / file).exists():
@@ -185,5 +184,5 @@ def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, beg
     for name, count in counts.items():
         if not count:
             words = f"no node of {', '.join(config.markers)} is in the FFD box {name}"
-            print(f"slideviz: warning: {words}", file=sys.stderr)
+            say("warning", words)
     return DONE
