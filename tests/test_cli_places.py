@@ -15,6 +15,8 @@ from slideviz.mesh.io.atomic import atomic_write, require_writable
 from slideviz.mesh.io.file_checks import protected
 from slideviz.samples.table import write_sample
 
+ODD = "a\udcff"
+"""A name that is not UTF-8."""
 CASE = ["square.cfg", "--set", "STEPS=1"]
 PLANE = ["--plane", "y=0.5"]
 
@@ -32,6 +34,23 @@ def square(tmp_path: Path, monkeypatch) -> Path:
 
 def content(folder: Path) -> dict[str, bytes]:
     return {str(p): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+@pytest.mark.parametrize("folder", ["/", "."])
+def test_a_mesh_is_not_written_to_a_folder(square, capsys, folder):
+    assert run(["run", *CASE, "-o", folder]) == 1
+    assert (
+        f"{folder}: is a folder; needed is the name of the mesh to write" in capsys.readouterr().err
+    )
+
+
+def test_names_need_not_be_utf_8(square):
+    (square / f"{ODD}.su2").write_bytes((square / "mesh.su2").read_bytes())
+    (square / f"{ODD}.cfg").write_bytes((square / "square.cfg").read_bytes())
+    call = ["run", f"{ODD}.cfg", *CASE[1:], "--set", f"MESH_FILENAME={ODD}.su2", "-q"]
+    more = ["--picture", f"{ODD}.png", "--picture-size", "100x100"]
+    assert run([*call, "-o", f"{ODD}2.su2", *more]) == 0
+    assert (square / f"{ODD}.png").exists()
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ by spaces, tabs, commas or semicolons; ``%``, ``#`` and ``$`` start comments.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +19,6 @@ from slideviz.mesh.model import FloatArray, IntArray, frozen_array
 
 _COMMENT = re.compile(f"[{COMMENT_SIGNS}][^\n]*")
 _SEPARATORS = str.maketrans(",;", "  ")
-_ENOUGH = 1000
 
 
 PART = 4000
@@ -185,7 +183,11 @@ def _table(path: Path, lines: list[str], dim: int, columns: Columns) -> FloatArr
         except CaseError as problem:
             problems.append((line, str(problem)))
     if problems:
-        raise CaseError(listed(path, problems))
+        kinds: dict[str, list[Problem]] = {}
+        for line, sentence in problems:
+            kinds.setdefault(sentence.rpartition("' ")[2], []).append((line, sentence))
+        told = [(kind[0][0], _with_count(kind[0][1], len(kind))) for kind in kinds.values()]
+        raise CaseError(listed(path, told))
     return np.array(rows, np.float64)
 
 
@@ -233,20 +235,26 @@ def _table_problems(
         return []
     row_line = [line for line, content in enumerate(lines, start=1) if content.strip()]
     last = f"its nodes are 0 to {count - 1}"
-    problems = [(row_line[i], f"{index[i]:.15g} is not a node number") for i in _first(broken)]
-    problems += [
-        (row_line[i], f"node {index[i]:.15g} is not in the mesh; {last}") for i in _first(outside)
-    ]
-    problems += [
-        (row_line[i], f"node {int(index[i])} is not on {of}; take the line out or change the roles")
-        for i in _first(strange)
-    ]
-    for k in _first(differ):
+    problems: list[Problem] = []
+    for wrong, begin, end in (
+        (broken, "", "is not a node number"),
+        (outside, "node ", f"is not in the mesh; {last}"),
+        (strange, "node ", f"is not on {of}; take the line out or change the roles"),
+    ):
+        if wrong.any():
+            k = int(np.argmax(wrong))
+            said = f"{begin}{index[k]:.15g} {end}"
+            problems.append((row_line[k], _with_count(said, int(np.count_nonzero(wrong)))))
+    if differ.any():
+        k = int(np.argmax(differ))
         before, after = row_line[order[k]], row_line[order[k + 1]]
-        sentence = f"node {int(index[order[k]])} has another {what} in line {before}"
-        problems.append((after, f"{sentence}; keep one of the two"))
+        said = f"node {int(index[order[k]])} has another {what} in line {before}"
+        said += "; keep one of the two"
+        problems.append((after, _with_count(said, int(np.count_nonzero(differ)))))
     return problems
 
 
-def _first(mask: Sequence[bool] | np.ndarray) -> list[int]:
-    return [int(i) for i in np.flatnonzero(mask)[:_ENOUGH]]
+def _with_count(sentence: str, count: int) -> str:
+    """Return the sentence on the first of ``count`` wrong lines, with the number of the others."""
+    more = "line" if count == 2 else "lines"
+    return f"{sentence} (and {count - 1} more {more} like it)" if count > 1 else sentence

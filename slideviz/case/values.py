@@ -162,7 +162,10 @@ def _read_path(text: str) -> Path | None:
         return None
     if not text:
         raise CaseError("the file name is empty; give one, or NONE")
-    return Path(text.replace("\\", "/"))
+    path = Path(text.replace("\\", "/"))
+    if path.name in ("", ".."):
+        raise CaseError(f"{shown(text)} is a folder; needed is the name of a file")
+    return path
 
 
 def path_text(path: Path, plain: re.Pattern[str] = _PLAIN_PATH) -> str:

@@ -75,7 +75,7 @@ def run_def(arguments: argparse.Namespace) -> int:
 
 def _run_def(arguments: argparse.Namespace) -> int:
     from slideviz import quality, write
-    from slideviz.cli.places import OutputPath, require_places, tell_lost
+    from slideviz.cli.places import OutputPath, qualities_beside, require_places, tell_lost
     from slideviz.cli.report import folded_cells, run_report
     from slideviz.cli.run_command import pull
     from slideviz.cli.run_outcome import CELLS, advice_for, tell, write_qualities
@@ -91,7 +91,7 @@ def _run_def(arguments: argparse.Namespace) -> int:
     place = OutputPath(
         output, "MESH_OUT_FILENAME", False, is_mesh=kind is None, replaces=replaces, remedy=remedy
     )
-    rated = output.with_name(output.stem + "_qual.txt") if config.case.generate_quality else None
+    rated = qualities_beside(output) if config.case.generate_quality else None
     require_places(
         arguments,
         place,

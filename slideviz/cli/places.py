@@ -67,6 +67,21 @@ def inputs_of(arguments: argparse.Namespace) -> dict[Path, str]:
     return {path: what for what, path in found.items() if path is not None}
 
 
+def qualities_beside(output: Path) -> Path:
+    """Return the path of the qualities of each cell, beside a mesh that is written.
+
+    Raises
+    ------
+    CaseError
+        The path of the mesh is that of a folder.
+    """
+    if not output.name:
+        from slideviz.errors import CaseError
+
+        raise CaseError(f"{output}: is a folder; needed is the name of the mesh to write")
+    return output.with_name(f"{output.stem}_qual.txt")
+
+
 def note_case(arguments: argparse.Namespace, case: Case) -> None:
     """Add the input files of a case to those of the command line, ``arguments.inputs``."""
     for path, what in case.inputs().items():

@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run(arguments: argparse.Namespace) -> int:
     from slideviz import quality, read, write
-    from slideviz.cli.places import tell_lost
+    from slideviz.cli.places import qualities_beside, tell_lost
     from slideviz.cli.report import cell_data, folded_cells, run_report
     from slideviz.scene.moved import require_detail
 
@@ -87,7 +87,7 @@ def _run(arguments: argparse.Namespace) -> int:
     mesh_file = require_mesh_file(arguments, case)
     output = arguments.output or case.mesh_out or _default_output(case)
     kind = _format_of(output, case)
-    qualities = output.with_name(output.stem + "_qual.txt") if case.generate_quality else None
+    qualities = qualities_beside(output) if case.generate_quality else None
     require_streamable(arguments, case, output, kind)
     _require_places(arguments, case, output, qualities)
     if is_to_be_streamed(arguments, case, output, kind):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slideviz.color_scheme import PAPER, SELECTED_COLOUR
+from slideviz.mesh.check import printable
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.mesh.surfaces import padded
@@ -34,7 +35,7 @@ LONGEST = "step {0}.00 of {0}, interpolated"
 def caption(name: str, found: Quality, colour_by: ColourBy = "size-skew") -> str:
     """Return a line with a name and the size-skew quality: min, mean, inverted cells."""
     what = "" if colour_by == "size-skew" else "size-skew "
-    text = f"{name}: {what}min {found.min:.4f}, mean {found.mean:.4f}"
+    text = f"{printable(name)}: {what}min {found.min:.4f}, mean {found.mean:.4f}"
     if found.inverted:
         text += f", {found.inverted} of {found.cells} cells inverted"
     return text

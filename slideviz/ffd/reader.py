@@ -14,7 +14,8 @@ from slideviz.ffd.coordinates import CoordinateSystem, polar_corners
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 _LETTERS = "IJK"
-
+_FARTHEST = 10.0
+"""Largest parametric coordinate of a point in a box, which goes from 0 to 1."""
 
 Row = tuple[int, list[str]]
 """A line of numbers: its place in the section, from 0, and its words."""
@@ -228,12 +229,20 @@ class _Reader:
         found = {}
         for marker, tails in on.items():
             table = self.table(key, tails, 4)
-            nodes = table[:, 0].astype(np.int64)
-            bad = (nodes != table[:, 0]) | (nodes < 0) | (nodes >= n_points)
+            number = table[:, 0]
+            bad = (number != np.floor(number)) | (number < 0) | (number >= n_points)
             if bad.any():
                 line, words = tails[int(np.argmax(bad))]
                 raise self.error(f"{key} names node {words[0]}, which is none", line)
-            nodes, first = np.unique(nodes, return_index=True)
+            far = np.abs(table[:, 1:]).max(axis=1) > _FARTHEST
+            if far.any():
+                line, words = tails[int(np.argmax(far))]
+                raise self.error(
+                    f"{key} puts node {words[0]} at ({', '.join(words[1:])}), and the box goes "
+                    "from 0 to 1; write the boxes again with DV_KIND= FFD_SETTING",
+                    line,
+                )
+            nodes, first = np.unique(number.astype(np.int64), return_index=True)
             if part is not None:  # which has all nodes of markers
                 inside = np.isin(nodes, part.points)
                 nodes, first = np.searchsorted(part.points, nodes[inside]), first[inside]

@@ -134,8 +134,8 @@ def within(points: FloatArray, largest: float) -> bool:
     return not points.size or bool(points.min() >= -largest and points.max() <= largest)
 
 
-def check_size(mesh: Mesh) -> None:
-    """Raise if a finite coordinate is too large to be computed with.
+def check_size(mesh: Mesh, name: str = "") -> None:
+    """Raise if a finite coordinate is too large to be computed with; ``name`` is for the message.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def check_size(mesh: Mesh) -> None:
     bad = ((np.abs(mesh.points) > LARGEST) & np.isfinite(mesh.points)).any(axis=1)
     if bad.any():
         k = int(np.argmax(bad))
-        raise too_large(mesh.name, k, mesh.points[k])
+        raise too_large(name or mesh.name, k, mesh.points[k])
 
 
 def too_large(name: str, k: int, point: FloatArray) -> MeshError:

@@ -113,6 +113,8 @@ def test_values(read, line, field, value):
         ("PERIODIC_ORIGIN= 1", r"the point has 1 values; needed are 2 or 3 numbers"),
         ('MESH_FILENAME= "a" b', r"""'"a" b' is not one file name; write it as "name\""""),
         ('MESH_FILENAME= ""', r"the file name is empty; give one, or NONE"),
+        ("MESH_OUT_FILENAME= /", r"'/' is a folder; needed is the name of a file"),
+        ("MESH_OUT_FILENAME= ..", r"'\.\.' is a folder; needed is the name of a file"),
         ('MESH_FILENAME= "a', r"""the quotation mark in '"a' is not closed; close it"""),
         ("MARKER_FIXED= (A, A)", r"MARKER_FIXED: marker 'A' is listed twice; list it once"),
         ('MARKER_FIXED= ("")', r"a marker has an empty name; give one"),

@@ -268,6 +268,25 @@ def test_several_objectives_and_names_of_files(case):
             ),
             "is cut off: 4 columns of 9 points do not fit in it",
         ),
+        *(
+            (
+                lambda p, w, n=n: Path("adj_cd.dat").write_bytes(
+                    np.array([535532, 4, 9], np.int32).tobytes()[:n]
+                ),
+                "do not fit in it",
+            )
+            for n in (4, 6, 8, 11)
+        ),
+        (
+            lambda p, w: Path("adj_cd.csv").write_text('"x", "Sensitivity_x", "Sensitivity_y"\n'),
+            "has no row of numbers; needed is one for each point",
+        ),
+        (
+            lambda p, w: Path("dot.cfg").write_text(
+                Path("dot.cfg").read_text() + "\nSOLUTION_ADJ_FILENAME= .\n"
+            ),
+            "SOLUTION_ADJ_FILENAME: '.' is a folder; needed is the name of a file",
+        ),
     ],
 )
 def test_wrong_sensitivities_are_told(change, message, case, capsys):

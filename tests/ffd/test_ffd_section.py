@@ -200,6 +200,12 @@ def test_mesh_without_boxes_has_none():
         (SECTION[12:], "", "FFD_NBOX= 1, but the FFD boxes that follow are none"),
         ("CONTROL_POINTS= 0", "CONTROL_POINTS= 2", "FFD_CONTROL_POINTS is 2; needed is 12"),
         ("SURFACE_POINTS= 0", "SURFACE_POINTS= 1\nlow 999 0 0 0", "names node 999, which is none"),
+        ("SURFACE_POINTS= 0", "SURFACE_POINTS= 1\nlow 9223372036854775808 0 0 0", "which is none"),
+        (
+            "SURFACE_POINTS= 0",
+            "SURFACE_POINTS= 1\nlow 0 0 1e308 0",
+            r"puts node 0 at \(0, 1e308, 0\), and the box goes from 0 to 1; write",
+        ),
     ],
 )
 def test_mistakes_are_told_with_box_and_remedy(old, new, message, tmp_path):

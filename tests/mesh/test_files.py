@@ -13,12 +13,14 @@ from hypothesis import strategies as st
 from su2_samples import SOLID, SQUARE, assert_same, bits, meshes, save
 
 import slideviz
+from slideviz.cli import run
 from slideviz.errors import MeshError
 from slideviz.mesh.cached_boundary import outer_facets
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.files import read, write
 from slideviz.mesh.io.meshio.bridge import read_with_meshio
 from slideviz.mesh.model import Cells, Marker, Mesh, Origin
+from tests.builders import square
 
 GMSH_22 = """\
 $MeshFormat
@@ -651,3 +653,17 @@ def test_foreign_mesh_becomes_an_su2_file(tmp_path):
     write(tmp_path / "out.su2", mesh)
     assert_same(read(tmp_path / "out.su2"), mesh)
     assert "MARKER_TAG= inflow\nMARKER_ELEMS= 1\n3 3 0\n" in (tmp_path / "out.su2").read_text()
+
+
+@pytest.mark.parametrize("ending", ["su2", "su2b", "vtu"])
+@pytest.mark.parametrize("command", ["info", "quality", "convert", "section"])
+def test_too_large_coordinates_are_refused_by_all_commands(tmp_path, capsys, ending, command):
+    path = tmp_path / f"a.{ending}"
+    mesh = square(4)
+    points = mesh.points.copy()
+    points[3, 0] = -2.8e101
+    write(path, mesh.with_points(points))
+    more = {"convert": [str(tmp_path / "b.su2")], "section": ["--plane", "y=0.5", "-o", "a.png"]}
+    assert run([command, str(path), *more.get(command, [])]) == 1
+    said = f"a.{ending}: point 3 is at (-2.8e+101, 0.75); nothing can be computed with coordinates"
+    assert said in capsys.readouterr().err

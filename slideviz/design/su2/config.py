@@ -186,7 +186,7 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
     notes = reader.warnings
     variables = read_variables(rows, problems, notes)
     ignored = tuple(key for key in rows if key not in _read_keys(rows))
-    files = {key: Path(reader.word(key, default)) for key, default in FILES.items()}
+    files = {key: reader.file(key, default) for key, default in FILES.items()}
     words = {key: reader.word(key, default) for key, default in WORDS.items()}
     reader.check(words)
     if problems:
@@ -248,6 +248,15 @@ class _Reader:
         """Return the value of a key, without quotes."""
         entry = self.rows.get(key)
         return default if entry is None else entry.value.strip('"') or default
+
+    def file(self, key: str, default: str) -> Path:
+        """Return the path that is the value of a key; one that can be no file is noted."""
+        path = Path(self.word(key, default))
+        if path.name in ("", ".."):
+            self.note(
+                self.rows[key], f"{shown(str(path))} is a folder; needed is the name of a file"
+            )
+        return path
 
     def names(self, key: str) -> tuple[str, ...]:
         """Return the markers that a key lists; none if it is missing or wrong, which is noted."""

@@ -60,6 +60,8 @@ def _csv(path: Path) -> tuple[list[str], FloatArray]:
     lines = body.splitlines()
     while lines and not is_number(lines[-1].partition(",")[0].strip()):
         lines.pop()  # what SU2 notes at the end
+    if not lines:
+        raise CaseError(f"{path}: has no row of numbers; needed is one for each point")
     try:
         table = np.loadtxt(lines, delimiter=",", ndmin=2, comments=None)
     except ValueError as problem:
@@ -76,7 +78,7 @@ def _binary(path: Path) -> tuple[list[str], FloatArray]:
     numbers, point by point.
     """
     data = path.read_bytes()
-    _, width, count = np.frombuffer(data[:12], np.int32).tolist()
+    _, width, count = np.frombuffer(data[:12].ljust(12, b"\0"), np.int32).tolist()
     begin = 20 + NAME_BYTES * width
     if width < 1 or count < 0 or len(data) < begin + 8 * width * count:
         raise CaseError(f"{path}: is cut off: {width} columns of {count} points do not fit in it")

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from slideviz.argument_types import check_types
 from slideviz.errors import MeshError
-from slideviz.mesh.check import check_mesh, path_error
+from slideviz.mesh.check import check_mesh, check_size, path_error, printable
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.file_checks import require_ordinary
 from slideviz.mesh.io.source import open_source, unreadable
@@ -63,8 +63,13 @@ def read(
     >>> sv.read("square.su2")
     Mesh('square.su2', 2D, 4 points, Cells(1 quadrilateral), markers: none)
     """
-    path = _named(path, file_format)
-    tick = progress or (lambda _: None)
+    mesh = _read(_named(path, file_format), zone, progress or (lambda _: None), file_format)
+    check_size(mesh, printable(path))
+    return mesh
+
+
+def _read(path: Path, zone: int | None, tick: Progress, file_format: FileFormat | None) -> Mesh:
+    """Return the mesh of a file, as `read` does, whatever the size of its coordinates."""
     try:
         kind = format_of(path, file_format)
         if kind == "su2b":
