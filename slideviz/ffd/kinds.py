@@ -6,7 +6,7 @@ box's coordinates q: x, y, z in Cartesian ones.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,54 +52,38 @@ def moves_of(box: Box, request: Request, held: Planes = NONE) -> tuple[Move, ...
     return KINDS[request.kind](box, request, held)
 
 
-def index_problem(box: Box, request: Request, dim: int) -> str:
+def variable_problem(box: Box, request: Request, dim: int, values: Sequence[float]) -> str:
     """Return why a variable cannot move a box; "" if it can. ``dim`` is that of the mesh."""
     kind, index = request.kind, request.index
-    directions = _directions(box, kind)
     if kind not in WHOLE_LINES and -1 in index:
         return f"{kind} has no index -1; write one from 0"
     if _is_polar(box, kind) and index[1] == -1:
         return f"{kind} has no second index -1 in polar coordinates; write one from 0"
-    for at, axis in zip(index, directions, strict=True):
-        if unknown := box.problem((*(at if axis == k else 0 for k in range(3)),)):  # type: ignore[arg-type]
-            return unknown
-    if dim == 2 or kind in TURNS:
-        return _line_problem(request, dim) or _plane_problem(box, request, dim)
+    full = [0, 0, 0]
+    for at, axis in zip(index, _directions(box, kind), strict=True):
+        full[axis] = at
+    if unknown := box.problem((full[0], full[1], full[2])):
+        return unknown
+    if (
+        kind in ("FFD_ROTATION", "FFD_CONTROL_SURFACE")
+        and request.numbers[:3] == request.numbers[3:]
+    ):
+        return f"{kind}: its two points are one; the line between them has no direction"
+    across = 2 if box.system.kind == "CARTESIAN" else 1  # in which a plane mesh must not move
+    moves = moves_of(box, request)
+    for move, value in zip(moves, values, strict=False):
+        if dim == 2 and (value or len(moves) == 1) and _leaves(move, across):
+            two = f"; take {kind}_2D" if f"{kind}_2D" in KINDS and len(moves) == 1 else ""
+            return f"{kind} moves points out of the plane of a mesh of 2 dimensions{two}"
     return ""
 
 
-def _line_problem(request: Request, dim: int) -> str:
-    """Return why a rotation has no axis; "" if it has, or for other kinds."""
-    if request.kind not in TURNS:
-        return ""
-    first, second = np.array(request.numbers).reshape(2, 3)
-    along = second - first
-    if not along.any() and request.kind != "FFD_TWIST":
-        return f"{request.kind}: its two points are one; the line between them has no direction"
-    if dim == 2 and (along[:2].any() or request.kind == "FFD_TWIST"):
-        return f"{request.kind} leaves the plane of a mesh of 2 dimensions"
-    return ""
-
-
-def _plane_problem(box: Box, request: Request, dim: int) -> str:
-    """Return why a move leaves the plane of a 2D mesh; "" if it does not, or in 3D."""
-    kind, numbers = request.kind, request.numbers
-    polar = box.system.kind in ("POLAR", "SPHERICAL")
-    moved = {
-        "FFD_CONTROL_POINT": numbers,
-        "FFD_NACELLE": (numbers[0], 0.0, numbers[-1]) if numbers else (),
-        "FFD_CAMBER": (0, 0, 1),
-        "FFD_THICKNESS": (0, 0, 1),
-        "FFD_GULL": (0, 0, 1),
-        "FFD_CAMBER_2D": (0, 1, 0),
-        "FFD_THICKNESS_2D": (0, 1, 0),
-    }.get(kind, ())
-    across = 1 if polar or box.system.kind == "CYLINDRICAL" else 2
-    if dim == 2 and moved and moved[across]:
-        said = f"{kind} with these parameters moves points out of the plane of a 2D mesh"
-        two = f"{kind}_2D"
-        return said + (f"; take {two}" if two in KINDS and across == 2 else "")
-    return ""
+def _leaves(move: Move, across: int) -> bool:
+    """Return whether a move takes control points along a direction, 0 to 2, or turns them there."""
+    if isinstance(move, Shift):
+        return bool(move.unit[..., across].any())
+    axis = move.axis if isinstance(move, Turn) else np.array([0.0, 1.0, 0.0])
+    return bool(np.delete(axis, across).any())
 
 
 def _is_polar(box: Box, kind: str) -> bool:
@@ -274,5 +258,3 @@ DIRECTIONS: dict[str, tuple[int, ...]] = {
 """The direction, 0 to 2, of each index among the parameters of a kind."""
 WHOLE_LINES = ("FFD_CONTROL_POINT", "FFD_CONTROL_POINT_2D", "FFD_NACELLE")
 """Kinds whose index may be -1, which means all."""
-TURNS = ("FFD_TWIST", "FFD_ROTATION", "FFD_CONTROL_SURFACE")
-"""Kinds that turn control points about a line through two points."""

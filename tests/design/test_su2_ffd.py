@@ -309,6 +309,40 @@ def test_nested_boxes_need_cartesian_coordinates_and_room(here, capsys):
         surface(NESTED + BOTH.replace("VALUES", "1, 60, 0"))
 
 
+def test_box_in_a_box_without_variables_or_nodes_moves_alone(here):
+    nested()
+    head, _, rest = Path("mesh.su2").read_text().partition("FFD_SURFACE_POINTS= ")
+    Path("mesh.su2").write_text(
+        head + "FFD_SURFACE_POINTS= 0\n" + "FFD_TAG= IN" + rest.partition("FFD_TAG= IN")[2]
+    )
+    one = "DV_KIND= FFD_CONTROL_POINT\nDV_PARAM= (IN, 1, 1, 0, 0.2, 0.4, 0.3)\nDV_VALUE= 0.4\n"
+    found = surface(NESTED + FREE + one)
+    inside = found.displacer.embedded["IN"]
+    unit = moved("FFD_CONTROL_POINT", (1, 1, 0), (0.2, 0.4, 0.3), (0.2,), np.zeros((3, 3, 2, 3)))
+    for node, uvw in zip(inside.nodes, inside.uvw, strict=True):
+        np.testing.assert_allclose(found.displacement[node], blended(unit, uvw), atol=1e-14)
+    outer, inner = boxes_of(found.displacer.boxed(found.mesh))
+    np.testing.assert_array_equal(outer.points, boxes_of(found.mesh)[0].points)
+    assert (inner.points != boxes_of(found.mesh)[1].points).any()
+
+
+def test_nodes_of_boundaries_that_a_box_does_not_list_stay(here):
+    sv.write("mesh.su2", square(8))
+    corners_ = "0.2, 0.2, 0, 1.1, 0.2, 0, 1.1, 0.8, 0, 0.2, 0.8, 0" + ", 0" * 12
+    text = HEAD.partition("FFD_DEFINITION")[0] + (
+        f"FFD_DEFINITION= (BOX, {corners_})\nFFD_DEGREE= (2, 1, 0)\nFFD_CONTINUITY= USER_INPUT\n"
+    )
+    Path("set.cfg").write_text(text + "DV_KIND= FFD_SETTING\n")
+    assert run(["def", "set.cfg", "-q"]) == 0
+    Path("out.su2").rename("mesh.su2")
+    text = text.replace("(BLOCK)", "(BLOCK, x_p)")
+    found = surface(text + "DV_KIND= FFD_CAMBER_2D\nDV_PARAM= (BOX, 1)\nDV_VALUE= 0.1\n")
+    moving = found.nodes[found.displacement.any(axis=1)]
+    np.testing.assert_array_equal(moving, np.unique(found.mesh.marker("BLOCK").nodes))
+    (said,) = found.warnings
+    assert "5 nodes of x_p are inside the FFD box 'BOX', which lists none of that boundary" in said
+
+
 def test_overlapping_boxes_give_nodes_to_the_last_one(here):
     # As two boxes of one level, IN takes its nodes from OUT.
     values = "20, 0.2, 0.4"
@@ -423,7 +457,9 @@ def test_third_value_in_2d_must_be_zero(here):
     text = POLAR.replace("KINDS", "FFD_CONTROL_POINT").partition("FFD_COORD")[0] + (
         "DV_KIND= FFD_CONTROL_POINT\nDV_PARAM= (BOX, 1, 1, -1, 0, 0, 0)\nDV_VALUE= 0.1, 0.1, 0.2\n"
     )
-    with pytest.raises(CaseError, match="variable 1: its third value leaves the plane; write 0"):
+    with pytest.raises(
+        CaseError, match="variable 1: FFD_CONTROL_POINT moves points out of the plane"
+    ):
         surface(text)
 
 

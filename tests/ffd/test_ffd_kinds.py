@@ -5,7 +5,7 @@ import pytest
 
 from slideviz.ffd.box import lattice, regular_box
 from slideviz.ffd.coordinates import CoordinateSystem, polar_corners
-from slideviz.ffd.kinds import KINDS, Request, index_problem, moves_of
+from slideviz.ffd.kinds import KINDS, Request, moves_of, variable_problem
 from tests.oracles.freeform import moved
 
 CUBE = 1.0 * np.array(
@@ -37,6 +37,7 @@ CASES = [
     ("FFD_NACELLE", (2, -1, -1), (0.1, 0.2)),
     ("FFD_NACELLE", (-1, -1, -1), (0.1, 0.2)),
 ]
+VALUES = (0.1, 0.2, 0.3)
 HELD = [((), (), ()), ((0,), (4,), ()), ((1,), (), ()), ((), (2,), (0,)), ((3,), (0,), (2,))]
 
 
@@ -108,32 +109,46 @@ def test_polar_control_points_have_their_second_index_along_k():
         ("FFD_GULL", (5,), (), 3, "no control point with j = 5"),
         ("FFD_TWIST", (7,), LINE, 3, "no control point with j = 7"),
         ("FFD_ROTATION", (), (1.0, 2.0, 3.0) * 2, 3, "its two points are one"),
-        ("FFD_ROTATION", (), LINE, 2, "FFD_ROTATION leaves the plane"),
-        ("FFD_TWIST", (0,), LINE, 2, "FFD_TWIST leaves the plane"),
-        ("FFD_CAMBER", (1, 0), (), 2, "out of the plane of a 2D mesh; take FFD_CAMBER_2D"),
-        ("FFD_CONTROL_POINT", (1, 0, 0), (0.0, 0.0, 1.0), 2, "out of the plane of a 2D mesh"),
-        ("FFD_NACELLE", (1, 0, 0), (0.0, 1.0), 2, "out of the plane of a 2D mesh"),
+        (
+            "FFD_ROTATION",
+            (),
+            LINE,
+            2,
+            "FFD_ROTATION moves points out of the plane of a mesh of 2 dim",
+        ),
+        ("FFD_TWIST", (0,), LINE, 2, "FFD_TWIST moves points out of the plane"),
+        ("FFD_CAMBER", (1, 0), (), 2, "of a mesh of 2 dimensions; take FFD_CAMBER_2D"),
+        (
+            "FFD_CONTROL_POINT",
+            (1, 0, 0),
+            (0.0, 0.0, 1.0),
+            2,
+            "out of the plane of a mesh of 2 dimensions",
+        ),
+        ("FFD_NACELLE", (1, 0, 0), (0.0, 1.0), 2, "out of the plane of a mesh of 2 dimensions"),
     ],
 )
 def test_impossible_variables_are_told(kind, index, numbers, dim, message):
-    assert message in index_problem(box(), Request(kind, index, numbers), dim)
+    assert message in variable_problem(box(), Request(kind, index, numbers), dim, VALUES)
 
 
 def test_possible_variables_have_no_problem():
     for kind, index, numbers in CASES:
-        assert index_problem(box(), Request(kind, index, numbers), 3) == ""
-    assert index_problem(box(), Request("FFD_CAMBER_2D", (1,), ()), 2) == ""
+        assert variable_problem(box(), Request(kind, index, numbers), 3, VALUES) == ""
+    assert variable_problem(box(), Request("FFD_CAMBER_2D", (1,), ()), 2, VALUES) == ""
     line = (0.1, 0.2, 0.0, 0.1, 0.2, 1.0)
-    assert index_problem(box(), Request("FFD_ROTATION", (), line), 2) == ""
+    assert variable_problem(box(), Request("FFD_ROTATION", (), line), 2, VALUES) == ""
 
 
 def test_second_polar_index_must_be_one_point():
     polar = CoordinateSystem("POLAR")
     flat = np.array([[0.5, 0.2], [0.6, 0.9], [1.6, 1.0], [1.5, 0.3]])
     one = regular_box("B", polar_corners(flat), (2, 1, 3), None, polar)
-    said = index_problem(one, Request("FFD_CONTROL_POINT_2D", (1, -1), (0.1, 0.2)), 2)
+    said = variable_problem(one, Request("FFD_CONTROL_POINT_2D", (1, -1), (0.1, 0.2)), 2, VALUES)
     assert "no second index -1 in polar coordinates" in said
-    assert "out of the plane" in index_problem(one, Request("FFD_CAMBER_2D", (1,), ()), 2)
+    assert "out of the plane" in variable_problem(
+        one, Request("FFD_CAMBER_2D", (1,), ()), 2, VALUES
+    )
 
 
 @pytest.mark.parametrize("kind", ["CYLINDRICAL", "SPHERICAL", "POLAR"])

@@ -24,7 +24,7 @@ from slideviz.design.su2.variables import angle_notes
 from slideviz.errors import CaseError
 from slideviz.ffd.box import Box, Embedding
 from slideviz.ffd.deformation import BoxDeformation, Drive, Limits
-from slideviz.ffd.kinds import Planes, index_problem, moves_of
+from slideviz.ffd.kinds import Planes, moves_of, variable_problem
 from slideviz.ffd.moves import Move
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -51,7 +51,7 @@ class MovedBoxes:
         names = dict.fromkeys(variable.box for variable in self.config.variables)
         return {name: len(self.embedded[name].nodes) for name in names}
 
-    @property
+    @cached_property
     def idle(self) -> tuple[bool, ...]:
         """Return for each variable whether it has no effect: none of its points may move."""
         places = range(len(self.config.variables))
@@ -144,13 +144,15 @@ def move_boxes(config: Su2Config, mesh: Mesh, nodes: IntArray) -> MovedBoxes:
         A box has no node inside, or a nested one is not inside its parent.
     """
     known, names = boxes_for(config.case, mesh), {each.box for each in config.variables}
+    nested = {name for box in known.values() if box.parent for name in (box.name, box.parent)}
     order = [box.name for box in boxes_of(mesh, system_of(config.case))]
     boxes, inside, warnings = [], {}, []
     for name in (*order, *(name for name in known if name not in order)):
         # As in SU2, a box without variables takes the nodes that the file lists for it, too.
-        if name not in names and not known[name].embedded:
+        if name not in names | nested and not known[name].embedded.keys() & {*config.markers}:
             continue
-        on = {marker: embedding(known[name], mesh, marker) for marker in config.markers}
+        on, stay = _embeddings(known[name], mesh, config.markers)
+        warnings += stay
         box, inside[name] = _embedded(known[name], on, nodes)
         boxes.append(box)
         if name in names and not len(inside[name].nodes):
@@ -222,14 +224,37 @@ def problems_of_boxes(config: Su2Config, mesh: Mesh) -> list[str]:
             problems.append(f"variable {place}: {said}")
             continue
         box = known[variable.box]
-        if wrong := index_problem(box, request_of(config, variable), mesh.dim):
+        request = request_of(config, variable)
+        if wrong := variable_problem(box, request, mesh.dim, variable.values):
             problems.append(f"variable {place}: {wrong}")
-        elif mesh.dim == 2 and any(variable.values[2:]):
-            problems.append(f"variable {place}: its third value leaves the plane; write 0")
         if box.level and config.case.ffd_system != "CARTESIAN":
             said = f"the FFD box {box.name!r} is nested, which needs FFD_COORD_SYSTEM= CARTESIAN"
             problems.append(f"variable {place}: {said}")
     return [f"{config.source}: {text}" for text in problems]
+
+
+def _embeddings(
+    box: Box, mesh: Mesh, markers: tuple[str, ...]
+) -> tuple[dict[str, tuple[Embedding, float]], list[str]]:
+    """Return the nodes of each marker in a box (`embedding`), and warnings.
+
+    As in SU2, nodes inside stay where the box lists nodes of other boundaries only.
+    """
+    on = {marker: embedding(box, mesh, marker) for marker in markers}
+    listed = [marker for marker in markers if marker in box.embedded]
+    if not box.embedded:
+        return on, []
+    known = np.concatenate([np.empty(0, np.int64), *(on[one][0].nodes for one in listed)])
+    warnings = []
+    for marker in (one for one in markers if one not in listed):
+        stay = np.setdiff1d(on[marker][0].nodes, known)
+        if len(stay):
+            warnings.append(
+                f"{len(stay)} nodes of {marker} are inside the FFD box {box.name!r}, which lists "
+                "none of that boundary: as in SU2, they stay; set the box anew to move them"
+            )
+        on[marker] = box.embed(stay[:0], np.empty((0, 3))), 0.0
+    return on, warnings
 
 
 def _embedded(
