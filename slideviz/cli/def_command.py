@@ -102,14 +102,16 @@ def _run_def(arguments: argparse.Namespace) -> int:
         return _set_boxes(arguments, config, mesh, begin)
     seconds = {"read": time.perf_counter() - begin}
 
-    def attempt(config: Su2Config) -> tuple[MovingSurface, list[Step]]:
-        surface = make_surface(config, mesh)
+    first = make_surface(config, mesh)
+
+    def attempt(design: Su2Config) -> tuple[MovingSurface, list[Step]]:
+        surface = first if design is config else make_surface(design, mesh)
         moves, case = surface.displacement.any(), surface.case()
         if surface.whole or not moves:
             return surface, [at_rest(case, surface.moved() if moves else mesh)]
         return surface, pull(arguments, case, mesh)
 
-    tell_lost(output, make_surface(config, mesh).displacer.boxed(mesh), kind)
+    tell_lost(output, first.displacer.boxed(mesh), kind)
     part, (surface, steps), said = convex_part(config, mesh, attempt, lambda each: each[1][-1].mesh)
     case = surface.case()
     steps[-1] = replace(steps[-1], warnings=(*steps[-1].warnings, *said))
