@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from slideviz.cli.options import add_shared
-from slideviz.cli.terminal import say
+from slideviz.cli.terminal import holding, say
 
 
 def add_convert(calls: argparse._SubParsersAction) -> None:
@@ -25,6 +25,11 @@ def add_convert(calls: argparse._SubParsersAction) -> None:
 
 def convert(arguments: argparse.Namespace) -> int:
     """Write a mesh in another format, with notes on what that leaves out; return the exit code."""
+    with holding():
+        return _convert(arguments)
+
+
+def _convert(arguments: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from slideviz import quality, read

@@ -568,9 +568,10 @@ def test_cell_data_through_meshio(tmp_path):
     ("ending", "message"),
     [
         (".stl", r"the format stl does not hold the .*hexahedron cells.* of this mesh; use anoth"),
-        (".inp", r"cannot be written as abaqus: meshio says .*; use another format"),
+        (".inp", r"the format abaqus does not hold the pyramid cells of this mesh; use another"),
+        (".h5m", r"the format h5m does not hold the .*pyramid cells.* of this mesh; use another"),
         (".ele", r"the format tetgen needs several files; use another, such as .vtu"),
-        (".svg", r"cannot be written as svg: meshio says .* use another format"),
+        (".svg", r"the format svg does not hold the .*pyramid cells.* of this mesh; use another"),
     ],
 )
 def test_formats_that_cannot_hold_the_mesh(tmp_path, capfd, ending, message):
@@ -581,6 +582,36 @@ def test_formats_that_cannot_hold_the_mesh(tmp_path, capfd, ending, message):
     assert old.read_text() == "old"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["grid.su2", f"out{ending}"]
     assert capfd.readouterr() == ("", "")
+
+
+def test_what_meshio_cannot_write_of_a_mesh_is_named(tmp_path, monkeypatch):
+    mesh, real = read(save(tmp_path, SQUARE)), meshio.write
+
+    def fails_with_data(path, data, **options):
+        if data.cell_data:
+            raise AttributeError("'list' object has no attribute 'items'")
+        real(path, data, **options)
+
+    monkeypatch.setattr(meshio, "write", fails_with_data)
+    with pytest.raises(MeshError, match="vtk does not hold the numbers of the boundaries of this"):
+        write(tmp_path / "out.vtk", mesh)
+
+    def fails(path, data, **options):
+        if len(data.cells) > 1:
+            raise AssertionError
+        real(path, data, **options)
+
+    monkeypatch.setattr(meshio, "write", fails)
+    with pytest.raises(
+        MeshError, match="written as vtk: meshio says 'AssertionError'; use another"
+    ):
+        write(tmp_path / "out.vtk", mesh)
+
+
+def test_an_element_that_meshio_does_not_read_is_named(tmp_path):
+    text = "*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n*ELEMENT, TYPE=C3D5\n1,1,2,3,4,5\n"
+    with pytest.raises(MeshError, match="as abaqus: elements of type C3D5 are not read from files"):
+        read(save(tmp_path, text, "a.inp"))
 
 
 def test_coordinates_that_a_format_rounds(tmp_path):

@@ -5,6 +5,7 @@ meshio prints, on some errors ends the process, and raises errors of any class.
 
 from __future__ import annotations
 
+import re
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 # The streams are redirected for the whole process, so two threads must not do it at once.
 _STREAMS = threading.Lock()
+_UNKNOWN = re.compile(r"Element type not available: (\S+)")
+"""meshio's words on a type of element that it does not read."""
 
 
 def formats_of(path: Path) -> list[str]:
@@ -78,6 +81,13 @@ def meshio_errors(path: Path, what: str) -> Iterator[None]:
     except (Exception, SystemExit) as problem:
         words = str(problem) if isinstance(problem, Exception) else ""
         reason = " ".join((words or said.getvalue()).split())[:160] or type(problem).__name__
+        unknown = _UNKNOWN.search(reason)
+        if unknown:
+            raise path_error(
+                path,
+                f"cannot be {what}: elements of type {unknown[1]} are not read from files of this "
+                "format; export the mesh in another one, such as .su2 or .vtu",
+            ) from problem
         raise path_error(
             path,
             f"cannot be {what}: meshio says {reason!r}; use another format, such as .su2 or .vtu",

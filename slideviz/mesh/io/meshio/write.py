@@ -8,6 +8,7 @@ from __future__ import annotations
 import shutil
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
@@ -103,17 +104,51 @@ def _write(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
 
     Raises MeshError, which names ``path``, if it cannot be written or needs several files.
     """
+    try:
+        _write_by_meshio(path, trial, data, name)
+    except MeshError as problem:
+        lost = _not_written(path, trial, data, name)
+        raise _not_held(path, name, lost) if lost else problem from problem
+    if len(list(trial.parent.iterdir())) != 1:
+        raise path_error(
+            path,
+            f"cannot be written: the format {name} needs several files; use another, such as .vtu",
+        )
+
+
+def _write_by_meshio(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
     import meshio
 
     # Without this XDMF puts the numbers in a second file.
     options = {"data_format": "XML"} if name == "xdmf" else {}
     with meshio_errors(path, f"written as {name}"):
         meshio.write(trial, data, file_format=_WRITTEN_AS.get(name, name), **options)
-    if len(list(trial.parent.iterdir())) != 1:
-        raise path_error(
-            path,
-            f"cannot be written: the format {name} needs several files; use another, such as .vtu",
-        )
+
+
+def _not_written(path: Path, trial: Path, data: meshio.Mesh, name: str) -> list[str]:
+    """Return words for what of ``data`` meshio cannot write, found by writing its parts alone."""
+    import meshio
+
+    bare, lost = meshio.Mesh(data.points, data.cells), []
+    for block in data.cells:
+        part = meshio.Mesh(data.points, [(block.type, block.data[:1])])
+        try:
+            _write_by_meshio(path, trial, part, name)
+        except MeshError:
+            lost.append(f"{block.type} cells")
+    if not lost and data.cell_data:
+        with suppress(MeshError):
+            _write_by_meshio(path, trial, bare, name)
+            lost.append("numbers of the boundaries")
+    return lost
+
+
+def _not_held(path: Path, name: str, lost: list[str]) -> MeshError:
+    return path_error(
+        path,
+        f"cannot be written: the format {name} does not hold the {', '.join(lost)} of "
+        "this mesh; use another, such as .vtu",
+    )
 
 
 def _compare(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
@@ -138,11 +173,7 @@ def _compare(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
     lost += [f"{kind} cells" for kind in _NAMES.values() if counts[0][kind] != counts[1][kind]]
     lost += [f"cell data {key!r}" for key in data.cell_data if key not in found.cell_data]
     if lost:
-        raise path_error(
-            path,
-            f"cannot be written: the format {name} does not hold the {', '.join(lost)} of "
-            "this mesh; use another, such as .vtu",
-        )
+        raise _not_held(path, name, lost)
 
 
 def _to_meshio(mesh: Mesh, cell_data: Mapping[str, NDArray], name: str) -> meshio.Mesh:
