@@ -18,6 +18,7 @@ import pytest
 
 import slideviz as sv
 from slideviz import cli
+from slideviz.case.keys import KEYS
 from slideviz.cli import exit_codes
 from slideviz.samples.table import write_sample
 
@@ -87,6 +88,27 @@ def test_a_page_shows_what_its_commands_print(page, tmp_path):
             got = run(["bash", "-c", command], tmp_path)
             alike = doctest.OutputChecker().check_output(wanted, got, FLAGS)
             assert alike or not wanted.strip(), f"$ {command}\n{got}"
+
+
+@pytest.mark.slow
+def test_the_commands_by_example_run_as_they_stand(tmp_path):
+    page = (DOCS / "reference" / "index.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^```sh\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    commands = block.splitlines()
+    assert len(commands) > 20
+    for command in commands:
+        run(["bash", "-c", command], tmp_path)
+
+
+def test_the_page_of_sweeps_has_what_sweep_json_holds(tmp_path):
+    page = (DOCS / "how-to" / "sweep.md").read_text(encoding="utf-8")
+    write_sample("passage", tmp_path, 12)
+    case = sv.Case.read(tmp_path / "passage.cfg").change(steps=1)
+    table = {"airfoil.translate.y": [0.01]}
+    list(sv.sweep(case, table, workers=1, folder=tmp_path / "out"))
+    found = json.loads((tmp_path / "out" / "sweep.json").read_text())
+    assert {name for name in found if f"`{name}`" not in page} <= set(KEYS)
+    assert {"slideviz", "mesh", "SLIDING_MODE"} <= set(found)
 
 
 @pytest.mark.parametrize("name", [name for name in sv.__all__ if not name.startswith("_")])
