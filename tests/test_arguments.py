@@ -90,6 +90,8 @@ def test_right_arguments_pass_and_are_still_told_of():
         (lambda: sv.Translate("a", {1.0}), "vector is of type set; needed is a tuple of numbers"),
         (lambda: sv.Radial("a", factor="b"), "Radial: factor is 'b'; needed is a number"),
         (lambda: sv.Ffd("a", "b", (1, 2), (1, 2, 3)), "index is (1, 2); needed is 3 whole numbers"),
+        (lambda: sv.FfdCamber("a", "b", (1, 2, 3), 1), "index is (1, 2, 3); needed is 2 whole num"),
+        (lambda: sv.FfdTwist("a", "b", 1.5, 3), "plane is 1.5; needed is a whole number"),
         (lambda: sv.FromFile(3), "FromFile: path is 3; needed is the name of a file"),
         (lambda: sv.Prescribed([0.5], [[1, 2]]), "nodes is [0.5]; needed is an array of whole"),
         (lambda: sv.Prescribed([0, 1], [[1, 2], [3]]), "needed is an array of numbers"),

@@ -2,14 +2,17 @@
 
 import json
 import lzma
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import slideviz as sv
+from slideviz.case.boxes import defined_boxes
 from slideviz.cli import run
 from slideviz.design.su2.config import read_config
+from slideviz.design.su2.planes import held_planes
 from slideviz.design.su2.surface import make_surface
 from slideviz.errors import CaseError
 from slideviz.ffd.coordinates import CoordinateSystem
@@ -509,6 +512,31 @@ def test_held_planes_act_on_each_kind_in_its_way(fixed, here):
     assert still
     idle = [place for place, is_idle in enumerate(found.idle, 1) if is_idle]
     assert idle == sorted([*still, 12])
+
+
+@pytest.mark.parametrize("system", ["CARTESIAN", "CYLINDRICAL"])
+def test_symmetry_planes_are_not_held(system, here):
+    # The block goes through both sides j of the box; in other coordinates only j = 0 is left out.
+    mesh = sv.read("mesh.su2")
+    made = CoordinateSystem(system, (0.0, -1.0, 0.5))
+    q = made.q_of(mesh.points[mesh.marker("BLOCK").nodes])
+    middle, half = 0.5 * (q.min(axis=0) + q.max(axis=0)), np.ptp(q, axis=0)
+    ends = np.array(
+        corners(middle - half * (0.7, 0.3, 0.7), middle + half * (0.7, 0.3, 0.7)).split(", "), float
+    ).reshape(8, 3)
+    numbers = ", ".join(map(repr, made.points_of(ends).ravel().tolist()))
+    text = HEAD.partition("FFD_DEFINITION")[0] + (
+        f"FFD_DEFINITION= (BOX, {numbers})\nFFD_DEGREE= (2, 2, 2)\nFFD_COORD_SYSTEM= {system}\n"
+        "FFD_AXIS= (0, -1, 0.5)\nFFD_CONTINUITY= NO_DERIVATIVE\nFFD_SYMMETRY_PLANE= YES\n"
+        "DV_KIND= FFD_GULL\nDV_PARAM= (BOX, 1)\nDV_VALUE= 0\n"
+    )
+    Path("a.cfg").write_text(text)
+    config = read_config(Path("a.cfg"))
+    box = defined_boxes(config.case, mesh)["BOX"]
+    i, j, k = held_planes(config, mesh, box, "NO_DERIVATIVE")
+    assert (i, sorted(j), k) == (set(), [] if system == "CARTESIAN" else [2], set())
+    free = replace(config, words={**config.words, "FFD_SYMMETRY_PLANE": "NO"})
+    assert held_planes(free, mesh, box, "NO_DERIVATIVE") == (set(), {0, 2}, set())
 
 
 @pytest.mark.parametrize(
