@@ -22,10 +22,11 @@ Folded = Mapping[int, tuple[int, int]]
 """VTK type and first inverted step of the inverted cells with the lowest numbers, by number."""
 
 
-def note_finished(about: str, files: list[Path], report: dict, folded: Folded) -> None:
+def note_finished(about: str, files: list[Path], report: dict, folded: Folded, advice: str) -> None:
     """Write the note of a finished run beside the first of its files, if it can be written.
 
-    ``about`` is the hash of case, mesh and version (`slideviz.deformation.streaming.about_run`).
+    ``about`` is the hash of case, mesh and version (`slideviz.deformation.streaming.about_run`),
+    ``advice`` what may help against inverted cells (`slideviz.cli.run_outcome.advice_for`).
     """
     note: dict[str, Any] = {
         "about": about,
@@ -33,6 +34,7 @@ def note_finished(about: str, files: list[Path], report: dict, folded: Folded) -
         "report": report,
         "harmless": [text for text in report["warnings"] if isinstance(text, Note)],
         "folded": [[cell, *row] for cell, row in folded.items()],
+        "advice": advice,
     }
     note["digest"] = _digest(note)
     with suppress(OSError, SlidevizError):
@@ -41,8 +43,8 @@ def note_finished(about: str, files: list[Path], report: dict, folded: Folded) -
             file.write(json.dumps(note).encode())
 
 
-def finished(about: str, files: list[Path]) -> tuple[dict, Folded] | None:
-    """Return report and inverted cells of a finished run; None if there is no valid note of it."""
+def finished(about: str, files: list[Path]) -> tuple[dict, Folded, str] | None:
+    """Return report, inverted cells and advice of a finished run; None without a valid note."""
     try:
         note = read_json(_note_of(files[0]))
         is_whole = note.pop("digest") == _digest(note)
@@ -50,7 +52,8 @@ def finished(about: str, files: list[Path]) -> tuple[dict, Folded] | None:
             return None
         report, harmless = note["report"], note["harmless"]
         report["warnings"] = [Note(t) if t in harmless else t for t in report["warnings"]]
-        return report, {cell: (vtk, step) for cell, vtk, step in note["folded"]}
+        folded = {cell: (vtk, step) for cell, vtk, step in note["folded"]}
+        return report, folded, note["advice"]
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
 

@@ -101,7 +101,7 @@ def run_streamed(
     if arguments.resume and (known := finished(about, made)):
         note(f"{output}: is finished, of this case, mesh and version; nothing is done")
         save_report(arguments, known[0])
-        return tell_warnings(*known, advice_for(case, 0.0), quiet=arguments.quiet)
+        return tell_warnings(*known, quiet=arguments.quiet)
     with Bar(not arguments.quiet, begun=arguments.begun) as bar:
         done = stream(
             case,
@@ -131,7 +131,7 @@ def run_streamed(
         undeformed=done.undeformed,
         folded=done.folded,
     )
-    note_finished(about, made, report, done.folded)
-    files = {"mesh": output, CELLS: qualities}
     advice = advice_for(case, done.steps[-1].layers)
+    note_finished(about, made, report, done.folded, advice)
+    files = {"mesh": output, CELLS: qualities}
     return tell(arguments, report, files, done.quality, done.undeformed, done.folded, advice=advice)
