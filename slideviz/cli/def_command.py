@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -112,7 +114,10 @@ def _run_def(arguments: argparse.Namespace) -> int:
         return surface, pull(arguments, case, mesh)
 
     tell_lost(output, first.displacer.boxed(mesh), kind)
-    part, (surface, steps), said = convex_part(config, mesh, attempt, lambda each: each[1][-1].mesh)
+    with _relaxation_told(config):
+        part, (surface, steps), said = convex_part(
+            config, mesh, attempt, lambda each: each[1][-1].mesh
+        )
     case = surface.case()
     steps[-1] = replace(steps[-1], warnings=(*steps[-1].warnings, *said))
     seconds["quality"] = -time.perf_counter()
@@ -138,6 +143,20 @@ def _run_def(arguments: argparse.Namespace) -> int:
     return tell(
         arguments, report, {"mesh": output, CELLS: rated}, found, before, folded, advice=advice
     )
+
+
+@contextmanager
+def _relaxation_told(config: Su2Config) -> Iterator[None]:
+    """Context in which an error has a line about OPT_RELAX_FACTOR, unless that is 1."""
+    from slideviz.errors import SlidevizError
+
+    try:
+        yield
+    except SlidevizError as problem:
+        if config.relaxation == 1.0:
+            raise
+        said = f"OPT_RELAX_FACTOR= {config.relaxation:g} multiplies all values of DV_VALUE"
+        raise type(problem)(f"{problem}\n{config.source}: {said}") from problem
 
 
 def variable_rows(surface: MovingSurface) -> list[dict[str, Any]]:

@@ -298,8 +298,9 @@ def row(name, code, said):
     variables = f"`{first}`" + f" × {count}" * (count > 1)
     outcome = "runs"
     if code not in (0, 3):
-        why = said.splitlines()[-1].partition(": ")[2].removeprefix("a.cfg:4: ")
-        outcome = f"refused: {re.sub(' near .*', '', why.partition('; ')[0])}"
+        lines = [re.sub(r"^(slideviz: )?(a.cfg|mesh.su2)(:4)?: ", "", x) for x in said.splitlines()]
+        why = [re.sub("( near|; ).*", "", line) for line in lines if " note: " not in line]
+        outcome = f"refused: {'; '.join(why)}"
     return f"| `{name}` | {variables} | {outcome} |"
 
 

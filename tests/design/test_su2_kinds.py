@@ -374,6 +374,20 @@ def test_an_angle_of_attack_alone_moves_nothing_and_has_its_gradient(here, capsy
     assert np.loadtxt("surface_sensitivity.dat", delimiter=",")[:, 3:5].any()
 
 
+def test_a_refused_design_names_the_factor_of_its_values(here, capsys):
+    sv.write("mesh.su2", bent())
+    text = SHAPES.partition("OPT_RELAX")[0] + "DV_KIND= HICKS_HENNE\nDV_PARAM= (1, 0.5)\n"
+    for factor, value in (("1E3", "1.0"), ("1", "1E3")):
+        Path("a.cfg").write_text(
+            text.replace("FACTOR\n", f"{factor}\n").replace("1.0\n", value + "\n")
+        )
+        assert run(["def", "a.cfg", "-q"]) == 1
+        lines = capsys.readouterr().err.splitlines()
+        assert "the motion puts airfoil through far near" in lines[0]
+        said = "a.cfg: OPT_RELAX_FACTOR= 1000 multiplies all values of DV_VALUE"
+        assert lines[1:] == ([said] if factor == "1E3" else [])
+
+
 def test_deform_mesh_is_warned_about(here):
     text = f"{HEAD}DV_KIND= SCALE\nDV_VALUE= 1.1\nDEFORM_MESH= YES\n"
     Path("a.cfg").write_text(text)
