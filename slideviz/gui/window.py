@@ -203,6 +203,7 @@ class MainWindow(Services):
         running.said.connect(self.say)
         running.worst_wanted.connect(self._show_worst)
         panel.place_wanted.connect(self.lead_to)
+        self.docks_.panel(DesignsPanel).changed.connect(self.sync_actions)
         self.start.file_wanted.connect(self.files.open_path)
         self.start.sample_wanted.connect(self.files.open_sample)
         self.start.try_wanted.connect(self.files.try_sample)

@@ -99,13 +99,25 @@ class Memento:
         return session
 
 
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """The values before and after a change of something that is not part of the session.
+
+    ``put`` shows one of them.
+    """
+
+    put: Callable[[Any], object]
+    before: object
+    after: object
+
+
 @dataclass(frozen=True)
 class _Done:
     """A change that can be undone.
 
     Attributes
     ----------
-    before : Memento
+    before : Memento or _Beside
         The state before the change (in the list for redo: after it).
     words : str
         Words for the menu.
@@ -116,7 +128,7 @@ class _Done:
         to it; minus infinity where nothing more can.
     """
 
-    before: Memento
+    before: Memento | _Beside
     words: str
     kind: tuple[object, ...]
     at_s: float
@@ -235,8 +247,24 @@ class Store:
         if not source:
             return
         done = source.pop()
+        if isinstance(done.before, _Beside):
+            target.append(done)
+            beside = done.before
+            beside.put(beside.before if source is self._undo else beside.after)
+            return
         target.append(replace(done, before=Memento.of(self.session), at_s=float("-inf")))
         self.put(done.before.put_into(self.session))
+
+    def remember(
+        self, words: str, put: Callable[[Any], object], before: object, after: object
+    ) -> None:
+        """Let undo call ``put(before)``, and redo ``put(after)``; ``words`` are for the menu.
+
+        For changes of what is not part of the session, such as a table of designs.
+        """
+        self._redo.clear()
+        self._undo.append(_Done(_Beside(put, before, after), words, (put,), float("-inf")))
+        del self._undo[:-DEEPEST]
 
     def _remember(self, old: Session, new: Session, words: str, kind: tuple[object, ...]) -> None:
         if new is old or new.mesh is not old.mesh or new.mesh is None:

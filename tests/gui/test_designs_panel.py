@@ -265,6 +265,49 @@ def test_tables_are_loaded_and_saved_and_all_mistakes_are_told_with_their_rows(
     assert window.banner.isVisible()
 
 
+def test_changes_of_the_table_are_undone_with_its_results(
+    window, passage, qtbot, in_a_thread, answers
+):
+    answers("ask_unsaved", "discard")
+    panel, undo = passage, window.actions_.by_name["undo"]
+    redo = window.actions_.by_name["redo"]
+    assert not undo.isEnabled()
+    fill(panel, "airfoil.rotate.angle_deg", "-2, 0")
+    assert undo.text() == "Undo designs"
+    fill(panel, "STEPS", "1, 2")
+    assert len(panel.table.rows) == 4
+    undo.trigger()
+    assert panel.table.rows == (("-2",), ("0",))
+    redo.trigger()
+    assert len(panel.table.rows) == 4
+    undo.trigger()
+    run(panel, qtbot)
+    done = panel.table
+    assert set(done.results) == {1, 2}
+    panel.rows.view.selectRow(0)
+    QTest.mouseClick(panel.remove, LEFT)
+    assert len(panel.table.rows) == 1
+    undo.trigger()
+    assert panel.table.rows == done.rows
+    assert set(panel.table.results) == {1, 2}
+    # Results for other settings do not come back with a design.
+    panel.rows.view.selectRow(0)
+    QTest.mouseClick(panel.remove, LEFT)
+    window.store.change(changes.set_case, sliding="none")
+    run(panel, qtbot)
+    undo.trigger()  # the change of the settings
+    undo.trigger()
+    assert panel.table.rows == done.rows
+    assert set(panel.table.results) == {2}
+    # While designs are run, their table stays.
+    QTest.mouseClick(panel.run, LEFT)
+    undo.trigger()
+    assert panel.table.rows == done.rows
+    assert "stop that first" in panel.said.label.text()
+    panel.runner.cancel()
+    qtbot.waitUntil(lambda: not panel.runner.busy)
+
+
 def test_other_settings_make_results_old(window, passage, qtbot, in_a_thread, answers):
     panel = passage
     fill(panel, "STEPS", "1, 2")

@@ -13,7 +13,15 @@ from qtpy.QtWidgets import QApplication
 
 from slideviz.gui.panels import worst
 from slideviz.gui.panels.worst import WorstPanel, info_text
-from slideviz.gui.panels.worst_table import CELL, COLUMNS, QUALITY, SINCE, WorstModel, digits_apart
+from slideviz.gui.panels.worst_table import (
+    CELL,
+    COLUMNS,
+    QUALITY,
+    SINCE,
+    WorstModel,
+    digits_apart,
+    place_digits,
+)
 from slideviz.gui.widgets import plot_canvas
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import quality
@@ -423,6 +431,18 @@ def test_coordinates_have_as_many_digits_as_tell_cells_apart(scale):
     # Where the usual ones do, there are no more.
     model.show(worst_at([[0.81, 0.5], [0.82, 0.5]], [1, 2]))
     assert model.index(0, len(COLUMNS)).data() == "0.8100"
+
+
+def test_lengths_have_the_same_number_of_decimals():
+    model = WorstModel()
+    for places, texts in (
+        ([[1.71, 0.5], [0.82, 0.25]], ("1.7100", "0.5000")),
+        ([[171.0, 1e-9], [82.0, 2e-9]], ("171.00000", "0.00000")),
+        ([[12345.0, 0.0], [0.5, 0.0]], ("12345", "0")),
+    ):
+        model.show(worst_at(places, [1, 2]))
+        assert tuple(model.index(0, len(COLUMNS) + k).data() for k in (0, 1)) == texts
+    assert place_digits(("r", "θ [°]", "z"), np.array([[1.5, 10.0, 0.02]])) == [5, 2, 5]
 
 
 def test_columns_grow_with_the_numbers_of_another_mesh(full):

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from qtpy.QtCore import QSize, Qt, Signal
 from qtpy.QtWidgets import QHBoxLayout, QSplitter
@@ -193,7 +194,18 @@ class DesignsPanel(Panel):
                 self.services.banner.tell_error(error)
             return
         self._say(counted(len(table.rows), "design") if table.rows else "")
+        if (table.columns, table.rows) != (self.table.columns, self.table.rows):
+            self.store.remember("designs", partial(self._bring, self.case), self.table, table)
         self.put(table)
+
+    def _bring(self, case: Case | None, table: DesignTable) -> None:
+        """Show a table again, whose results are for ``case``, with those that came since."""
+        if self.runner.busy:
+            self._say("The designs are being run: stop that first, then undo.", wrong=True)
+            return
+        known = table if case is self.case else table.without_results()
+        self.put(known.keeping(self.table))
+        self._say(counted(len(table.rows), "design") if table.rows else "")
 
     def _picked(self, number: int) -> None:
         self.rows.view.selectRow(number - 1)

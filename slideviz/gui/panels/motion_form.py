@@ -121,7 +121,10 @@ class MotionForm(QWidget):
 
     def _place_fields(self) -> None:
         both = (self.kind, self.marker)
-        self.form.addRow("Motion", boxed(in_row(*both, wide=both, spacing=6)))
+        line = in_row(*both, wide=both, spacing=6)
+        line.setStretch(0, 4)  # room for the longest kind, where the window is 1280 pixels wide
+        line.setStretch(1, 3)
+        self.form.addRow("Motion", boxed(line))
         file = boxed(in_row(self.path, self.browse, self.table, wide=[self.path], spacing=4))
         self._rows: dict[str, QWidget] = {}
         for name, title, widget in (

@@ -55,6 +55,18 @@ def digits_apart(values: FloatArray) -> int:
     return MOST
 
 
+def place_digits(names: Sequence[str], places: FloatArray) -> list[int]:
+    """Return the number of decimals of each column of places (n, d), by their ``names``.
+
+    All lengths have as many: those that the smallest needs, but not many more than the largest.
+    """
+    angles = ["°" in name for name in names]
+    each = [decimals(column) for column in places.T]
+    lengths = [n for n, angle in zip(each, angles, strict=True) if not angle and n]
+    length = min(max(lengths), min(lengths) + MOST_MORE) if lengths else 0
+    return [min(n, 2) if angle else length for n, angle in zip(each, angles, strict=True)]
+
+
 def digits_more(places: FloatArray, digits: Sequence[int]) -> int:
     """Return how many more digits than given tell places (n, d) apart, `MOST_MORE` at most."""
     different = len(np.unique(places, axis=0))
@@ -87,6 +99,7 @@ class WorstModel(QAbstractTableModel):
         self.names: tuple[str, ...] = ()
         self.places = np.empty((0, 0))
         self._decimals: list[int] = []
+        self._figures: list[int] = []
         self._more = 0
         self._mixed = False
         self._digits = FEWEST
@@ -99,12 +112,13 @@ class WorstModel(QAbstractTableModel):
         self.worst = worst
         if worst is not None:
             self.names, self.places = coordinates(worst.positions, around)
-            digits = [
-                min(decimals(column), 2) if "°" in name else decimals(column)
-                for name, column in zip(self.names, self.places.T, strict=True)
-            ]
+            digits = place_digits(self.names, self.places)
             self._more = digits_more(self.places, digits)
             self._decimals = [count + self._more for count in digits]
+            self._figures = [
+                3 + count - decimals(column)
+                for count, column in zip(self._decimals, self.places.T, strict=True)
+            ]
             self._digits = digits_apart(worst.values[~worst.inverted])
             self._mixed = len(set(worst.kinds)) > 1
         self._arrange()
@@ -178,7 +192,7 @@ class WorstModel(QAbstractTableModel):
         # The sum turns -0 into 0; a column of tiny numbers is shown in scientific notation.
         if digits - self._more < 8:
             return f"{round(value, digits) + 0.0:.{digits}f}"
-        return f"{value:.{3 + self._more}g}"
+        return f"{value:.{self._figures[axis]}g}"
 
     def sort(self, column: int, order: Qt.SortOrder = Qt.SortOrder.AscendingOrder) -> None:
         self._by, self._down = column, order == Qt.SortOrder.DescendingOrder
