@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -112,7 +111,7 @@ class Box:
         i, j, k = (count - 1 for count in self.points.shape[:3])
         return i, j, k
 
-    @cached_property
+    @property
     def q(self) -> FloatArray:
         """Return the coordinates (I, J, K, 3) of the control points in the box's system."""
         return self.system.q_of(self.points)

@@ -12,6 +12,7 @@ from slideviz.case.motion import displacements
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe, motion_labels
 from slideviz.design.sweeps.columns import numbers_of
+from slideviz.design.sweeps.results import sources_of
 from slideviz.errors import CaseError
 from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.coordinates import CoordinateSystem
@@ -234,3 +235,16 @@ def test_coordinates_of_boxes_are_kept_in_a_case_file(tmp_path):
     assert (again.ffd_system, again.ffd_axis) == (CURVED["ffd_system"], CURVED["ffd_axis"])
     case(CAMBER).write(tmp_path / "a.cfg")
     assert "COORD_SYSTEM" not in (tmp_path / "a.cfg").read_text()
+
+
+def test_results_of_a_sweep_know_boxes_in_other_coordinates():
+    system = CoordinateSystem(CURVED["ffd_system"], CURVED["ffd_axis"])
+    box = regular_box(
+        "BOX", system.points_of(LOW + 3 + UNIT * (HIGH - LOW)), (3, 2, 2), None, system
+    )
+    mesh = with_boxes(square(3, 3), [box])
+    first = sources_of(case(CAMBER, **CURVED), mesh)
+    boxes_of(mesh, system)[0].at(np.full((1, 3), 0.5))
+    assert sources_of(case(CAMBER, **CURVED), mesh) == first
+    moved = with_boxes(mesh, [box.moved(np.full(box.points.shape, 0.1))])
+    assert sources_of(case(CAMBER, **CURVED), moved) != first

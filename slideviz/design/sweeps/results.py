@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from slideviz import __version__
+from slideviz.case.boxes import system_of
 from slideviz.case.check import effective
 from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
@@ -247,7 +248,8 @@ def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
         "mesh": _digest(mesh.points, mesh.cells.types, mesh.cells.connectivity, *chain(*boundaries))
     }
     if any(isinstance(motion, BoxMotion) for motion in written):
-        found["FFD_TAG section of the mesh"] = _digest(pickle.dumps(boxes_of(mesh)))
+        boxes = boxes_of(mesh, system_of(case))
+        found["FFD_TAG section of the mesh"] = _digest(pickle.dumps(boxes))
     for at, one in enumerate(given, start=1):
         found[f"displacement {at}"] = _digest(one.nodes, one.vectors)
     for motion in written:
