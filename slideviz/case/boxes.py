@@ -218,7 +218,7 @@ def off_points(box: Box, mesh: Mesh, marker: str) -> list[str]:
     said = (
         f"{mesh.name}: the surface points of the FFD box {box.name!r} on {marker} are not those of "
         f"the mesh, by up to {off:.1g} of the box; was the mesh moved without it? Then define the "
-        "box anew"
+        "box anew; or is it in other coordinates? Then set FFD_COORD_SYSTEM"
     )
     return [said] if off > OFF else []
 
