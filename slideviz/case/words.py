@@ -187,3 +187,12 @@ def nearest(name: str, known: Iterable[str]) -> str:
     by_lower = {other.lower(): other for other in known}
     close = get_close_matches(name.lower(), list(by_lower), n=1, cutoff=0.6)
     return f"; did you mean {by_lower[close[0]]}?" if close else ""
+
+
+def wrong_by(part: float, *, bounded: bool) -> str:
+    """Return the size of an error, a part of the largest value, in words.
+
+    ``bounded``: whether it is a bound; else it is the part of the error that could be measured.
+    """
+    percent = f"{100.0 * part:.2g} % of the largest"
+    return f"up to {percent}" if bounded else f"{percent} or more, how much is not known"

@@ -9,6 +9,7 @@ import numpy as np
 
 from slideviz.case.boxes import moved_boxes
 from slideviz.case.model import Case
+from slideviz.case.words import wrong_by
 from slideviz.deformation.growth import farthest_node, stray_warning, unsoundness
 from slideviz.deformation.setup import Setup
 from slideviz.deformation.steps import Progress, Step, Trial
@@ -329,8 +330,8 @@ def _doubt_warning(doubt: float, refined: float, index: int, condition: float) -
     if doubt > TRUSTED:
         sentence = (
             f"step {index}: {nearly}, so that between the boundary nodes the displacement may be "
-            f"wrong by {100 * doubt:.2g} % of the largest; use DATA_REDUCTION= YES, a less smooth "
-            "RBF_KERNEL such as wendland-c0, or a smaller INFLUENCE_FACTOR"
+            f"wrong by {wrong_by(doubt, bounded=refined > 0.0)}; use DATA_REDUCTION= YES, a less "
+            "smooth RBF_KERNEL such as wendland-c0, or a smaller INFLUENCE_FACTOR"
         )
         return [sentence]
     if refined:

@@ -138,6 +138,7 @@ class Deformer:
                 "give `displacements` as large as the designs to come, or use DATA_REDUCTION= NO"
             )
         self._setup, self._input = setup, given_input(mesh, setup, asked)
+        self._references = references
         self.warnings = (*case.warnings, *setup.warnings)
         targets = [value(self._input.target(reference)) for reference in references]
         tell = progress or (lambda _: None)
@@ -182,7 +183,9 @@ class Deformer:
         points, errors, doubt = self._deformed(given)
         warn_of_doubt(self._steps, doubt)
         reduced = self._setup.reduction is not None
-        warn_of_errors(errors, self._checks.tolerance(given), reduced=reduced)
+        reference = any(np.array_equal(given, each) for each in self._references)
+        allowed = self._checks.tolerance(given)
+        warn_of_errors(errors, allowed, reduced=reduced, reference=reference)
         return points
 
     @check_types

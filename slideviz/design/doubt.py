@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from slideviz.case.words import counted
+from slideviz.case.words import counted, wrong_by
 from slideviz.design.frozen.solve import REMEDY
 from slideviz.design.frozen.step import FrozenStep
 from slideviz.errors import ConditionWarning, Note, ToleranceWarning
@@ -21,6 +21,10 @@ BADLY_CONDITIONED = 1e14
 def largest_condition(steps: Sequence[FrozenStep]) -> float:
     """Return the largest condition number of the steps' systems at the reference; or 1.0."""
     return max((step.condition for step in steps), default=1.0)
+
+
+def _refined(steps: Sequence[FrozenStep]) -> bool:
+    return all(step.refined for step in steps)
 
 
 def note_of_refinement(steps: Sequence[FrozenStep]) -> tuple[str, ...]:
@@ -44,7 +48,7 @@ def warn_of_condition(steps: Sequence[FrozenStep]) -> None:
     doubt = max((step.doubt for step in steps), default=0.0)
     if doubt > TRUSTED:
         worst = largest_condition(steps)
-        amount = f"may be wrong by {100 * doubt:.2g} % of the largest displacement"
+        amount = f"may be wrong by {wrong_by(doubt, bounded=_refined(steps))}"
     elif worst > BADLY_CONDITIONED:  # that of a method without a system is NaN
         amount = "may have few correct digits"
     else:
@@ -66,18 +70,26 @@ def warn_of_doubt(steps: Sequence[FrozenStep], doubt: FloatArray) -> bool:
     of = "" if doubt.ndim == 0 else f" of {counted(int((doubt > TRUSTED).sum()), 'design')}"
     warnings.warn(
         f"the condition number of the system is {largest_condition(steps):.0e}: derivatives, and "
-        f"points{of} between the boundary nodes, may be wrong by {100 * worst:.2g} % of the "
-        f"largest displacement; {REMEDY}",
+        f"points{of} between the boundary nodes, may be wrong by "
+        f"{wrong_by(worst, bounded=_refined(steps))}; {REMEDY}",
         ConditionWarning,
         stacklevel=3,
     )
     return True
 
 
-def warn_of_errors(errors: FloatArray, allowed: FloatArray, *, reduced: bool) -> None:
+def warn_of_errors(
+    errors: FloatArray, allowed: FloatArray, *, reduced: bool, reference: bool
+) -> None:
     """Warn where designs miss what they must do by more than is allowed.
 
-    ``reduced`` tells whether control nodes were chosen, beside the facets of sliding nodes.
+    Parameters
+    ----------
+    errors, allowed : (...,)
+    reduced
+        Whether control nodes were chosen, beside the facets of sliding nodes.
+    reference
+        Whether the design is one that all was chosen for.
     """
     above = errors > allowed
     if not above.any():
@@ -85,10 +97,14 @@ def warn_of_errors(errors: FloatArray, allowed: FloatArray, *, reduced: bool) ->
     worst = np.unravel_index(int(np.argmax(errors - allowed)), errors.shape)
     chosen = "control nodes and facets" if reduced else "the facets that nodes slide on"
     of = "" if errors.ndim == 0 else f" of {counted(int(above.sum()), 'design')}"
+    why = f": {chosen} are those of another displacement; choose them anew with `deformer = "
+    why += "deformer.refresh(displacement)`"
+    if reference:
+        why = f", with {chosen} chosen for this displacement; use more STEPS, a less smooth "
+        why += "RBF_KERNEL such as wendland-c0, or a smaller displacement"
     warnings.warn(
         f"the largest error{of} at the boundary is {errors[worst]:.3g}, above the tolerance of "
-        f"{allowed[worst]:.3g}: {chosen} are those of another displacement; "
-        "choose them anew with `deformer = deformer.refresh(displacement)`",
+        f"{allowed[worst]:.3g}{why}",
         ToleranceWarning,
         stacklevel=3,
     )

@@ -15,9 +15,6 @@ from slideviz.rbf.saddle import saddle_condition, solve_saddle
 from slideviz.rbf.solve import NOTHING, Factor, condition, enough_threads, extend
 from slideviz.rbf.twofold import usable
 
-BETTER = 0.1
-"""A refined solution is taken where its error is below this part of the first solution's."""
-
 
 class ExactFit:
     """The interpolant that meets all rows: solves ``G w = b``, G_ab = phi_ab (n_a . n_b).
@@ -139,9 +136,10 @@ class ExactFit:
                 system.refined(data, np.full(data.shape[1], size), first, lambda _: tick(1.0))
                 for data, first, size in trials
             ]
-            doubt = [float(each.doubt.max(initial=0.0)) for each in refined]
-            if max(doubt) < BETTER * max(wrong):
-                self.refined, self.doubt = max(self.refined, *wrong), max(self.doubt, *doubt)
+            doubt = max(float(each.doubt.max(initial=0.0)) for each in refined)
+            if refined[0].exact or doubt < max(wrong):
+                first = max(float(each.before.max(initial=0.0)) for each in refined)
+                self.refined, self.doubt = max(self.refined, *wrong, first), max(self.doubt, doubt)
                 return refined[0].weights, True
         self.doubt = max(self.doubt, *wrong)
         return found, False

@@ -6,10 +6,11 @@ far field, for example. So neither r nor the condition number shows it. One step
 does: its field, at some points between control nodes, is the error of the solution there. Rows
 that the pivot guard left out are included, for the error at their nodes spreads in the same way.
 
-Where the error is too large, the system is solved again, by conjugate gradients with the factor
-as preconditioner, and with residuals of twice the precision (`twofold`): ordinary residuals lose
-as many digits as the weights are larger than the data, so that refinement with them adds noise.
-The refined solution meets the rows that the guard left out, too.
+Where the error is too large, the system is solved again with twice the precision (`twofold`), and
+the solution meets the rows that the guard left out, too: with a factor of that precision, and for a
+large system by conjugate gradients with the ordinary factor as preconditioner. Residuals are those
+of twice the precision: ordinary ones lose as many digits as the weights are larger than the data,
+so that refinement with them adds noise.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import numpy as np
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf.evaluate import Basis, Tick, evaluate, matrix, no_tick
 from slideviz.rbf.solve import Factor, enough_threads, solve_lower
-from slideviz.rbf.twofold import Residuals
+from slideviz.rbf.twofold import DoubleFactor, Residuals, usable
 
 TRUSTED = 1e-5
 """Largest error of a field between control nodes, as a part of the largest displacement. Above it
@@ -40,12 +41,19 @@ are little but rounding; the diagonal of a system is 1."""
 ROUNDING = 4.0 * float(np.finfo(float).eps)
 """Rounding error of a field, over the sum of the absolute weights: a few times the one measured."""
 
+DENSE = 4000
+"""Rows of the largest system that is factorised with twice the digits: 256 MB."""
+
 SLOW = 0.3
 """Refinement ends after a round whose error is above this part of the error of the round before."""
 
 ROUNDS, STEPS = 4, 40
 """Most rounds of a refinement, each with a new residual, and most conjugate gradient steps of a
 round."""
+
+MARGIN = 10.0
+"""Factor of an error that conjugate gradients measure: up to seven times too small where nodes
+nearly coincide, for the preconditioner does not see them."""
 
 CHECKS = 60
 """Number of points between control nodes at each of four distances (`between`)."""
@@ -59,11 +67,18 @@ class Refined:
     ----------
     weights : (n, m) float64
     doubt : (m,) float64
-        Estimated error of each column's field, as a part of its largest data.
+        Error of each column's field, as a part of its largest data: a bound where ``exact``, an
+        estimate times `MARGIN` else.
+    before : (m,) float64
+        The same of the solution that was refined, measured in the first round.
+    exact : bool
+        Whether the system was factorised with twice the digits.
     """
 
     weights: FloatArray
     doubt: FloatArray
+    before: FloatArray
+    exact: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,11 +153,13 @@ class System:
         residuals = self._residuals()
         size = np.where(largest > 0.0, largest, 1.0)
         doubt = np.full(len(size), np.inf)
+        first: FloatArray | None = None
         open_ = np.arange(len(size))
         for _ in range(ROUNDS):
             before = weights[:, open_]
             lacking = residuals(right[:, open_], before, low[:, open_], tick)
             step, wrong = self._step(lacking, before, size[open_], tick, settle=settle)
+            first = wrong / size if first is None else first
             weights[:, open_] = before + step
             low[:, open_] += before - weights[:, open_] + step
             now = wrong / size[open_]
@@ -154,8 +171,20 @@ class System:
             open_ = open_[going]
             if not len(open_):
                 break
-        rounding = 0.0 if settle else ROUNDING * np.abs(weights).sum(axis=0)
-        return Refined(weights, doubt + rounding / size)
+        assert first is not None
+        factor = self._double_factor(tick)
+        if not settle:
+            margin = 1.0 if factor is not None else MARGIN
+            rounding = ROUNDING * np.abs(weights).sum(axis=0) / size
+            return Refined(weights, margin * doubt + rounding, first, factor is not None)
+        if factor is not None:
+            # Data of a reverse pass are sums, whose rounding the inverse of the system enlarges:
+            # most where neighbours have different signs.
+            signs = ROUNDING / 2.0 * np.where(np.arange(len(right)) % 2, 1.0, -1.0)
+            most = np.abs(weights).max(axis=0)
+            noise = np.abs(factor.solve(right * signs[:, None])).max(axis=0)
+            doubt += noise / np.where(most > 0.0, most, 1.0)
+        return Refined(weights, doubt, first, factor is not None)
 
     def _step(
         self,
@@ -171,6 +200,9 @@ class System:
         By conjugate gradients for the residual ``lacking`` (n, m). Each column ends by itself, so
         that its result does not depend on the others.
         """
+        if (factor := self._double_factor(tick)) is not None:
+            exact = factor.solve(lacking)
+            return exact, self._field(exact)
         whole, residuals, r = self._whole(), self._residuals(), lacking.copy()
         total, z = np.zeros_like(r), whole.solve(r)
         p, rz = z.copy(), (r * z).sum(axis=0)
@@ -218,6 +250,15 @@ class System:
             self._kept["whole"] = with_dropped_rows(self.basis, self.place, self.factor)
         whole: Factor = self._kept["whole"]
         return whole
+
+    def _double_factor(self, tick: Tick) -> DoubleFactor | None:
+        """Return the factor with twice the digits; None of a large or a singular system."""
+        if "double" not in self._kept:
+            small = self.place[0].shape[1] <= DENSE and usable(self.basis)
+            found = DoubleFactor.of(self._residuals(), tick) if small else None
+            self._kept["double"] = found
+        factor: DoubleFactor | None = self._kept["double"]
+        return factor
 
     def _residuals(self) -> Residuals:
         """Return what computes residuals of this system with twice the precision."""

@@ -37,6 +37,9 @@ from the constant on. The same functions are in `kernels` and `compiled`."""
 PAIRS = 1_000_000
 """Pairs between two calls of ``tick``: some tens of milliseconds."""
 
+ROWS, STRIP = 16, 256
+"""Rows and columns of a factor that a thread computes at once."""
+
 KEPT = 2000
 """Rows of the largest system whose matrix is kept for further residuals: 64 MB."""
 
@@ -188,6 +191,72 @@ def _lacking(v, vl, right, weights, low, out):  # type: ignore[no-untyped-def]
             out[i, k] = total + lost
 
 
+@njit(inline="always", **_OPTIONS)
+def _over(a, al, b, bl):  # type: ignore[no-untyped-def]
+    """Return the quotient of two double-double numbers."""
+    q = a / b
+    p, pl = _times(b, bl, q, 0.0)
+    r, rl = _plus(a, al, -p, -pl)
+    return _joined(q, (r + rl) / b)
+
+
+@njit(inline="always", **_OPTIONS)
+def _less_product(u, ul, k, j, first, last):  # type: ignore[no-untyped-def]
+    """Subtract from row j of u + ul what row k makes of it, from column ``first`` to ``last``."""
+    a, al, b, bl = u[k, j], ul[k, j], u[k, first:last], ul[k, first:last]
+    s, lost = u[j, first:last], ul[j, first:last]
+    for i in range(last - first):
+        p, e = _product(-a, b[i])
+        s[i], f = _sum(s[i], p)
+        lost[i] += e + f - (a * bl[i] + al * b[i])
+
+
+@njit(parallel=True, **_OPTIONS)
+def _factorise(u, ul, top):  # type: ignore[no-untyped-def]
+    """Overwrite `ROWS` rows of u + ul (n, n) from ``top`` on by those of U with U^T U = u + ul.
+
+    U is upper triangular; what is below its diagonal means nothing. Rows above are done. In strips
+    of columns that fit into a fast memory. Returns False if there is no such U.
+    """
+    n, end = len(u), min(len(u), top + ROWS)
+    for part in prange((n - top + STRIP - 1) // STRIP):
+        first, last = top + part * STRIP, min(n, top + (part + 1) * STRIP)
+        for k in range(top):
+            for j in range(top, min(end, last)):
+                _less_product(u, ul, k, j, max(j, first), last)
+    for j in range(top, end):
+        for k in range(top, j):
+            _less_product(u, ul, k, j, j, n)
+        s, sl = _sum(u[j, j], ul[j, j])
+        if not s > 0.0:
+            return False
+        d, dl = _root(s, sl)
+        u[j, j], ul[j, j] = d, dl
+        for i in range(j + 1, n):
+            s, sl = _sum(u[j, i], ul[j, i])
+            u[j, i], ul[j, i] = _over(s, sl, d, dl)
+    return True
+
+
+@njit(parallel=True, **_OPTIONS)
+def _solve(u, ul, x, xl):  # type: ignore[no-untyped-def]
+    """Overwrite each row of x + xl (m, n) by its solution, with the factor from `_factorise`."""
+    n = len(u)
+    for c in prange(len(x)):
+        for i in range(n):
+            d, dl = _over(x[c, i], xl[c, i], u[i, i], ul[i, i])
+            x[c, i], xl[c, i] = d, dl
+            for k in range(i + 1, n):
+                p, pl = _times(u[i, k], ul[i, k], -d, -dl)
+                x[c, k], xl[c, k] = _plus(x[c, k], xl[c, k], p, pl)
+        for i in range(n - 1, -1, -1):
+            s, sl = x[c, i], xl[c, i]
+            for k in range(i + 1, n):
+                p, pl = _times(u[i, k], ul[i, k], -x[c, k], -xl[c, k])
+                s, sl = _plus(s, sl, p, pl)
+            x[c, i], xl[c, i] = _over(s, sl, u[i, i], ul[i, i])
+
+
 @dataclass(frozen=True, eq=False)
 class Residuals:
     """Computes residuals of an interpolation system with twice the digits of a float64.
@@ -225,6 +294,14 @@ class Residuals:
             tick(part.stop / n)
         return out
 
+    def matrix(self) -> tuple[FloatArray, FloatArray]:
+        """Return G (n, n), rounded, and its rounding errors."""
+        n = self.place[0].shape[1]
+        size = max(1, PAIRS // max(1, n))
+        parts = [self._rows(slice(k, min(n, k + size)), n) for k in range(0, n, size)]
+        rows, rest = zip(*parts, strict=True)
+        return np.concatenate(rows), np.concatenate(rest)
+
     def _rows(self, part: slice, n: int) -> tuple[FloatArray, FloatArray]:
         """Return the rows ``part`` of G (p, n), rounded, and their rounding errors.
 
@@ -244,6 +321,33 @@ class Residuals:
         if n <= KEPT:
             self._kept[part.start] = found, rest
         return found, rest
+
+
+@dataclass(frozen=True, eq=False)
+class DoubleFactor:
+    """The factor U of a system G = U^T U (n, n): its rounding ``upper``, and the rest ``low``."""
+
+    upper: FloatArray
+    low: FloatArray
+
+    @classmethod
+    def of(cls, residuals: Residuals, tick: Tick = no_tick) -> DoubleFactor | None:
+        """Return the factor of a system; None if it is singular in double-double arithmetic."""
+        upper, low = residuals.matrix()
+        for top in range(0, len(upper), ROWS):
+            with one_at_a_time(40 * ROWS * (len(upper) - top) * top):
+                if not _factorise(upper, low, top):
+                    return None
+            tick(top / len(upper))
+        return cls(upper, low)
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return the rounded solutions (n, m) for right-hand sides (n, m)."""
+        x = np.array(right.T, order="C")
+        low = np.zeros_like(x)
+        with one_at_a_time(40 * len(x) * self.upper.size):
+            _solve(self.upper, self.low, x, low)
+        return np.ascontiguousarray(x.T)
 
 
 def usable(basis: Basis) -> bool:

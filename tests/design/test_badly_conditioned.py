@@ -11,7 +11,8 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Scale, Translate
-from slideviz.errors import ConditionWarning, Note
+from slideviz.design.frozen.solve import whole
+from slideviz.errors import ConditionWarning, DeformError, Note, ToleranceWarning
 from tests import builders
 from tests.oracles.digits import interpolated
 
@@ -54,7 +55,7 @@ def test_a_run_is_right_and_says_that_it_was_refined(motion):
     moved = last.mesh.points[None]
     (off,) = errors(mesh, case, deformer.nodes, deformer.displacement[None], moved)
     assert off < 1e-6
-    (note,) = last.warnings
+    (note,) = [text for text in last.warnings if "singular" in text]
     assert isinstance(note, Note)
     assert "so it was refined with twice the digits" in note
     assert np.abs(deformer.deform() - last.mesh.points).max() < 1e-7
@@ -72,7 +73,7 @@ def test_a_run_says_where_it_cannot_be_trusted():
     assert not isinstance(said, Note)
     assert "may be wrong by" in said
     assert "a less smooth RBF_KERNEL" in said
-    percent = float(said.split("may be wrong by ")[1].split(" %")[0])
+    percent = float(said.split("may be wrong by up to ")[1].split(" %")[0])
     assert 1e-6 < off < 0.01 * percent
     rough = sv.deform(case.change(kernel="wendland-c0"), mesh)
     assert not any("singular" in text for text in [*rough][-1].warnings)
@@ -83,8 +84,9 @@ def test_kernels_that_cannot_be_refined_are_measured_too(kernel):
     mesh = thin()
     case = asked(Scale("airfoil", (1.0, 1.5)), kernel=kernel, influence_factor=20.0)
     *_, last = sv.deform(case, mesh)
-    told = any("may be wrong by" in text for text in last.warnings)
-    assert told == (kernel == "gaussian")
+    told = [text for text in last.warnings if "may be wrong by" in text]
+    assert bool(told) == (kernel == "gaussian")
+    assert all("or more, how much is not known; use" in text for text in told)
 
 
 @pytest.mark.parametrize("at_rest", [False, True], ids=["motion", "rest"])
@@ -151,12 +153,47 @@ def test_gradients_count_the_nodes_that_the_guard_left_out(tmp_path, kernel):
     at, weights = deformer.displacement, np.cos(3.0 * mesh.points)
     x, y = mesh.points[deformer.nodes].T
     thicker = np.column_stack([0.0 * x, (1.0 + x) * y])
-    if kernel == "wendland-c4":
-        with pytest.warns(ConditionWarning, match="gradients with respect to nodes that nearly"):
-            deformer.vjp(at, weights)
-        return
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", ConditionWarning)
+    with pytest.warns(
+        ConditionWarning, match="gradients with respect to nodes that nearly"
+    ) as all_:
         gradient = deformer.vjp(at, weights)
+    if kernel == "wendland-c4":
+        return
+    # Rounding of the weights alone changes the gradient by so much at nodes that nearly coincide.
+    percent = float(str(all_[0].message).split("wrong by up to ")[1].split(" %")[0])
+    noise = 1.0 + 2e-16 * np.random.default_rng(0).standard_normal(weights.shape)
+    with pytest.warns(ConditionWarning, match="gradients"):
+        again = deformer.vjp(at, weights * noise)
+    off = np.abs(again - gradient).max() / np.abs(gradient).max()
+    assert 1e-3 * percent < off < 1e-2 * percent
     change = (weights * deformer.jvp(at, thicker)).sum()
     assert (gradient * thicker).sum() == pytest.approx(change, rel=1e-4)
+
+
+@pytest.mark.filterwarnings("ignore:the condition number:slideviz.errors.ConditionWarning")
+def test_a_deformer_at_its_own_reference_does_not_blame_another_displacement():
+    """Nodes that the pivot guard leaves out are off by more than a thousandth of the motion."""
+    mesh = builders.cube(6, "prism")
+    roles = dict.fromkeys(mesh.marker_names, "sliding") | {"BLOCK": "moving"}
+    motion = Translate("BLOCK", (0.04, -0.03, 0.015))
+    case = Case(roles=roles, motions=(motion,), sliding="ds", kernel="gaussian")
+    with pytest.warns(ConditionWarning, match="of the largest or more, how much is not known"):
+        deformer = sv.Deformer(mesh, case.change(reduction=None, influence_factor=2.5))
+    with pytest.warns(ToleranceWarning, match="nodes slide on chosen for this displacement; use"):
+        deformer.deform()
+    with pytest.warns(ToleranceWarning, match="are those of another displacement; choose"):
+        deformer.deform(1.01 * deformer.displacement)
+
+
+def test_a_derivative_that_cannot_be_trusted_is_told():
+    mesh, case = thin(), asked(Rotate("airfoil", 5.0))
+    deformer = sv.Deformer(mesh, case)
+    alone = np.zeros_like(deformer.displacement)
+    alone[0, 1] = 1.0
+    with pytest.warns(ConditionWarning, match="system of the derivative is nearly singular: betw"):
+        deformer.jvp(deformer.displacement, alone)
+
+
+def test_a_singular_system_of_a_design_is_refused():
+    with pytest.raises(DeformError, match=r"system of the 2 control rows is singular at this des"):
+        whole(np.ones((2, 2)))

@@ -440,7 +440,7 @@ def test_control_nodes_that_do_not_suffice_are_told(case, capsys):
     points = written(simple() + extra)
     code, lines = heard(extra, "0.05, 0.02", points, case[1], capsys)
     assert code == 0
-    assert "control nodes and facets are those of another displacement; boundary" in lines[-1]
+    assert "with control nodes and facets chosen for this displacement; boundary" in lines[-1]
 
 
 def test_other_warnings_of_python_go_on(recwarn):

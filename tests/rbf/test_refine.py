@@ -7,10 +7,11 @@ from decimal import localcontext
 import numpy as np
 import pytest
 
+from slideviz.rbf import refine
 from slideviz.rbf.evaluate import Basis, matrix
 from slideviz.rbf.refine import System
 from slideviz.rbf.solve import factorise
-from slideviz.rbf.twofold import FUNCTIONS, Residuals
+from slideviz.rbf.twofold import FUNCTIONS, DoubleFactor, Residuals
 from tests.oracles import digits
 
 
@@ -53,9 +54,12 @@ def test_residuals_with_rotational_distances_are_those_of_the_matrix():
     np.testing.assert_allclose(found, -matrix(basis, (features, None)) @ weights, rtol=1e-12)
 
 
+@pytest.mark.parametrize("dense", [refine.DENSE, 0], ids=["factor", "gradients"])
 @pytest.mark.parametrize("turned", [False, True], ids=["axes", "directions"])
 @pytest.mark.parametrize("dropped", [False, True], ids=["whole", "dropped"])
-def test_the_error_is_measured_and_mended(turned, dropped):
+def test_the_error_is_measured_and_mended(monkeypatch, turned, dropped, dense):
+    """By a factor with twice the digits, or by conjugate gradients, as of large systems."""
+    monkeypatch.setattr(refine, "DENSE", dense)
     size = 1e-3 if dropped else 0.02
     points, inside = profile(size)
     values = np.sin(points[:, ::-1] / size) * inside[:, None]
@@ -72,6 +76,7 @@ def test_the_error_is_measured_and_mended(turned, dropped):
         if normals is not None:
             exact = exact * (digits.EXACT(normals) @ digits.EXACT(normals).T)
         weights = digits.solved(exact, digits.EXACT(right))
+        all_digits = weights.astype(float)
         field = digits.matrix(0.9 * points, points, 4.0)
         if normals is not None:
             weights = weights * digits.EXACT(normals)
@@ -87,4 +92,34 @@ def test_the_error_is_measured_and_mended(turned, dropped):
     assert error(refined.weights) < 0.01 * error(first)
     assert error(refined.weights) <= refined.doubt.max() + 1e-12
     assert refined.doubt.max() < 1e-4
+    assert refined.exact == (dense > 0)
+    if refined.exact:
+        off = np.abs(refined.weights - all_digits).max(axis=0)
+        assert (off < 1e-12 * np.abs(all_digits).max(axis=0)).all()
+        assert 0.3 * error(first) < refined.before.max() < 30.0 * error(first)
     assert 0.03 * error(first) < system.wrong(right, first).max() < 30.0 * error(first)
+
+
+def test_nodes_in_one_place_have_no_factor_and_are_refined_by_conjugate_gradients():
+    points = np.concatenate([profile(0.5)[0], profile(0.5)[0][:1]])
+    place = points.T.copy(), None
+    assert DoubleFactor.of(Residuals(Basis(4.0), place)) is None
+    system = System(Basis(4.0), place, factorise(matrix(Basis(4.0), place)))
+    right = points[:, :1]
+    found = system.refined(right, np.ones(1), system.factor.solve(right))
+    assert not found.exact
+    assert found.doubt.max() < 1e-6
+
+
+def test_a_factor_of_several_blocks_has_twice_the_digits():
+    """Solutions of a matrix whose condition number is 1e13, against residuals."""
+    points = np.random.default_rng(0).uniform(size=(300, 2)) * [1.0, 1e-3]
+    residuals = Residuals(Basis(4.0), (points.T.copy(), None))
+    right = np.sin(9.0 * points)
+    factor = DoubleFactor.of(residuals)
+    assert factor is not None
+    weights = factor.solve(right)
+    # What remains is the rounding of the weights: the residual of the next ones is far below.
+    low = factor.solve(residuals(right, weights, np.zeros_like(weights)))
+    left = np.abs(residuals(right, weights, low)).max()
+    assert left < 1e-12 * np.finfo(float).eps * np.abs(weights).max()

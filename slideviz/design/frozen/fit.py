@@ -184,8 +184,10 @@ class FrozenFit:
             if isinstance(solve, LeastSquares):
                 found = solve.solution(met, data, value(found))
             else:
-                adjoint = solve.adjoint if isinstance(solve, MeasuredSystem) else None
-                found = solution(met(value(found)) - data, value(found), solve, adjoint)
+                forward, back = solve, None
+                if isinstance(solve, MeasuredSystem):
+                    forward, back = solve.tangent, solve.adjoint
+                found = solution(met(value(found)) - data, value(found), forward, back)
         own = take(found, np.arange(count))
         tail = None
         if extra:

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from slideviz.case.words import wrong_by
 from slideviz.design.frozen.tape import Array, recorded, value
 from slideviz.errors import ConditionWarning, DeformError
 from slideviz.mesh.model import FloatArray, IntArray
@@ -59,13 +60,32 @@ class MeasuredSystem:
         shaped = np.moveaxis(out.reshape(n, -1, m), 1, 0)
         return np.ascontiguousarray(shaped).reshape(right.shape)
 
+    def tangent(self, right: FloatArray) -> FloatArray:
+        """Return the solutions (..., n, m) of the forward pass: changes of weights.
+
+        Warns
+        -----
+        ConditionWarning
+            The field of a solution is not accurate to `TRUSTED`.
+        """
+        found = self(right)
+        worst = float(self.doubt.max(initial=0.0))
+        if worst > TRUSTED:
+            warnings.warn(
+                "the system of the derivative is nearly singular: between the boundary nodes it "
+                f"may be wrong by {wrong_by(worst, bounded=self._refined)}; {REMEDY}",
+                ConditionWarning,
+                stacklevel=2,
+            )
+        return found
+
     def adjoint(self, right: FloatArray) -> FloatArray:
         """Return the solutions (..., n, m) of the reverse pass, which are gradients themselves.
 
         Warns
         -----
         ConditionWarning
-            Refinement does not reach the accuracy `TRUSTED`.
+            The solution is not accurate to `TRUSTED`.
         """
         if not self._refined:  # the error of a field is no measure for a gradient
             return solved(self._blocks, [system.factor for system in self._systems], right)
@@ -73,9 +93,9 @@ class MeasuredSystem:
         worst = float(self.doubt.max(initial=0.0))
         if worst > TRUSTED:
             warnings.warn(
-                "the system of the gradient is too nearly singular to be solved: gradients with "
-                "respect to nodes that nearly coincide may be wrong by "
-                f"{100.0 * min(worst, 1.0):.2g} % of the largest; {REMEDY}",
+                "the system of the gradient is nearly singular: gradients with respect to nodes "
+                f"that nearly coincide may be wrong by {wrong_by(min(worst, 1.0), bounded=True)}; "
+                f"{REMEDY}",
                 ConditionWarning,
                 stacklevel=2,
             )
@@ -168,8 +188,8 @@ def whole(system: FloatArray) -> Factor:
         lower = np.linalg.cholesky(system)
     except np.linalg.LinAlgError as problem:
         raise DeformError(
-            f"the system of the {len(system)} control rows chosen for another displacement is "
-            "singular at this design; choose them anew with `refresh(displacement)`"
+            f"the system of the {len(system)} control rows is singular at this design; {REMEDY}, "
+            "or choose the rows at this design with `refresh(displacement)`"
         ) from problem
     every = np.arange(len(system))
     return Factor(np.asfortranarray(lower), every, every[:0])
