@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from math import ceil, floor, pi
 
 import numpy as np
 
 from slideviz.case.model import Case
+from slideviz.deformation.classes import find_period
 from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.cached_boundary import boundary_of, shell_of
 from slideviz.mesh.caching import njit
@@ -23,6 +25,8 @@ MOST = 30_000
 """Most facets of moving boundaries that are tested for crossing each other: takes three seconds."""
 LOOKED_AT = 5
 """Facets of a moved body that are tested; the body is in the mesh where one of them is."""
+ARCS = 16
+"""Places on the way of nodes that move on arcs, between which it is taken as straight."""
 BESIDE = 1e-4
 """Distance from a facet of a point in the cells beside it, over the size of the facet."""
 OPEN = 0.1
@@ -90,18 +94,48 @@ def _new_crossing(
 
 
 def jump_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:
-    """Return a sentence when a moved node crosses another boundary on its straight way, or None."""
+    """Return a sentence when a moved node crosses another boundary on its way, or None.
+
+    Nodes move on straight lines, in a cylindrical frame on arcs about its axis. Boundaries that
+    cross before the motion, as twisted quadrilaterals close to each other may, are not compared.
+    Parameters are those of `intersection_message`.
+    """
     after = np.array(mesh.points)
     after[nodes] += vectors
     for name in case.markers_with("moving"):
-        others = _others(case, mesh, name)
-        hit = swept_crossing(mesh.points, after, mesh.marker(name).cells, others)
+        moved, others = mesh.marker(name).cells, _others(case, mesh, name)
+        hit = swept_crossing(mesh.points, after, moved, others)
+        while hit is not None:
+            wall = [other for other in others if other[0] == hit.marker]
+            if first_crossing(mesh.points, moved, wall) is None:
+                break
+            others = [other for other in others if other[0] != hit.marker]
+            hit = swept_crossing(mesh.points, after, moved, others)
+        if hit is not None and (path := _arcs(case, mesh, nodes, vectors)):
+            pairs = pairwise((mesh.points, *path))
+            hits = (swept_crossing(*pair, moved, others) for pair in pairs)
+            hit = next(filter(None, hits), None)
         if hit is not None:
             return (
-                f"{name} goes through {hit.marker} near {_place(hit)} on its way; cells will be "
-                "inverted there, unless its real path is not straight and goes around"
+                f"the motion takes {name} through {hit.marker} near {_place(hit)} on its way, for "
+                f"nodes move straight; move {name} less, around {hit.marker} in several runs, or "
+                f"{_giving_way(case, hit.marker)}"
             )
     return None
+
+
+def _arcs(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> list[FloatArray]:
+    """Return the points (n, d) at ``ARCS`` places on the way; none where nodes move straight."""
+    frame = find_period(case, mesh, boundary_of(mesh))[1]
+    if not frame.cylindrical:
+        return []
+    start, shift = frame.coords(mesh.points[nodes]), frame.difference(mesh.points[nodes], vectors)
+    path = []
+    for part in range(1, ARCS + 1):
+        points = np.array(mesh.points)
+        points[nodes] = frame.points(start + part / ARCS * shift)
+        path.append(points)
+    return path
 
 
 def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:

@@ -103,14 +103,14 @@ def prescribed(
     Raises
     ------
     CaseError
-        The motion puts a boundary through another one, or out of the mesh.
+        The motion takes a boundary through another one, or out of the mesh.
     DeformError
         No node is moving or fixed, or images are asked to move differently.
     """
-    problem = intersection_message(case, mesh, moved.nodes, moved.vectors)
+    asked = case, mesh, moved.nodes, moved.vectors
+    problem = intersection_message(*asked) or jump_message(*asked)
     if problem:
         raise CaseError(f"{mesh.name}: {problem}")
-    remark = jump_message(case, mesh, moved.nodes, moved.vectors)
     known = np.concatenate([classes.moving, classes.fixed])
     if not len(known):
         raise DeformError(
@@ -128,4 +128,4 @@ def prescribed(
         corners = corners_of(coords, boundary.facets, on_axis(frame, coords))
         normals = fan_normals(boundary, fans, coords, corners)
         require_free(spread, follow, alone, normals, allowed)
-    return known, spread.at(known), (*moved.warnings, *((remark,) if remark else ()))
+    return known, spread.at(known), moved.warnings

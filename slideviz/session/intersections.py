@@ -7,7 +7,11 @@ from pathlib import Path
 
 from slideviz.case.model import Case, FromFile
 from slideviz.case.motion import check_case, displacements
-from slideviz.deformation.intersection import folding_message, intersection_message
+from slideviz.deformation.intersection import (
+    folding_message,
+    intersection_message,
+    jump_message,
+)
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import Mesh
 from slideviz.session.jobs import Report, Stopped
@@ -36,8 +40,9 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
         if not all(path.is_file() for path in files):
             return "", ""
         moved = displacements(case, mesh)
-        found = intersection_message(case, mesh, moved.nodes, moved.vectors)
-        folded = None if found else folding_message(case, mesh, moved.nodes, moved.vectors)
+        asked = case, mesh, moved.nodes, moved.vectors
+        found = intersection_message(*asked) or jump_message(*asked)
+        folded = None if found else folding_message(*asked)
     except SlidevizError as error:
         return _first_line(error, files), ""
     said = in_window_words(found[0].upper() + found[1:] + ".") if found else ""

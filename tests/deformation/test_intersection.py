@@ -12,7 +12,8 @@ from slideviz.deformation.intersection import intersection_message as message
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Mesh
 from slideviz.samples.table import sample
-from tests.builders import airfoil, cube, make_mesh, passage, sphere_in_box
+from slideviz.session.intersections import find_intersection
+from tests.builders import airfoil, cube, make_mesh, passage, sector, sphere_in_box
 from tools.laws.cases import random_run
 
 
@@ -98,17 +99,41 @@ def test_nor_may_one_come_out_by_a_turn(square):
     assert message(*moved(case, mesh, Rotate("BLOCK", 180.0, (0.45, 0.5)))) is None
 
 
-def test_a_jump_over_a_wall_inside_is_a_warning():
+def test_a_jump_over_a_wall_inside_is_refused():
     mesh = two_blocks()
     roles = dict.fromkeys(mesh.marker_names, "fixed") | {"one": "moving"}
     case = Case(roles=roles)
     case, *_ = arguments = moved(case, mesh, Translate("one", (6.0, 0.4)))
     assert message(*arguments) is None
-    assert "goes through other" in jump_message(*arguments)
-    *_, last = sv.deform(case, mesh)
-    assert any("goes through other" in text for text in last.warnings)
+    text = jump_message(*arguments)
+    assert text.startswith("the motion takes one through other near (5, 2")
+    assert "move one less, around other in several runs, or let other move with it" in text
+    with pytest.raises(CaseError, match="takes one through other near"):
+        next(sv.deform(case, mesh))
+    said, _ = find_intersection(case, mesh, lambda _: None, lambda: False)
+    assert said.startswith("The motion takes one through other near")
+    assert jump_message(*moved(case, mesh, Translate("one", (2.0, 0.4)))) is None
+    both = case.change(roles=roles | {"other": "moving"})
+    far = Translate("one", (4.0, 0.4)), Translate("other", (4.0, 0.4))
+    assert jump_message(*moved(both, mesh, *far)) is None
     lost = moved(case, mesh, Translate("one", (60.0, 0.0)))
     assert "takes one out of the mesh" in message(*lost)
+
+
+def test_nodes_that_move_on_arcs_do_not_cut_corners():
+    """The chord of a turn by 100 degrees would go through the inner wall of the sector."""
+    mesh = sector(8)
+    roles = {"BLOCK": "moving", "inner": "sliding", "outer": "sliding"}
+    roles |= dict.fromkeys(("per1", "per2"), "periodic")
+    case = Case(roles=roles, sliding="ps", periodic="moving", periodic_type="rotational")
+    turned = moved(case, mesh, Rotate("BLOCK", 100.0, (0.0, 0.0)))
+    assert jump_message(*turned) is None
+    next(sv.deform(turned[0], mesh))
+    straight = moved(case.change(periodic_type="auto", roles=roles), mesh, *turned[0].motions)
+    assert jump_message(*straight) is None
+    alone = {name: role for name, role in roles.items() if role != "periodic"}
+    cut = moved(Case(roles=alone), mesh, *turned[0].motions)
+    assert "BLOCK through " in jump_message(*cut)
 
 
 def test_a_motion_by_very_many_periods_is_looked_at_at_once(monkeypatch):

@@ -31,7 +31,7 @@ PLAIN = (
 
 KINDS = {
     r"nodes (\d+) and (\d+) coincide": "images asked to move differently",
-    r"the motion puts (\S+) through (\S+) near": "motion through a boundary",
+    r"the motion (?:puts|takes) (\S+) through (\S+) near": "motion through a boundary",
     r"which displace it differently": "two moving markers disagree",
     r"would go \S+ far, more than": "an overshoot",
     r"misses its own control nodes": "a system that was not solved",
@@ -130,7 +130,7 @@ def unlikely(run: Run, problem: SlidevizError) -> Iterator[str]:
         nodes = np.array([int(pair[1]), int(pair[2])])
         if not np.isin(nodes, nodes_with(run.case, run.mesh, "moving")).any():
             yield f"neither of the nodes moves: {text[:120]}"
-    through = re.search(r"the motion puts (\S+) through (\S+) near", text)
+    through = re.search(r"the motion (?:puts|takes) (\S+) through (\S+) near", text)
     if through:
         yield from _too_far(run, through[1], through[2])
 
