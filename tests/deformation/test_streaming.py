@@ -50,6 +50,8 @@ RUNS = [
         marks=pytest.mark.slow,
     ),
     ("polar", 12, ("STEPS=auto",)),
+    ("airfoil", 24, ("STEPS=2",)),
+    ("airfoil", 24, ("STEPS=1", "DATA_REDUCTION=YES", "DATA_RED_TOLERANCE=1e-3")),
 ]
 """Sample, size and changes of its case: every sliding method, periodic mode and kind of frame."""
 
