@@ -22,7 +22,7 @@ OFF_CHORD = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class MovedNodes:
     """Moving nodes of a mesh: what the formulas depend on."""
 
     mesh: Mesh
@@ -98,20 +98,20 @@ class Surface:
 class Formula:
     """Displacement by a variable, as a formula of its value times OPT_RELAX_FACTOR."""
 
-    moved: Callable[[DesignVariable, Surface, float], FloatArray]
+    moved: Callable[[DesignVariable, MovedNodes, float], FloatArray]
     """Displacement (m, d) of the nodes by an amount."""
-    rate: Callable[[DesignVariable, Surface, float], FloatArray] | None = None
+    rate: Callable[[DesignVariable, MovedNodes, float], FloatArray] | None = None
     """Its derivative with respect to the amount; None: that of 1, since it is linear."""
     relaxed: bool = True
     """Whether OPT_RELAX_FACTOR multiplies its value."""
 
 
-def _shifted(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+def _shifted(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
     vector = np.array(variable.numbers[: on.mesh.dim])
     return np.broadcast_to(amount * vector, on.points.shape)
 
 
-def _shifted_mesh(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+def _shifted_mesh(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
     vector = np.array(variable.numbers[: on.mesh.dim])
     length = np.linalg.norm(vector)
     if length == 0.0:
@@ -119,42 +119,42 @@ def _shifted_mesh(variable: DesignVariable, on: Surface, amount: float) -> Float
     return np.broadcast_to(amount * (vector / length), on.points.shape)
 
 
-def _scaled(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+def _scaled(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
     del variable
     return (amount - 1.0) * on.points
 
 
-def _scaling(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+def _scaling(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
     del variable, amount
     return on.points
 
 
-def _rotated(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+def _rotated(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
     return _turned(variable, on.points, np.radians(amount), derivative=False)
 
 
-def _rotating(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+def _rotating(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
     return np.radians(1.0) * _turned(variable, on.points, np.radians(amount), derivative=True)
 
 
-def _hicks_henne(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+def _hicks_henne(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
     side, peak = variable.numbers
     require_peak(peak)
     outwards = np.maximum(on.side, 0.0) if side else np.minimum(on.side, 0.0)
     return on.along_y(amount * outwards * hicks_henne(on.points[:, 0], peak))
 
 
-def _cst(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+def _cst(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
     side, k, n = variable.numbers
     there = on.side > 0.0 if side else on.side < 0.0
     return on.along_y(amount * there * kulfan(on.points[:, 0], k, n))
 
 
-def _bumped(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+def _bumped(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
     return on.along_y(amount * surface_bump(on.points[:, 0], *variable.numbers))
 
 
-def _cambered(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+def _cambered(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
     (peak,) = variable.numbers
     require_peak(peak)
     leading, angle = on.chord
@@ -166,7 +166,7 @@ def _cambered(variable: DesignVariable, on: Surface, amount: float) -> FloatArra
     return out
 
 
-def _naca(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+def _naca(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
     del amount  # SU2 uses the digits only
     most, where, thickness = np.array(variable.numbers) / (100.0, 10.0, 100.0)
     if not 0.0 < where < 1.0 and most:
@@ -185,7 +185,7 @@ def _naca(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
     return _put(on, camber + on.side * thickness * polynomial)
 
 
-def _parabolic(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+def _parabolic(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
     del amount  # SU2 uses the parameters only
     centre, thickness = variable.numbers
     if centre in (0.0, 1.0):
@@ -195,12 +195,12 @@ def _parabolic(variable: DesignVariable, on: Surface, amount: float) -> FloatArr
     return _put(on, on.side * half)
 
 
-def _put(on: Surface, y: FloatArray) -> FloatArray:
+def _put(on: MovedNodes, y: FloatArray) -> FloatArray:
     """Return displacements (m, d) that put the nodes of both sides onto y (m,)."""
     return on.along_y(np.where(on.side == 0.0, 0.0, y - on.points[:, 1]))
 
 
-def _still(variable: DesignVariable, on: Surface, amount: float) -> FloatArray:
+def _still(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:
     del variable, amount
     return np.zeros_like(on.points)
 
@@ -234,8 +234,8 @@ class Shapes:
     nodes: IntArray
 
     @cached_property
-    def _surface(self) -> Surface:
-        return Surface(self.mesh, self.config.markers, self.nodes)
+    def _surface(self) -> MovedNodes:
+        return MovedNodes(self.mesh, self.config.markers, self.nodes)
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ NOT_YET = "is not supported"
 
 
 @dataclass(frozen=True)
-class Kind:
+class VariableKind:
     """A kind of design variable."""
 
     group: Group
@@ -41,49 +41,49 @@ class Kind:
 
 
 KINDS = {
-    "NO_DEFORMATION": Kind("nothing"),
-    "TRANSLATION": Kind("surface", "x, y, z", 1),
-    "ROTATION": Kind("surface", "x0, y0, z0, x1, y1, z1", 1),
-    "SCALE": Kind("surface", "", 1),
-    "HICKS_HENNE": Kind("surface", "side, x", 2),
-    "CST": Kind("surface", "side, k, n", 3),
-    "SURFACE_BUMP": Kind("surface", "x0, x1, x", 4),
-    "ANGLE_OF_ATTACK": Kind("surface", "one", 5),
-    "HICKS_HENNE_CAMBER": Kind("surface", "x", 6),
-    "NACA_4DIGITS": Kind("naca", "digit1, digit2, digits34"),
-    "PARABOLIC": Kind("parabolic", "x, thickness"),
-    "AIRFOIL": Kind(
+    "NO_DEFORMATION": VariableKind("nothing"),
+    "TRANSLATION": VariableKind("surface", "x, y, z", 1),
+    "ROTATION": VariableKind("surface", "x0, y0, z0, x1, y1, z1", 1),
+    "SCALE": VariableKind("surface", "", 1),
+    "HICKS_HENNE": VariableKind("surface", "side, x", 2),
+    "CST": VariableKind("surface", "side, k, n", 3),
+    "SURFACE_BUMP": VariableKind("surface", "x0, x1, x", 4),
+    "ANGLE_OF_ATTACK": VariableKind("surface", "one", 5),
+    "HICKS_HENNE_CAMBER": VariableKind("surface", "x", 6),
+    "NACA_4DIGITS": VariableKind("naca", "digit1, digit2, digits34"),
+    "PARABOLIC": VariableKind("parabolic", "x, thickness"),
+    "AIRFOIL": VariableKind(
         "nothing",
         "one, two",
         refused="is not supported, as SU2 asks for its file at a terminal; use SURFACE_FILE",
     ),
-    "SURFACE_FILE": Kind("file"),
-    "TRANSLATE_GRID": Kind("grid", "x, y, z"),
-    "ROTATE_GRID": Kind("grid", "x0, y0, z0, x1, y1, z1"),
-    "SCALE_GRID": Kind("grid"),
-    "FFD_SETTING": Kind("boxes"),
-    "FFD_CONTROL_POINT": Kind("ffd", "BOX, i, j, k, dx, dy, dz", several="dx, dy, dz"),
-    "FFD_CONTROL_POINT_2D": Kind("ffd", "BOX, i, j, dx, dy", several="dx, dy"),
-    "FFD_CAMBER": Kind("ffd", "BOX, i, j"),
-    "FFD_CAMBER_2D": Kind("ffd", "BOX, i"),
-    "FFD_THICKNESS": Kind("ffd", "BOX, i, j"),
-    "FFD_THICKNESS_2D": Kind("ffd", "BOX, i"),
-    "FFD_TWIST": Kind("ffd", "BOX, j, x0, y0, z0, x1, y1, z1"),
-    "FFD_ROTATION": Kind("ffd", "BOX, x0, y0, z0, x1, y1, z1"),
-    "FFD_CONTROL_SURFACE": Kind("ffd", "BOX, x0, y0, z0, x1, y1, z1"),
-    "FFD_GULL": Kind("ffd", "BOX, j"),
-    "FFD_NACELLE": Kind("ffd", "BOX, i, j, k, dr, dx"),
-    "FFD_ANGLE_OF_ATTACK": Kind("ffd", "BOX, one"),
-    "FFD_TWIST_2D": Kind(
+    "SURFACE_FILE": VariableKind("file"),
+    "TRANSLATE_GRID": VariableKind("grid", "x, y, z"),
+    "ROTATE_GRID": VariableKind("grid", "x0, y0, z0, x1, y1, z1"),
+    "SCALE_GRID": VariableKind("grid"),
+    "FFD_SETTING": VariableKind("boxes"),
+    "FFD_CONTROL_POINT": VariableKind("ffd", "BOX, i, j, k, dx, dy, dz", several="dx, dy, dz"),
+    "FFD_CONTROL_POINT_2D": VariableKind("ffd", "BOX, i, j, dx, dy", several="dx, dy"),
+    "FFD_CAMBER": VariableKind("ffd", "BOX, i, j"),
+    "FFD_CAMBER_2D": VariableKind("ffd", "BOX, i"),
+    "FFD_THICKNESS": VariableKind("ffd", "BOX, i, j"),
+    "FFD_THICKNESS_2D": VariableKind("ffd", "BOX, i"),
+    "FFD_TWIST": VariableKind("ffd", "BOX, j, x0, y0, z0, x1, y1, z1"),
+    "FFD_ROTATION": VariableKind("ffd", "BOX, x0, y0, z0, x1, y1, z1"),
+    "FFD_CONTROL_SURFACE": VariableKind("ffd", "BOX, x0, y0, z0, x1, y1, z1"),
+    "FFD_GULL": VariableKind("ffd", "BOX, j"),
+    "FFD_NACELLE": VariableKind("ffd", "BOX, i, j, k, dr, dx"),
+    "FFD_ANGLE_OF_ATTACK": VariableKind("ffd", "BOX, one"),
+    "FFD_TWIST_2D": VariableKind(
         "ffd",
         "BOX, x, y",
         refused="is not supported: it moved nothing in SU2 7, and SU2 8 lacks it",
     ),
-    "ELECTRIC_FIELD": Kind("nothing", "one, two"),
-    "YOUNG_MODULUS": Kind("nothing"),
-    "POISSON_RATIO": Kind("nothing"),
-    "STRUCTURAL_DENSITY": Kind("nothing"),
-    "DEAD_WEIGHT": Kind("nothing"),
+    "ELECTRIC_FIELD": VariableKind("nothing", "one, two"),
+    "YOUNG_MODULUS": VariableKind("nothing"),
+    "POISSON_RATIO": VariableKind("nothing"),
+    "STRUCTURAL_DENSITY": VariableKind("nothing"),
+    "DEAD_WEIGHT": VariableKind("nothing"),
 }
 """SU2's kinds (8.3, and those of 7 that it dropped), by their name in DV_KIND."""
 WITHOUT_VALUE = ("nothing", "boxes", "file", "naca", "parabolic")
@@ -98,9 +98,9 @@ class DesignVariable:
 
     kind: str
     values: tuple[float, ...]
-    """One, or a value for each parameter in `Kind.several`."""
+    """One, or a value for each parameter in `VariableKind.several`."""
     numbers: tuple[float, ...] = ()
-    """Its parameters without the box, as in `Kind.form`."""
+    """Its parameters without the box, as in `VariableKind.form`."""
     box: str = ""
     ignored: bool = False
     """Whether it does nothing, beside the others in the list."""
@@ -116,7 +116,7 @@ class DesignVariable:
         return KINDS[self.kind].group
 
     def parameter(self, name: str, default: float = 0.0) -> float:
-        """Return the parameter of a name in `Kind.form`; ``default`` where it has none."""
+        """Return the parameter of a name in `VariableKind.form`; ``default`` where it has none."""
         names = [one for one in KINDS[self.kind].parameters if one != "BOX"]
         return dict(zip(names, self.numbers, strict=True)).get(name, default)
 
