@@ -9,12 +9,14 @@ from pathlib import Path
 import pytest
 from qtpy.QtCore import QSize, Qt
 from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication, QDialog, QLabel
 
 from slideviz.case.model import Case, FromFile, Radial, Rotate
 from slideviz.gui import files
 from slideviz.gui.panels.worst import info_text
 from slideviz.gui.start import StartPage
 from slideviz.gui.widgets import questions
+from slideviz.gui.widgets.build import on_screen
 from slideviz.gui.window import MainWindow
 from slideviz.samples.table import SAMPLES
 from slideviz.session import changes
@@ -55,6 +57,20 @@ def test_the_window_fits_a_screen_that_is_small_beside_the_letters(scale):
     given = dict(os.environ) | {"QT_SCALE_FACTOR": scale}
     done = subprocess.run(call, env=given, capture_output=True, text=True, timeout=120, check=False)
     assert done.stdout.split() == ["True"] * 3, done.stderr
+
+
+def test_a_dialog_that_is_larger_than_the_screen_scrolls(qtbot):
+    dialog, room = QDialog(), QApplication.primaryScreen().availableSize()
+    qtbot.addWidget(dialog)
+    for high in (200, room.height() + 300):
+        content = QLabel("options")
+        content.setMinimumSize(300, high)
+        area = on_screen(content, dialog)
+        assert (area is content) == (high == 200)
+        qtbot.addWidget(area)
+    assert area.widget() is content
+    assert area.minimumSizeHint().boundedTo(room) == area.minimumSizeHint()
+    assert area.minimumHeight() < room.height() - 80, "buttons below it are seen"
 
 
 def test_a_key_hides_every_panel_and_shows_them_again(driver, passage_file):

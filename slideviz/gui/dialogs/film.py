@@ -16,7 +16,15 @@ from slideviz.gui.dialogs.film_form import FilmForm
 from slideviz.gui.responsiveness.piece_runner import PieceRunner, raise_again
 from slideviz.gui.responsiveness.settings import PREVIEW_MS
 from slideviz.gui.responsiveness.timers import later
-from slideviz.gui.widgets.build import QuietBar, hint_label, in_column, in_row, set_style
+from slideviz.gui.widgets.build import (
+    QuietBar,
+    boxed,
+    hint_label,
+    in_column,
+    in_row,
+    on_screen,
+    set_style,
+)
 from slideviz.gui.widgets.pixmaps import drawn_for, fitted, framed, preview_label, to_image
 
 PREVIEW = (360, 225)
@@ -64,8 +72,8 @@ class FilmDialog(QDialog):
         self.words.setTextFormat(Qt.TextFormat.PlainText)  # it has the name of a file
         self.words.setWordWrap(True)
         self.bar = QuietBar()
-        parts = (self._make_previews(), self.form, self.words, self.bar, self._make_buttons())
-        self.setLayout(in_column(*parts))
+        parts = boxed(in_column(self._make_previews(), self.form, self.words, self.bar))
+        self.setLayout(in_column(on_screen(parts, self), self._make_buttons()))
         self._soon = later(self, self._draw, PREVIEW_MS)
         self._changed()
         self._show_filming(False)

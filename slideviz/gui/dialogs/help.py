@@ -117,7 +117,7 @@ class ShortcutsDialog(QDialog):
     def __init__(self, window: Services) -> None:
         super().__init__(window)
         self.setWindowTitle("Keyboard and mouse")
-        self.resize(1060, 700)
+        self.resize(QSize(1060, 700).boundedTo(self.screen().availableSize()))
         self.search = _search_field("Find an action or a key")
         self.search.textChanged.connect(self._filter)
         self.tree = QTreeWidget()
@@ -165,7 +165,7 @@ class TextDialog(QDialog):
     def __init__(self, parent: QWidget, title: str, text: str) -> None:
         super().__init__(parent)
         self.setWindowTitle(title)
-        self.resize(860, 640)
+        self.resize(QSize(860, 640).boundedTo(self.screen().availableSize()))
         self.search, self.count = _search_field("Find (Enter: the next one)"), hint_label()
         self.count.setWordWrap(False)
         self.text = QPlainTextEdit(text)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from qtpy.QtCore import QSize
 from qtpy.QtWidgets import QDialog, QDialogButtonBox, QLabel, QPlainTextEdit, QWidget
 
 from slideviz.errors import SlidevizError
@@ -38,7 +39,7 @@ class TableDialog(QDialog):
         super().__init__(parent)
         self.rows = rows
         self.setWindowTitle(f"Displacements of {rows.of}")
-        self.resize(520, 560)
+        self.resize(QSize(520, 560).boundedTo(self.screen().availableSize()))
         about = QLabel(ABOUT)
         about.setWordWrap(True)
         self.edit = QPlainTextEdit(text)

@@ -36,6 +36,7 @@ from slideviz.gui.widgets.build import (
     in_column,
     in_row,
     number_box,
+    on_screen,
     set_style,
 )
 from slideviz.gui.widgets.choice import Choice
@@ -114,7 +115,7 @@ class PictureDialog(QDialog):
         self._make_options()
         left = in_column(self.preview, self.words, self.kinds, None)
         parts = in_row(left, in_column(self._form, None), spacing=16)
-        self.setLayout(in_column(parts, self._make_buttons()))
+        self.setLayout(in_column(on_screen(boxed(parts), self), self._make_buttons()))
         self._timer = later(self, self._draw, PREVIEW_MS)
         self._runner = PieceRunner(self)
         self._runner.failed.connect(raise_again)

@@ -176,6 +176,17 @@ def reveal(field: QWidget | None) -> None:
         area = area.parentWidget()
 
 
+def on_screen(content: QWidget, dialog: QWidget) -> QWidget:
+    """Return the content of a dialog; in a scroll area if the screen is too small."""
+    # The dialog has margins, a title, and buttons below.
+    room, wanted = dialog.screen().availableSize() - QSize(40, 120), content.sizeHint()
+    if wanted.boundedTo(room) == wanted:
+        return content
+    area = PanelScroll(content)
+    area.setMinimumSize((wanted + QSize(20, 20)).boundedTo(room))
+    return area
+
+
 # Buttons -----------------------------------------------------------------------------------
 
 
