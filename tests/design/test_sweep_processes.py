@@ -178,3 +178,18 @@ def test_a_killed_worker_of_a_dask_cluster(passage):
     assert not any(row.problem for row in rows)
     own = {row.design: row.min for row in sv.sweep(passage.case, asked, mesh=passage.mesh)}
     assert {row.design: row.min for row in rows} == own
+
+
+def test_no_worker_heeds_ctrl_c_while_it_starts():
+    """Also the first one, for which multiprocessing starts its tracker, and unblocks signals."""
+    script = (
+        "import signal\n"
+        "from multiprocessing import resource_tracker\n"
+        "from slideviz.design.sweeps.processes import _settings_of_workers\n"
+        "with _settings_of_workers():\n"
+        "    resource_tracker.getfd()  # as `Popen` does before it starts a process\n"
+        "    print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))\n"
+        "print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
+    assert done.stdout == b"True\nFalse\n"

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context, parent_process, resource_tracker
 from typing import Any, NamedTuple, NoReturn
 
 from slideviz.design.sweeps.worker import Packed, hold
@@ -262,6 +262,7 @@ def _settings_of_workers() -> Iterator[None]:
         before = {name: os.environ.get(name) for name in (*_THREADS, "PYTHONWARNINGS")}
         os.environ.update(dict.fromkeys(_THREADS, "1"))
         os.environ["PYTHONWARNINGS"] = ",".join(filter(None, [before["PYTHONWARNINGS"], _QUIET]))
+        resource_tracker.ensure_running()  # which would unblock the signal where it starts later
         masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             yield
