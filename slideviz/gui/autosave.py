@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from itertools import count
 from pathlib import Path
+from urllib.parse import unquote_to_bytes
 
 from qtpy.QtCore import QLockFile, QObject
 
@@ -41,6 +42,7 @@ SOURCE = "saved as: "
 CURRENT = "the results of the designs are of this case"
 """The remark in a session's file that says so."""
 
+_URI = "file://"
 _numbers = count(1)
 log = logging.getLogger("slideviz")
 
@@ -128,7 +130,7 @@ class Autosave(QObject):
             self._lock = _lock(self.path)
             if self._lock.tryLock(0):
                 private_file(Path(self._lock.fileName()))
-        remarks = [f"{SOURCE}{case.source}"] if case.source is not None else []
+        remarks = [] if case.source is None else [f"{SOURCE}{_written(case.source)}"]
         if table.rows:
             write_results(_designs_file(self.path), table)
             private_file(_designs_file(self.path))
@@ -187,7 +189,8 @@ class LeftSession:
         file = _designs_file(self.path)
         if not file.exists():
             return DesignTable(), False
-        return read_results(file), f"% {CURRENT}" in self.path.read_text(encoding="utf-8")
+        text = self.path.read_text(encoding="utf-8", errors="replace")
+        return read_results(file), f"% {CURRENT}" in text
 
     def remove(self) -> None:
         """Remove the session's files, and release its lock."""
@@ -211,7 +214,7 @@ def find_sessions(folder: Path) -> tuple[list[LeftSession], list[str]]:
             if case.mesh_file is None:
                 raise SlidevizError(f"{path.name}: it names no mesh")
             found.append(LeftSession(path, case, _source(path), lock))
-        except (SlidevizError, OSError) as problem:
+        except (SlidevizError, OSError, ValueError) as problem:
             problems.append(_put_aside(path, str(problem).splitlines()[0]))
             lock.unlock()
     left = [path for path in folder.glob(".slideviz-*.tmp") if _is_left(path)]
@@ -249,11 +252,18 @@ def _modified(path: Path) -> float:
 
 def _source(path: Path) -> Path | None:
     """Return the case file named by the remark in a session's file, or None."""
-    for line in path.read_text(encoding="utf-8").splitlines():
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
         _, found, name = line.partition(f"% {SOURCE}")
+        if found and name.startswith(_URI):
+            return Path(os.fsdecode(unquote_to_bytes(name.removeprefix(_URI))))
         if found:
             return Path(name)
     return None
+
+
+def _written(path: Path) -> str:
+    """Return a path as text in UTF-8: as it is, or else as a URI."""
+    return str(path) if str(path).isprintable() else path.absolute().as_uri()
 
 
 def _put_aside(path: Path, why: str) -> str:

@@ -11,7 +11,7 @@ from qtpy.QtWidgets import QMessageBox, QWidget
 from slideviz.case.model import Case
 from slideviz.design.sweeps.row import DesignRow
 from slideviz.gui import autosave
-from slideviz.gui.autosave import Autosave, find_sessions
+from slideviz.gui.autosave import SOURCE, Autosave, find_sessions
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import faults, questions
 from slideviz.gui.window import MainWindow
@@ -276,6 +276,33 @@ def test_a_session_that_cannot_be_read_is_kept(folder, text):
     assert not bad.exists()
     assert (folder / "session-4194399-1.cfg.2.broken").read_text() == text
     assert (folder / "session-4194399-1.cfg.broken").read_text() == "an earlier one"
+
+
+def test_a_session_that_is_not_utf_8_does_not_end_the_search(folder):
+    folder.mkdir(parents=True)
+    odd, plain = folder / "session-4194399-1.cfg", folder / "session-4194399-2.cfg"
+    odd.write_bytes(b"% caf\xe9\nMESH_FILENAME= m.su2\n")
+    plain.write_text(f"% {SOURCE}a.cfg\nMESH_FILENAME= m.su2\n")
+    found, problems = find_sessions(folder)
+    assert {session.path for session in found} == {odd, plain}
+    assert {session.source for session in found} == {None, Path("a.cfg")}
+    assert not problems
+    assert all(session.designs() == (DesignTable(), False) for session in found)
+
+
+def test_the_name_of_the_case_need_not_be_utf_8(make, qtbot, folder, case_file):
+    path = case_file.with_name("c\udce9.cfg")
+    path.write_bytes(case_file.read_bytes())
+    window = make()
+    open_in(window, path, qtbot)
+    window.autosave.save()
+    qtbot.waitUntil(window.autosave.path.exists)
+    qtbot.waitUntil(lambda: not window.autosave._runner.busy)
+    left = folder / "session-4194399-1.cfg"
+    left.write_bytes(window.autosave.path.read_bytes())
+    path.unlink()
+    (found,) = (one for one in find_sessions(folder)[0] if one.path == left)
+    assert found.source == path
 
 
 def test_sessions_that_cannot_be_read_are_told_once(make, folder):
