@@ -182,7 +182,7 @@ def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) 
         f"node {found.node} at ({where}) goes {found.length:.3g} far, {ratio:.3g} "
         f"times as far as the farthest boundary node ({most:.3g}): the interpolation, whose "
         f"support radius is {radius:.3g}, continues the turning or stretching of the boundary "
-        "beyond it; use a smaller support radius, such as INFLUENCE_FACTOR= "
+        "beyond it; use a smaller radius, as with INFLUENCE_FACTOR= "
         f"{factor}, or RBF_KERNEL= wendland-c0"
     )
     return [sentence]
