@@ -11,6 +11,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Scale, Translate
+from slideviz.case.reduction import Reduction
 from slideviz.design.frozen.solve import whole
 from slideviz.errors import ConditionWarning, DeformError, Note, ToleranceWarning
 from tests import builders
@@ -185,9 +186,10 @@ def test_a_deformer_at_its_own_reference_does_not_blame_another_displacement():
         deformer.deform(1.01 * deformer.displacement)
 
 
-def test_a_derivative_that_cannot_be_trusted_is_told():
+@pytest.mark.parametrize("reduction", [None, Reduction(tolerance=1e-9)], ids=["exact", "reduced"])
+def test_a_derivative_that_cannot_be_trusted_is_told(reduction):
     mesh, case = thin(), asked(Rotate("airfoil", 5.0))
-    deformer = sv.Deformer(mesh, case)
+    deformer = sv.Deformer(mesh, case.change(reduction=reduction))
     alone = np.zeros_like(deformer.displacement)
     alone[0, 1] = 1.0
     with pytest.warns(ConditionWarning, match="system of the derivative is nearly singular: betw"):

@@ -32,8 +32,8 @@ from slideviz.rbf.methods import ROUNDING as FLAT
 from slideviz.terms import Sliding
 
 CHECKED = 1e11
-"""Above this condition number, the errors of exact solutions are estimated for each design. With
-data reduction they are not: its tolerance is larger than rounding."""
+"""Above this condition number, the errors of solutions are estimated for each design; with data
+reduction only those of derivatives, for points have a tolerance that is larger than rounding."""
 
 
 class Interpolation(Method):
@@ -105,7 +105,7 @@ class Interpolation(Method):
             chosen=self._step.choices,
             fixed=self._step.factors(value(self._coords)),
             refined=self._step.refined > 0.0,
-            checked=setup.reduction is None and self._step.condition > CHECKED,
+            checked=self._step.condition > CHECKED,
         )
 
     def _meet(self, fit: FrozenFit, nodes: IntArray, values: Array) -> None:
@@ -196,7 +196,8 @@ class Interpolation(Method):
             displacement = self._spread(displacement, spread, errors)
         displacement = put(displacement, nodes, values, own=True)
         most = size.max(axis=-1, initial=0.0)
-        return Solved(displacement, lag, nodes, most, lost, doubt=fit.doubt)
+        doubt = fit.doubt if setup.reduction is None else np.zeros_like(fit.doubt)
+        return Solved(displacement, lag, nodes, most, lost, doubt=doubt)
 
     def _spread(self, displacement: Array, spread: FrozenSpread, errors: Array) -> Array:
         """Return the displacement with the boundary correction added."""
