@@ -150,13 +150,13 @@ def advice_for(
     ``layers`` is that of the last ``Step``. Without a mesh in memory, with its quality ``found``
     after the run, neither the pitch nor boundaries beside the cells are named.
     """
+    if found is not None and not found.inverted:
+        return ""
     from slideviz.deformation.remedies import beyond_pitch, fixed_beside, remedies
 
     beside: tuple[str, ...] = ()
     pitch = ""
     if mesh is not None and found is not None:
-        if not found.inverted:
-            return ""
         beside = fixed_beside(case, mesh, found.inverted_cells())
         pitch = beyond_pitch(case, mesh)
     ideas = "; ".join(remedy.keys for remedy in remedies(case, beside, pitch, layers))
