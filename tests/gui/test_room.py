@@ -225,7 +225,7 @@ def test_a_sample_is_opened_in_another_size(driver, cache, answers):
 
 def test_the_dialog_of_the_size_says_what_is_counted(qtbot, driver, monkeypatch):
     monkeypatch.undo()
-    from qtpy.QtWidgets import QDialog, QLabel
+    from qtpy.QtWidgets import QDialogButtonBox
 
     from slideviz.gui.widgets.choice import Choice
     from slideviz.gui.widgets.fields import NumberBox
@@ -238,6 +238,10 @@ def test_the_dialog_of_the_size_says_what_is_counted(qtbot, driver, monkeypatch)
             choice.setCurrentIndex(choice.findData(name))
             told = " ".join(label.text() for label in dialog.findChildren(QLabel))
             seen.append((box.value(), "one side" in told, "all cells" in told))
+        (buttons,) = dialog.findChildren(QDialogButtonBox)
+        for text, able in (("2.5", False), ("20000", True)):
+            box.lineEdit().setText(text)
+            assert buttons.button(QDialogButtonBox.StandardButton.Open).isEnabled() == able
         return QDialog.DialogCode.Accepted
 
     monkeypatch.setattr(QDialog, "exec", look)

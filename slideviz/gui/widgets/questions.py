@@ -163,7 +163,9 @@ def ask_sample(
     form.addRow("Sample", name)
     form.addRow("Size", size)
     form.addRow(about)
-    form.addRow(dialog_buttons(dialog, kinds.Open, kinds.Cancel))
+    buttons = dialog_buttons(dialog, kinds.Open, kinds.Cancel)
+    size.marked.connect(lambda: buttons.button(kinds.Open).setEnabled(not size.fault))
+    form.addRow(buttons)
     dialog.setMinimumWidth(420)
     accepted = dialog.exec() == QDialog.DialogCode.Accepted
     return (name.currentData(), size.value()) if accepted else None
