@@ -60,6 +60,8 @@ VERB_OF: dict[type, MotionKind] = {
 }
 """Verbs of motions, by class."""
 ALL_MOVING = "*"
+MOST_TERMS = 100
+"""Most terms of an airfoil's shape function."""
 
 
 def read_motions(text: str) -> tuple[Motion, ...]:
@@ -301,8 +303,11 @@ def require_peak(peak: float) -> None:
 
 def term_of(k: float, n: float) -> tuple[int, int]:
     """Return term k of n of an airfoil's shape as whole numbers; raises CaseError if none is."""
-    if k != int(k) or n != int(n) or not 1 <= k <= n:
-        raise CaseError(f"there is no term {k:g} of {n:g}; needed are whole numbers, 1 to n of n")
+    if k != int(k) or n != int(n) or not 1 <= k <= n <= MOST_TERMS:
+        raise CaseError(
+            f"there is no term {k:g} of {n:g}; needed are whole numbers, 1 to n of n, and n up to "
+            f"{MOST_TERMS}"
+        )
     return int(k), int(n)
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -20,7 +20,7 @@ from slideviz.design.su2.markers import problems_of_markers
 from slideviz.design.su2.positions import ListedPositions
 from slideviz.design.su2.shapes import Shapes
 from slideviz.design.su2.variables import Group
-from slideviz.errors import Note, SlidevizError
+from slideviz.errors import CaseError, Note, SlidevizError
 from slideviz.ffd.section import boxes_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
@@ -99,8 +99,12 @@ class MovingSurface:
 
     @cached_property
     def displacement(self) -> FloatArray:
-        """Return the displacement of the nodes, (m, d), in the mesh's length unit."""
-        return self.displacer.displacement()
+        """Return the displacement of the nodes, (m, d), in the mesh's length unit.
+
+        Raises CaseError where it is not finite.
+        """
+        with _large_numbers_told(self.config):
+            return self._finite(self.displacer.displacement())
 
     def slope(self, place: int, part: int = 0, undeformed: bool = False) -> FloatArray:
         """Return the derivative (m, d) of the displacement with respect to a value.
@@ -116,7 +120,14 @@ class MovingSurface:
         """
         if self.idle[place]:
             return np.zeros((len(self.nodes), self.mesh.dim))
-        return self.displacer.slope(place, part, undeformed)
+        with _large_numbers_told(self.config):
+            return self._finite(self.displacer.slope(place, part, undeformed))
+
+    def _finite(self, vectors: FloatArray) -> FloatArray:
+        """Return vectors (m, d) that must be finite."""
+        if not np.isfinite(vectors).all():
+            raise OverflowError
+        return vectors
 
     @property
     def whole(self) -> bool:
@@ -153,6 +164,19 @@ class MovingSurface:
         return case.change(motions=motions, warnings=(*case.warnings, *self.warnings))
 
 
+@contextmanager
+def _large_numbers_told(config: Su2Config) -> Iterator[None]:
+    """Context in which an OverflowError is a CaseError about the variables."""
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    except OverflowError as problem:
+        raise CaseError(
+            f"{config.source}: the variables take nodes farther than can be computed with; correct "
+            "DV_PARAM or DV_VALUE"
+        ) from problem
+
+
 def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
     """Return the moving boundaries of a configuration, and what moves them.
 
@@ -169,7 +193,8 @@ def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
     listed = [mesh.marker(name).nodes for name in config.markers]
     nodes = np.unique(np.concatenate([np.empty(0, np.int64), *listed]))
     nodes = np.arange(len(mesh.points)) if group == "grid" else nodes
-    displacer = DISPLACERS[group](config, mesh, nodes)
+    with _large_numbers_told(config):
+        displacer = DISPLACERS[group](config, mesh, nodes)
     left = [] if group == "ffd" else _left_behind(config, mesh)
     if group == "grid" and mesh.halo is not None:
         said = f"the transformations of the halo in {mesh.name} (SEND_RECEIVE) stay as they are"
