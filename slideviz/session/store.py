@@ -100,7 +100,7 @@ class Memento:
 
 
 @dataclass(frozen=True, eq=False)
-class _Beside:
+class _OutsideChange:
     """The values before and after a change of something that is not part of the session.
 
     ``put`` shows one of them.
@@ -117,7 +117,7 @@ class _Done:
 
     Attributes
     ----------
-    before : Memento or _Beside
+    before : Memento or _OutsideChange
         The state before the change (in the list for redo: after it).
     words : str
         Words for the menu.
@@ -128,7 +128,7 @@ class _Done:
         to it; minus infinity where nothing more can.
     """
 
-    before: Memento | _Beside
+    before: Memento | _OutsideChange
     words: str
     kind: tuple[object, ...]
     at_s: float
@@ -247,10 +247,10 @@ class Store:
         if not source:
             return
         done = source.pop()
-        if isinstance(done.before, _Beside):
+        if isinstance(done.before, _OutsideChange):
             target.append(done)
-            beside = done.before
-            beside.put(beside.before if source is self._undo else beside.after)
+            outside = done.before
+            outside.put(outside.before if source is self._undo else outside.after)
             return
         target.append(replace(done, before=Memento.of(self.session), at_s=float("-inf")))
         self.put(done.before.put_into(self.session))
@@ -263,7 +263,7 @@ class Store:
         For changes of what is not part of the session, such as a table of designs.
         """
         self._redo.clear()
-        self._undo.append(_Done(_Beside(put, before, after), words, (put,), float("-inf")))
+        self._undo.append(_Done(_OutsideChange(put, before, after), words, (put,), float("-inf")))
         del self._undo[:-DEEPEST]
 
     def _remember(self, old: Session, new: Session, words: str, kind: tuple[object, ...]) -> None:
