@@ -161,6 +161,8 @@ def connected(basis: Basis, features: FloatArray) -> IntArray:
     if not (features.shape[1] and KERNELS[basis.kernel].compact):
         return np.zeros(features.shape[1], np.int64)
     low, high, box = boxes(basis, features)
+    if low.shape[1] == 1:
+        return box
     from scipy.spatial import cKDTree  # takes long to load
 
     middle, reach = ((low + high) / 2).T, SLACK * basis.radius
