@@ -9,8 +9,10 @@ import numpy as np
 from slideviz.argument_types import check_types
 from slideviz.case import motion
 from slideviz.case.displacement import Displacements
+from slideviz.case.method_keys import automatic_radius
 from slideviz.case.model import Case, Translate
 from slideviz.deformation.prescribed import displaced
+from slideviz.deformation.radius import support_radius
 from slideviz.deformation.setup import make_setup
 from slideviz.deformation.solver import Progress
 from slideviz.design.checks import Checks, facets_of, usual_edge
@@ -39,10 +41,10 @@ class Deformer:
     """A deformation prepared once, for many displacements of the moving nodes.
 
     Everything discrete is chosen at the reference, the first displacement that the deformer is
-    made with, and kept: number of steps, control nodes, the facet, edge or vertex that each
-    sliding node is on, nearest boundary nodes and radius of the correction. So results are smooth
-    functions of the displacement, and `jvp` and `vjp` are their exact derivatives. Results depend
-    on the arguments alone, to the bit. A deformer can be pickled.
+    made with, and kept: number of steps, support radius, control nodes, the facet, edge or vertex
+    that each sliding node is on, nearest boundary nodes and radius of the correction. So results
+    are smooth functions of the displacement, and `jvp` and `vjp` are their exact derivatives.
+    Results depend on the arguments alone, to the bit. A deformer can be pickled.
 
     Attributes
     ----------
@@ -104,7 +106,8 @@ class Deformer:
             Roles, motions and settings. It needs no motions if ``displacements`` are given.
         displacements : (m, d) or (k, m, d), optional
             Of the moving nodes; those of the case's motions if not given. If k are given, the
-            control nodes suffice for all of them, and all else is chosen at the first.
+            control nodes suffice for all of them, the support radius fits all together, and all
+            else is chosen at the first.
         progress
             Called often with a ``Progress``; an exception it raises ends the work at once.
 
@@ -131,7 +134,13 @@ class Deformer:
         references = given.reshape(-1, *asked.vectors.shape)
         sizes = np.linalg.norm(references, axis=2).max(axis=1, initial=0.0)
         most = Displacements(asked.nodes, references[int(np.argmax(sizes))], asked.warnings)
-        setup = make_setup(case, mesh, displaced(most, mesh))
+        held = case
+        if automatic_radius(case) and len(references) > 1:
+            far = np.linalg.norm(references, axis=2).argmax(axis=0)
+            widest = references[far, np.arange(len(asked.nodes))]
+            together = Displacements(asked.nodes, widest, asked.warnings)
+            held = case.change(support_radius=support_radius(case, mesh, together))
+        setup = make_setup(held, mesh, displaced(most, mesh))
         if setup.reduction is not None and not sizes.any():
             raise DeformError(
                 "no displacement is given by which control nodes could be chosen: all are zero; "

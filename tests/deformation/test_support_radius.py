@@ -77,3 +77,28 @@ def test_the_factor_of_a_case_replaces_its_length_and_a_file_keeps_either(tmp_pa
     assert "INFLUENCE_FACTOR= AUTO\n" in path.read_text()
     case = KEYS["INFLUENCE_FACTOR"].put(sv.Case(support_radius=3.0), 0.5)
     assert (case.influence_factor, case.support_radius) == (0.5, None)
+
+
+def test_a_deformer_keeps_the_radius_of_its_reference():
+    mesh = far_field(60.0, bodies=2)
+    sizes = [np.ptp(mesh.points[mesh.marker(m).nodes], axis=0).max() for m in ("body", "other")]
+    case = sv.Case(roles={"body": "moving", "other": "moving"})
+    both = case.change(motions=(sv.Translate(("body", "other"), (0.1, 0.0)),))
+    deformer = sv.Deformer(mesh, both)
+    own = np.isin(deformer.nodes, mesh.marker("body").nodes)
+    small = np.where(own[:, None], (-0.1, 0.0), 0.0)
+
+    def found(displacements):
+        return sv.Deformer(mesh, case, displacements)._setup.basis.radius
+
+    assert found(small) == BODIES * sizes[0]
+    assert found(np.zeros_like(small)) == BODIES * max(sizes)
+    assert found(np.stack([small, 0.01 + 0.1 * small])) == BODIES * max(sizes)
+    assert found(np.stack([small, 30.0 * small])) == DISPLACEMENTS * 3.0
+    # A design that goes farther has the same radius.
+    kept = sv.Deformer(mesh, case, small)
+    radius = kept._setup.basis.radius
+    fixed = case.change(support_radius=radius, motions=(sv.Translate("body", (-1.0, 0.0)),))
+    fixed = fixed.change(motions=(*fixed.motions, sv.Translate("other", (0.0, 0.0))))
+    expected = [*sv.deform(fixed, mesh)][-1].mesh.points
+    np.testing.assert_allclose(kept.deform(10.0 * small), expected, atol=1e-11)
