@@ -215,6 +215,8 @@ class _Process:
             began = begun is not None and _succeeded(begun)
             if lost and not began:
                 ended = (getattr(pool, "_processes", None) or {}).values()
+                for one in ended:
+                    one.join(1.0)  # its pipe closes a moment before it has an exit code
                 self._owner.exit_codes += [one.exitcode or 0 for one in ended]
             self._owner._done(self, call, inner, lost=lost, began=began)
 
