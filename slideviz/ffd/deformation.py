@@ -8,14 +8,15 @@ takes it. Of nested boxes, the control points of the inner one are carried by th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
 from slideviz.errors import CaseError
 from slideviz.ffd.box import Box, Embedding
-from slideviz.ffd.inverse import parametric, placed_again
+from slideviz.ffd.coordinates import CARTESIAN
+from slideviz.ffd.inverse import parametric, placed_again, uvw_step
 from slideviz.ffd.moves import Move, Shift, Twist
 from slideviz.mesh.model import FloatArray, IntArray
 
@@ -150,7 +151,7 @@ class BoxDeformation:
             inside = self._embedded[box.name]
             moved = box.moved(self.change[box.name])
             there = self._base(box) + self.nodes[inside.nodes]
-            if there.any():
+            if len(there):
                 found[box.name] = inside.nodes, placed_again(moved, there, inside.uvw)
         return found
 
@@ -186,14 +187,12 @@ class BoxDeformation:
         if cage is not None:
             change = cage.sums(self.change[parent]).reshape(change.shape)
         inside = self._embedded[name]
-        moved = self.nodes[inside.nodes]
-        if not change.any() and not moved.any():
-            return
         self.change[name] = change
         at = box.moved(change)
-        inside = box.embed(inside.nodes, placed_again(at, self._base(box) + moved, inside.uvw))
+        there = self._base(box) + self.nodes[inside.nodes]
+        inside = box.embed(inside.nodes, placed_again(at, there, inside.uvw))
         self._embedded[name] = inside
-        inverse = np.linalg.inv(at.slopes(inside.uvw))
+        slopes = at.slopes(inside.uvw)
 
         def rates_of(rates: _Rates) -> None:
             if cage is not None and parent in rates.change:
@@ -201,7 +200,7 @@ class BoxDeformation:
             shifted = rates.nodes[inside.nodes]
             if name in rates.change:
                 shifted = shifted - inside.sums(rates.change[name])
-            rates.uvw[name] = np.einsum("mij,mj->mi", inverse, shifted)
+            rates.uvw[name] = uvw_step(slopes, shifted)
 
         self._tape.append(rates_of)
 
@@ -334,8 +333,9 @@ class BoxDeformation:
     def _is_folded(self, box: Box) -> bool:
         """Return whether a deformed box has turned inside out at any of its nodes."""
         uvw = self._embedded[box.name].uvw
-        before = np.linalg.det(box.slopes(uvw))
-        after = np.linalg.det(box.moved(self.change[box.name]).slopes(uvw))
+        # In q, as angles of points would jump where they pass the end of their range.
+        straight = replace(box, points=box.q + self.change[box.name], system=CARTESIAN)
+        before, after = (np.linalg.det(each.slopes(uvw)) for each in (box, straight))
         return bool((after * np.sign(before) < 0.0).any())
 
     def _unfold(self, box: Box) -> None:
@@ -343,19 +343,18 @@ class BoxDeformation:
 
         SU2's bisection, after Gain and Dodgson 2001: passes with a part of the values each.
         """
-        folded = self._is_folded(box)
-        if not folded:
+        if not self._is_folded(box):
             return
         step, total, depth = -0.5, 0.5, 0
         for number in range(1, self.limits.iterations + 1):
             self._apply(box, step)
             self._place(box)
-            before, folded = folded, self._is_folded(box)
+            folded = self._is_folded(box)
             depth += not folded
             if not folded and depth == self.limits.depth:
                 break
             if number < self.limits.iterations:
-                step = step / 2.0 if before == folded else -step / 2.0
+                step = abs(step) / (-2.0 if folded else 2.0)
                 total += step
         self._factor *= step
         said = f"FFD_INTPREV: the FFD box {box.name!r} is deformed by {100.0 * total:g} % only"

@@ -126,7 +126,7 @@ def _newton(
     for _ in range(STEPS):
         if not len(going):
             break
-        step = _step(box.slopes(uvw[going]), rest[going])
+        step = uvw_step(box.slopes(uvw[going]), rest[going])
         scale = np.ones(len(going))
         better = np.zeros(len(going), bool)
         for _ in range(HALVINGS):
@@ -145,8 +145,11 @@ def _newton(
     return uvw, gap
 
 
-def _step(slopes: FloatArray, rest: FloatArray) -> FloatArray:
-    """Return Newton's steps (m, 3); least-squares ones if any derivative (m, 3, 3) is singular."""
+def uvw_step(slopes: FloatArray, rest: FloatArray) -> FloatArray:
+    """Return the changes (m, 3) of uvw that shift points by ``rest`` (m, 3), to first order.
+
+    They are least-squares ones if any derivative, ``slopes`` (m, 3, 3), is singular.
+    """
     try:
         step = np.linalg.solve(slopes, rest[..., None])[..., 0]
     except np.linalg.LinAlgError:

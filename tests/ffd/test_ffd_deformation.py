@@ -129,11 +129,11 @@ def test_last_box_takes_the_nodes_and_says_what_is_lost():
     assert not deformed([inner(), outer()], two[1:] * 0).notes
 
 
-def nested(extra):
+def nested(extra, part=0.5):
     boxes = [outer(), inner(level=1, parent="OUT")]
     variables = variables_of("OUT", np.zeros(6)) + variables_of("IN", np.zeros(6))
-    halved = [(*one[:4], 0.5 * one[4] + e) for one, e in zip(variables, extra, strict=True)]
-    return deformed(boxes, halved)
+    parts = [(*one[:4], part * one[4] + e) for one, e in zip(variables, extra, strict=True)]
+    return deformed(boxes, parts)
 
 
 def test_parent_carries_nested_box():
@@ -170,6 +170,22 @@ def test_nested_box_moves_on_top_of_its_parent():
         at = both.moved()[name].at(there)
         np.testing.assert_allclose(at, (POINTS + both.nodes)[nodes], rtol=0, atol=1e-12)
     assert set(both.uvw()) == {"IN", "OUT"}
+
+
+def test_nested_box_at_rest_has_the_slopes_of_its_parent():
+    assert not nested(np.zeros(12), 0.0).nodes.any()
+    check_slopes(lambda extra: nested(extra, 0.0), 12, atol=1e-8, idle=1)
+
+
+def test_nested_box_may_shrink_to_an_edge():
+    wedge = CUBE.copy()
+    wedge[[6, 7]] = CUBE[[5, 4]]  # at the top, w = 1, all v are one
+    box = replace(regular_box("IN", 0.6 * wedge + 0.15, (2, 2, 1), None), level=1, parent="OUT")
+    still = [("OUT", "FFD_CONTROL_POINT", (1, -1, -1), (0.3, 0.5, 0.1), 0.0)]
+    points = np.array([[0.4, 0.15, 0.75], [0.4, 0.3, 0.3]])
+    found, alone = (deformed(boxes, still, points=points) for boxes in ([outer(), box], [outer()]))
+    assert len(found.inside["IN"].nodes) == 2
+    np.testing.assert_allclose(found.slope(0), alone.slope(0), rtol=0, atol=1e-14)
 
 
 def test_nested_box_must_be_inside_its_parent():
@@ -262,6 +278,17 @@ def test_self_intersection_is_taken_back_by_bisection(value, iterations, depth):
         assert ("still intersects itself" in found.notes[0]) == (part * value > worst)
         right = part * make(value).slope(0)
         np.testing.assert_allclose(found.slope(0), right, rtol=0, atol=1e-14)
+
+
+def test_box_that_passes_the_range_of_angles_does_not_fold():
+    system = CoordinateSystem("CYLINDRICAL")
+    ends = np.array([1.0, 0.1 * np.pi, 0.0]) + CUBE * (0.5, 0.3 * np.pi, 1.0)
+    box = regular_box("IN", system.points_of(ends), (2, 2, 2), None, system)
+    points = system.points_of(np.array([[1.2, 0.35 * np.pi, 0.5], [1.3, 0.3 * np.pi, 0.2]]))
+    turn = ("IN", "FFD_CONTROL_POINT", (-1, 2, -1), (0.0, 1.0, 0.0), 0.4)
+    found = deformed([box], [turn], points=points, iterations=10)
+    assert system.q_of(points + found.nodes)[:, 1].min() > 0.3 * np.pi
+    assert not found.notes
 
 
 def test_later_boxes_get_the_last_values_of_the_search():

@@ -152,8 +152,7 @@ def _gradients(
         for place, part in surface.values
     )
     gradient = np.array([float((pulled * slope).sum()) for slope in slopes])
-    kinds = np.array([surface.config.variables[place].kind for place, _ in surface.values])
-    angles = np.char.endswith(kinds, "ANGLE_OF_ATTACK")
+    angles = np.array([surface.config.variables[place].is_angle for place, _ in surface.values])
     if angles.any():
         rate = angle_sensitivity(found.path)
         gradient[angles] = rate or 0.0

@@ -115,6 +115,11 @@ class DesignVariable:
         """Return the group of its kind."""
         return KINDS[self.kind].group
 
+    @property
+    def is_angle(self) -> bool:
+        """Return whether it is an angle of attack, which moves no node."""
+        return self.kind.endswith("ANGLE_OF_ATTACK") and not self.ignored
+
     def parameter(self, name: str, default: float = 0.0) -> float:
         """Return the parameter of a name in `VariableKind.form`; ``default`` where it has none."""
         names = [one for one in KINDS[self.kind].parameters if one != "BOX"]
@@ -310,7 +315,7 @@ def _why_ignored(variable: DesignVariable, first: DesignVariable) -> str:
 
 def angle_notes(variables: Sequence[DesignVariable], relaxation: float) -> list[str]:
     """Return what an angle of attack among variables does to the flow; or none."""
-    angles = [each for each in variables if each.kind.endswith("ANGLE_OF_ATTACK")]
+    angles = [each for each in variables if each.is_angle]
     if not angles:
         return []
     offset = relaxation * angles[-1].value  # the last one wins in SU2
