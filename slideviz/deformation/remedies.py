@@ -9,6 +9,7 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.case.motion import displacements
+from slideviz.case.reduction import Reduction
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
@@ -46,11 +47,13 @@ def remedies(
     if case.method != "rbf":
         found.append(Remedy("METHOD= rbf", "radial basis functions as the method"))
     if layers:
-        yes = "DATA_REDUCTION= YES with " if case.reduction and case.reduction.auto else ""
+        given = case.reduction or Reduction()
+        yes = "DATA_REDUCTION= YES with " if given.auto else ""
+        no = " instead of DATA_RED_RELATIVE" if given.relative and not given.auto else ""
         why = "half of the smallest distance between moving and sliding nodes"
         found.append(
             Remedy(
-                f"{yes}DATA_RED_TOLERANCE= {layers:.2g}, {why}",
+                f"{yes}DATA_RED_TOLERANCE= {layers:.2g}{no}, {why}",
                 f"a data reduction with the tolerance {layers:.2g}, {why}",
             )
         )

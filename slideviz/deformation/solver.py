@@ -171,8 +171,11 @@ def folded_at(steps: Sequence[Step], mesh: Mesh, cells: IntArray) -> IntArray:
     return first
 
 
-def require_memory(setup: Setup, case: Case) -> None:
-    """Raise DeformError when the system of a step would not fit into free memory."""
+def require_memory(setup: Setup, case: Case, *, lasting: bool = False) -> None:
+    """Raise DeformError when the system of a step would not fit into free memory.
+
+    ``lasting``: as of a ``Problem``.
+    """
     if case.method == "elastic":
         _require_free(
             ELASTIC_BYTES[setup.coords.shape[1]] * len(setup.coords),
@@ -181,7 +184,7 @@ def require_memory(setup: Setup, case: Case) -> None:
         )
     if case.method != "rbf" or setup.reduction is not None:
         return  # nothing is dense; the selection keeps no matrix of all candidates
-    sizes = _systems(setup, case)
+    sizes = _systems(setup, case, lasting=lasting)
     _require_free(
         8.0 * (sum(n**2 for n in sizes) + 1.6 * max(sizes) ** 2),
         f"{sum(sizes)} unknowns need",
@@ -190,7 +193,7 @@ def require_memory(setup: Setup, case: Case) -> None:
     )
 
 
-def _systems(setup: Setup, case: Case) -> list[int]:
+def _systems(setup: Setup, case: Case, *, lasting: bool) -> list[int]:
     """Return the number of unknowns of each dense system whose factors are in memory together.
 
     At most: parts of the boundary that supports do not connect have systems of their own.
@@ -201,6 +204,7 @@ def _systems(setup: Setup, case: Case) -> list[int]:
     goal = setup.coords[setup.known] + setup.target
     problem = problem_at(setup, setup.coords, goal)
     label, moves = problem.reach
+    moves = moves | lasting
     known, nodes = (
         int(moves[label[setup.same_as[each]]].sum())
         for each in (problem.known, np.concatenate([problem.known, problem.edge, problem.surface]))

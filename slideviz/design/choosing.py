@@ -40,7 +40,7 @@ def choose_steps(
     DeformError
         A step cannot be solved, or its result cannot be right.
     """
-    require_memory(setup, case)
+    require_memory(setup, case, lasting=True)
     kept = setup
     setup = replace(setup, solve=lambda problem, watch: kept.solve(_lasting(problem), watch))
     parts, solutions, points = _reference(case, mesh, replace(setup, target=targets[0]), tell)

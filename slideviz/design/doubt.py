@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slideviz.case.words import counted, wrong_by
 from slideviz.design.frozen.solve import REMEDY
@@ -79,17 +80,17 @@ def warn_of_doubt(steps: Sequence[FrozenStep], doubt: FloatArray) -> bool:
 
 
 def warn_of_errors(
-    errors: FloatArray, allowed: FloatArray, *, reduced: bool, reference: bool
+    errors: FloatArray, allowed: FloatArray, reference: NDArray[np.bool_], *, reduced: bool
 ) -> None:
     """Warn where designs miss what they must do by more than is allowed.
 
     Parameters
     ----------
     errors, allowed : (...,)
+    reference : (...,) bool
+        Whether a design is one that all was chosen for.
     reduced
         Whether control nodes were chosen, beside the facets of sliding nodes.
-    reference
-        Whether the design is one that all was chosen for.
     """
     above = errors > allowed
     if not above.any():
@@ -99,7 +100,7 @@ def warn_of_errors(
     of = "" if errors.ndim == 0 else f" of {counted(int(above.sum()), 'design')}"
     why = f": {chosen} are those of another displacement; choose them anew with `deformer = "
     why += "deformer.refresh(displacement)`"
-    if reference:
+    if reference[worst]:
         why = f", with {chosen} chosen for this displacement; use more STEPS, a less smooth "
         why += "RBF_KERNEL such as wendland-c0, or a smaller displacement"
     warnings.warn(

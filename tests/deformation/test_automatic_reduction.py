@@ -103,6 +103,9 @@ def test_it_stays_below_half_of_the_first_layer_beside_sliding_walls(monkeypatch
     assert state.inverted > 0
     keys = "what may help: DATA_RED_TOLERANCE= 5e-07, half of the smallest distance"
     assert advice_for(loose, bad.layers, mesh, state).startswith(keys)
+    relative = loose.change(reduction=Reduction(relative=1e-4))
+    keys = "DATA_RED_TOLERANCE= 5e-07 instead of DATA_RED_RELATIVE, half of"
+    assert keys in advice_for(relative, 5e-7)
     shown = help_for(Run(1, loose, (StepFrame(bad.mesh, state, bad),), "done"), mesh)
     assert "What may help: a data reduction with the tolerance 5e-07, half of" in shown
 

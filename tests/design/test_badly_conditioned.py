@@ -184,6 +184,9 @@ def test_a_deformer_at_its_own_reference_does_not_blame_another_displacement():
         deformer.deform()
     with pytest.warns(ToleranceWarning, match="are those of another displacement; choose"):
         deformer.deform(1.01 * deformer.displacement)
+    both = np.stack([0.5 * deformer.displacement, deformer.displacement])
+    with pytest.warns(ToleranceWarning, match=r"of 2 designs .* nodes slide on chosen for this"):
+        deformer.deform(both)
 
 
 @pytest.mark.parametrize("reduction", [None, Reduction(tolerance=1e-9)], ids=["exact", "reduced"])

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import slideviz as sv
+from slideviz.deformation import solver
 from slideviz.deformation.setup import make_setup
 from slideviz.deformation.solver import _systems
+from slideviz.errors import DeformError
 from slideviz.rbf import evaluate as module
 from slideviz.rbf.evaluate import Basis, connected, evaluate, reached
 from slideviz.rbf.kernels import KERNELS
@@ -89,8 +91,13 @@ def test_a_far_field_out_of_reach_is_in_no_system_and_keeps_its_bits(sliding, ke
     assert last.mesh.points[outside].tobytes() == mesh.points[outside].tobytes()
     assert last.mesh.points[far].tobytes() == mesh.points[far].tobytes()
     assert (last.mesh.points[~outside] != mesh.points[~outside]).any(axis=1).mean() > 0.9
-    # The memory that a run may take is that of the body's system.
-    assert max(_systems(make_setup(case, mesh), case)) == len(body)
+    # The memory that a run may take is that of the body's system; a deformer keeps all rows.
+    setup = make_setup(case, mesh)
+    assert max(_systems(setup, case, lasting=False)) == len(body)
+    monkeypatch.setattr(solver, "free_memory", lambda: 30.0 * len(body) ** 2)
+    with pytest.raises(DeformError, match="GB are free"):
+        sv.Deformer(mesh, case)
+    monkeypatch.setattr(solver, "free_memory", lambda: np.inf)
     # With the far field in the system the result is the same.
     monkeypatch.setattr(Problem, "reach", property(all_together))
     *_, whole = sv.deform(case, mesh)
