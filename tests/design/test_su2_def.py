@@ -177,7 +177,7 @@ def test_rotation_in_2d_is_about_a_line_along_z(here):
     expected = surface(f"{text} (0.5, 1, 0, 0.5, 1, 1)\n").displacement
     for same in ("(0.5, 1, 0, 0.5, 1, 0)", "(0.5, 1, 2, 0.5, 1, 9)"):
         np.testing.assert_array_equal(surface(f"{text} {same}\n").displacement, expected)
-    message = r"ROTATION: the line from \(0.5, 1, 0\) to \(0.6, 1, 1\) leaves the normal"
+    message = r"\(ROTATION\): the line from \(0.5, 1, 0\) to \(0.6, 1, 1\) leaves the normal"
     with pytest.raises(CaseError, match=message):
         _ = surface(f"{text} (0.5, 1, 0, 0.6, 1, 1)\n").displacement
 
@@ -398,6 +398,7 @@ def test_continuity_holds_planes_where_it_is_asked_for(here):
     silent = surface(text)
     assert not any(silent.idle)
     assert "SU2 would hold i = 0, 1, 2, 4, 5, 6 of the box BOX" in silent.warnings[0]
+    assert "1, 2, 3, 5, 6, 7 of DV_KIND would do nothing; here they move" in silent.warnings[0]
 
 
 def test_continuity_in_3d_finds_the_sides_that_the_surface_passes(here):

@@ -86,6 +86,14 @@ def test_a_run_that_moves_one_says_which_zone_no_longer_fits(tmp_path, name, str
     assert "BLOCK is an interface with core of zone 2" in capsys.readouterr().out
 
 
+def test_a_design_that_moves_all_of_a_zone_says_which_other_no_longer_fits(tmp_path, capsys):
+    text = f"MESH_FILENAME= {zones(tmp_path)}\nMESH_OUT_FILENAME= {tmp_path / 'out.su2'}\n"
+    text += "DV_KIND= TRANSLATE_GRID\nDV_PARAM= (0, 1, 0)\nDV_VALUE= 0.01\n"
+    (tmp_path / "a.cfg").write_text(text)
+    assert command(["def", str(tmp_path / "a.cfg"), "-q"]) == 0
+    assert "zone 2 no longer fits: BLOCK, which is an interface" in capsys.readouterr().err
+
+
 def test_a_run_that_leaves_it_in_place_says_nothing(tmp_path):
     mesh = sv.read(zones(tmp_path))
     case = sv.Case(roles={"x_p": "moving"}, motions=(sv.Translate("x_p", (0.01, 0.0)),))

@@ -142,8 +142,8 @@ def held_by_continuity(
             said = f"FFD_CONTINUITY= {asked} holds {_words(held)} of the box {name}: "
             warnings += [f"{said}{places_words(at)} will {effect}" for at, effect in effects if at]
         elif stuck or partly:
-            done = ", and ".join(
-                f"{places_words(at)} {_did(effect)}" for at, effect in effects if at
+            done = " and ".join(
+                f"{places_words(at)} would {effect}" for at, effect in effects if at
             )
             warnings.append(
                 f"SU2 would hold {_words(held)} of the box {name}, since the surface leaves it "
@@ -152,10 +152,6 @@ def held_by_continuity(
                 "FFD_FIX_I, FFD_FIX_J, FFD_FIX_K name"
             )
     return (every if asked else dict.fromkeys(boxes, NONE)), warnings
-
-
-def _did(effect: str) -> str:
-    return effect.replace("do ", "did ").replace("leave", "left")
 
 
 def _words(held: Planes) -> str:

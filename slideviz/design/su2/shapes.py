@@ -115,7 +115,7 @@ def _shifted_mesh(variable: DesignVariable, on: MovedNodes, amount: float) -> Fl
     vector = np.array(variable.numbers[: on.mesh.dim])
     length = np.linalg.norm(vector)
     if length == 0.0:
-        raise CaseError("TRANSLATE_GRID: its direction has no length; give one, as (1, 0, 0)")
+        raise CaseError("its direction has no length; give one, as (1, 0, 0)")
     return np.broadcast_to(amount * (vector / length), on.points.shape)
 
 
@@ -171,7 +171,7 @@ def _naca(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray
     most, where, thickness = np.array(variable.numbers) / (100.0, 10.0, 100.0)
     if not 0.0 < where < 1.0 and most:
         raise CaseError(
-            f"NACA_4DIGITS: the second digit is {variable.numbers[1]:g}; the largest camber must "
+            f"the second digit is {variable.numbers[1]:g}; the largest camber must "
             "lie between 0 and 10 tenths of the chord"
         )
     x = on.points[:, 0]
@@ -189,7 +189,7 @@ def _parabolic(variable: DesignVariable, on: MovedNodes, amount: float) -> Float
     del amount  # SU2 uses the parameters only
     centre, thickness = variable.numbers
     if centre in (0.0, 1.0):
-        raise CaseError(f"PARABOLIC: the centre is {centre:g}; it must not be 0 or 1")
+        raise CaseError(f"the centre is {centre:g}; it must not be 0 or 1")
     x = on.points[:, 0]
     half = 0.01 * thickness * (x**2 - x) / (2.0 * (centre**2 - centre))
     return _put(on, on.side * half)
@@ -264,11 +264,15 @@ class Shapes:
     def displacement(self) -> FloatArray:
         """Return the displacement (m, d) of the nodes by all variables."""
         total = np.zeros_like(self._surface.points)
-        for variable in self.config.variables:
+        for place, variable in enumerate(self.config.variables, start=1):
             if variable.kind in FORMULAS and not variable.ignored:
                 formula = FORMULAS[variable.kind]
                 amount = self._factor(formula) * variable.value
-                total += formula.moved(variable, self._surface, amount)
+                try:
+                    total += formula.moved(variable, self._surface, amount)
+                except CaseError as problem:
+                    at = f"{self.config.source}: variable {place} ({variable.kind})"
+                    raise CaseError(f"{at}: {problem}") from problem
         return total
 
     def slope(self, place: int, part: int, undeformed: bool) -> FloatArray:
@@ -304,17 +308,17 @@ def _turned(
     two points that are the variable's numbers, in 2D along z. Rodrigues:
     ``sin(a) k x v + (1 - cos(a)) k x (k x v)``. Raises CaseError where the points define no line.
     """
-    kind, dim = variable.kind, points.shape[1]
+    dim = points.shape[1]
     first, second = np.array(variable.numbers).reshape(2, 3)
     axis = second - first if dim == 3 else np.array([0.0, 0.0, 1.0])
     if dim == 2 and (first != second)[:2].any():
         raise CaseError(
-            f"{kind}: the line from {_shown(first)} to {_shown(second)} leaves the normal of a "
+            f"the line from {_shown(first)} to {_shown(second)} leaves the normal of a "
             "mesh of 2 dimensions; give both points the same x and y"
         )
     length = np.linalg.norm(axis)
     if length == 0.0:
-        raise CaseError(f"{kind}: its two points are one; the line between them has no direction")
+        raise CaseError("its two points are one; the line between them has no direction")
     arm = np.zeros((len(points), 3))
     arm[:, :dim] = points - first[:dim]
     across = np.cross(axis / length, arm)

@@ -22,6 +22,7 @@ from slideviz.design.su2.shapes import Shapes
 from slideviz.design.su2.variables import Group
 from slideviz.errors import CaseError, Note, SlidevizError
 from slideviz.ffd.section import boxes_of
+from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 RIGID = ("TRANSLATION", "ROTATION", "SCALE")
@@ -152,7 +153,7 @@ class MovingSurface:
         ):
             # All boundaries move as a body does, or grow: this kernel has that exactly inside.
             case = case.change(kernel="thin-plate")
-        nodes, vectors = self.nodes, self.displacement
+        nodes, vectors, said = self.nodes, self.displacement, self.warnings
         if self.whole or not self.config.markers:
             every = dict.fromkeys(self.mesh.marker_names, "moving")
             case = case.change(roles=every, sliding="none", periodic="none")
@@ -160,8 +161,9 @@ class MovingSurface:
             listed = [marker.nodes for marker in self.mesh.markers]
             nodes = np.unique(np.concatenate([np.empty(0, np.int64), *listed]))
             vectors = np.zeros((len(nodes), self.mesh.dim))
+            said = (*said, *torn_interfaces(self.mesh, self.moved().points))
         motions = (Prescribed(nodes, vectors),)
-        return case.change(motions=motions, warnings=(*case.warnings, *self.warnings))
+        return case.change(motions=motions, warnings=(*case.warnings, *said))
 
 
 @contextmanager
