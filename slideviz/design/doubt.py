@@ -24,10 +24,6 @@ def largest_condition(steps: Sequence[FrozenStep]) -> float:
     return max((step.condition for step in steps), default=1.0)
 
 
-def _refined(steps: Sequence[FrozenStep]) -> bool:
-    return all(step.refined for step in steps)
-
-
 def note_of_refinement(steps: Sequence[FrozenStep]) -> tuple[str, ...]:
     """Return a note about systems that are solved with twice the digits; empty if none is."""
     refined = max((step.refined for step in steps), default=0.0)
@@ -49,15 +45,15 @@ def warn_of_condition(steps: Sequence[FrozenStep]) -> None:
     doubt = max((step.doubt for step in steps), default=0.0)
     if doubt > TRUSTED:
         worst = largest_condition(steps)
-        amount = f"may be wrong by {wrong_by(doubt, bounded=_refined(steps))}"
+        amount = f"may be wrong by {wrong_by(doubt, bounded=False)}"
     elif worst > BADLY_CONDITIONED:  # that of a method without a system is NaN
         amount = "may have few correct digits"
     else:
         return
     warnings.warn(
         f"the condition number of the system is {worst:.0e}, so that derivatives by single "
-        "nodes, and points between the boundary nodes where neighbours move very differently, "
-        f"{amount}; {REMEDY}",
+        "nodes, and displacements between the boundary nodes where neighbours move very "
+        f"differently, {amount}; {REMEDY}",
         ConditionWarning,
         stacklevel=3,
     )
@@ -70,9 +66,9 @@ def warn_of_doubt(steps: Sequence[FrozenStep], doubt: FloatArray) -> bool:
         return False
     of = "" if doubt.ndim == 0 else f" of {counted(int((doubt > TRUSTED).sum()), 'design')}"
     warnings.warn(
-        f"the condition number of the system is {largest_condition(steps):.0e}: derivatives, and "
-        f"points{of} between the boundary nodes, may be wrong by "
-        f"{wrong_by(worst, bounded=_refined(steps))}; {REMEDY}",
+        f"the condition number of the system is {largest_condition(steps):.0e}: derivatives may "
+        f"have few correct digits, and displacements{of} between the boundary nodes may be wrong "
+        f"by {wrong_by(worst, bounded=all(step.refined for step in steps))}; {REMEDY}",
         ConditionWarning,
         stacklevel=3,
     )

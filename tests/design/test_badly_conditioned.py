@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import lzma
+import re
 import warnings
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from slideviz.case.model import Case, Rotate, Scale, Translate
 from slideviz.case.reduction import Reduction
 from slideviz.design.frozen.solve import whole
 from slideviz.errors import ConditionWarning, DeformError, Note, ToleranceWarning
+from slideviz.samples.table import sample
 from tests import builders
 from tests.oracles.digits import interpolated
 
@@ -125,7 +127,7 @@ def test_a_design_that_cannot_be_trusted_is_told():
     deformer = sv.Deformer(mesh, case)
     designs = np.zeros((2, *deformer.displacement.shape))
     designs[1, 0, 1] = 0.01  # the trailing edge alone
-    with pytest.warns(ConditionWarning, match="points of 1 design between the boundary nodes"):
+    with pytest.warns(ConditionWarning, match="displacements of 1 design between the"):
         deformer.deform(designs)
 
 
@@ -187,6 +189,18 @@ def test_a_deformer_at_its_own_reference_does_not_blame_another_displacement():
     both = np.stack([0.5 * deformer.displacement, deformer.displacement])
     with pytest.warns(ToleranceWarning, match=r"of 2 designs .* nodes slide on chosen for this"):
         deformer.deform(both)
+
+
+def test_what_is_measured_at_a_reference_is_no_bound_for_single_nodes():
+    made = sample("airfoil")
+    with pytest.warns(ConditionWarning, match="single nodes, .* or more, how much is not") as told:
+        deformer = sv.Deformer(made.mesh, made.case.change(kernel="wendland-c6"))
+    alone = np.zeros_like(deformer.displacement)
+    alone[0, 1] = 1.0
+    with pytest.warns(ConditionWarning, match="derivative is nearly singular") as more:
+        deformer.jvp(deformer.displacement, alone)
+    few, many = (re.search(r"wrong by (?:up to )?(\S+) %", str(w[0].message)) for w in (told, more))
+    assert float(many[1]) > 100.0 * float(few[1])
 
 
 @pytest.mark.parametrize("reduction", [None, Reduction(tolerance=1e-9)], ids=["exact", "reduced"])
