@@ -64,8 +64,8 @@ def _told(arguments: argparse.Namespace, mesh: Mesh, counts: MeshCounts, found: 
         report["ffd_boxes"] = [
             {
                 "name": box.name,
-                "degrees": box.degrees[: mesh.dim],
-                "orders": box.orders and box.orders[: mesh.dim],
+                "degrees": [box.degrees[axis] for axis in box.axes(mesh.dim)],
+                "orders": box.orders and [box.orders[axis] for axis in box.axes(mesh.dim)],
             }
             for box in boxes
         ]

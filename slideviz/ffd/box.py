@@ -116,11 +116,17 @@ class Box:
         """Return the coordinates (I, J, K, 3) of the control points in the box's system."""
         return self.system.q_of(self.points)
 
+    def axes(self, dim: int) -> tuple[int, ...]:
+        """Return its directions, 0 to 2, in 2D or 3D; in 2D a polar box has i and k."""
+        polar = self.system.kind == "POLAR" or self.degrees[2] > 1
+        return (0, 2) if dim == 2 and polar else (0, 1, 2)[:dim]
+
     def describe(self, dim: int) -> str:
         """Return degrees, blending and the number of surface points in words, for 2D or 3D."""
-        words = f"degree {' x '.join(map(str, self.degrees[:dim]))}, "
+        axes = self.axes(dim)
+        words = f"degree {' x '.join(str(self.degrees[axis]) for axis in axes)}, "
         words += "Bézier" if self.orders is None else "uniform B-splines of order "
-        words += " x ".join(map(str, (self.orders or ())[:dim]))
+        words += " x ".join(str(self.orders[axis]) for axis in axes if self.orders)
         words += f", in {self.parent}" if self.parent else ""
         count = sum(len(nodes) for nodes, _ in self.embedded.values())
         return words + f", {count:,} surface points of {', '.join(self.embedded)}" * bool(count)

@@ -107,16 +107,17 @@ def _update(lines: list[str], entries: Entries, box: Box, renewed: bool) -> None
 def _written(box: Box, dim: int) -> Iterator[str]:
     """Yield all lines of a box."""
     letters = _LETTERS[:dim]
-    polar = dim == 2 and box.system.kind == "POLAR"  # the second direction is k then
-    axes = (0, 2) if polar else (0, 1, 2)
+    axes = box.axes(dim)
     yield f"FFD_TAG= {box.name}\nFFD_LEVEL= 0\n"
-    for letter, degree in zip(letters, (box.degrees[axis] for axis in axes), strict=False):
+    for letter, degree in zip(letters, (box.degrees[axis] for axis in axes), strict=True):
         yield f"FFD_DEGREE_{letter}= {degree}\n"
     yield f"FFD_BLENDING= {'BSPLINE_UNIFORM' if box.orders else 'BEZIER'}\n"
     orders = (box.orders[axis] for axis in axes) if box.orders else ()
     for letter, order in zip(letters, orders, strict=False):
         yield f"BSPLINE_ORDER_{letter}= {order}\n"
-    corners = given_of_polar(box.corners) if polar else box.corners[: 4 if dim == 2 else 8, :dim]
+    corners = (
+        given_of_polar(box.corners) if axes == (0, 2) else box.corners[: 4 if dim == 2 else 8, :dim]
+    )
     yield f"FFD_PARENTS= 0\nFFD_CHILDREN= 0\nFFD_CORNER_POINTS= {len(corners)}\n"
     yield from (_tabbed(corner) + "\n" for corner in corners.tolist())
     yield from _control_lines(box.points)

@@ -230,7 +230,9 @@ def test_polar_boxes_in_2d_are_set_and_deform_as_in_su2(here):
         np.testing.assert_allclose(right[2], 0.0, atol=1e-15)
         at = found.mesh.points[found.nodes[node]]
         np.testing.assert_allclose(found.displacement[node], right[:2] - at, rtol=0, atol=1e-12)
-    assert boxes_of(sv.read("mesh.su2"))[0].degrees == (3, 1, 2)  # by its rows
+    (read,) = boxes_of(sv.read("mesh.su2"))
+    assert read.degrees == (3, 1, 2)  # by its rows
+    assert read.describe(2).startswith("degree 3 x 2, ")
     check_gradient(text, values)
 
 
