@@ -189,9 +189,10 @@ def _is_numeric(value: object, *, whole: bool) -> bool:
 
 
 def _parts(value: Any, hint: Any, place: str) -> Iterator[tuple[object, Any, str]]:
-    """Yield the values in a mapping or sequence, with their types and places."""
+    """Yield keys and values of a mapping, or values of a sequence, with their types and places."""
     kind, inner = origin_of(hint), get_args(hint)
     if kind is Mapping:
+        yield from ((key, inner[0], f"a key of {place}") for key in value)
         yield from ((each, inner[1], f"{place}[{key!r}]") for key, each in value.items())
     elif kind in (tuple, Sequence) and hasattr(value, "__len__"):
         fixed = kind is tuple and Ellipsis not in inner

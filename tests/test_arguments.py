@@ -63,6 +63,8 @@ def test_right_arguments_pass_and_are_still_told_of():
             "designs is 3; needed is the name of a CSV file, a sequence of",
         ),
         (lambda: sv.sweep(CASE, {"STEPS": 3}), "designs['STEPS'] is 3; needed is a sequence of"),
+        (lambda: sv.sweep(CASE, {3: [3]}), "a key of designs is 3; needed is a text"),
+        (lambda: CASE.change(roles={3: "moving"}), "a key of roles is 3; needed is a text"),
         (lambda: sv.sweep(CASE, {"STEPS": [3]}, workers="2"), "workers is '2'; needed is a whole"),
         (lambda: sv.Mesh("a", "b"), "Mesh: points is 'a'; needed is an array of numbers"),
         (lambda: sv.Mesh(MESH.points, "b"), "Mesh: cells is 'b'; needed is Cells"),

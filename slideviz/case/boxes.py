@@ -48,6 +48,12 @@ def system_of(case: Case) -> CoordinateSystem:
     return CARTESIAN if plain else CoordinateSystem(case.ffd_system, case.ffd_axis)
 
 
+def box_definition(case: Case) -> tuple[object, ...]:
+    """Return the values of a case that its boxes depend on."""
+    shape = case.ffd_boxes, case.ffd_degrees, case.ffd_blending, case.ffd_orders
+    return *shape, case.ffd_system, case.ffd_axis
+
+
 def defined_boxes(case: Case, mesh: Mesh) -> dict[str, Box]:
     """Return the boxes that FFD_DEFINITION of the case defines, undeformed, by name.
 
@@ -58,8 +64,7 @@ def defined_boxes(case: Case, mesh: Mesh) -> dict[str, Box]:
     CaseError
         The corners, degrees or orders of a box make none.
     """
-    definition = case.ffd_boxes, case.ffd_degrees, case.ffd_blending, case.ffd_orders
-    key = definition, system_of(case)
+    key = box_definition(case)
     kept = _DEFINED.setdefault(mesh, {})
     if key not in kept:
         kept[key] = {

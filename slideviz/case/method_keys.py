@@ -128,7 +128,7 @@ METHOD_ROWS = (
         real(0.0),
         "support_radius",
         "Support radius in the mesh's length unit, instead of INFLUENCE_FACTOR.",
-        label="a support radius of a case file,",
+        label="Support radius as a length",
         said="radius {}",
         method="rbf",
     ),

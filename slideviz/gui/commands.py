@@ -46,10 +46,9 @@ KEY = QKeySequence.StandardKey
 # What they do ------------------------------------------------------------------------------
 
 
-def _again(window: MainWindow, step: Callable[[], None], words: str, done: str) -> None:
+def _again(window: MainWindow, step: Callable[[], bool], words: str, done: str) -> None:
     """Call ``step`` (undo or redo), and show in the status bar which change that was."""
-    step()
-    if words:
+    if step():
         window.say(f"{done}: {words}")
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from slideviz.case.boxes import box_changes, box_motions, boxes_for
+from slideviz.case.boxes import box_changes, box_definition, box_motions, boxes_for
 from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
 from slideviz.ffd.box import Box
@@ -50,10 +50,8 @@ class BoxLayer(Layer):
             return
         shown = "ffd" in new.view.drawn
         case = new.case
-        shape = case.ffd_boxes, case.ffd_degrees, case.ffd_blending, case.ffd_orders
-        definition = shape, case.ffd_system, case.ffd_axis
         style = self.stage.scheme, self.stage.pixel_scale
-        key = (new.mesh, box_motions(case), definition, style) if shown else ()
+        key = (new.mesh, box_motions(case), box_definition(case), style) if shown else ()
         if key == self._key:
             return
         self._key = key

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from slideviz.case.boxes import boxes_for
+from slideviz.case.boxes import box_definition, boxes_for
 from slideviz.case.displacement import Displacements, read_displacements
 from slideviz.case.given import key_of, placed_displacements
 from slideviz.case.model import Case, FromFile, Target, moves
@@ -117,9 +117,8 @@ def largest_prescribed(case: Case, mesh: Mesh) -> float:
 
 def support_key(case: Case, mesh: Mesh) -> tuple[object, ...]:
     """Return the values on which `support_of` depends."""
-    moving, boxes = case.markers_with("moving"), (case.ffd_boxes, case.ffd_degrees, case.ffd_orders)
     given = case.method, case.influence_factor, case.support_radius
-    return mesh, moving, case.motions, boxes, case.ffd_blending, given
+    return mesh, case.markers_with("moving"), case.motions, box_definition(case), given
 
 
 def shown_case(session: Session) -> Case:

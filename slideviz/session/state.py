@@ -244,7 +244,7 @@ class Session:
 
     @property
     def marked_here(self) -> bool:
-        """Return whether a cell is marked since it was looked at in a run that is shown now."""
+        """Return whether the marked cell was marked in a run that is shown now."""
         view = self.view
         return view.marked_cell is not None and view.marked_in in (self.shown, view.beside)
 

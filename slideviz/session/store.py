@@ -103,10 +103,10 @@ class Memento:
 class _OutsideChange:
     """The values before and after a change of something that is not part of the session.
 
-    ``put`` shows one of them.
+    ``put`` shows one of them, and returns whether it could.
     """
 
-    put: Callable[[Any], object]
+    put: Callable[[Any], bool]
     before: object
     after: object
 
@@ -235,30 +235,35 @@ class Store:
         """Return the words for the change that `redo` makes again; "" where there is none."""
         return self._redo[-1].words if self._redo else ""
 
-    def undo(self) -> None:
-        """Take back the last change, if there was one."""
-        self._step(self._undo, self._redo)
+    def undo(self) -> bool:
+        """Take back the last change, if there was one; return whether it could be."""
+        return self._step(self._undo, self._redo)
 
-    def redo(self) -> None:
-        """Make the change again that was taken back last, if no other was made since."""
-        self._step(self._redo, self._undo)
+    def redo(self) -> bool:
+        """Make the last change that was undone again, if none was made since; return as `undo`."""
+        return self._step(self._redo, self._undo)
 
-    def _step(self, source: list[_Done], target: list[_Done]) -> None:
+    def _step(self, source: list[_Done], target: list[_Done]) -> bool:
         if not source:
-            return
+            return False
         done = source.pop()
         if isinstance(done.before, _OutsideChange):
-            target.append(done)
+            target.append(done)  # before listeners ask what can be undone
             outside = done.before
-            outside.put(outside.before if source is self._undo else outside.after)
-            return
+            if outside.put(outside.before if source is self._undo else outside.after):
+                return True
+            source.append(target.pop())
+            return False
         target.append(replace(done, before=Memento.of(self.session), at_s=float("-inf")))
         self.put(done.before.put_into(self.session))
+        return True
 
     def remember(
-        self, words: str, put: Callable[[Any], object], before: object, after: object
+        self, words: str, put: Callable[[Any], bool], before: object, after: object
     ) -> None:
         """Let undo call ``put(before)``, and redo ``put(after)``; ``words`` are for the menu.
+
+        ``put`` returns False where it must not be done now: it stays to be undone.
 
         For changes of what is not part of the session, such as a table of designs.
         """

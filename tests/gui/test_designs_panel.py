@@ -304,8 +304,11 @@ def test_changes_of_the_table_are_undone_with_its_results(
     undo.trigger()
     assert panel.table.rows == done.rows
     assert "stop that first" in panel.said.label.text()
+    assert undo.text() == "Undo designs"
     panel.runner.cancel()
     qtbot.waitUntil(lambda: not panel.runner.busy)
+    undo.trigger()  # which was not lost
+    assert panel.table.rows == ()
 
 
 def test_other_settings_make_results_old(window, passage, qtbot, in_a_thread, answers):

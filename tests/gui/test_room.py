@@ -73,6 +73,16 @@ def test_a_dialog_that_is_larger_than_the_screen_scrolls(qtbot):
     assert area.minimumHeight() < room.height() - 80, "buttons below it are seen"
 
 
+def test_lists_shrink_before_their_panel_scrolls(window, driver, sample_folder):
+    driver.open(sample_folder / "passage" / "passage.cfg")
+    window.store.change(changes.set_case, sliding="none", periodic="none")
+    dock = window.docks["boundaries"]
+    window.resizeDocks([dock], [230], Qt.Orientation.Vertical)
+    QApplication.processEvents()
+    assert dock.height() < 250
+    assert dock.widget().verticalScrollBar().maximum() == 0
+
+
 def test_a_key_hides_every_panel_and_shows_them_again(driver, passage_file):
     driver.open(passage_file)
     window = driver.window

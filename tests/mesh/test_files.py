@@ -608,6 +608,25 @@ def test_what_meshio_cannot_write_of_a_mesh_is_named(tmp_path, monkeypatch):
         write(tmp_path / "out.vtk", mesh)
 
 
+@pytest.mark.parametrize(
+    ("problem", "said"),
+    [
+        (OSError(errno.ENOSPC, "No space left"), "No space left; check the file, its ending and"),
+        (ModuleNotFoundError("no", name="netCDF4"), "needs the package netCDF4; install it"),
+    ],
+)
+def test_what_hinders_meshio_is_not_told_as_what_a_format_lacks(
+    tmp_path, monkeypatch, problem, said
+):
+    def fails(*_, **__):
+        raise problem
+
+    mesh = read(save(tmp_path, SQUARE))
+    monkeypatch.setattr(meshio, "write", fails)
+    with pytest.raises(MeshError, match=f"written as vtk: .*{said}"):
+        write(tmp_path / "out.vtk", mesh)
+
+
 def test_an_element_that_meshio_does_not_read_is_named(tmp_path):
     text = "*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n*ELEMENT, TYPE=C3D5\n1,1,2,3,4,5\n"
     with pytest.raises(MeshError, match="as abaqus: elements of type C3D5 are not read from files"):

@@ -169,6 +169,7 @@ def test_a_vtu_file_has_the_displacement(square, tmp_path, vector):
             "with PERIODIC_MODE= moving (or fixed) they do",
             "with Periodicity “periodic, moving vertices” (or “periodic, fixed vertices”) they do",
         ),
+        ("SUPPORT_RADIUS: 0.0 does not fit", "Support radius as a length: 0.0 does not fit"),
         ("STEPS= auto or less", "Steps “automatic” or less"),
         ("MARKER_MOVING= (a, b) does not have it", "the role “moving” (a, b) does not have it"),
         ("use more STEPS, or METHOD= rbf", "use more Steps, or Method “RBF interpolation”"),

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from qtpy.QtCore import QSize, Qt, QUrl
+from qtpy.QtCore import QModelIndex, QSignalBlocker, QSize, Qt, QUrl
 from qtpy.QtGui import QImage, QTextCursor, QTextDocument
 from qtpy.QtWidgets import (
     QDialog,
@@ -23,6 +23,8 @@ from slideviz.gui.widgets.build import dialog_buttons, in_column, in_row, push_b
 from slideviz.session.manual import manual_pages, page_text, page_title
 
 PATH = Qt.ItemDataRole.UserRole
+PAGES = (".md", ".rst", "")
+"""Endings of the names of pages in links."""
 LARGEST = 740
 """Largest width of a picture in a page, in pixels."""
 
@@ -35,9 +37,16 @@ class Pages(QTextBrowser):
         self.setOpenExternalLinks(True)
         self.sourceChanged.connect(lambda _: self._space())
 
+    def doSetSource(  # type: ignore[override]  # Qt gives a URL, and both
+        self, url: QUrl, kind: QTextDocument.ResourceType
+    ) -> None:
+        # Qt takes only names that end in .md for Markdown.
+        is_page = Path(url.path()).suffix in PAGES
+        super().doSetSource(url, QTextDocument.ResourceType.MarkdownResource if is_page else kind)
+
     def loadResource(self, kind: int, url: QUrl | str) -> object:
         path = Path(QUrl(url).toLocalFile())
-        if path.suffix in (".md", ".rst", ""):
+        if path.suffix in PAGES:
             return page_text(path)
         picture = QImage(str(path))
         if picture.width() > LARGEST:
@@ -57,7 +66,7 @@ class Pages(QTextBrowser):
 
     def show_page(self, path: Path) -> None:
         """Show a page."""
-        self.setSource(QUrl.fromLocalFile(str(path)), QTextDocument.ResourceType.MarkdownResource)
+        self.setSource(QUrl.fromLocalFile(str(path)))
 
 
 class ManualDialog(QDialog):
@@ -78,6 +87,7 @@ class ManualDialog(QDialog):
         self.tree.setIndentation(14)
         self._fill(folder)
         self.tree.currentItemChanged.connect(lambda item, _: self._show(item))
+        self.pages.sourceChanged.connect(self._select)
         back = push_button("Back", "The page before.", self.pages.backward)
         self.pages.backwardAvailable.connect(back.setEnabled)
         back.setEnabled(False)
@@ -105,6 +115,14 @@ class ManualDialog(QDialog):
     def _show(self, item: QTreeWidgetItem | None) -> None:
         if item is not None:
             self.pages.show_page(Path(item.data(0, PATH)))
+
+    def _select(self, url: QUrl) -> None:
+        """Select the page that is shown, which a link or “Back” may have led to."""
+        path = f"{url.toLocalFile().removesuffix('.md')}.md"  # some links leave the ending out
+        items = (one for section in self._items() for one in (section, *self._items(section)))
+        places = (self.tree.indexFromItem(one) for one in items if one.data(0, PATH) == path)
+        with QSignalBlocker(self.tree):
+            self.tree.setCurrentIndex(next(places, QModelIndex()))
 
     def _items(self, item: QTreeWidgetItem | None = None) -> list[QTreeWidgetItem]:
         top = item or self.tree.invisibleRootItem()

@@ -198,14 +198,18 @@ class DesignsPanel(Panel):
             self.store.remember("designs", partial(self._bring, self.case), self.table, table)
         self.put(table)
 
-    def _bring(self, case: Case | None, table: DesignTable) -> None:
-        """Show a table again, whose results are for ``case``, with those that came since."""
+    def _bring(self, case: Case | None, table: DesignTable) -> bool:
+        """Show a table again, whose results are for ``case``, with those that came since.
+
+        Returns whether it is shown: not while designs are being run.
+        """
         if self.runner.busy:
             self._say("The designs are being run: stop that first, then undo.", wrong=True)
-            return
+            return False
         known = table if case is self.case else table.without_results()
         self.put(known.keeping(self.table))
         self._say(counted(len(table.rows), "design") if table.rows else "")
+        return True
 
     def _picked(self, number: int) -> None:
         self.rows.view.selectRow(number - 1)

@@ -1,5 +1,7 @@
 """The base class of the panels."""
 
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -40,6 +42,11 @@ class Panel(QWidget):
     def sync(self, session: Session) -> None:
         """Fill the widgets from the session."""
         raise NotImplementedError
+
+    def heightForWidth(self, width: int) -> int:
+        # A scroll area takes this as the least height: lists in the panel shrink before it scrolls.
+        layout = self.layout()
+        return -1 if layout is None else layout.totalMinimumHeightForWidth(width)
 
     def take_theme(self, scheme: ColorScheme) -> None:
         """Draw plots again in another theme's colours; subclasses: all else without a palette."""

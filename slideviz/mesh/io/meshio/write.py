@@ -107,6 +107,9 @@ def _write(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
     try:
         _write_by_meshio(path, trial, data, name)
     except MeshError as problem:
+        # A full disk or a missing package says nothing of the mesh.
+        if isinstance(problem.__cause__, ImportError) or getattr(problem.__cause__, "errno", None):
+            raise
         lost = _not_written(path, trial, data, name)
         raise _not_held(path, name, lost) if lost else problem from problem
     if len(list(trial.parent.iterdir())) != 1:
