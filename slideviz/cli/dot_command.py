@@ -36,13 +36,12 @@ def run_dot(arguments: argparse.Namespace) -> int:
 
     begin = time.perf_counter()
     config, mesh = read_configuration(arguments)
-    kinds = {variable.kind for variable in config.variables}
     first = config.variables[0]
     if first.group in ("boxes", "nothing"):
         raise CaseError(f"{config.source}: {first.kind} moves nothing: there is no gradient for it")
     arguments.inputs.setdefault(sensitivity_file(config), "the file of the sensitivities")
     sensitivities = config.files["DV_SENS_FILENAME"]
-    gradient = None if "SURFACE_FILE" in kinds else config.files["GRAD_OBJFUNC_FILENAME"]
+    gradient = None if first.group == "file" else config.files["GRAD_OBJFUNC_FILENAME"]
     require_places(
         arguments,
         OutputPath(sensitivities, "DV_SENS_FILENAME", False),

@@ -166,11 +166,6 @@ class _Reader:
         """Raise MeshError where SU2 could not deform a nested box with those around it."""
         by_name = {each.name: each for each in boxes}
         parents = self.tags("FFD_PARENTS")
-        for name in (*parents, *self.tags("FFD_CHILDREN")):
-            if name not in by_name:
-                raise self.error(
-                    f"there is no FFD box {name!r} beside it, but {', '.join(by_name)}"
-                )
         if len(parents) > 1:
             said = f"FFD_PARENTS is {len(parents)}; supported is one parent"
             raise self.error(said, "FFD_PARENTS")

@@ -381,17 +381,19 @@ def test_an_angle_of_attack_alone_moves_nothing_and_has_its_gradient(here, capsy
     assert np.loadtxt("surface_sensitivity.dat", delimiter=",")[:, 3:5].any()
 
 
-def test_an_ignored_angle_of_attack_has_no_gradient(here, capsys):
+def test_ignored_variables_have_no_gradient(here, capsys):
     sv.write("mesh.su2", bent())
     text = SHAPES.partition("DATA_REDUCTION")[0] + (
-        "DV_KIND= SCALE_GRID, ANGLE_OF_ATTACK\nDV_PARAM= (); (1.0)\nDV_VALUE= 1.0, 2.0\n"
+        "DV_KIND= SCALE_GRID, ANGLE_OF_ATTACK, SURFACE_FILE\nDV_PARAM= (); (1.0); ()\n"
+        "DV_VALUE= 1.0, 2.0, 0.0\n"
     )
     points = written(text)
     assert "degrees, to AOA" not in capsys.readouterr().err
     write_csv("adj_cd.csv", points, np.ones_like(points), extra="SENS_AOA= 0.25\n")
     Path("dot.cfg").write_text(text)
     assert run(["dot", "dot.cfg", "-q"]) == 0
-    assert gradient()[1] == 0.0
+    assert gradient()[0] != 0.0
+    assert gradient()[1:].tolist() == [0.0, 0.0]
 
 
 def test_a_refused_design_names_the_factor_of_its_values(here, capsys):
