@@ -20,7 +20,7 @@ from slideviz.design.sweeps import sweep as sweeping
 def folder(kept_passage, tmp_path, monkeypatch):
     shutil.copytree(kept_passage, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "designs.csv").write_text("airfoil.translate.dy,STEPS\n0.01,1\n0.1,2\n3,1\n")
+    (tmp_path / "designs.csv").write_text("airfoil.translate.dy,STEPS\n0.01,1\n0.1,2\n30,1\n")
     return tmp_path
 
 
@@ -60,7 +60,7 @@ def test_a_table_of_results(folder, in_threads, capsys):
     assert [(row["design"], row["airfoil.translate.dy"], row["STEPS"]) for row in rows] == [
         ("1", "0.01", "1"),
         ("2", "0.1", "2"),
-        ("3", "3.0", "1"),
+        ("3", "30.0", "1"),
     ]
     report = json.loads((folder / "report.json").read_text())
     assert report["columns"] == ["airfoil.translate.dy", "STEPS"]

@@ -28,6 +28,9 @@ def find_interfaces(
     others
         Zone, name and nodes (k, d) of each boundary of the other zones.
     """
+    others = list(others)
+    if not others:
+        return ()
     found, near = [], COINCIDENT * mesh.extent
     nodes_of = {marker.name: marker.nodes for marker in mesh.markers}
     for zone, name, points in others:

@@ -95,6 +95,7 @@ SIZES = {
     "passage": 12,
     "turbine-row": 5_000,
     "stator": 5_000,
+    "airfoil": 24,
 }
 
 

@@ -10,7 +10,7 @@ from slideviz.case.key import METHOD, REDUCTION, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Translate
 from slideviz.case.reduction import Reduction
-from slideviz.errors import ArgumentError, CaseError
+from slideviz.errors import ArgumentError, CaseError, UnsoundError
 from slideviz.rbf.kernels import KERNELS
 from tests import builders
 from tests.slow import one_of_each_fast
@@ -78,7 +78,12 @@ def test_an_absurd_number_is_refused_or_works(name, text, sliding):
 def test_the_ends_of_what_is_allowed_work(end, sliding):
     name, text, kernel = end
     case, mesh = case_with(name, text, sliding, kernel or "wendland-c2")
-    *_, last = sv.deform(case, mesh)
+    try:
+        *_, last = sv.deform(case, mesh)
+    except UnsoundError:  # of a smooth kernel nearly all values are 1
+        assert text == "9e5"
+        assert kernel not in ("wendland-c0", "ctps-c0")
+        return
     assert np.all(np.isfinite(last.mesh.points))
     moved = mesh.marker("BLOCK").nodes
     np.testing.assert_allclose(last.mesh.points[moved], mesh.points[moved] + (0.02, 0.01))

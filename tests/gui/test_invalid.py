@@ -6,6 +6,7 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QLineEdit
 
 from slideviz.case.model import Rotate, Scale, Translate
+from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.fields import NumberBox, NumberField
 from slideviz.session import changes
 
@@ -59,7 +60,9 @@ def test_no_run_starts_with_what_was_typed_before(blade):
         assert window.actions_.by_name["run"].isEnabled()
 
 
-def test_an_invalid_field_keeps_runs_from_starting_until_it_is_hidden_or_gone(blade, qtbot):
+def test_an_invalid_field_keeps_runs_from_starting_until_it_is_hidden_or_gone(
+    blade, qtbot, monkeypatch
+):
     window, field, store = blade.window, blade.window.motions.editor.angle, blade.window.store
     drawn = blade.session.view.drawn
     type_into(field, "1fgab.5xe-1")
@@ -82,6 +85,7 @@ def test_an_invalid_field_keeps_runs_from_starting_until_it_is_hidden_or_gone(bl
     assert "Steps: “2.5” is not a whole number" in window.run_panel.text.text()
     assert try_all_ways(blade) == 0
     assert blade.session.view.drawn == drawn, "no letter ran a shortcut"
+    monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
     blade.open(blade.session.path)
     assert not blade.session.invalid
     assert steps.value() == count

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from hypothesis import strategies as st
 
+from slideviz.mesh.check import LARGEST
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, Marker, Mesh
 
@@ -162,7 +163,7 @@ def meshes(draw: st.DrawFn) -> Mesh:
     """Return meshes of random cells: nonsense as a grid, but any file must keep them."""
     dim = draw(st.sampled_from([2, 3]))
     n_points = draw(st.integers(8, 11))
-    number = st.floats(allow_nan=False, allow_infinity=False)
+    number = st.floats(-LARGEST, LARGEST)
     points = draw(st.lists(number, min_size=n_points * dim, max_size=n_points * dim))
     markers = [
         Marker(name, draw(cell_lists(dim - 1, n_points, 3)))

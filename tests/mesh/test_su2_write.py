@@ -22,6 +22,7 @@ from su2_samples import (
 )
 
 from slideviz.errors import MeshError
+from slideviz.mesh.check import LARGEST
 from slideviz.mesh.io.files import read, write
 from slideviz.mesh.model import Cells, Marker, Mesh, Origin
 
@@ -40,7 +41,7 @@ def test_nothing_moved_gives_the_same_bytes(tmp_path, name, zone):
     assert (tmp_path / "out.su2").read_bytes() == path.read_bytes()
 
 
-numbers = st.floats(allow_nan=False, allow_infinity=False)
+numbers = st.floats(-LARGEST, LARGEST)
 
 
 @settings(max_examples=60, deadline=None)
