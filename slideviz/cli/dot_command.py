@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from slideviz.cli.def_command import add_config, read_configuration, variable_rows
 from slideviz.cli.options import add_shared
+from slideviz.cli.terminal import holding
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,6 +27,11 @@ def add_dot(calls: argparse._SubParsersAction) -> None:
 
 def run_dot(arguments: argparse.Namespace) -> int:
     """Write the gradients for moving nodes and for design variables; return the exit code."""
+    with holding() as arguments.begun:
+        return _run_dot(arguments)
+
+
+def _run_dot(arguments: argparse.Namespace) -> int:
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import OutputPath, require_places
     from slideviz.cli.progress import Bar
@@ -48,7 +54,7 @@ def run_dot(arguments: argparse.Namespace) -> int:
         OutputPath(gradient, "GRAD_OBJFUNC_FILENAME", False),
         OutputPath(arguments.json, "--json"),
     )
-    with Bar(not arguments.quiet) as bar:
+    with Bar(not arguments.quiet, begun=arguments.begun) as bar:
         surface, found = design_gradients(config, mesh, bar)
     _write_surface(sensitivities, found)
     if gradient is not None:
