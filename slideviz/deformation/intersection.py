@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from math import ceil, floor, pi
 
 import numpy as np
 
-from slideviz.case.model import Case
+from slideviz.case.model import Case, Rotate
+from slideviz.case.motion import displacements
 from slideviz.deformation.classes import find_period
+from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.cached_boundary import boundary_of, shell_of
 from slideviz.mesh.caching import njit
@@ -96,9 +99,10 @@ def _new_crossing(
 def jump_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:
     """Return a sentence when a moved node crosses another boundary on its way, or None.
 
-    Nodes move on straight lines, in a cylindrical frame on arcs about its axis. Boundaries that
-    cross before the motion, as twisted quadrilaterals close to each other may, are not compared.
-    Parameters are those of `intersection_message`.
+    None too where it crosses none on an arc (`_arcs`): steps go straight, but a body that turns
+    beside a curved wall can come out right. Boundaries that cross before the motion, as twisted
+    quadrilaterals close to each other may, are not compared. Parameters are those of
+    `intersection_message`.
     """
     after = np.array(mesh.points)
     after[nodes] += vectors
@@ -117,25 +121,48 @@ def jump_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -
             hit = next(filter(None, hits), None)
         if hit is not None:
             return (
-                f"the motion takes {name} through {hit.marker} near {_place(hit)} on its way, for "
-                f"nodes move straight; move {name} less, around {hit.marker} in several runs, or "
+                f"the motion takes {name} through {hit.marker} near {_place(hit)} on its way; move "
+                f"{name} less, around {hit.marker} in several runs, or "
                 f"{_giving_way(case, hit.marker)}"
             )
     return None
 
 
 def _arcs(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> list[FloatArray]:
-    """Return the points (n, d) at ``ARCS`` places on the way; none where nodes move straight."""
-    frame = find_period(case, mesh, boundary_of(mesh))[1]
-    if not frame.cylindrical:
+    """Return the points (n, d) at ``ARCS`` places on the way; none where it is straight.
+
+    It is an arc in a cylindrical frame, about its axis, and where motions of the case turn.
+    """
+    frame, at = find_period(case, mesh, boundary_of(mesh))[1], mesh.points[nodes]
+    parts = np.arange(1, ARCS + 1) / ARCS
+    if frame.cylindrical:
+        start, shift = frame.coords(at), frame.difference(at, vectors)
+        places = [frame.points(start + part * shift) for part in parts]
+    elif any(isinstance(motion, Rotate) for motion in case.motions):
+        try:
+            still, *turned = (_turned(case, mesh, part) for part in (0.0, *parts))
+        except CaseError:
+            return []  # markers with common nodes turn differently
+        if not np.array_equal(turned[-1], vectors):
+            return []  # the displacements are not those of the motions
+        places = [
+            at + there - (1.0 - part) * still for part, there in zip(parts, turned, strict=True)
+        ]
+    else:
         return []
-    start, shift = frame.coords(mesh.points[nodes]), frame.difference(mesh.points[nodes], vectors)
-    path = []
-    for part in range(1, ARCS + 1):
-        points = np.array(mesh.points)
-        points[nodes] = frame.points(start + part / ARCS * shift)
-        path.append(points)
+    path = [np.array(mesh.points) for _ in places]
+    for points, there in zip(path, places, strict=True):
+        points[nodes] = there
     return path
+
+
+def _turned(case: Case, mesh: Mesh, part: float) -> FloatArray:
+    """Return the displacements (k, d) of the motions, with a part of all turns."""
+    motions = tuple(
+        replace(motion, angle_deg=part * motion.angle_deg) if isinstance(motion, Rotate) else motion
+        for motion in case.motions
+    )
+    return displacements(case.change(motions=motions), mesh).vectors
 
 
 def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:

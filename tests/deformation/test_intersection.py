@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.model import Case, Prescribed, Rotate, Translate
 from slideviz.case.motion import displacements
 from slideviz.deformation import intersection
 from slideviz.deformation.intersection import folding_message, jump_message
 from slideviz.deformation.intersection import intersection_message as message
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Mesh
+from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
 from slideviz.session.intersections import find_intersection
 from tests.builders import airfoil, cube, make_mesh, passage, sector, sphere_in_box
@@ -134,6 +135,20 @@ def test_nodes_that_move_on_arcs_do_not_cut_corners():
     alone = {name: role for name, role in roles.items() if role != "periodic"}
     cut = moved(Case(roles=alone), mesh, *turned[0].motions)
     assert "BLOCK through " in jump_message(*cut)
+
+
+def test_a_turn_beside_a_curved_wall_is_not_refused():
+    """The chord of a turn by 60 degrees goes through the inner wall, the arc does not."""
+    mesh = sector(24, 300.0, 0.8)
+    roles = {"BLOCK": "moving", "inner": "sliding", "outer": "sliding"}
+    case = Case(roles=roles, sliding="ps", steps=4)
+    case, *_ = arguments = moved(case, mesh, Rotate("BLOCK", 60.0, (0.0, 0.0)))
+    *_, last = sv.deform(case, mesh)
+    assert quality(last.mesh, mesh).inverted == 0
+    away = Rotate("BLOCK", 60.0, (0.0, 0.0)), Translate("BLOCK", (0.0, 0.02))
+    assert jump_message(*moved(case, mesh, *away)) is None
+    given = case.change(motions=(Prescribed(arguments[2], arguments[3]),))
+    assert "takes BLOCK through inner near" in jump_message(given, *arguments[1:])
 
 
 def test_a_motion_by_very_many_periods_is_looked_at_at_once(monkeypatch):
