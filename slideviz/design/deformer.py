@@ -28,6 +28,7 @@ from slideviz.design.frozen.step import FrozenStep, StepState
 from slideviz.design.frozen.tape import Array, Tape, Variable, value
 from slideviz.design.given import given_input
 from slideviz.errors import CaseError, DeformError
+from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 from slideviz.rbf.images import FAR
 
@@ -56,7 +57,8 @@ class Deformer:
     displacement : (m, d) float64
         Displacement of these nodes by the case's motions, in the mesh's length unit.
     warnings : tuple of str
-        Warnings about case and mesh, and a note where systems are solved with twice the digits.
+        About case and mesh, zones that no longer fit at the reference, and systems that are solved
+        with twice the digits (a note).
 
     Notes
     -----
@@ -160,7 +162,7 @@ class Deformer:
         facets = facets_of(setup, value(states[-1].coords))
         least = max(float(sizes.max()), usual_edge(setup))
         self._checks = Checks(mesh, setup, self._steps, facets, least)
-        self.warnings += note_of_refinement(self._steps)
+        self.warnings += (*note_of_refinement(self._steps), *torn_interfaces(mesh, points))
         if not warn_of_doubt(self._steps, np.max([state.doubt for state in states], axis=0)):
             warn_of_condition(self._steps)
 

@@ -94,6 +94,13 @@ def test_a_design_that_moves_all_of_a_zone_says_which_other_no_longer_fits(tmp_p
     assert "zone 2 no longer fits: BLOCK, which is an interface" in capsys.readouterr().err
 
 
+def test_a_deformer_that_moves_one_says_which_zone_no_longer_fits(tmp_path):
+    mesh, case = sv.read(zones(tmp_path)), moved(tmp_path)
+    (said,) = sv.Deformer(mesh, case).warnings
+    assert said.startswith("zone 2 no longer fits: BLOCK, which is an interface with its core")
+    assert sv.Deformer(mesh, case, np.zeros((8, 2))).warnings == ()
+
+
 def test_a_run_that_leaves_it_in_place_says_nothing(tmp_path):
     mesh = sv.read(zones(tmp_path))
     case = sv.Case(roles={"x_p": "moving"}, motions=(sv.Translate("x_p", (0.01, 0.0)),))
