@@ -177,13 +177,14 @@ def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) 
     where = ", ".join(f"{value:.6g}" for value in found.point)
     ratio, radius = found.length / most, setup.basis.radius
     smaller = f"{0.8 * STRAY / ratio * radius / mesh.extent:.2g}"
-    factor = "AUTO" if setup.fitted_radius < radius else smaller
+    remedy = f"RBF_KERNEL= wendland-c0, which does not, or INFLUENCE_FACTOR= {smaller}"
+    if setup.fitted_radius < radius:
+        remedy = "INFLUENCE_FACTOR= AUTO, or RBF_KERNEL= wendland-c0"
     sentence = (
         f"node {found.node} at ({where}) goes {found.length:.3g} far, {ratio:.3g} "
         f"times as far as the farthest boundary node ({most:.3g}): the interpolation, whose "
         f"support radius is {radius:.3g}, continues the turning or stretching of the boundary "
-        "beyond it; use a smaller radius, as with INFLUENCE_FACTOR= "
-        f"{factor}, or RBF_KERNEL= wendland-c0"
+        f"beyond it; use {remedy}"
     )
     return [sentence]
 

@@ -30,6 +30,8 @@ LOOKED_AT = 5
 """Facets of a moved body that are tested; the body is in the mesh where one of them is."""
 ARCS = 16
 """Places on the way of nodes that move on arcs, between which it is taken as straight."""
+ROUNDING = 1e-9
+"""Part of the largest displacement by which an affine motion may differ from its matrix."""
 BESIDE = 1e-4
 """Distance from a facet of a point in the cells beside it, over the size of the facet."""
 OPEN = 0.1
@@ -170,6 +172,8 @@ def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray
 
     None when they do not, when they did so before, or when they have more than ``MOST`` facets.
     """
+    if not vectors.any() or _affine(mesh.points[nodes], vectors):
+        return None
     after = np.array(mesh.points)
     after[nodes] += vectors
     names = _movers(case, mesh, nodes, vectors)
@@ -185,7 +189,16 @@ def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray
     first, other = (names[k] for k in sorted(np.searchsorted(ends, hit[1:], "right")))
     where = "itself" if first == other else other
     place = ", ".join(f"{value:.4g}" for value in hit[0])
-    return f"{first} goes through {where} near ({place}); cells will be inverted there"
+    return f"{first} goes through {where} near ({place}); cells will overlap there"
+
+
+def _affine(points: FloatArray, vectors: FloatArray) -> bool:
+    """Return whether a motion of points (k, d) is affine: so no body goes through itself."""
+    terms = np.column_stack([points - points.mean(axis=0), np.ones(len(points))])
+    found = np.linalg.lstsq(terms, vectors)[0]
+    tolerance = ROUNDING * np.abs(vectors).max(initial=0.0)
+    keeps_sides = np.linalg.det(np.eye(points.shape[1]) + found[:-1]) > 0.0
+    return bool(keeps_sides and np.abs(terms @ found - vectors).max(initial=0.0) <= tolerance)
 
 
 def _outside(case: Case, mesh: Mesh, nodes: IntArray, after: FloatArray) -> str | None:

@@ -10,7 +10,7 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile, Prescribed
 from slideviz.case.motion import ROUNDING, same
 from slideviz.deformation.classes import find_classes
-from slideviz.deformation.intersection import intersection_message, jump_message
+from slideviz.deformation.intersection import folding_message, intersection_message, jump_message
 from slideviz.errors import CaseError, DeformError
 from slideviz.mesh.fans import Fans, fan_normals
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
@@ -128,4 +128,6 @@ def prescribed(
         corners = corners_of(coords, boundary.facets, on_axis(frame, coords))
         normals = fan_normals(boundary, fans, coords, corners)
         require_free(spread, follow, alone, normals, allowed)
-    return known, spread.at(known), moved.warnings
+    folded = folding_message(*asked)
+    warnings = (*moved.warnings, *([f"{folded}; move it less"] if folded else []))
+    return known, spread.at(known), warnings

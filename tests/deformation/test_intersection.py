@@ -9,6 +9,7 @@ from slideviz.case.motion import displacements
 from slideviz.deformation import intersection
 from slideviz.deformation.intersection import folding_message, jump_message
 from slideviz.deformation.intersection import intersection_message as message
+from slideviz.deformation.setup import make_setup
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import quality
@@ -325,3 +326,15 @@ def test_a_body_that_turns_as_it_is_does_not_go_through_itself(mesh, name):
 def test_of_very_many_facets_nobody_waits(monkeypatch):
     monkeypatch.setattr(intersection, "MOST", 3)
     assert folding_message(*pushed(sphere_in_box(6), "sphere")) is None
+
+
+def test_a_run_warns_of_a_body_that_goes_through_itself():
+    case, mesh, nodes, vectors = pushed(sphere_in_box(6), "sphere")
+    moved = Prescribed(nodes, vectors)
+    case = case.change(motions=(moved,), steps=1)
+    assert any(
+        text.startswith("sphere goes through itself near (") and text.endswith("move it less")
+        for text in make_setup(case, mesh).warnings
+    )
+    less = case.change(motions=(Prescribed(nodes, 0.1 * vectors),))
+    assert not make_setup(less, mesh).warnings

@@ -1056,7 +1056,7 @@ def test_all_panels_fit_1280_x_800_and_links_lead_to_them(ready):
 
     window = ready.window
     ready.qtbot.waitUntil(lambda: not window.intersection_check.busy)
-    folding = "airfoil goes through itself near (0, 0); cells will be inverted there."
+    folding = "airfoil goes through itself near (0, 0); cells will overlap there."
     key = intersection_key(ready.session)
     window.store.change(set_intersection, ("", folding), key)
     panel = window.run_panel

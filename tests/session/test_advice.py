@@ -70,7 +70,7 @@ def test_it_offers_what_the_case_has_not_used(case, words, not_words):
 
 
 def test_where_the_motion_goes_through_itself_no_steps_are_offered(run, passage):
-    folding = "airfoil goes through itself near (0, 0); cells will be inverted there."
+    folding = "airfoil goes through itself near (0, 0); cells will overlap there."
     assert help_for(run, passage.mesh, folding) == (
         "airfoil goes through itself near (0, 0), so more steps cannot help; another motion, or a "
         "smaller one, may."
