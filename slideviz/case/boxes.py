@@ -109,8 +109,9 @@ def ffd_problems(case: Case, mesh: Mesh, motion: BoxMotion) -> tuple[str, ...]:
     box = boxes[motion.box]
     unknown = box.problem(_lattice_index(motion, mesh.dim))
     found = [unknown] if unknown else []
-    if isinstance(motion, Ffd) and mesh.dim == 2 and motion.vector[2]:
-        found.append(f"dz is {motion.vector[2]:g}, which leaves the plane; in 2D write 0")
+    name, across = ("dz", 2) if box.system.kind == "CARTESIAN" else ("dθ", 1)
+    if isinstance(motion, Ffd) and mesh.dim == 2 and (shift := motion.vector[across]):
+        found.append(f"{name} is {shift:g}, which leaves the plane; in 2D write 0")
     if isinstance(motion, FfdTwist) and mesh.dim == 2:
         found.append("a box in 2D has no span to twist along; write rotate")
     if isinstance(motion, FfdTwist) and case.ffd_system != "CARTESIAN":

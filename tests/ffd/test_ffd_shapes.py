@@ -148,6 +148,12 @@ def test_motions_that_do_not_fit_the_coordinates_are_told():
     thick = case(sv.FfdCamber("y_low", "BOX", (1, -1), 0.1), marker="y_low", **CURVED)
     (said,) = check_case(thick, flat())
     assert "in 2D it needs FFD_COORD_SYSTEM= CARTESIAN, which is CYLINDRICAL" in said
+    by, turned = (
+        check_case(case(sv.Ffd("y_low", "BOX", (1, -1, -1), to), marker="y_low", **CURVED), flat())
+        for to in ((0.1, 0.0, 0.2), (0.0, 0.2, 0.0))
+    )
+    assert not by
+    assert "dθ is 0.2, which leaves the plane; in 2D write 0" in turned[0]
 
 
 def test_nested_boxes_of_a_run_stay_and_a_note_says_so():
