@@ -99,8 +99,7 @@ def test_all_kinds_of_a_list_act_one_after_the_other(here):
         np.testing.assert_allclose(by, right, rtol=0, atol=1e-14)
     assert found.idle == (False,) * 11 + (True,)
     (angle,) = found.warnings
-    assert "FFD_ANGLE_OF_ATTACK moves no node; add its value times" in angle
-    assert "1 degrees" in angle
+    assert "FFD_ANGLE_OF_ATTACK moves no node; add 1 degrees, its value times" in angle
     after = boxes_of(found.displacer.boxed(found.mesh))[0]
     np.testing.assert_allclose(after.points, points, rtol=0, atol=1e-14)
 

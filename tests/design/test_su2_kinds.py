@@ -170,7 +170,7 @@ def test_normals_of_triangles_are_those_of_the_median_dual_mesh():
             "(1.0); (1.0)",
             (2.0, 1.1),
             (False, True),
-            "ANGLE_OF_ATTACK moves no node; add its value times OPT_RELAX_FACTOR, 2 degrees, to",
+            "ANGLE_OF_ATTACK moves no node; add 2 degrees, its value times OPT_RELAX_FACTOR, to",
         ),
         (
             "SCALE_GRID, TRANSLATE_GRID",
@@ -388,7 +388,7 @@ def test_ignored_variables_have_no_gradient(here, capsys):
         "DV_VALUE= 1.0, 2.0, 0.0\n"
     )
     points = written(text)
-    assert "degrees, to AOA" not in capsys.readouterr().err
+    assert "to AOA of the flow" not in capsys.readouterr().err
     write_csv("adj_cd.csv", points, np.ones_like(points), extra="SENS_AOA= 0.25\n")
     Path("dot.cfg").write_text(text)
     assert run(["dot", "dot.cfg", "-q"]) == 0

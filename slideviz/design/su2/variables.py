@@ -321,5 +321,5 @@ def angle_notes(variables: Sequence[DesignVariable], relaxation: float) -> list[
     offset = relaxation * angles[-1].value  # the last one wins in SU2
     what = f"{angles[-1].kind} moves no node"
     return [
-        f"{what}; add its value times OPT_RELAX_FACTOR, {offset:.10g} degrees, to AOA of the flow"
+        f"{what}; add {offset:.10g} degrees, its value times OPT_RELAX_FACTOR, to AOA of the flow"
     ]
