@@ -61,6 +61,19 @@ def actions(driver, number):
 # The panel --------------------------------------------------------------------------------
 
 
+def test_a_run_that_failed_in_its_first_step_can_be_selected_and_removed(ran):
+    store = ran.window.store
+    store.change(lambda session: changes.end_run(changes.start_run(session), "failed"))
+    for _ in range(2):
+        assert panel(ran).tree.number == 3
+        assert panel(ran).buttons["remove"].isEnabled()
+        click(ran, 1)
+        assert panel(ran).tree.number == 1
+        click(ran, 3)
+    QTest.mouseClick(panel(ran).buttons["remove"], Qt.MouseButton.LeftButton)
+    assert [run.number for run in ran.session.runs] == [1, 2]
+
+
 def test_without_runs_the_panel_says_what_will_be_there(driver, passage_file):
     driver.open(passage_file)
     driver.window.docks["runs"].raise_()

@@ -68,11 +68,11 @@ class RunsPanel(Panel):
         self.actions_.sync(session)
 
     def _select(self, session: Session) -> None:
-        """Select the row of the shown run, or that of the undeformed mesh at step 0."""
-        numbers = [run.number for run in session.runs]
-        place = -1
-        if session.shown in numbers:
-            place = 1 + numbers.index(session.shown) if session.view.frame else 0
+        """Select the row of the shown run, or that of the undeformed mesh at its step 0."""
+        run, place = session.run_shown, -1
+        if run is not None:
+            # A run without steps, as one that failed, has no other than step 0.
+            place = 1 + session.runs.index(run) if session.view.frame or not run.frames else 0
         index = self.tree.model().index(place, 0)
         if index != self.tree.currentIndex():
             self.tree.setCurrentIndex(index)
