@@ -265,7 +265,7 @@ class NumberField(TextField):
             self._before = self._value
             return
         typed, self._value = self._value, self._before
-        _say_kept(self, self.problem, short_text(self._value, self._scale))
+        _say_kept(self, self.problem, self._text())
         if typed != self._value:
             self.changed.emit(self._value)
         self.mark()
