@@ -15,6 +15,7 @@ from slideviz.case.model import (
     FfdThickness,
     FfdTwist,
     FromFile,
+    HicksHenne,
     Motion,
     OnAirfoil,
     Point,
@@ -71,6 +72,8 @@ def _in_full(motion: Motion, dim: int, extent: float) -> str:
         return f"push radially by {_push(motion)}"
     if isinstance(motion, Ffd):
         return f"move {_control(motion)} by {vector_words(motion.vector[:dim])}"
+    if isinstance(motion, HicksHenne):
+        return f"move {_bump(motion, f'outwards by {motion.height:.4g}')}"
     if isinstance(motion, OnAirfoil):
         return f"raise {_bump(motion, f'by {motion.height:.4g}')}"
     if isinstance(motion, BoxMotion):
@@ -220,7 +223,7 @@ def _push(motion: Radial) -> str:
 
 
 def _bump(motion: OnAirfoil, by: str, form: str = ".4g") -> str:
-    """Return what a motion raises of an airfoil, in words, with the height as in ``by``."""
+    """Return what a motion moves of an airfoil, in words, with the height as in ``by``."""
     if isinstance(motion, Cst):
         return f"{motion.side} side {by} × CST {motion.term[0]} of {motion.term[1]}"
     what = "both sides" if isinstance(motion, Bump) else f"{motion.side} side"

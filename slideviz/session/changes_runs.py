@@ -20,14 +20,15 @@ MOST_REMOVED = 2
 def start_run(session: Session, case: Case | None = None, name: str = "") -> Session:
     """Return the session with a new run, which is shown: of ``case``, or of the session's case.
 
-    With a ``name`` it is the run of a design. Earlier runs without any step are removed.
+    With a ``name`` it is the run of a design. Earlier runs without any step are removed. No cell is
+    marked: one that was bad need not be of interest in another run.
     """
     kept = tuple(run for run in session.runs if run.frames)
     number = 1 + max((session.newest, *(run.number for run in session.runs)))
     panels = session.case if name else None
     runs = (*kept, Run(number, case or session.case, name=name, panels=panels))
     session = replace(session, runs=runs, shown=number, newest=number)
-    return show_frame(session, 0)
+    return show_frame(set_view(session, marked_cell=None), 0)
 
 
 def add_frames(session: Session, frames: Sequence[StepFrame]) -> Session:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -160,7 +161,7 @@ class Store:
         self.failed: Failed | None = None
         self._undo: list[_Done] = []
         self._redo: list[_Done] = []
-        self._dragging = False
+        self._dragging = self._taking_back = False
 
     def listen(self, listener: Listener) -> None:
         """Call ``listener(old, new)`` after each change from now on."""
@@ -195,6 +196,15 @@ class Store:
             last = self._undo[-1]
             if dragging or last.at_s == float("inf"):
                 self._undo[-1] = replace(last, at_s=float("-inf"))
+
+    @contextmanager
+    def taking_back(self) -> Iterator[None]:
+        """Within, a change to what was there before the last ones of its kind undoes these."""
+        self._taking_back = True
+        try:
+            yield
+        finally:
+            self._taking_back = False
 
     def put(self, session: Session) -> None:
         """Replace the session, and call the listeners; nothing if it is the same object.
@@ -278,6 +288,8 @@ class Store:
         if before == Memento.of(new):
             return
         self._redo.clear()
+        if self._taking_back and self._drop_alike(Memento.of(new), kind):
+            return
         now = self._clock()
         last = self._undo[-1] if self._undo else None
         # Infinity: a change during a drag is undone with the others of the drag.
@@ -292,3 +304,13 @@ class Store:
         there = {run.number for run in new.removed}
         self._undo = [d for d in self._undo if d.kind[0] is not remove_run or d.kind[1] in there]
         del self._undo[:-DEEPEST]
+
+    def _drop_alike(self, before: Memento, kind: tuple[object, ...]) -> bool:
+        """Forget the last changes since a state; return whether all are of one kind."""
+        for at in reversed(range(len(self._undo))):
+            if self._undo[at].kind != kind:
+                return False
+            if self._undo[at].before == before:
+                del self._undo[at:]
+                return True
+        return False

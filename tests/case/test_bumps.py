@@ -92,7 +92,7 @@ def test_words_and_columns_of_bumps():
     )
     assert read_motions(write_motions(motions).replace("\\\n", "")) == motions
     assert [describe(one) for one in motions] == [
-        "airfoil: raise upper side by 0.02 at 30 % chord",
+        "airfoil: move upper side outwards by 0.02 at 30 % chord",
         "airfoil: raise lower side by -0.01 × CST 2 of 6",
         "airfoil: raise both sides by 0.1 at 50 % chord",
     ]

@@ -6,6 +6,7 @@ from qtpy.QtGui import QColor, QFocusEvent, QKeyEvent, QPalette
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QToolTip
 
+from slideviz.case.model import Rotate, Scale
 from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberBox, NumberField, TextField, short_text
@@ -266,3 +267,55 @@ def test_ctrl_z_and_ctrl_y_act_on_what_is_typed(driver, kind):
     assert edit.text() != "7"
     QTest.keyClick(box, Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier)
     assert edit.text() == "7"
+    QTest.keyClick(box, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    asked = []
+    store.redo, store.undo = (lambda: asked.append("redo")), (lambda: asked.append("undo"))
+    QTest.keyClick(box, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    QTest.keyClick(box, Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier)
+    assert asked == ["undo", "redo"], "nothing of its own is left"
+
+
+def test_what_a_field_takes_back_is_no_new_change(driver, sample_folder, qtbot):
+    driver.open(sample_folder / "passage" / "passage.cfg")
+    window, store = driver.window, driver.window.store
+    window.motions.list.setCurrentRow(0)
+    now = [0.0]
+    store._clock = lambda: now[0]
+    before = store.session.case.motions[0]
+    assert isinstance(before, Rotate)
+    editor = window.motions.editor
+    driver.choose(editor.kind, Scale)
+    made = store.session.case.motions[0]
+    field = editor.factors.fields[0]
+    field.setFocus()
+    qtbot.waitUntil(field.hasFocus)
+    field.selectAll()
+    for letter in "-16":
+        now[0] += 60.0  # each is a change of its own
+        QTest.keyClicks(field, letter)
+    assert store.session.case.motions[0].factors[0] == -16.0
+    now[0] += 60.0
+    QTest.keyClick(field, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert store.session.case.motions[0] == made
+    QTest.keyClick(field, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert store.session.case.motions[0] == before, "the window undoes the change before"
+
+
+def test_a_text_that_is_not_valid_withdraws_its_valid_beginning(driver, sample_folder, qtbot):
+    driver.open(sample_folder / "passage" / "passage.cfg")
+    window, store = driver.window, driver.window.store
+    window.motions.list.setCurrentRow(0)
+    before, words = store.session.case, store.can_undo
+    field = window.motions.editor.angle
+    field.setFocus()
+    qtbot.waitUntil(field.hasFocus)
+    field.selectAll()
+    QTest.keyClicks(field, "0.04")
+    assert store.session.case.motions[0].angle_deg == 0.04
+    QTest.keyClicks(field, "abc")
+    assert store.session.case == before
+    assert "-8" in window.motions.list.item(0).text().replace("−", "-")
+    QTest.keyClick(field, Qt.Key.Key_Escape)
+    assert (field.text(), store.session.case) == ("-8", before)
+    assert "the value is still -8" in window.statusBar().currentMessage()
+    assert store.can_undo == words, "nothing that undo would bring back"

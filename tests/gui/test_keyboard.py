@@ -9,7 +9,7 @@ from qtpy.QtGui import QContextMenuEvent, QImage
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QAbstractItemView, QApplication, QMenu, QTableView
 
-from slideviz.case.model import Ffd, FfdCamber, FfdTwist, FromFile, Radial, Rotate, Scale, Translate
+from slideviz.case.model import Ffd, FfdCamber, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.session import changes
 
 pytestmark = pytest.mark.usefixtures("unpainted")
@@ -156,7 +156,6 @@ FIRST = {
     Radial: lambda editor: editor.percent,
     Ffd: lambda editor: editor.index.fields[0],
     FfdCamber: lambda editor: editor.index.fields[0],
-    FfdTwist: lambda editor: editor.plane,
     FromFile: lambda editor: editor.path,
 }
 

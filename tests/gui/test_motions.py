@@ -359,6 +359,7 @@ def test_camber_and_thickness_of_a_box_are_shown_edited_and_kept(boxed, tmp_path
         assert sv.Case.read(tmp_path / "kept.cfg").motions == (motion,)
     form = editor(boxed)
     assert not form.kind.model().item(form.kind.findData(FfdTwist)).isEnabled()
+    assert not boxed.window.motions.add_actions[FfdTwist].isEnabled()
 
 
 def test_twist_of_a_box_is_shown_edited_and_kept(driver, sample_folder, tmp_path):
@@ -372,6 +373,7 @@ def test_twist_of_a_box_is_shown_edited_and_kept(driver, sample_folder, tmp_path
     block.role("BLOCK", "moving")
     block.add_motion(FfdTwist)
     form = editor(block)
+    block.qtbot.waitUntil(form.plane.hasFocus)
     assert block.session.case.motions == (FfdTwist("BLOCK", "BOX", 0, 0.0),)
     shown = [form.plane, form.angle, form.point, form.axis, form.box]
     assert all(field.isVisible() for field in shown)
@@ -404,7 +406,9 @@ def test_bumps_on_an_airfoil_are_shown_edited_and_kept(driver, tmp_path):
     driver.choose(form.side, "lower")
     motion = HicksHenne("airfoil", 0.02, 0.3, "lower", (1.0, 3.0))
     assert driver.session.case.motions == (motion,)
-    assert listed(driver) == "1.  airfoil: raise lower side by 0.02 at 30 % chord"
+    assert listed(driver) == "1.  airfoil: move lower side outwards by 0.02 at 30 % chord"
+    assert form.form.labelForField(form.raised).text() == "Outwards by"
+    assert "the lower side down" in form.raised.toolTip()
     moved = Ghosts(driver.session.mesh).moved(driver.session.case)["airfoil"]
     assert moved[:, 1].min() < driver.session.mesh.points[:24, 1].min()
     driver.choose(form.kind, Cst)
@@ -418,6 +422,8 @@ def test_bumps_on_an_airfoil_are_shown_edited_and_kept(driver, tmp_path):
     assert driver.session.case.motions == (Cst("airfoil", 0.1, (2, 4), chord=(1.0, 3.0)),)
     driver.choose(form.kind, Bump)
     assert not form.side.isVisible()
+    assert form.form.labelForField(form.raised).text() == "Raised by"
+    assert "towards +y" in form.raised.toolTip()
     driver.type(form.raised, "0.05")
     assert driver.session.case.motions == (Bump("airfoil", 0.05, 0.5, (1.0, 3.0)),)
     driver.session.case.write(tmp_path / "kept.cfg")

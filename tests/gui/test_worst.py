@@ -95,6 +95,15 @@ def click(panel, row, modifier=Qt.KeyboardModifier.NoModifier):
     QTest.mouseClick(panel.table.viewport(), button, modifier, where)
 
 
+def test_the_mark_goes_with_a_new_run(full):
+    click(full, 3)
+    assert full.store.session.view.marked_cell is not None
+    assert full.info.isVisible()
+    full.store.change(changes.start_run)
+    assert full.store.session.view.marked_cell is None
+    assert not full.info.isVisible()
+
+
 def test_without_a_mesh_it_says_what_to_do(panel):
     assert panel.stack.currentWidget() is panel.words
     assert "Open a mesh first" in panel.words.text()

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from qtpy.QtCore import Signal
-from qtpy.QtWidgets import QFileDialog, QWidget
+from qtpy.QtWidgets import QFileDialog, QLabel, QWidget
 
 from slideviz.case.model import (
     BoxMotion,
@@ -37,6 +37,11 @@ from slideviz.session.motions import Axis, radial
 
 Z = (0.0, 0.0, 1.0)
 """Axis of rotations in 2D."""
+RAISED = {
+    True: ("Outwards by", "outwards, the lower side down,"),
+    False: ("Raised by", "towards +y"),
+}
+"""Title and direction of the height of an airfoil's motion, by whether it is `HicksHenne`."""
 
 
 class MotionEditor(MotionForm):
@@ -141,6 +146,11 @@ class MotionEditor(MotionForm):
     def _show_bump(self, motion: OnAirfoil) -> set[str]:
         """Fill the fields for a bump on an airfoil; return the names of their rows."""
         self.raised.show_value(motion.height)
+        title, way = RAISED[isinstance(motion, HicksHenne)]
+        label = self.form.labelForField(self.raised)
+        assert isinstance(label, QLabel)
+        label.setText(title)
+        self.raised.set_tip(f"How far it moves {way}, in the mesh's length unit.")
         self.chord.show_value(motion.chord)
         shown = {"raised", "chord"}
         if not isinstance(motion, Bump):

@@ -13,7 +13,7 @@ from qtpy.QtCore import QSignalBlocker, QSize, Qt
 from qtpy.QtGui import QAction, QKeySequence
 from qtpy.QtWidgets import QApplication, QHBoxLayout, QListWidget, QMenu, QToolButton
 
-from slideviz.case.model import FromFile, Motion, Target, Translate, named
+from slideviz.case.model import FfdTwist, FromFile, Motion, Target, Translate, named
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe
 from slideviz.errors import SlidevizError
@@ -133,6 +133,7 @@ class MotionPanel(Panel):
     def _take_mesh(self, mesh: Mesh | None) -> None:
         """Store another mesh and its extent (slow for a large mesh) and pass both to the editor."""
         self._mesh, self._extent = mesh, mesh.extent if mesh is not None else 0.0
+        self.add_actions[FfdTwist].setEnabled(mesh is None or mesh.dim == 3)  # as in the editor
         self.editor.set_centroid(self._centroid)
         self.editor.set_extent(self._extent)
         self.editor.set_chord(self._chord)

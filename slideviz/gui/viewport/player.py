@@ -284,11 +284,10 @@ def plain(rich: str) -> str:
 
 
 def result_parts(session: Session) -> list[list[str]]:
-    """Return three forms of the shown step's numbers, as rich text, the longest form first.
+    """Return two forms of the shown step's numbers, as rich text, the longest form first.
 
-    Each form is the list of inverted cells, minimum and mean quality: in full, with a shorter
-    word, and with fewer decimals of the mean too. Those of the minimum stay: it is small where it
-    matters. Empty if no mesh is open.
+    Each form is the list of inverted cells, minimum and mean quality: in full, and with a shorter
+    word. No number has fewer decimals: it would look cut off. Empty if no mesh is open.
     """
     frame = session.frame
     if frame is None:
@@ -296,11 +295,11 @@ def result_parts(session: Session) -> list[list[str]]:
     quality = frame.quality
     colour = f" style='color:{alarm()}'" if quality.inverted else ""
 
-    def form(word: str, digits: int = 4) -> list[str]:
+    def form(word: str) -> list[str]:
         return [
             f"<span{colour}><b>{quality.inverted:,}</b> {word}</span>",
             f"min <b>{quality.min:.4f}</b>",
-            f"mean <b>{quality.mean:.{digits}f}</b>",
+            f"mean <b>{quality.mean:.4f}</b>",
         ]
 
-    return [form("inverted"), form("inv."), form("inv.", digits=2)]
+    return [form("inverted"), form("inv.")]

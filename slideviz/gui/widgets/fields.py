@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 
 from qtpy.QtCore import QEvent, QLocale, QSignalBlocker, Qt, Signal
-from qtpy.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QValidator, QWheelEvent
+from qtpy.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QMouseEvent, QValidator, QWheelEvent
 from qtpy.QtWidgets import (
     QApplication,
     QCheckBox,
@@ -51,35 +52,61 @@ def _say_kept(field: QWidget, problem: str, value: str) -> None:
         window.say(f"Not taken: {problem}; the value is still {value}.")
 
 
-def _redoes(field: QLineEdit, event: QEvent) -> bool:
-    """Return whether an event is Ctrl+Y, which does in a field again what was undone there.
+def _own_step(field: QLineEdit, event: QEvent) -> bool | None:
+    """Undo or redo in a field on Ctrl+Z or Ctrl+Y, while there is something of its own.
 
-    On Linux Qt does so by Ctrl+Shift+Z only, and the window would take Ctrl+Y.
+    Returns whether there was; None for other events. What is not its own is left to the window. On
+    Linux Qt does again by Ctrl+Shift+Z only, and the window would take Ctrl+Y.
     """
     kinds = (QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress)
     if event.type() not in kinds or not isinstance(event, QKeyEvent):
-        return False
-    if (event.key(), event.modifiers()) != (Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier):
-        return False
-    event.accept()
-    if event.type() == QEvent.Type.KeyPress:
-        field.redo()
-    return True
+        return None
+    undoes = event.matches(QKeySequence.StandardKey.Undo)
+    ctrl_y = (Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier)
+    redoes = event.matches(QKeySequence.StandardKey.Redo)
+    if not (undoes or redoes or (event.key(), event.modifiers()) == ctrl_y):
+        return None
+    own = field.isUndoAvailable() if undoes else field.isRedoAvailable()
+    event.setAccepted(own)
+    if not own:
+        _forget(field)  # what was typed here before is older than what the window does now
+    elif event.type() == QEvent.Type.KeyPress:
+        with _taking_back(field):
+            (field.undo if undoes else field.redo)()
+    return own
+
+
+def _forget(field: QLineEdit) -> None:
+    """Leave nothing that the field itself could undo or redo."""
+    if field.isUndoAvailable() or field.isRedoAvailable():
+        field.setText(field.text())
+
+
+@contextmanager
+def _taking_back(field: QWidget) -> Iterator[None]:
+    """Let the session take a value that it had before as its own undo, not as a new change."""
+    window = main_window(field)
+    if window is None:
+        yield
+        return
+    with window.store.taking_back():
+        yield
 
 
 class TextField(QLineEdit):
-    """A field for a text, in which Ctrl+Z and Ctrl+Y act on what is typed."""
+    """A field for a text, in which Ctrl+Z and Ctrl+Y act first on what is typed."""
 
     def event(self, event: QEvent) -> bool:
-        return _redoes(self, event) or super().event(event)
+        own = _own_step(self, event)
+        return super().event(event) if own is None else own
 
 
 class NumberField(TextField):
     """A field for a number, typed as such or as an expression, which its value then replaces.
 
-    It shows six digits, and all of them while it is edited. An invalid text is marked at once. If
-    the text is invalid when the field is left, it stays and is marked; its value is the one from
-    before the editing (not a valid beginning of what was typed), which Escape writes again.
+    It shows six digits, and all of them while it is edited. An invalid text is marked at once, and
+    stays when the field is left; its value is the one from before the editing (not a valid
+    beginning of what was typed), which Escape writes again.
 
     Parameters
     ----------
@@ -250,10 +277,13 @@ class NumberField(TextField):
         super().focusOutEvent(event)
         if not self.problem:
             self.setModified(False)
+            _forget(self)
             self._write()
 
     def _edited(self) -> None:
-        if not self.problem:
+        if self.problem:
+            self._withdraw()
+        else:
             self._value = self._typed()
             # Before `mark`: who listens to ``marked`` shows the value, and needs the new one.
             self.changed.emit(self._value)
@@ -264,11 +294,16 @@ class NumberField(TextField):
         if not self.problem:
             self._before = self._value
             return
-        typed, self._value = self._value, self._before
+        self._withdraw()
         _say_kept(self, self.problem, self._text())
-        if typed != self._value:
-            self.changed.emit(self._value)
         self.mark()
+
+    def _withdraw(self) -> None:
+        """Take back a valid beginning of a text that is not valid."""
+        if self._value != self._before:
+            self._value = self._before
+            with _taking_back(self):
+                self.changed.emit(self._value)
 
     def mark(self) -> None:
         """Mark the field as invalid, with the reason as tooltip, or as valid again."""
@@ -321,7 +356,8 @@ class NumberBox(QSpinBox):
             self._look()
 
     def event(self, event: QEvent) -> bool:
-        return _redoes(self.lineEdit(), event) or super().event(event)
+        own = _own_step(self.lineEdit(), event)
+        return super().event(event) if own is None else own
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if self.fault and event.key() == Qt.Key.Key_Escape:
@@ -349,6 +385,7 @@ class NumberBox(QSpinBox):
     def focusOutEvent(self, event: QFocusEvent) -> None:
         typed, bad = self.text(), self.fault
         super().focusOutEvent(event)
+        _forget(self.lineEdit())
         if bad:
             self.setValue(self._before)
             _say_kept(self, bad, self.text())
