@@ -22,6 +22,7 @@ from slideviz.case.lines import (
     listed,
     read_text,
     require_no_mesh,
+    require_no_su2_configuration,
     require_some_key,
 )
 from slideviz.case.model import Case, FromFile
@@ -116,6 +117,7 @@ def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]
     """
     entries, problems = entries_of(text)
     require_no_mesh(path, entries)
+    require_no_su2_configuration(path, entries)
     require_some_key(path, entries, problems, KEYS)
     rows: dict[str, Entry] = {}
     for entry in entries:

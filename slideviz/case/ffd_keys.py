@@ -115,7 +115,8 @@ def ffd_contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
     boxes, degrees = len(case.ffd_boxes), len(case.ffd_degrees)
     if boxes == degrees or not boxes:
         return []
-    said = f"FFD_DEFINITION has {boxes} and FFD_DEGREE {degrees}; give a degree for each box"
+    said = f"FFD_DEFINITION has {boxes} and FFD_DEGREE {degrees}" if degrees else ""
+    said = f"{said or 'FFD_DEGREE is missing'}; give a degree (i, j, k) for each box"
     return [(("FFD_DEFINITION", "FFD_DEGREE"), said)]
 
 

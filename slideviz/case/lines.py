@@ -96,6 +96,15 @@ def require_no_mesh(path: Path, entries: list[Entry]) -> None:
         raise CaseError(f"{path}: is an SU2 mesh, not a case file; name it in MESH_FILENAME=")
 
 
+def require_no_su2_configuration(path: Path, entries: list[Entry]) -> None:
+    """Raise CaseError where the entries of a file are those of a configuration of SU2."""
+    if any(entry.key in ("DV_KIND", "DV_PARAM", "DV_VALUE") for entry in entries):
+        raise CaseError(
+            f"{path}: is a configuration of SU2 with design variables, not a case file; deform by "
+            f"it with `slideviz def {path}`"
+        )
+
+
 def require_some_key(
     path: Path, entries: list[Entry], problems: list[Problem], known: Container[str]
 ) -> None:

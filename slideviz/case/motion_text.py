@@ -32,6 +32,7 @@ from slideviz.case.model import (
 from slideviz.case.values import Kind, axis_text, path_text, read_axis, read_vector, vector_text
 from slideviz.case.words import (
     Word,
+    counted,
     is_none,
     name_text,
     nearest,
@@ -278,7 +279,12 @@ def _read_bump(marker: Target, verb: str, rest: list[Word]) -> OnAirfoil:
     numbers = [number(word.text) for word in words[sided:]]
     before = 3 if verb == "cst" else 2
     if len(numbers) not in ((before, before + 2) if sided else (4,)):
-        raise CaseError(f"needed is {_BUMPS[verb]}")
+        given = next((word.text for word in words[:1] if word.text.lower() in SIDES), "upper")
+        hint = "; decimals are written with a point" if len(numbers) > 2 else ""
+        raise CaseError(
+            f"{counted(len(numbers), 'number')} given; needed is "
+            f"{_BUMPS[verb].replace('upper', given)}{hint}"
+        )
     low, high = (*numbers[before:], 0.0, 1.0)[:2]
     if not low < high:
         raise CaseError(f"the chord goes from x = {low:g} to {high:g}; give the lower one first")

@@ -65,6 +65,12 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
             f"{file}: is not in the working folder, but beside {arguments.case}; as SU2 does, this "
             f"takes paths from the working folder: go to {arguments.case.parent} first"
         )
+    if not file.exists() and "MESH_FILENAME" not in config.given:
+        hints = [text for text in config.case.warnings if "did you mean MESH_FILENAME?" in text]
+        raise CaseError(
+            f"{arguments.case}: MESH_FILENAME is missing, and there is no {file}, SU2's default; "
+            f"{hints[0] if hints else 'name the mesh to deform'}"
+        )
     mesh = read(file, zone=config.case.zone, file_format=config.case.mesh_format)
     return on_mesh(config, mesh), mesh
 

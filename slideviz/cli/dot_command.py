@@ -50,8 +50,8 @@ def _run_dot(arguments: argparse.Namespace) -> int:
     gradient = None if first.group == "file" else config.files["GRAD_OBJFUNC_FILENAME"]
     require_places(
         arguments,
-        OutputPath(sensitivities, "DV_SENS_FILENAME", False),
-        OutputPath(gradient, "GRAD_OBJFUNC_FILENAME", False),
+        OutputPath(sensitivities, "DV_SENS_FILENAME"),
+        OutputPath(gradient, "GRAD_OBJFUNC_FILENAME"),
         OutputPath(arguments.json, "--json"),
     )
     with Bar(not arguments.quiet, begun=arguments.begun) as bar:

@@ -89,6 +89,7 @@ def run_streamed(
 
     ``begin`` is the time of ``time.perf_counter`` when the command began.
     """
+    from slideviz.cli.places import REPLACED
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import LISTED, run_report
     from slideviz.cli.run_finished import finished, note_finished
@@ -99,6 +100,7 @@ def run_streamed(
     about = about_run(case)
     made = [path for path in (output, qualities) if path]
     if arguments.resume and (known := finished(about, made)):
+        arguments.begun(REPLACED)
         note(f"{output}: is finished, of this case, mesh and version; nothing is done")
         save_report(arguments, known[0])
         return tell_warnings(*known, quiet=arguments.quiet)

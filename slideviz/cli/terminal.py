@@ -123,19 +123,21 @@ def say(what: str, text: str) -> None:
 
 
 @contextmanager
-def holding() -> Iterator[Callable[[], None]]:
+def holding() -> Iterator[Callable[..., None]]:
     """Context in which `say` prints nothing until the function it yields is called, or it ends.
 
-    An error that ends it before is printed alone: nothing was done that the rest could concern.
+    The function leaves out texts that begin with its argument, if any. An error that ends it before
+    is printed alone: nothing was done that the rest could concern.
     """
     held: list[tuple[str, str]] = []
     token = _HELD.set(held)
 
-    def release() -> None:
+    def release(*without: str) -> None:
         if _HELD.get() is held:
             _HELD.reset(token)
-            for each in held:
-                say(*each)
+            for what, text in held:
+                if not text.startswith(without):
+                    say(what, text)
 
     try:
         yield release

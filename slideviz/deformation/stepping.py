@@ -25,7 +25,7 @@ from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import largest_misfit, misfits
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Problem, Solution, Watch
-from slideviz.rbf.refine import TRUSTED
+from slideviz.rbf.refine import NOTED, TRUSTED
 
 HALVINGS = 3
 """How often at most a step that folds a cell is halved: into eighths."""
@@ -113,7 +113,7 @@ class Stepping:
             if solution.short and solution.max_error > worst:
                 remarks, worst = [_short_warning(setup, solution, index)], solution.max_error
             elif not remarks:
-                remarks = _dropped_warning(setup, solution, index, mesh)
+                remarks = _dropped_warning(setup, solution, index, total, mesh)
             warnings += [f"step {index}: {text}" for text in solution.warnings]
             stray = []
             if self.rate is None and self.case.method == "rbf":
@@ -333,7 +333,7 @@ def _doubt_warning(doubt: float, refined: float, index: int, condition: float) -
             f"wrong by {wrong_by(doubt, bounded=refined > 0.0)}; use DATA_REDUCTION= YES, a less "
             "smooth RBF_KERNEL such as wendland-c0, or a smaller INFLUENCE_FACTOR"
         )
-        return [sentence]
+        return [sentence if doubt > NOTED else Note(sentence)]
     if refined:
         return [
             Note(
@@ -345,16 +345,19 @@ def _doubt_warning(doubt: float, refined: float, index: int, condition: float) -
     return []
 
 
-def _dropped_warning(setup: Setup, solution: Solution, index: int, mesh: Mesh) -> list[str]:
+def _dropped_warning(
+    setup: Setup, solution: Solution, index: int, total: int, mesh: Mesh
+) -> list[str]:
     """Return the warning that the system is singular, or the pivot guard left out nodes; or [].
 
     Only a note where the misfit at these nodes is negligible.
     """
     if not len(solution.dropped):
         return []
+    since = f"from step {index} on, " if total > 1 else ""
     if KERNELS[setup.basis.kernel].polynomial:
         sentence = (
-            f"from step {index} on, the system is singular for RBF_KERNEL= {setup.basis.kernel}, "
+            f"{since}the system is singular for RBF_KERNEL= {setup.basis.kernel}, "
             f"and its {solution.control_nodes} control nodes are met by least squares, to "
             f"{solution.dropped_error:.2g}; they still get exactly their displacement, and the "
             "cells beside them take that up; use RBF_KERNEL= wendland-c2"
@@ -362,10 +365,15 @@ def _dropped_warning(setup: Setup, solution: Solution, index: int, mesh: Mesh) -
         return [sentence]
     node = int(solution.dropped[0])
     where = ", ".join(f"{v:.6g}" for v in mesh.points[node])
+    which = f"node {mesh.number(node)} at {where}"
+    if len(solution.dropped) == 1:
+        said = f"boundary {which} nearly coincides with another and is no control node; it still "
+        said += "gets exactly its displacement"
+    else:
+        said = f"{len(solution.dropped)} boundary nodes that nearly coincide with others (first: "
+        said += f"{which}) are no control nodes; they still get exactly their displacement"
     sentence = (
-        f"from step {index} on, {len(solution.dropped)} boundary nodes that nearly coincide with "
-        f"others (first: node {mesh.number(node)} at {where}) are no control nodes; they still get "
-        f"exactly their displacement, from which the interpolation is off by "
+        f"{since}{said}, from which the interpolation is off by "
         f"{solution.dropped_error:.2g} at most, and the cells beside them take that up"
     )
     harmless = solution.dropped_error <= AGREE * mesh.extent

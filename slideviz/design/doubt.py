@@ -13,7 +13,7 @@ from slideviz.design.frozen.solve import REMEDY
 from slideviz.design.frozen.step import FrozenStep
 from slideviz.errors import ConditionWarning, Note, ToleranceWarning
 from slideviz.mesh.model import FloatArray
-from slideviz.rbf.refine import TRUSTED
+from slideviz.rbf.refine import NOTED, TRUSTED
 
 BADLY_CONDITIONED = 1e14
 """Above this condition number, the effect of moving a single node has few correct digits."""
@@ -50,13 +50,13 @@ def warn_of_condition(steps: Sequence[FrozenStep]) -> None:
         amount = "may have few correct digits"
     else:
         return
-    warnings.warn(
+    said = (
         f"the condition number of the system is {worst:.0e}, so that derivatives by single "
         "nodes, and displacements between the boundary nodes where neighbours move very "
-        f"differently, {amount}; {REMEDY}",
-        ConditionWarning,
-        stacklevel=3,
+        f"differently, {amount}; {REMEDY}"
     )
+    little = TRUSTED < doubt <= NOTED
+    warnings.warn(Note(said) if little else said, ConditionWarning, stacklevel=3)
 
 
 def warn_of_doubt(steps: Sequence[FrozenStep], doubt: FloatArray) -> bool:
@@ -65,13 +65,12 @@ def warn_of_doubt(steps: Sequence[FrozenStep], doubt: FloatArray) -> bool:
     if worst <= TRUSTED:
         return False
     of = "" if doubt.ndim == 0 else f" of {counted(int((doubt > TRUSTED).sum()), 'design')}"
-    warnings.warn(
+    said = (
         f"the condition number of the system is {largest_condition(steps):.0e}: derivatives may "
         f"have few correct digits, and displacements{of} between the boundary nodes may be wrong "
-        f"by {wrong_by(worst, bounded=all(step.refined for step in steps))}; {REMEDY}",
-        ConditionWarning,
-        stacklevel=3,
+        f"by {wrong_by(worst, bounded=all(step.refined for step in steps))}; {REMEDY}"
     )
+    warnings.warn(said if worst > NOTED else Note(said), ConditionWarning, stacklevel=3)
     return True
 
 

@@ -30,6 +30,9 @@ TRUSTED = 1e-5
 """Largest error of a field between control nodes, as a part of the largest displacement. Above it
 the solution is refined, and where refinement does not help the user is warned."""
 
+NOTED = 1e-3
+"""Up to this part the warning is a note."""
+
 SETTLED, VERIFIED = 1e-4 * TRUSTED, 1e-3 * TRUSTED
 """Conjugate gradients end when a step changes the field by less than the first part of the largest
 displacement; refinement ends when the field's error is below the second."""

@@ -144,6 +144,10 @@ def test_examples_of_the_reference_are_read():
         ("(B, ffd, BOX, 1, -2, 0, 4, 5, 6)", r"point \(1, -2, 0\) is none; needed are whole"),
         ("(B, ffd, BOX, 1, 0.5, 0, 4, 5, 6)", r"point \(1, 0.5, 0\) is none; needed are whole"),
         ("(B, hicks-henne, upper, 0.5)", "needed is hicks-henne, upper, peak, height, or besides"),
+        (
+            "(B, hicks-henne, lower, 0.3, 0,01)",
+            "3 numbers given; needed is hicks-henne, lower, peak, .*; decimals are written with a",
+        ),
         ("(B, hicks-henne, 0.5, 0.1, 0.2)", "'0.5' is not one of upper | lower"),
         ("(B, hicks-henne, uper, 0.5, 0.1)", "'uper' is not one of .*; did you mean upper?"),
         ("(B, hicks-henne, upper, 1.5, 0.1)", "the peak is at x = 1.5; it must lie between 0 and"),

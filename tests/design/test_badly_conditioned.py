@@ -6,6 +6,8 @@ import lzma
 import re
 import warnings
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +15,8 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Scale, Translate
 from slideviz.case.reduction import Reduction
+from slideviz.deformation.stepping import _doubt_warning, _dropped_warning
+from slideviz.design.doubt import warn_of_condition, warn_of_doubt
 from slideviz.design.frozen.solve import whole
 from slideviz.errors import ConditionWarning, DeformError, Note, ToleranceWarning
 from slideviz.samples.table import sample
@@ -73,11 +77,11 @@ def test_a_run_says_where_it_cannot_be_trusted():
     moved = last.mesh.points[None]
     (off,) = errors(mesh, case, deformer.nodes, deformer.displacement[None], moved)
     (said,) = [text for text in last.warnings if "nearly singular" in text]
-    assert not isinstance(said, Note)
     assert "may be wrong by" in said
     assert "a less smooth RBF_KERNEL" in said
     percent = float(said.split("may be wrong by up to ")[1].split(" %")[0])
     assert 1e-6 < off < 0.01 * percent
+    assert isinstance(said, Note) == (percent <= 0.1)
     rough = sv.deform(case.change(kernel="wendland-c0"), mesh)
     assert not any("singular" in text for text in [*rough][-1].warnings)
 
@@ -90,6 +94,27 @@ def test_kernels_that_cannot_be_refined_are_measured_too(kernel):
     told = [text for text in last.warnings if "may be wrong by" in text]
     assert bool(told) == (kernel == "gaussian")
     assert all("or more, how much is not known; use" in text for text in told)
+
+
+@pytest.mark.parametrize(("doubt", "little"), [(5e-4, True), (2e-3, False)])
+def test_a_small_error_is_a_note(doubt, little):
+    step: Any = SimpleNamespace(condition=1e12, refined=0.0, doubt=doubt)
+    with pytest.warns(ConditionWarning) as told:
+        warn_of_condition([step])
+    with pytest.warns(ConditionWarning) as more:
+        warn_of_doubt([step], np.array(doubt))
+    said = [each.message.args[0] for each in (*told, *more)] + _doubt_warning(doubt, 0.0, 1, 1e12)
+    assert [isinstance(each, Note) for each in said] == [little] * 3
+
+
+@pytest.mark.parametrize(("count", "total"), [(1, 1), (2, 1), (1, 2)])
+def test_nodes_without_control_are_counted(count, total):
+    solution: Any = SimpleNamespace(dropped=np.arange(count), dropped_error=1.0)
+    setup: Any = SimpleNamespace(basis=SimpleNamespace(kernel="wendland-c2"))
+    (said,) = _dropped_warning(setup, solution, 1, total, thin())
+    assert said.startswith("from step 1 on, ") == (total > 1)
+    assert ("boundary node 0 at" in said) == (count == 1)
+    assert ("2 boundary nodes that nearly coincide with others (first: " in said) == (count == 2)
 
 
 @pytest.mark.parametrize("at_rest", [False, True], ids=["motion", "rest"])

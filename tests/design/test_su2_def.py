@@ -150,11 +150,57 @@ def test_parameters_and_values_are_read_as_su2_reads_them(here):
     np.testing.assert_allclose(found.displacement, [[0.1, 0.2]] * 7, atol=1e-16)
     said = "DV_VALUE has 3 values for 2 variables: as in SU2, the last ones mean nothing"
     assert said in found.case().warnings
+    for more in ("0.1, 0.2, 7, 8", "1, -1, 2, -2", "0, 0, 0, 0"):  # no decimals with a comma
+        assert surface(f"{text} {more}\n").case().warnings
     boxed = (
         f"{BOXED}DV_KIND= FFD_CONTROL_POINT_2D, FFD_CONTROL_POINT_2D\nOPT_RELAX_FACTOR= 3\n"
         "DV_PARAM= (BOX, -1, -1, 0, 0); (BOX, 1, 0, 0, 0)\nDV_VALUE= 0.2, 0.1, 0.0, 0.0\n"
     )
     np.testing.assert_allclose(surface(boxed).displacement, [[0.2, 0.1]] * 7, atol=1e-15)
+
+
+@pytest.mark.parametrize("params", ["(2, 0.5)", "(0.4, 0.5)", "(-1, 0.5)"])
+def test_a_side_that_is_neither_upper_nor_lower_is_warned_of(params, here):
+    text = f"DV_KIND= HICKS_HENNE\nDV_VALUE= 1\nDV_PARAM= {params}"
+    (said,) = config(text).case.warnings
+    assert said.startswith("DV_PARAM: variable 1 (HICKS_HENNE): side ")
+    assert said.endswith(" is neither 0 (lower) nor 1 (upper): as in SU2, the upper side")
+    assert not config(text.replace(params, "(0, 0.5)")).case.warnings
+
+
+def test_a_missing_mesh_that_is_not_named_is_told(here, capsys):
+    Path("mesh.su2").unlink()
+    for line, hint in (
+        ("", "name the mesh"),
+        ("MESH_FILENAM= a.su2\n", "a.cfg:2: MESH_FILENAM is"),
+    ):
+        Path("a.cfg").write_text(f"DV_KIND= SCALE\n{line}DV_VALUE= 1\nDV_MARKER= (low)\n")
+        assert run(["def", "a.cfg", "-q"]) == 1
+        said = "a.cfg: MESH_FILENAME is missing, and there is no mesh.su2, SU2's default; " + hint
+        assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["run", "film", "sweep"])
+def test_other_commands_say_that_a_file_is_a_configuration_of_su2(command, here, capsys):
+    Path("a.cfg").write_text("SOLVER= RANS\nDV_KIND= SCALE\nDV_VALUE= 1\nDV_MARKER= (low)\n")
+    Path("t.csv").write_text("STEPS\n1\n")
+    more = {"run": [], "film": ["-o", "a.gif"], "sweep": ["t.csv", "-o", "runs"]}[command]
+    assert run([command, "a.cfg", *more]) == 1
+    (said,) = capsys.readouterr().err.splitlines()
+    assert said.endswith("deform by it with `slideviz def a.cfg`")
+
+
+@pytest.mark.parametrize("degree", ["", "FFD_DEGREE= (3, 1, 0)\n"])
+def test_boxes_that_move_nothing_are_not_set(degree, here, capsys):
+    Path("out.su2").write_text("good")
+    boxes = BOXED.replace("FFD_DEGREE= (3, 1, 0)\n", degree)
+    boxes = boxes if not degree else boxes.replace("-0.1, 0", "0.1, 0")
+    Path("a.cfg").write_text(f"{FILES}{boxes}DV_KIND= FFD_SETTING\n")
+    assert run(["def", "a.cfg", "-q"]) == 1
+    said = "no node of low is in the FFD box 'BOX'; correct the box or DV_MARKER"
+    said = said if degree else "FFD_DEGREE is missing; give a degree (i, j, k) for each box"
+    assert capsys.readouterr().err == f"slideviz: a.cfg: {said}\n"
+    assert Path("out.su2").read_text() == "good"
 
 
 def test_rotation_in_3d_turns_about_its_line(here):
@@ -462,7 +508,15 @@ def test_roles_follow_from_the_lists_of_su2_and_of_ours(here):
         ("DV_KIND= SCALE", "DV_VALUE is missing: a value for each variable"),
         ("DV_KIND= SCALE, SCALE\nDV_VALUE= 1", "DV_VALUE has 1 value for 2 variables"),
         ("DV_KIND= SCALE\nDV_VALUE= x", "DV_VALUE: 'x' is not a number"),
-        ("DV_KIND= TRANSLATION\nDV_VALUE= 1", "DV_PARAM is missing"),
+        (
+            "DV_KIND= SCALE, SCALE\nDV_VALUE= 0,01, -0,02",
+            "a.cfg:6: DV_VALUE has 4 values for 2 variables; decimals are written with a point",
+        ),
+        ("DV_KIND= SCALE\nDV_VALUES= 1", "a value for .*; did you mean it by DV_VALUES in line 6"),
+        (
+            "DV_KIND= TRANSLATION, SCALE\nDV_VALUE= 1\nDV_PARAMS= (1, 0, 0) ; (1.0)",
+            r"DV_PARAM is missing: TRANSLATION needs \(x, y, z\), SCALE .* by DV_PARAMS in line 7",
+        ),
         (
             "DV_KIND= TRANSLATION\nDV_VALUE= 1\nDV_PARAM= (1, 0)",
             r"a.cfg:7: DV_PARAM: variable 1: 2 numbers are given; TRANSLATION needs \(x, y, z\)",

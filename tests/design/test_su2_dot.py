@@ -260,7 +260,19 @@ def test_several_objectives_and_names_of_files(case):
         ),
         (
             lambda p, w: Path("adj_cd.csv").write_text('"x", "Sensitivity_x"\n0, a\n1, 2\n'),
-            "has a row that is not all numbers",
+            "adj_cd.csv:2: needed is a number for each of the 2 columns, separated by commas; dec",
+        ),
+        (
+            lambda p, w: Path("adj_cd.csv").write_text('"x", "Sensitivity_x"\n1, 2\n0,5, 2\n'),
+            "adj_cd.csv:3: needed is a number for each of the 2 columns, separated by commas; dec",
+        ),
+        (
+            lambda p, w: Path("adj_cd.csv").write_text('"x", "Sensitivity_x"\n1,5, 2,5\n'),
+            "adj_cd.csv:2: needed is a number for each of the 2 columns, separated by commas; dec",
+        ),
+        (
+            lambda p, w: write_csv("adj_cd.csv", p[on := square(8).marker("BLOCK").nodes], w[on]),
+            "points, as many as move of mesh.su2; sensitivities at moving nodes only are read with",
         ),
         (
             lambda p, w: Path("adj_cd.dat").write_bytes(
@@ -311,6 +323,15 @@ def test_wrong_unordered_files_are_told(case, capsys):
     Path("unordered_sensitivity.dat").write_text("\n".join(rows[:-2]))
     assert run(["dot", "dot.cfg", "-q"]) == 0
     assert "2 points of the mesh are not in it; taken as 0" in capsys.readouterr().err
+    nodes = square(8).marker("BLOCK").nodes
+    for kept, of in ((nodes, ""), (nodes[3:], f", 3 of the {len(nodes)} moving nodes among them")):
+        Path("unordered_sensitivity.dat").write_text("\n".join(rows[k] for k in kept))
+        assert run(["dot", "dot.cfg"]) == 0
+        said = f"{'warning' if of else 'note'}: unordered_sensitivity.dat: {80 - len(kept)} points"
+        said = f"{said} of the mesh are not in it{of}; taken as 0"
+        found = capsys.readouterr().err
+        assert said in found
+        assert "there already" not in found
 
 
 def test_held_variables_have_no_gradient(case, capsys):

@@ -147,7 +147,11 @@ def test_mesh_without_boxes_and_wrong_definitions_are_told():
     flat = case(motion, ffd_boxes=(("BOX", (0.0,) * 24),), ffd_degrees=((3, 1, 0),))
     assert "box 'BOX': the corners enclose no volume" in check_case(flat, square())[0]
     fewer = case(motion, ffd_boxes=(("BOX", NUMBERS),))
-    assert "FFD_DEFINITION has 1 and FFD_DEGREE 0" in check_case(fewer, square())[0]
+    assert (
+        "FFD_DEGREE is missing; give a degree (i, j, k) for each" in check_case(fewer, square())[0]
+    )
+    more = case(motion, ffd_boxes=(("BOX", NUMBERS),), ffd_degrees=((3, 1, 0),) * 2)
+    assert "FFD_DEFINITION has 1 and FFD_DEGREE 2; give a" in check_case(more, square())[0]
 
 
 def test_case_file_with_boxes_as_su2_writes_them(tmp_path):

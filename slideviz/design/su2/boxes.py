@@ -197,9 +197,9 @@ def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
     Raises
     ------
     CaseError
-        The configuration defines no box, or a box is not possible.
+        The configuration defines no box, a box is not possible, or no node is in any.
     """
-    contradictions = (text for _, text in ffd_contradictions(config.case))
+    contradictions = (f"{config.source}: {text}" for _, text in ffd_contradictions(config.case))
     raise_all((*problems_of_markers(config, mesh), *contradictions))
     boxes = []
     for box in defined_boxes(config.case, mesh).values():
@@ -208,6 +208,11 @@ def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
         boxes.append(replace(box, embedded=listed))
     if not boxes:
         raise CaseError(f"{config.source}: FFD_SETTING needs FFD_DEFINITION, which has no box")
+    if not any(box.embedded for box in boxes):
+        raise CaseError(
+            f"{config.source}: no node of {', '.join(config.markers)} is in the FFD box "
+            f"{', '.join(repr(box.name) for box in boxes)}; correct the box or DV_MARKER"
+        )
     return with_boxes(mesh, boxes, anew=True), tuple(boxes)
 
 

@@ -17,7 +17,7 @@ from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, r
 from slideviz.case.model import Case
 from slideviz.case.words import list_of, nearest, not_one_of, number, shown
 from slideviz.design.su2.radial import FUNCTION, READ_WITH_RBF, radial_keys, radial_settings
-from slideviz.design.su2.variables import DesignVariable, read_variables, supported
+from slideviz.design.su2.variables import DesignVariable, misspelt, read_variables, supported
 from slideviz.errors import CaseError
 from slideviz.terms import FILE_FORMATS, ROLES, Role
 
@@ -113,6 +113,8 @@ class Su2Config:
         The keys that are not read.
     named : dict of str to str
         For each marker with a role, the key that lists it.
+    given : frozenset of str
+        The keys that it has.
     """
 
     case: Case
@@ -122,6 +124,7 @@ class Su2Config:
     words: dict[str, str]
     ignored: tuple[str, ...]
     named: dict[str, str]
+    given: frozenset[str]
 
     @property
     def source(self) -> Path:
@@ -197,7 +200,8 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
         mesh_out=_with_ending(files["MESH_OUT_FILENAME"], case),
         warnings=(*warnings, *notes, *_perhaps_ours(path, ignored, rows)),
     )
-    return Su2Config(case, markers, variables, files, words, ignored, reader.named)
+    given = frozenset(rows)
+    return Su2Config(case, markers, variables, files, words, ignored, reader.named, given)
 
 
 def _perhaps_ours(path: Path, ignored: tuple[str, ...], rows: dict[str, Entry]) -> list[str]:
@@ -353,7 +357,7 @@ class _Reader:
             said = (
                 f"DV_KIND is missing: which design variables there are ({', '.join(supported())})"
             )
-            close = nearest("DV_KIND", self.rows)
+            close = misspelt("DV_KIND", self.rows)
             self.problems.append(
                 (max((e.line for e in self.rows.values()), default=1), said + close)
             )

@@ -104,10 +104,10 @@ def find_gradients(
     The warnings of the `Deformer` are among the warnings of the result.
     """
     mesh = surface.mesh
-    found = read_sensitivities(surface.config, mesh)
+    found = read_sensitivities(surface.config, mesh, surface.nodes)
     displacement = surface.displacement
     if surface.whole:
-        matched = match(found, mesh, lambda: surface.moved().points)
+        matched = match(found, mesh, surface.nodes, lambda: surface.moved().points)
         moved = displacement if matched.at_design else np.zeros_like(displacement)
         told = (*surface.case().warnings, *matched.warnings)
         return _gradients(surface, found, matched, matched.values, moved, told)
@@ -126,7 +126,7 @@ def find_gradients(
 
     said: list[str] = []
     with _heard(said):
-        matched = match(found, mesh, design if moves else None)
+        matched = match(found, mesh, surface.nodes, design if moves else None)
         if moves and not matched.at_design:
             displacement = np.zeros_like(displacement)
             prepared.clear()
@@ -177,7 +177,8 @@ def _heard(said: list[str]) -> Iterator[None]:
         yield
     for one in caught:
         if one.category is ConditionWarning:
-            said.append(str(one.message))
+            assert isinstance(one.message, Warning)
+            said.append(one.message.args[0])  # a `Note`, where little
         elif one.category is ToleranceWarning:  # its remedy is one for Python
             said.append(str(one.message).partition("; ")[0] + INSUFFICIENT)
         else:

@@ -64,10 +64,15 @@ def _csv(path: Path) -> tuple[list[str], FloatArray]:
         raise CaseError(f"{path}: has no row of numbers; needed is one for each point")
     try:
         table = np.loadtxt(lines, delimiter=",", ndmin=2, comments=None)
-    except ValueError as problem:
-        raise CaseError(f"{path}: has a row that is not all numbers: {problem}") from problem
+    except ValueError:
+        table = np.empty((0, 0))
     if table.shape[1:] != (len(names),):
-        raise CaseError(f"{path}: has {len(names)} names of columns, but rows of another length")
+        rows = enumerate((line.split(",") for line in lines), start=2)
+        line = next(k for k, row in rows if len(row) != len(names) or not all(map(is_number, row)))
+        raise CaseError(
+            f"{path}:{line}: needed is a number for each of the {len(names)} columns, separated by "
+            "commas; decimals are written with a point"
+        )
     return names, table
 
 

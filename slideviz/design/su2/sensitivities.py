@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 from slideviz.case.lines import read_text
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.restart import is_number, read_restart
-from slideviz.errors import CaseError
-from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
+from slideviz.errors import CaseError, Note
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 
 SUFFIXES = {
     "DRAG": "cd",
@@ -109,8 +109,8 @@ class Matched:
     warnings: tuple[str, ...] = ()
 
 
-def read_sensitivities(config: Su2Config, mesh: Mesh) -> Sensitivities:
-    """Read the sensitivities that a configuration names.
+def read_sensitivities(config: Su2Config, mesh: Mesh, moving: IntArray) -> Sensitivities:
+    """Read the sensitivities that a configuration names; ``moving`` (m,) are the moving nodes.
 
     Raises
     ------
@@ -121,6 +121,11 @@ def read_sensitivities(config: Su2Config, mesh: Mesh) -> Sensitivities:
     if _is_unordered(config):
         return _unordered(path, mesh)
     names, table = read_restart(path)
+    if len(table) != len(mesh.points) and len(table) == len(moving):
+        raise CaseError(
+            f"{path}: has {len(table)} points, as many as move of {mesh.name}; sensitivities at "
+            "moving nodes only are read with DV_SENSITIVITY_FORMAT= UNORDERED_ASCII"
+        )
     return _ordered(path, names, table, mesh)
 
 
@@ -160,12 +165,18 @@ def sensitivity_file(config: Su2Config) -> Path:
     )
 
 
-def match(found: Sensitivities, mesh: Mesh, design: Callable[[], FloatArray] | None) -> Matched:
+def match(
+    found: Sensitivities,
+    mesh: Mesh,
+    moving: IntArray,
+    design: Callable[[], FloatArray] | None,
+) -> Matched:
     """Return sensitivities in the order of the mesh's points, and whether they are at the design.
 
     An adjoint solution belongs to the mesh that it was computed on: that of this design, whose
     points (n, d) ``design`` returns (None: it moves nothing), or MESH_FILENAME itself where that
-    is deformed already, as in SU2's own loop. The points in the file decide.
+    is deformed already, as in SU2's own loop. The points in the file decide. ``moving`` (m,) are
+    the nodes of the boundaries that move; a file may have these only.
 
     Raises
     ------
@@ -201,7 +212,10 @@ def match(found: Sensitivities, mesh: Mesh, design: Callable[[], FloatArray] | N
     values[rows] = found.values
     missing = len(mesh.points) - len(index)
     if missing:
-        notes.append(f"{found.path}: {missing} points of the mesh are not in it; taken as 0")
+        lost = len(np.setdiff1d(moving, index))
+        of = f", {lost} of the {len(moving)} moving nodes among them" if lost else ""
+        said = f"{found.path}: {missing} points of the mesh are not in it{of}; taken as 0"
+        notes.append(Note(said) if np.array_equal(index, moving) else said)
     return Matched(values, at_design, tuple(notes))
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from typing import Literal
 
 from slideviz.case.lines import Entry, Problem
@@ -17,7 +18,8 @@ from slideviz.errors import CaseError, Note
 Group = Literal["nothing", "boxes", "ffd", "file", "grid", "surface", "naca", "parabolic"]
 """What SU2 does with a list of variables; the first kind decides it for all of them."""
 
-NOT_YET = "is not supported"
+ALIKE = 0.7
+"""Similarity (``difflib``, 0 to 1) from which a key may be one that is missing, misspelt."""
 
 
 @dataclass(frozen=True)
@@ -162,11 +164,21 @@ def read_variables(
             found.append(_variable(kind, group))
         except CaseError as problem:
             problems.append((rows["DV_PARAM"].line, f"DV_PARAM: variable {place}: {problem}"))
+            continue
+        if (side := found[-1].parameter("side")) not in (0.0, 1.0):
+            said = f"side {side:g} is neither 0 (lower) nor 1 (upper): as in SU2, the upper side"
+            warnings.append(f"DV_PARAM: variable {place} ({kind}): {said}")
     if len(found) < len(groups):
         return ()
     found = _with_values(rows, found, problems, warnings)
     problems += [(row.line, f"DV_KIND: {sentence}") for sentence in _contradictions(found)]
     return _dispatched(found, warnings)
+
+
+def misspelt(key: str, rows: Mapping[str, Entry]) -> str:
+    """Return where a key that is missing may stand misspelt; empty if no key resembles it."""
+    close = get_close_matches(key, rows, n=1, cutoff=ALIKE)
+    return f"; did you mean it by {close[0]} in line {rows[close[0]].line}?" if close else ""
 
 
 def _strange(kinds: list[str]) -> list[str]:
@@ -190,7 +202,9 @@ def _groups(
     entry = rows.get("DV_PARAM")
     if entry is None:
         if any(KINDS[kind].form for kind in kinds):
-            problems.append((rows["DV_KIND"].line, "DV_PARAM is missing: ( ... ) ; ( ... )"))
+            needed = ", ".join(f"{kind} needs {form(kind)}" for kind in dict.fromkeys(kinds))
+            said = f"DV_PARAM is missing: {needed}{misspelt('DV_PARAM', rows)}"
+            problems.append((rows["DV_KIND"].line, said))
             return []
         return [[] for _ in kinds]
     try:
@@ -206,11 +220,11 @@ def _groups(
         return []
     if len(groups) < len(kinds):
         warnings.append(f"DV_PARAM has {said}: as in SU2, the last ones of DV_KIND do nothing")
-    last, needed = groups[-1], len(KINDS[kinds[len(groups) - 1]].parameters)
-    if needed and len(last) > needed:
-        extra = ", ".join(word.text for word in last[needed:])
+    last, most = groups[-1], len(KINDS[kinds[len(groups) - 1]].parameters)
+    if most and len(last) > most:
+        extra = ", ".join(word.text for word in last[most:])
         warnings.append(Note(f"DV_PARAM: {extra} after the last variable is passed over"))
-        groups[-1] = last[:needed]
+        groups[-1] = last[:most]
     return groups
 
 
@@ -246,11 +260,12 @@ def _with_values(
     needless = not variables or variables[0].group in WITHOUT_VALUE
     if entry is None:
         if not needless:
-            said = "DV_VALUE is missing: a value for each variable"
+            said = f"DV_VALUE is missing: a value for each variable{misspelt('DV_VALUE', rows)}"
             problems.append((rows["DV_KIND"].line, said))
         return variables
     try:
-        values = [number(word.text) for word in list_of(entry.value)]
+        words = [word.text for word in list_of(entry.value)]
+        values = [number(word) for word in words]
     except CaseError as problem:
         problems.append((entry.line, f"DV_VALUE: {problem}"))
         return variables
@@ -260,7 +275,11 @@ def _with_values(
         said += f", which need {needed}"
     if len(values) < needed and not needless:
         problems.append((entry.line, f"DV_VALUE has {said}; give one each"))
-    if len(values) > needed:
+    whole = (*(word.lstrip("+-") for word in words[::2]), *words[1::2])  # as in 0,01 -0,02
+    comma = len(values) == 2 * needed and any(values) and all(map(str.isdecimal, whole))
+    if comma and not needless:
+        problems.append((entry.line, f"DV_VALUE has {said}; decimals are written with a point"))
+    elif len(values) > needed:
         warnings.append(f"DV_VALUE has {said}: as in SU2, the last ones mean nothing")
     left = iter(values + [0.0] * needed)
     return [replace(each, values=tuple(next(left) for _ in each.values)) for each in variables]
