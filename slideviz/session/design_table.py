@@ -46,22 +46,25 @@ class DesignTable:
     results: Mapping[int, DesignRow] = field(default_factory=lambda: MappingProxyType({}))
 
     def crossed(self, column: str, values: Iterable[str]) -> DesignTable:
-        """Return the table with each design once for each of ``values`` in a column.
+        """Return the table with each design once for each of ``values`` in a column, and no result.
 
-        A column of that name is replaced; there are no results.
+        Where there is a column of that name, its designs stay, and those that are new follow.
 
         Raises
         ------
         CaseError
             There would be too many designs.
         """
-        at = [k for k, name in enumerate(self.columns) if name != column]
-        rest = list(dict.fromkeys(tuple(row[k] for k in at) for row in self.rows)) or [()]
+        there = column in self.columns
+        columns = self.columns if there else (*self.columns, column)
+        at = columns.index(column)
+        rest = dict.fromkeys((row[:at], row[at + 1 :]) for row in self.rows) or [((), ())]
         given = list(values)
-        if len(rest) * len(given) > MOST:
-            raise CaseError(f"{len(rest) * len(given):,} designs are too many; {MOST:,} are not")
-        rows = tuple((*row, value) for row in rest for value in given)
-        return DesignTable((*(self.columns[k] for k in at), column), rows)
+        count = len(rest) * len(given) + there * len(self.rows)
+        if count > MOST:
+            raise CaseError(f"{count:,} designs are too many; {MOST:,} are not")
+        rows = [(*left, value, *right) for left, right in rest for value in given]
+        return DesignTable(columns, tuple(dict.fromkeys((*self.rows, *rows)) if there else rows))
 
     def with_cell(self, row: int, column: int, text: str) -> DesignTable:
         """Return the table with another value in a cell, and without the result of that design."""

@@ -361,12 +361,8 @@ def test_results_are_not_lost_without_a_question(
     answers("ask_table", file)
     asked = answers("ask_unsaved", "cancel")
     QTest.mouseClick(panel.load, LEFT)
-    assert asked == [
-        (
-            "Save the table of designs first?\nWhat comes now takes away the result of a design.",
-            ["table"],
-        )
-    ]
+    lost = "What comes now takes away the result of a design. Ctrl+Z brings that back."
+    assert asked == [(f"Save the table of designs first?\n{lost}", ["table"])]
     assert panel.table.rows == (("1",), ("2",))
     answers("ask_unsaved", "discard")
     QTest.mouseClick(panel.load, LEFT)
@@ -384,6 +380,15 @@ def test_results_are_not_lost_without_a_question(
     assert window.close()
     assert not panel.unsaved
     assert (tmp_path / "out.csv").read_text().count("\n") == 3
+
+
+def test_more_values_of_a_number_come_below_and_results_stay(passage, qtbot, in_a_thread):
+    fill(passage, "STEPS", "1, 2")
+    run(passage, qtbot)
+    fill(passage, "STEPS", "2, 3")  # without a question
+    assert passage.table.rows == (("1",), ("2",), ("3",))
+    assert set(passage.table.results) == {1, 2}
+    assert passage.run.text() == "Run 1 design"
 
 
 def test_results_can_be_saved_before_a_number_is_added_or_all_is_run_again(

@@ -52,9 +52,10 @@ def test_numbers_are_combined(monkeypatch):
     table = DesignTable().crossed("a", ["1", "2"]).crossed("b", ["x", "y"])
     assert table.columns == ("a", "b")
     assert table.rows == (("1", "x"), ("1", "y"), ("2", "x"), ("2", "y"))
-    # The same number again: its new values, in place of the old ones.
-    again = table.crossed("a", ["7"])
-    assert (again.columns, again.rows) == (("b", "a"), (("x", "7"), ("y", "7")))
+    # The same number again: the designs stay, and those that are new follow.
+    again = table.crossed("a", ["2", "7"])
+    assert again.columns == table.columns
+    assert again.rows == (*table.rows, ("7", "x"), ("7", "y"))
     monkeypatch.setattr(design_table, "MOST", 7)
     with pytest.raises(CaseError, match="8 designs are too many"):
         table.crossed("c", ["1", "2"])

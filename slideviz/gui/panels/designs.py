@@ -241,15 +241,18 @@ class DesignsPanel(Panel):
     def _replacing(self, table: DesignTable) -> DesignTable:
         """Return another table, with the results it shares; this one if the user cancels."""
         table = table.keeping(self.table)
-        return table if self._may_become(table) else self.table
+        return table if self._may_become(table, " Ctrl+Z brings that back.") else self.table
 
-    def _may_become(self, table: DesignTable) -> bool:
-        """Return whether a table may replace this one; asks to save results that would be lost."""
+    def _may_become(self, table: DesignTable, more: str = "") -> bool:
+        """Return whether a table may replace this one; asks to save results that would be lost.
+
+        ``more`` is the end of the question.
+        """
         lost = self.table.count_done() - table.count_done()
         if lost <= 0 or self.table is self.written:
             return True
         what = f"the results of {lost:,} designs" if lost > 1 else "the result of a design"
-        text = f"Save the table of designs first?\nWhat comes now takes away {what}."
+        text = f"Save the table of designs first?\nWhat comes now takes away {what}.{more}"
         answer = questions.ask_unsaved(self, text, ["table"])
         return self.save_table() if answer == "table" else answer == "discard"
 

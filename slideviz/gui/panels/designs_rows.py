@@ -21,8 +21,9 @@ from slideviz.session.design_table import DesignTable, column_choices
 
 ABOUT = (
     "Each row is a design: a run with other numbers of the motions, or other settings. Choose a "
-    "number, give its values, and add them; another number is combined with all that there are. "
-    "A click on a design that was run, here or in the plot, shows its mesh."
+    "number, give its values, and add them; another number is combined with all that there are, "
+    "and more values of the same come below. A click on a design that was run, here or in the "
+    "plot, shows its mesh."
 )
 RANGE = "-8 to 0 in 9, or 1, 2, 5"
 """Placeholder of the field for values."""
@@ -47,7 +48,12 @@ class DesignRows(QWidget):
         self.values.setToolTip("A range, as -8 to 0 in 9, or values with commas between them.")
         self.column.chosen.connect(lambda _: self.values.clear())
         self.values.returnPressed.connect(add)
-        self.add = push_button("Add", "Give each design there is each of these values.", add)
+        self.add = push_button(
+            "Add",
+            "Give each design there is each of these values; of a number that varies already, "
+            "designs with the new values come below.",
+            add,
+        )
         self.add.setMaximumWidth(64)
         self.model = DesignsModel()
         self.view = self._make_view()
