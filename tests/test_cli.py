@@ -192,6 +192,16 @@ def test_a_folder_that_is_missing_is_told_before_the_mesh_is_read(
     assert not (square / "a.png").exists()
 
 
+def test_the_summary_says_that_nothing_slides_where_all_is_fixed(square, capsys):
+    case = square / "square.cfg"
+    lines = [line for line in case.read_text().splitlines() if "MARKER_SLIDING" not in line]
+    lines = [line for line in lines if "PERIODIC" not in line]
+    assert any(line.startswith("SLIDING_MODE= ps") for line in lines)
+    case.write_text("\n".join([*lines, "PERIODIC_MODE= none"]))
+    run(["run", str(case), "-o", str(square / "a.su2"), "--steps", "1"])
+    assert ": 1 step, sliding none, periodic none" in capsys.readouterr().out
+
+
 def test_one_step_is_one_step(square, capsys):
     argv = ["run", str(square / "square.cfg"), "-o", str(square / "a.su2"), "--steps"]
     run([*argv, "1"])

@@ -109,7 +109,9 @@ def _print_run(
     auto = " (AUTO)" if report["tried"] else ""
     print(f"{report['case']}: {counted(report['steps'], 'step')}{auto}, {method}", end="")
     zone = f", zone {report['zone']}" if report["zones"] > 1 else ""
-    print(f"sliding {report['sliding']}, periodic {report['periodic']}{zone}")
+    slides = counts["sliding_edge"] + counts["sliding_surface"]
+    sliding = report["sliding"] if slides else "none"
+    print(f"sliding {sliding}, periodic {report['periodic']}{zone}")
     print(quality_lines(found, before))
     rows = [(name.replace("_", " ") + " nodes", count) for name, count in counts.items()]
     rows.append(("control nodes", report["control_nodes"][-1]))

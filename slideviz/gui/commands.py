@@ -278,6 +278,12 @@ _VIEW = Menu("view", "&View", entries=(
     Command("full_screen", "F&ull screen", "Fill the screen with the window, or end that.",
             lambda window: window.toggle_full_screen(), ("F11",)),
     Menu("panels", "&Panels", "Show and hide the panels around the view.", (
+        Command("next_panel", "&Next panel",
+                "Bring the next panel to the front, behind a tab or not, and go there.",
+                lambda window: window.docks_.bring_next(), ("Ctrl+PgDown",)),
+        Command("previous_panel", "&Previous panel",
+                "Bring the panel before to the front, behind a tab or not, and go there.",
+                lambda window: window.docks_.bring_next(-1), ("Ctrl+PgUp",)),
         Command("hide_panels", "&Hide or show all",
                 "Hide every panel, so that the view has all the room, or show them again.",
                 lambda window: window.docks_.toggle_all(), ("F9",)),

@@ -313,6 +313,15 @@ class Docks(QObject):
         else:
             self.bring_to_front(name)
 
+    def bring_next(self, by: int = 1) -> None:
+        """Bring the panel after that with the focus to the front, in the order of `DOCKS`."""
+        names = [row.name for row in DOCKS if not self.by_name[row.name].isHidden()]
+        at = self.window.focusWidget()
+        inside = (at is not None and self.by_name[name].isAncestorOf(at) for name in names)
+        here = next((k for k, found in enumerate(inside) if found), -1 if by > 0 else 0)
+        if names:
+            self.bring_to_front(names[(here + by) % len(names)])
+
     def bring_to_front(self, name: str) -> None:
         """Show a dock in front and give it the keyboard focus, unless one of its fields has it."""
         dock = self.by_name[name]

@@ -216,8 +216,12 @@ def values_of(text: str) -> list[str]:
     match = _RANGE.match(text.strip())
     if match is None:
         found = [word.strip() for word in text.split(",")]
-        if not all(found):
-            raise CaseError("Give values, as 1, 2, 5, or a range, as -8 to 0 in 9")
+        parts = text.split(":")
+        if not all(found) or (len(parts) > 1 and all(is_number(part.strip()) for part in parts)):
+            raise CaseError(
+                f"“{text.strip()}” is neither values, as 1, 2, 5, nor a range “a to b in n”, "
+                "as -8 to 0 in 9"
+            )
         return list(dict.fromkeys(found))
     first, last, count = match.groups()
     if not (is_number(first) and is_number(last)) or not 2 <= int(count) <= MOST:

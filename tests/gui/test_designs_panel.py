@@ -324,6 +324,15 @@ def test_other_settings_make_results_old(window, passage, qtbot, in_a_thread, an
     assert panel.case.sliding == "ds"
 
 
+def test_the_first_motion_is_offered_where_none_was_there_before(window, passage):
+    motions = window.store.session.case.motions
+    window.store.change(changes.set_case, motions=())
+    assert passage.rows.column.currentData() == "MARKER_MOVING"
+    window.store.change(changes.set_case, motions=motions)
+    assert passage.rows.column.currentIndex() == 0
+    assert passage.rows.column.currentData().startswith("airfoil.")
+
+
 def test_another_mesh_has_other_designs(window, passage, driver, passage_file, tmp_path):
     fill(passage, "STEPS", "1, 2")
     window.store.change(changes.set_case, sliding="ds")

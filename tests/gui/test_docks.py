@@ -369,3 +369,21 @@ def test_no_tab_is_left_over_the_panels(tmp_path):
     every.append(["Runs", "Sections", "Display"])
     said = done.stdout.strip().splitlines()
     assert said == [str(every)] * 4, "twice at the start, and after the layout was put back"
+
+
+def test_keys_go_from_panel_to_panel_behind_tabs_too(driver, sample_folder, qtbot):
+    driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
+    window, docks = driver.window, driver.window.docks_
+    driver.activate()
+    docks.bring_to_front("motion")
+    for key, name in ((Qt.Key.Key_PageDown, "method"), (Qt.Key.Key_PageUp, "motion")):
+        QTest.keyClick(window.focusWidget(), key, Qt.KeyboardModifier.ControlModifier)
+        settled(qtbot, window)
+        assert window.docks[name].isAncestorOf(window.focusWidget())
+        assert not window.docks[name].visibleRegion().isEmpty()
+    seen = []
+    for _ in range(12):
+        docks.bring_next()
+        settled(qtbot, window)
+        seen += [k for k, one in window.docks.items() if one.isAncestorOf(window.focusWidget())]
+    assert set(seen) == {k for k, one in window.docks.items() if not one.isHidden()}

@@ -611,6 +611,12 @@ def test_every_action_says_in_a_sentence_what_it_does_and_can_be_found_with_its_
     assert {key.toString() for key in panels} - {""} <= told
     dialog.search.setText("whole mesh fill")
     assert [row.text(0) for row in rows if not row.isHidden()] == ["Fit all"]
+    assert dialog.nothing.isHidden()
+    dialog.search.setText("no such key")
+    assert dialog.nothing.isVisible()
+    dialog.reject()
+    QTest.keyClick(window, Qt.Key.Key_F1)
+    assert dialog.search.selectedText() == "no such key"
 
 
 def test_the_manual_is_read_and_searched(opened, monkeypatch):
@@ -620,7 +626,15 @@ def test_the_manual_is_read_and_searched(opened, monkeypatch):
     assert "slideviz moves the boundaries of a mesh" in dialog.pages.toPlainText()
     dialog.search.setText("first-mesh.md")
     assert all(section.isHidden() for section in dialog._items())
+    assert dialog.count.text() == "Nothing found"
+    before = dialog.pages.source()
+    QTest.keyClick(dialog.search, Qt.Key.Key_Return)
+    assert dialog.pages.source() == before
     dialog.search.setText("halves a step")
+    assert dialog.count.text() == "1 page"
+    QTest.keyClick(dialog.search, Qt.Key.Key_Return)
+    assert dialog.pages.textCursor().selectedText() == "halves a step"
+    dialog.pages.backward()
     shown = [one for one in dialog._items() if not one.isHidden()]
     pages = [page for one in shown for page in dialog._items(one) if not page.isHidden()]
     assert [page.text(0) for page in pages] == ["A cell is inverted: what now"]

@@ -42,7 +42,9 @@ def test_values_have_no_more_digits_than_their_steps_need():
     assert values_of("1 to 1 in 2") == ["1", "1"]
 
 
-@pytest.mark.parametrize("text", ["", "1,,2", "1 to 2 in 1", "a to b in 3", "1 to 2 in 9999999"])
+@pytest.mark.parametrize(
+    "text", ["", "1,,2", "1 to 2 in 1", "a to b in 3", "1 to 2 in 9999999", "0:0.1:0.01", "0:1"]
+)
 def test_no_values(text):
     with pytest.raises(CaseError, match="as -8 to 0 in 9"):
         values_of(text)

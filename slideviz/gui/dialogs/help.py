@@ -109,6 +109,9 @@ class Help(QObject):
         dialog.show()
         dialog.raise_()
         dialog.activateWindow()
+        for field in dialog.findChildren(QLineEdit):  # typing replaces what was searched before
+            field.setFocus()
+            field.selectAll()
 
 
 class ShortcutsDialog(QDialog):
@@ -119,6 +122,9 @@ class ShortcutsDialog(QDialog):
         self.setWindowTitle("Keyboard and mouse")
         self.resize(QSize(1060, 700).boundedTo(self.screen().availableSize()))
         self.search = _search_field("Find an action or a key")
+        self.nothing = hint_label("Nothing found")
+        self.nothing.setWordWrap(False)
+        self.nothing.hide()
         self.search.textChanged.connect(self._filter)
         self.tree = QTreeWidget()
         self.tree.setHeaderLabels(["Action", "Keys", "What it does"])
@@ -132,7 +138,8 @@ class ShortcutsDialog(QDialog):
         header = self.tree.header()
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(1, QHeaderView.ResizeMode.ResizeToContents)
-        self.setLayout(in_column(self.search, self.tree, dialog_buttons(self, CLOSE)))
+        head = in_row(self.search, self.nothing, wide=[self.search])
+        self.setLayout(in_column(head, self.tree, dialog_buttons(self, CLOSE)))
         self.search.setFocus()
 
     def _add(self, title: str, rows: list[tuple[str, str, str]]) -> None:
@@ -147,7 +154,7 @@ class ShortcutsDialog(QDialog):
         top.setExpanded(True)
 
     def _filter(self, wanted: str) -> None:
-        wanted = wanted.strip().lower()
+        wanted, total = wanted.strip().lower(), 0
         for index in range(self.tree.topLevelItemCount()):
             top = self.tree.topLevelItem(index)
             found = 0
@@ -157,6 +164,8 @@ class ShortcutsDialog(QDialog):
                 row.setHidden(wanted not in words)
                 found += not row.isHidden()
             top.setHidden(not found)
+            total += found
+        self.nothing.setVisible(not total)
 
 
 class TextDialog(QDialog):

@@ -19,7 +19,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.gui.widgets.build import dialog_buttons, in_column, in_row, push_button
+from slideviz.gui.widgets.build import dialog_buttons, hint_label, in_column, in_row, push_button
 from slideviz.session.manual import manual_pages, page_text, page_title
 
 PATH = Qt.ItemDataRole.UserRole
@@ -80,6 +80,9 @@ class ManualDialog(QDialog):
         self.search = QLineEdit()
         self.search.setPlaceholderText("Find pages with these words (Enter: the next place)")
         self.search.setClearButtonEnabled(True)
+        self.count = hint_label()
+        self.count.setWordWrap(False)
+        self._found: list[Path] = []
         self.search.textChanged.connect(self._filter)
         self.search.returnPressed.connect(self._next)
         self.tree = QTreeWidget()
@@ -98,7 +101,7 @@ class ManualDialog(QDialog):
         buttons = dialog_buttons(self, QDialogButtonBox.StandardButton.Close)
         for button in (back, buttons.button(QDialogButtonBox.StandardButton.Close)):
             button.setAutoDefault(False)  # Enter belongs to the search
-        head = in_row(self.search, back, wide=[self.search])
+        head = in_row(self.search, self.count, back, wide=[self.search])
         self.setLayout(in_column(head, split, buttons, wide=[split]))
         self.pages.show_page(folder / "index.md")
         self.search.setFocus()
@@ -130,20 +133,31 @@ class ManualDialog(QDialog):
         return [child for child in children if child is not None]
 
     def _filter(self, words: str) -> None:
-        """Show the pages whose text has the words, below their sections."""
+        """Show the pages whose text has the words, below their sections, and their number."""
         words = words.strip().lower()
+        self._found = []
         for section in self._items():
-            found = [
-                words in page_text(Path(one.data(0, PATH))).lower()
-                for one in (section, *self._items(section))
-            ]
-            for one, there in zip(self._items(section), found[1:], strict=True):
+            pages = (section, *self._items(section))
+            paths = [Path(one.data(0, PATH)) for one in pages]
+            found = [words in page_text(path).lower() for path in paths]
+            for one, there in zip(pages, found, strict=True):
                 one.setHidden(not there)
             section.setHidden(not any(found))
+            self._found += [path for path, there in zip(paths, found, strict=True) if there]
+        pages_found = "1 page" if len(self._found) == 1 else f"{len(self._found)} pages"
+        self.count.setText((pages_found if self._found else "Nothing found") if words else "")
 
     def _next(self) -> None:
-        """Select the next place of the words in the page; at its end, the first."""
+        """Select the next place of the words; where the page has none, that of the first found."""
         words = self.search.text().strip()
-        if words and not self.pages.find(words):
-            self.pages.moveCursor(self.pages.textCursor().MoveOperation.Start)
-            self.pages.find(words)
+        if not words or self.pages.find(words):
+            return
+        self.pages.moveCursor(self.pages.textCursor().MoveOperation.Start)
+        if self.pages.find(words):
+            return
+        shown = self.pages.source()
+        for path in self._found:
+            self.pages.show_page(path)
+            if self.pages.find(words):
+                return
+        self.pages.setSource(shown)

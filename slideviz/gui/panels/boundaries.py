@@ -264,6 +264,7 @@ def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMen
         act.setToolTip(ROLES[role].tip)
         act.setCheckable(True)
         act.setChecked(roles == {role})
+        act.setIconVisibleInMenu(roles != {role})  # in its place there is the check mark
         act.triggered.connect(_later(store, changes.set_role, names, role))
         menu.addAction(act)
     menu.addSeparator()

@@ -81,8 +81,12 @@ class DesignRows(QWidget):
         return view
 
     def show_columns(self, case: Case, mesh: Mesh | None) -> None:
-        """Offer the numbers of a case that can vary; keep the choice unless the mesh is another."""
-        chosen = self.column.currentData() if mesh is self._mesh else None
+        """Offer the numbers of a case that can vary; keep a choice unless the mesh is another.
+
+        The first one is the default, not a choice, until values are typed for it.
+        """
+        kept = self.column.currentIndex() > 0 or bool(self.values.text())
+        chosen = self.column.currentData() if kept and mesh is self._mesh else None
         if mesh is not self._mesh:
             self.values.clear()
         self._mesh = mesh

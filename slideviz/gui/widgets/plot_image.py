@@ -94,7 +94,7 @@ def _arrange(figure: Figure, place: AxesPlace) -> AxesPlace:
     axes = figure.axes[0]
     digits = [len(f"{end:.0f}") for end in axes.get_ylim()]
     labels = axes.get_xlabel(), axes.get_ylabel(), axes.get_title(), axes.get_yscale()
-    key = (*figure.bbox.size, figure.dpi, *labels, *digits, *_beside(axes))
+    key = (*figure.bbox.size, figure.dpi, *labels, *digits, *_last_tick(axes), *_beside(axes))
     if key != place.key:
         engine = figure.get_layout_engine()
         assert engine is not None
@@ -103,6 +103,14 @@ def _arrange(figure: Figure, place: AxesPlace) -> AxesPlace:
     figure.set_layout_engine("none")
     axes.set_position(place.bounds)
     return place
+
+
+def _last_tick(axes: Axes) -> tuple[int, bool]:
+    """Return the length of the last number along x, and whether it juts out at the axes' end."""
+    low, high = axes.get_xlim()
+    inside = [at for at in axes.get_xticks() if low <= at <= high]
+    texts = axes.xaxis.get_major_formatter().format_ticks(inside)
+    return (len(texts[-1]), inside[-1] > low + 0.9 * (high - low)) if texts else (0, False)
 
 
 def _beside(axes: Axes) -> list[str]:
