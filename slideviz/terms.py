@@ -466,8 +466,8 @@ SHOWN: dict[Shown, ShownTerm] = {
     ),
     "support": ShownTerm(
         "Support radius",
-        "Draw how far the radial functions of the moving boundaries reach: a circle or sphere "
-        "around each of these.",
+        "Draw how far the radial functions of the moving boundaries reach with the present "
+        "settings: a circle or sphere around each of these; in a comparison, those of each run.",
         shortcut="D",
         in_bar=False,
     ),

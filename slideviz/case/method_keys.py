@@ -113,10 +113,10 @@ METHOD_ROWS = (
             "Support radius of the radial function over the largest extent of the mesh. AUTO: 15 "
             "times the largest extent of a connected moving body, or 20 times the largest "
             "displacement where that is more, and 2.5 extents of the mesh at most.",
-            label="Support radius ×",
+            label="Radius × extent",
             form="more",
-            tip="How far a boundary node reaches into the mesh, as a multiple of the mesh's "
-            "largest extent. Automatic: as far as the motion needs.",
+            tip="Support radius: how far a boundary node reaches into the mesh, as a multiple of "
+            "the mesh's largest extent. Automatic: as far as the motion needs.",
             said="radius × {}",
             method="rbf",
         ),

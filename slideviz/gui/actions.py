@@ -16,6 +16,7 @@ from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.command import Menu, Now, valued
 from slideviz.session import changes
 from slideviz.session.colors import NO_DISPLACEMENT, unmoved
+from slideviz.session.motions import support_case, support_key, support_words
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.terms import COLOUR_BY, SHOWN, labels
@@ -44,6 +45,7 @@ class Actions:
         self.bar = ToolBar(window, self)
         window.addToolBar(self.bar)
         window.store.listen(self._explain_colours)
+        window.store.listen(self._explain_support)
 
     def _make(self, above: QMenu | QMenuBar, table: Menu) -> None:
         menu = self.menus[table.name] = above.addMenu(table.title)
@@ -69,6 +71,15 @@ class Actions:
     def _explain_colours(self, old: Session, new: Session) -> None:
         if unmoved(new) and not unmoved(old):
             self.window.say(NO_DISPLACEMENT)
+
+    def _explain_support(self, old: Session, new: Session) -> None:
+        """Say the support radius when it is switched on, and when it changes while it is drawn."""
+        if new.mesh is None or new.mesh is not old.mesh or "support" not in new.view.drawn:
+            return
+        before, now = support_case(old), support_case(new)
+        changed = before is not now and support_key(before, new.mesh) != support_key(now, new.mesh)
+        if changed or "support" not in old.view.drawn:
+            self.window.say(support_words(new))
 
     def sync(self, now: Now) -> None:
         """Update the actions, menus and tool bar: titles, checked, enabled."""

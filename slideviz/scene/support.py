@@ -8,11 +8,11 @@ import pyvista as pv
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.surfaces import lifted
 from slideviz.scene.stage import Layer, Stage
-from slideviz.session.motions import shown_case, support_key, support_of
+from slideviz.session.motions import support_case, support_key, support_of
 from slideviz.session.state import Session
 from slideviz.terms import ROLES
 
-NAME = "support:circles"
+NAME, HALO = "support:circles", "support:halo"
 PIECES = 180
 """Straight pieces of a circle."""
 
@@ -32,12 +32,17 @@ class SupportLayer(Layer):
         """Draw another state of the session."""
         if new.mesh is None:
             return
-        shown, case = "support" in new.view.drawn, shown_case(new)
-        key = (*support_key(case, new.mesh), self.stage.pixel_scale) if shown else ()
+        shown, case = "support" in new.view.drawn, support_case(new)
+        key = (
+            (*support_key(case, new.mesh), self.stage.pixel_scale, self.stage.scheme)
+            if shown
+            else ()
+        )
         if key == self._key:
             return
         self._key = key
-        self.stage.remove(NAME)
+        for name in (HALO, NAME):
+            self.stage.remove(name)
         radius, boxes = support_of(case, new.mesh) if shown else (0.0, ())
         if not radius:
             return
@@ -47,9 +52,14 @@ class SupportLayer(Layer):
             lifted(points, 4.0 * self.stage.lift(new.mesh)),
             lines=np.insert(lines, 0, PIECES + 1, axis=1).ravel(),
         )
-        actor = self.stage.add(shape, NAME, lighting=False, pickable=False)
-        actor.prop.color = ROLES["moving"].colour
-        actor.prop.line_width = 2.0 * self.stage.pixel_scale
+        # The seam in the background's colour keeps the circle apart from the cells.
+        for name, color, width in (
+            (HALO, self.stage.scheme.background, 7.0),
+            (NAME, ROLES["moving"].colour, 3.5),
+        ):
+            actor = self.stage.add(shape, name, lighting=False, pickable=False)
+            actor.prop.color = color
+            actor.prop.line_width = width * self.stage.pixel_scale
 
 
 def circles(middles: FloatArray, radius: float) -> FloatArray:

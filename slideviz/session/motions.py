@@ -144,6 +144,28 @@ def support_of(case: Case, mesh: Mesh) -> tuple[float, FloatArray]:
     return (support_radius(case, mesh, moved), boxes) if len(boxes) else none
 
 
+def support_case(session: Session) -> Case:
+    """Return the case whose support radius is drawn: that in the panels, or of a compared run."""
+    return session.case if session.view.beside is None else shown_case(session)
+
+
+def support_words(session: Session) -> str:
+    """Return the message on the support radius that is drawn, on an open mesh: length, place."""
+    mesh, case = session.mesh, support_case(session)
+    assert mesh is not None
+    radius, boxes = support_of(case, mesh)
+    if not radius:
+        return "There is no support radius to draw: nothing moves by radial functions"
+    of = " of the settings" if case is session.case else f" of run {session.shown}"
+    of = of if session.runs else ""
+    shape = "circle" if mesh.dim == 2 else "sphere"
+    middles, (low, high) = boxes.mean(axis=1), mesh.bounds
+    farthest = np.linalg.norm(np.maximum(high - middles, middles - low), axis=1)
+    if radius > farthest.max():
+        return f"Support radius{of}: {radius:.4g}, a {shape} larger than the whole mesh"
+    return f"Support radius{of}: {radius:.4g}, a {shape} around what moves; F shows all"
+
+
 class Ghosts:
     """Computes where motions take the boundaries of a mesh, to be drawn before a run.
 

@@ -294,13 +294,12 @@ def test_every_setting_has_its_reason_and_is_used():
 
 
 def test_the_last_number_along_x_is_whole_when_it_becomes_longer():
-    def draw(figure, _style):
-        axes = figure.add_subplot()
-        axes.set_xlim(low, 1.0)
+    def draw(low):
+        return lambda figure, _style: figure.add_subplot().set_xlim(low, 1.0)
 
     paper, place = plot_image.PlotFormat(300, 200, 1.0, PRINT), plot_image.AxesPlace()
     for low in (0.0, 0.995):
-        found = plot_image.picture(draw, paper, place)
+        found = plot_image.picture(draw(low), paper, place)
         place = found.place
         ends = [label.get_window_extent().x1 for label in found.figure.axes[0].get_xticklabels()]
         assert max(ends) <= 300.0

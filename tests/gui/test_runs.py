@@ -595,3 +595,27 @@ def test_the_camera_moves_after_a_run_only_if_some_of_the_mesh_has_left_the_view
     window.running.ended.emit()
     assert eye.place != before
     assert not eye.loses_some()
+
+
+def test_the_support_radius_is_said_and_follows_the_settings_or_a_compared_run(ran):
+    window = ran.window
+    bar, scene = window.statusBar(), window.viewing.scene
+
+    def radius():
+        points = scene.plotter.actors["support:circles"].mapper.dataset.points
+        return np.ptp(points, axis=0).max() / 2.0
+
+    window.actions_.by_name["support"].trigger()
+    assert "larger than the whole mesh" in bar.currentMessage()
+    own = radius()
+    extent = window.store.session.mesh.extent
+    window.store.change(changes.set_case, influence_factor=0.1)
+    assert radius() == pytest.approx(0.1 * extent, rel=1e-3)
+    said = f"Support radius of the settings: {0.1 * extent:.4g}, a circle around what moves; F"
+    assert bar.currentMessage().startswith(said)
+    window.store.change(changes.show_beside, 1)
+    assert radius() == pytest.approx(own)
+    assert f"Support radius of run {window.store.session.shown}: " in bar.currentMessage()
+    window.store.change(changes.show_beside, None)
+    window.store.change(changes.set_case, method="idw")
+    assert "no support radius" in bar.currentMessage()
