@@ -80,9 +80,11 @@ def set_case(session: Session, **values: Any) -> Session:
 
 def set_invalid(session: Session, place: PanelPlace, sentences: tuple[str, ...]) -> Session:
     """Return the session with ``sentences`` on the invalid fields of the panel ``place``."""
+    # The order of the panels does not count: two of them would change it in turns, for ever.
+    if tuple(said for where, said in session.invalid if where == place) == sentences:
+        return session
     others = tuple(each for each in session.invalid if each[0] != place)
-    found = (*others, *((place, sentence) for sentence in sentences))
-    return session if found == session.invalid else replace(session, invalid=found)
+    return replace(session, invalid=(*others, *((place, sentence) for sentence in sentences)))
 
 
 @undoable("new motion")

@@ -382,3 +382,10 @@ def test_roles_and_equal_values_have_no_range(ran, session):
     assert changes.fit_colours(ran) is ran, "roles"
     equal = changes.set_view(session, colour_by="size")
     assert changes.fit_colours(equal) is equal
+
+
+def test_invalid_fields_of_two_panels_do_not_change_in_turns(session):
+    both = changes.set_invalid(changes.set_invalid(session, "motion", ("a",)), "method", ("b",))
+    assert changes.set_invalid(both, "motion", ("a",)) is both
+    assert changes.set_invalid(both, "method", ("b",)) is both
+    assert changes.set_invalid(both, "motion", ()).invalid == (("method", "b"),)
