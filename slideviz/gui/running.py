@@ -206,7 +206,7 @@ class Running(QObject):
             self.store.change(changes.saved_mesh)
         text = (
             f"{_steps_text(run.last)}min {quality.min:.4f}, mean {quality.mean:.4f}, "
-            f"{quality.inverted} inverted"
+            f"{quality.inverted:,} inverted"
         )
         log.info("done: %s", text)
         warnings = self._log_remarks(run)

@@ -19,7 +19,7 @@ from slideviz.gui.panels.worst_table import CELL
 from slideviz.gui.viewport import player as player_module
 from slideviz.gui.viewport.player import plain, result_parts, step_ms
 from slideviz.gui.widgets.fields import NumberField
-from slideviz.mesh.quality import INVERTED
+from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.session import changes, jobs
 from slideviz.session.inspect import worst_cells
 from slideviz.session.run_messages import ended
@@ -738,6 +738,12 @@ def ended_badly(driver, texts=(), inverted=38):
     driver.window.store.put(replace(session, runs=(*session.runs[:-1], ended)))
     driver.window.running._run_done(None)
     return ended
+
+
+def test_large_numbers_have_separators_in_the_status_bar(ready, monkeypatch):
+    monkeypatch.setattr(Quality, "inverted", 1911)
+    ended_badly(ready)
+    assert ready.window.statusBar().currentMessage().endswith("1,911 inverted")
 
 
 def test_inverted_cells_are_told_in_red_with_what_would_help(ready):
