@@ -235,10 +235,9 @@ def test_a_killed_rank_ends_all_and_others_go_on_with_what_is_done(square, alone
     hook = kill.format(1, 300)
     code, out, err = done(started(square, 2, *WORDS, "--resume", hook=hook, pause=0.02))
     assert (code != 0, out) == (True, "")
-    assert f"slideviz: note: out.su2b: goes on after {first} of 19 parts" in err
     assert err.count("slideviz: ended by SIGTERM; what is done is kept in ") == 1
     assert err.count("/.out.su2b.partial; go on with --resume") == 1
-    assert err.count("slideviz:") == 2
+    assert err.count("slideviz:") == 1
     assert not (square / "out.su2b").exists()
     assert ours.read_bytes()[:4] not in MAGIC
     assert len(json.loads(note.read_text())["sums"]) > first
