@@ -372,7 +372,7 @@ def test_nodes_left_out_are_harmless_only_where_the_interpolation_meets_them():
     setup = make_setup(Case(roles={"BLOCK": "moving"}, motions=(Rotate("BLOCK", 1.0),)), mesh)
     for error, note in ((1e-12, True), (1e-3, False)):
         solution = Solution(zeros, 1, 0.0, np.array([3]), 1.0, dropped_error=error)
-        (warning,) = stepping._dropped_warning(setup, solution, 1, mesh)
+        (warning,) = stepping._dropped_warning(setup, solution, 1, 2, mesh)
         assert isinstance(warning, Note) == note
         assert f"off by {error:.2g} at most" in warning
         assert "no harm" not in warning

@@ -65,8 +65,9 @@ def decide_unproven(vtk: int, at: FloatArray, signs: NDArray[np.int8]) -> Status
         return subdivide(hexahedron_coefficients(at) * signs)
     low, middle, top = prism_coefficients(at) * signs
     # A quadratic with these coefficients has minimum zero if middle = -√(low · top).
-    least = middle + np.sqrt(low * top)
-    return np.where((least > 0).all(axis=0), VALID, INVERTED).astype(np.uint8)
+    product = low * top  # negative by rounding only
+    positive = (product >= 0) & (middle + np.sqrt(np.maximum(product, 0.0)) > 0)
+    return np.where(positive.all(axis=0), VALID, INVERTED).astype(np.uint8)
 
 
 def subdivide(coefficients: FloatArray, levels: int = LEVELS) -> Status:

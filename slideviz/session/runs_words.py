@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 
 from slideviz.case.key import METHOD, PERIODICITY, QUALITY, REDUCTION, Key
 from slideviz.case.keys import BY_WEIGHT
-from slideviz.case.method_keys import nothing_slides
 from slideviz.case.model import Case
 from slideviz.case.motion_words import motion_labels
 from slideviz.session.state import Run
@@ -17,9 +16,8 @@ WORDED = {METHOD: 0, REDUCTION: 0, QUALITY: 0, PERIODICITY: 1}
 
 
 def method_words(case: Case) -> str:
-    """Return the method of a case in words; where no boundary may slide, none slides."""
-    sliding = "none" if nothing_slides(case) else case.sliding
-    return (SLIDING[sliding] if case.method == "rbf" else METHODS[case.method]).name
+    """Return the method of a case in words."""
+    return (SLIDING[case.sliding] if case.method == "rbf" else METHODS[case.method]).name
 
 
 def run_words(run: Run) -> str:

@@ -162,7 +162,7 @@ def test_a_vtu_file_has_the_displacement(square, tmp_path, vector):
             ),
             (
                 "Gaussian (global) is too smooth: use a Kernel such as CP C0 (compact), a "
-                "smaller Support radius or Kernel “CTPS C2a (compact)”"
+                "smaller Radius × extent or Kernel “CTPS C2a (compact)”"
             ),
         ),
         (

@@ -52,7 +52,7 @@ def test_a_marked_cell_moves_after_garbage_was_collected(plotter, stator):
     run = changes.end_run(
         changes.add_frames(changes.start_run(marked), [StepFrame(mesh, quality(mesh))]), "done"
     )
-    scene.update(run)
+    scene.update(changes.mark_cell(run, 17))
     corners = mesh.points[mesh.cells.connectivity[17 * 8 : 18 * 8]]
     low, high = corners.min(axis=0), corners.max(axis=0)
     names = [name for name in plotter.actors if name.startswith("mark:")]
