@@ -697,9 +697,15 @@ def test_a_marked_cell_is_in_pictures_unless_it_is_switched_off_and_in_films_if_
         assert form.picture_options.showing(renderer.session).view.marked_cell is None
         form.mark.setChecked(True)
         assert form.picture_options.showing(renderer.session).view.marked_cell == 3
-    # A cell that was marked is of no interest in another run.
+    # A new run has no marked cell. One that is marked in another run is of no interest there.
     ran.window.store.change(changes.start_run)
     with ran.window.exports._renderer() as renderer:
         dialog = PictureDialog(ran.window, renderer, kept=json.dumps({"marked": True}))
         assert not dialog._form.isRowVisible(dialog.options["marked"])
+    ran.window.store.change(changes.mark_cell, 3)
+    ran.window.store.change(changes.show_run, ran.session.runs[0].number)
+    with ran.window.exports._renderer() as renderer:
+        dialog = PictureDialog(ran.window, renderer, kept=json.dumps({"marked": True}))
+        assert not dialog.options["marked"].isChecked()
+        assert dialog._form.isRowVisible(dialog.options["marked"])
         assert "marked" not in json.loads(dialog.choices)
