@@ -28,15 +28,15 @@ if TYPE_CHECKING:
         Translate,
     )
     from slideviz.case.reduction import Reduction
-    from slideviz.deformation.solver import Step, deform
     from slideviz.design.deformer import Deformer
     from slideviz.design.sweeps.sweep import sweep
     from slideviz.errors import ConditionWarning, SlidevizError, ToleranceWarning
-    from slideviz.mesh.io.convert import convert
-    from slideviz.mesh.io.files import read, write
+    from slideviz.formats.convert import convert
+    from slideviz.formats.files import read, write
     from slideviz.mesh.model import Cells, Marker, Mesh
     from slideviz.mesh.quality import Quality, quality
     from slideviz.mesh.quality_derivative import QualityDerivative
+    from slideviz.solver.deform import Step, deform
 
 _HOME = {
     "Bump": "case.model",
@@ -61,15 +61,15 @@ _HOME = {
     "Rotate": "case.model",
     "Scale": "case.model",
     "SlidevizError": "errors",
-    "Step": "deformation.solver",
+    "Step": "solver.deform",
     "ToleranceWarning": "errors",
     "Translate": "case.model",
-    "convert": "mesh.io.convert",
-    "deform": "deformation.solver",
+    "convert": "formats.convert",
+    "deform": "solver.deform",
     "quality": "mesh.quality",
-    "read": "mesh.io.files",
+    "read": "formats.files",
     "sweep": "design.sweeps.sweep",
-    "write": "mesh.io.files",
+    "write": "formats.files",
 }
 
 __all__ = [

@@ -78,7 +78,7 @@ def _wait(read: int) -> None:
         number = os.read(read, 1)[0]
     try:
         # As long as this module is not loaded, there is nothing to clean up.
-        cleanup = sys.modules.get("slideviz.mesh.io.cleanup")
+        cleanup = sys.modules.get("slideviz.system.cleanup")
         left = "it leaves nothing half-written"
         if cleanup is not None and hasattr(cleanup, "left"):  # it may be being loaded
             left = cleanup.left()

@@ -1,33 +1,33 @@
-"""Color schemes of light and dark views and of paper, and colours that are the same in all."""
+"""Color schemes of light and dark views and of paper, and colors that are the same in all."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from slideviz.terms import COLOUR_MAPS
+from slideviz.terms import COLOR_MAPS
 
-COLOUR_MAP = next(iter(COLOUR_MAPS))
-"""The default colour map: perceptually uniform, and readable for colour-blind people."""
+COLOR_MAP = next(iter(COLOR_MAPS))
+"""The default color map: perceptually uniform, and readable for color-blind people."""
 
-INVERTED_COLOUR = "#e8112d"
-SELECTED_COLOUR = "#ffb000"
+INVERTED_COLOR = "#e8112d"
+SELECTED_COLOR = "#ffb000"
 VALUE_EDGE = "#000000"
-"""Edges of cells that are coloured by values or roles: it differs from all colours of maps."""
-INTERSECTION_COLOUR = "#e8112d"
+"""Edges of cells that are colored by values or roles: it differs from all colors of maps."""
+INTERSECTION_COLOR = "#e8112d"
 """The motion ghost of a boundary that crosses another one."""
 
 
 @dataclass(frozen=True)
 class ColorScheme:
-    """A color scheme: colours of a view that belong together.
+    """A color scheme: colors of a view that belong together.
 
     Attributes
     ----------
     name : str
     background, background_top : str
-        Colours of the bottom and the top of the background, as ``#rrggbb``.
+        Colors of the bottom and the top of the background, as ``#rrggbb``.
     text, edge, cell, ghost : str
-        Colours of letters, of edges of cells, of faces without a value, of undeformed boundaries.
+        Colors of letters, of edges of cells, of faces without a value, of undeformed boundaries.
     """
 
     name: str

@@ -6,6 +6,8 @@ The command line and the window show it as it is.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 
 class SlidevizError(Exception):
     """An error that the user can correct; the base of all others."""
@@ -62,3 +64,13 @@ class Note(str):
     """
 
     __slots__ = ()
+
+
+def printable(path: str | Path) -> str:
+    """Return a path as text for a message; bytes that are no UTF-8 become escape sequences."""
+    return str(path).encode("utf-8", "backslashreplace").decode()
+
+
+def path_error(path: Path, message: str) -> MeshError:
+    """Return the error ``path: message``."""
+    return MeshError(f"{printable(path)}: {message}")

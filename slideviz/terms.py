@@ -1,4 +1,4 @@
-"""All enumerations: their values, with labels, tips and colours.
+"""All enumerations: their values, with labels, tips and colors.
 
 Values are those of case files and of the command line. For each enumeration there is a type, such
 as ``Sliding``, and a table with the words for its values, such as ``SLIDING``. All lists, checks,
@@ -23,15 +23,15 @@ class Term:
         Its words in a list with a heading.
     tip : str
         Its meaning, as a tip.
-    colour : str
-        The colour it is drawn in, ``#rrggbb``; empty for none.
+    color : str
+        The color it is drawn in, ``#rrggbb``; empty for none.
     alone : str
         Its words without a heading, where they differ from ``label``.
     """
 
     label: str
     tip: str = ""
-    colour: str = ""
+    color: str = ""
     alone: str = ""
 
     @property
@@ -65,7 +65,7 @@ PALETTE = {
     "purple": "#cc79a7",
     "black": "#000000",
 }
-"""Okabe and Ito's colours (2008), which colour-blind people can distinguish."""
+"""Okabe and Ito's colors (2008), which color-blind people can distinguish."""
 
 # Files -------------------------------------------------------------------------------------
 
@@ -108,19 +108,19 @@ ROLES: dict[Role, RoleTerm] = {
         key="MARKER_INTERNAL",
     ),
 }
-"""The roles of boundaries; fixed ones are grey, others have colours of the palette."""
+"""The roles of boundaries; fixed ones are grey, others have colors of the palette."""
 
 NodeType = Literal[
     "moving", "fixed", "sliding_surface", "sliding_edge", "periodic", "internal", "control"
 ]
 NODE_TYPES: dict[NodeType, Term] = {
-    "moving": Term("moving", colour=ROLES["moving"].colour),
-    "fixed": Term("fixed", colour=ROLES["fixed"].colour),
-    "sliding_surface": Term("sliding face", colour=ROLES["sliding"].colour),
-    "sliding_edge": Term("sliding edge", colour=PALETTE["sky blue"]),
-    "periodic": Term("periodic", colour=ROLES["periodic"].colour),
-    "internal": Term("internal", colour=ROLES["internal"].colour),
-    "control": Term("control", colour="#d81b60"),
+    "moving": Term("moving", color=ROLES["moving"].color),
+    "fixed": Term("fixed", color=ROLES["fixed"].color),
+    "sliding_surface": Term("sliding face", color=ROLES["sliding"].color),
+    "sliding_edge": Term("sliding edge", color=PALETTE["sky blue"]),
+    "periodic": Term("periodic", color=ROLES["periodic"].color),
+    "internal": Term("internal", color=ROLES["internal"].color),
+    "control": Term("control", color="#d81b60"),
 }
 """The types of boundary nodes in the view: as the roles, with sliding edges and control nodes."""
 
@@ -336,12 +336,12 @@ CELL_STATES: tuple[CellState, ...] = ("valid", "inverted", "unproven")
 # View --------------------------------------------------------------------------------------
 
 Quantity = Literal["size-skew", "size", "skew", "displacement"]
-ColourBy = Literal["role", "size-skew", "size", "skew", "displacement"]
+ColorBy = Literal["role", "size-skew", "size", "skew", "displacement"]
 
 
 @dataclass(frozen=True)
-class ColourByTerm(Term):
-    """The words for a quantity that cells are coloured by; ``unit`` is empty if it has none."""
+class ColorByTerm(Term):
+    """The words for a quantity that cells are colored by; ``unit`` is empty if it has none."""
 
     unit: str = ""
 
@@ -351,33 +351,33 @@ class ColourByTerm(Term):
         return f"{self.label} {self.unit or '[-]'}"
 
 
-COLOUR_BY: dict[ColourBy, ColourByTerm] = {
-    "role": ColourByTerm("role"),
-    "size-skew": ColourByTerm("size-skew"),
-    "size": ColourByTerm("size"),
-    "skew": ColourByTerm("skew"),
-    "displacement": ColourByTerm("displacement", unit="[mesh units]"),
+COLOR_BY: dict[ColorBy, ColorByTerm] = {
+    "role": ColorByTerm("role"),
+    "size-skew": ColorByTerm("size-skew"),
+    "size": ColorByTerm("size"),
+    "skew": ColorByTerm("skew"),
+    "displacement": ColorByTerm("displacement", unit="[mesh units]"),
 }
-"""The quantities to colour by; a mesh just opened has the first."""
+"""The quantities to color by; a mesh just opened has the first."""
 
-QUANTITIES: dict[Quantity, ColourByTerm] = {value: COLOUR_BY[value] for value in get_args(Quantity)}
-"""The quantities of `COLOUR_BY` that are values of cells; the first is the default."""
-
-
-def quantity_of(colour_by: ColourBy) -> Quantity:
-    """Return the quantity that is coloured by, or size-skew for roles."""
-    return "size-skew" if colour_by == "role" else colour_by
+QUANTITIES: dict[Quantity, ColorByTerm] = {value: COLOR_BY[value] for value in get_args(Quantity)}
+"""The quantities of `COLOR_BY` that are values of cells; the first is the default."""
 
 
-ColourMap = Literal["viridis", "cividis", "plasma", "inferno", "gray"]
-COLOUR_MAPS: dict[ColourMap, Term] = {
+def quantity_of(color_by: ColorBy) -> Quantity:
+    """Return the quantity that is colored by, or size-skew for roles."""
+    return "size-skew" if color_by == "role" else color_by
+
+
+ColorMap = Literal["viridis", "cividis", "plasma", "inferno", "gray"]
+COLOR_MAPS: dict[ColorMap, Term] = {
     "viridis": Term("viridis"),
     "cividis": Term("cividis"),
     "plasma": Term("plasma"),
     "inferno": Term("inferno"),
     "gray": Term("gray"),
 }
-"""Colour maps of matplotlib that colour-blind people can read; the first is the default."""
+"""Color maps of matplotlib that color-blind people can read; the first is the default."""
 
 PointsShown = Literal["none", "types", "control"]
 POINTS_SHOWN: dict[PointsShown, Term] = {
@@ -439,7 +439,7 @@ SHOWN: dict[Shown, ShownTerm] = {
         at_first=True,
     ),
     "legend": ShownTerm(
-        "Legend", "Draw the legend of roles or the colour bar.", shortcut="L", at_first=True
+        "Legend", "Draw the legend of roles or the color bar.", shortcut="L", at_first=True
     ),
     "triad": ShownTerm(
         "Axes",

@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.io.su2.write import su2_blocks
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.periodic import Pair, match
 

@@ -9,9 +9,9 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Translate
 from slideviz.cli import run
-from slideviz.deformation.solver import COUNTS, all_steps, folded_at
 from slideviz.mesh.quality import INVERTED
 from slideviz.samples.table import sample, write_sample
+from slideviz.solver.deform import COUNTS, all_steps, folded_at
 
 
 @pytest.fixture

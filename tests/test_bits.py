@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from slideviz.case.model import Case, Rotate, Scale
-from slideviz.deformation.setup import make_setup
 from slideviz.mesh.topology import find_boundary
+from slideviz.solver.setup import make_setup
 from tests import builders
 from tools.laws.meshes import renumbered
 

@@ -19,10 +19,10 @@ import slideviz as sv
 from slideviz.cli import run
 from slideviz.cli.options import changed
 from slideviz.cli.report import CYCLE_KEYS, TRIAL_KEYS
-from slideviz.deformation.steps import Trial
 from slideviz.errors import CaseError
 from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import write_sample
+from slideviz.solver.steps import Trial
 
 SECONDS = {
     *("read", "classify", "select", "solve", "evaluate", "project", "quality", "write", "total"),
@@ -184,7 +184,7 @@ def test_a_folder_that_is_missing_is_told_before_the_mesh_is_read(
         raise AssertionError("too late")
 
     monkeypatch.chdir(square)
-    monkeypatch.setattr("slideviz.mesh.io.files.read", never)
+    monkeypatch.setattr("slideviz.formats.files.read", never)
     monkeypatch.setattr("slideviz.read", never, raising=False)
     assert run(words) == 1
     assert "the folder" in (err := capsys.readouterr().err)

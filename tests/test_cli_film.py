@@ -53,7 +53,7 @@ def test_quiet_is_quiet_and_few_steps_get_a_hint(case, tmp_path, capsys):
     assert "few steps; --between 20 puts 20 images" in capsys.readouterr().out
 
 
-def test_colours_say_what_is_asked_for(case, tmp_path):
+def test_colors_say_what_is_asked_for(case, tmp_path):
     for what in ("size-skew", "displacement"):
         assert film(case, "-o", str(tmp_path / f"{what}_%d.png"), "--color", what) == 0
     with (
@@ -177,7 +177,7 @@ def test_a_picture_has_the_size_and_the_detail_asked_for(tmp_path):
     out, file = tmp_path / "out.su2", tmp_path / "a.png"
     words = ["run", str(tmp_path / "square" / "square.cfg"), "-o", str(out), "-q"]
     words += ["--set", "STEPS=2", "--picture", str(file), "--picture-size", "400x300"]
-    colours = []
+    colors = []
     for zoom in ("all", "block"):
         if zoom == "block":
             moved = sv.read(out)
@@ -186,9 +186,9 @@ def test_a_picture_has_the_size_and_the_detail_asked_for(tmp_path):
         assert run([*words, "--zoom", zoom]) == 0
         with Image.open(file) as image:
             assert image.size == (400, 300)
-            colours.append(np.asarray(image.convert("RGB"))[100:200, 50:250])
-    assert (colours[0].min(axis=2) < 250).any(), "cells"
-    assert (colours[1] == 255).all(), "inside the block"
+            colors.append(np.asarray(image.convert("RGB"))[100:200, 50:250])
+    assert (colors[0].min(axis=2) < 250).any(), "cells"
+    assert (colors[1] == 255).all(), "inside the block"
 
 
 def test_a_detail_may_lie_where_coordinates_are_negative(case, tmp_path):

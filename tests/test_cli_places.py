@@ -11,9 +11,9 @@ import pytest
 from slideviz.cli import parser, run
 from slideviz.cli.places import inputs_of
 from slideviz.errors import MeshError
-from slideviz.mesh.io.atomic import atomic_write, require_writable
-from slideviz.mesh.io.file_checks import protected
 from slideviz.samples.table import write_sample
+from slideviz.system.atomic import atomic_write, require_writable
+from slideviz.system.file_checks import protected
 
 ODD = "a\udcff"
 """A name that is not UTF-8."""

@@ -14,7 +14,7 @@ from slideviz.cli import run
 from slideviz.cli.parser import parse
 from slideviz.cli.section_options import about_axis, glued, plane
 from slideviz.plots import section_picture
-from slideviz.terms import COLOUR_MAPS, QUANTITIES
+from slideviz.terms import COLOR_MAPS, QUANTITIES
 from tests.builders import cube, passage, square
 
 
@@ -76,11 +76,11 @@ def test_cylinders(text, origin, direction, given):
     assert (section.origin, section.direction) == (origin, direction)
 
 
-def test_the_command_takes_every_colour_and_map_that_there_is():
+def test_the_command_takes_every_color_and_map_that_there_is():
     words = ["section", "cube.su2", "--plane", "z=0.4", "-o", "out.png"]
-    for colour in QUANTITIES:
-        assert parse([*words, "--color", colour]).color == colour
-    for name in COLOUR_MAPS:
+    for color in QUANTITIES:
+        assert parse([*words, "--color", color]).color == color
+    for name in COLOR_MAPS:
         assert parse([*words, "--map", name]).map == name
 
 
@@ -219,7 +219,7 @@ def test_a_2d_mesh_shows_the_cells_whole_unless_they_are_to_be_cut(folder, capsy
     assert whole["cells"] == cut["cells"] == 6
 
 
-def test_displacement_is_coloured_up_to_its_largest(folder, capsys):
+def test_displacement_is_colored_up_to_its_largest(folder, capsys):
     mesh = passage()
     sv.write(folder / "moved.su2", mesh.with_points(mesh.points + np.array([0.0, 0.0, 0.002])))
     options = ("--color", "displacement", "--reference", str(folder / "passage.su2"))
@@ -311,7 +311,7 @@ def test_the_help_has_an_example(capsys):
     )
 
 
-def test_another_colour_map(folder):
+def test_another_color_map(folder):
     for name in ("viridis", "gray"):
         options = ("--plane", "z=0.4", "--map", name, "--size", "400x300")
         assert call(folder, "cube.su2", *options, out=f"{name}.png") == 0

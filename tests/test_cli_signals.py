@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.mesh.io.atomic import atomic_write, require_writable
-from slideviz.mesh.io.cleanup import PREFIX, draft
 from slideviz.samples.table import write_sample
+from slideviz.system.atomic import atomic_write, require_writable
+from slideviz.system.cleanup import PREFIX, draft
 
 SAID = {
     signal.SIGINT: "slideviz: cancelled; it leaves nothing half-written\n",
@@ -142,7 +142,7 @@ def test_nothing_is_left_of_a_film_that_is_ended(square, start):
 
 def test_what_a_killed_run_left_is_removed_by_the_next(square):
     code = (
-        "import time; from pathlib import Path; from slideviz.mesh.io.cleanup import draft\n"
+        "import time; from pathlib import Path; from slideviz.system.cleanup import draft\n"
         "with draft(Path()) as file: file.touch(); time.sleep(300)"
     )
     child = subprocess.Popen([sys.executable, "-c", code], cwd=square)

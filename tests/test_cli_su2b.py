@@ -7,10 +7,10 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.mesh.io.su2b.layout import MAGIC
+from slideviz.formats.su2b.layout import MAGIC
 from slideviz.samples.table import write_sample
 from slideviz.session.formats import left_out
-from tests.mesh.test_su2b import THREE_D, TWO_D, packed
+from tests.formats.test_su2b import THREE_D, TWO_D, packed
 
 FFD = "FFD_NBOX= 1\nFFD_NLEVEL= 1\n"
 

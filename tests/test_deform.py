@@ -9,10 +9,10 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
-from slideviz.deformation import solver
 from slideviz.errors import Cancelled, CaseError, DeformError, MeshError
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf import exact as solve
+from slideviz.solver import deform as solver
 from slideviz.terms import SLIDING
 from tests import builders
 from tests.slow import one_of_each_fast
@@ -117,8 +117,8 @@ def test_a_callback_that_raises_ends_the_run_at_once_wherever_it_is(method):
 
 @pytest.mark.parametrize("steps", [1, 3])
 def test_a_plan_made_before_gives_the_same_mesh(steps, monkeypatch):
-    from slideviz.deformation.setup import make_setup
     from slideviz.samples.table import sample
+    from slideviz.solver.setup import make_setup
 
     made = sample("square", 10, "motion")
     case, mesh = made.case.change(steps=steps), made.mesh

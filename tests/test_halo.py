@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders import grid, halo_text, passage, sector
-from mesh.su2_samples import save
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
 from slideviz.mesh.periodic import match
+from tests.formats.su2_samples import save
 from tests.slow import one_of_each_fast
 
 UP = np.array([[0.0, 0, 0], [0, 0, 0], [0, -1.0, 0]])

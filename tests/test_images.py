@@ -15,8 +15,6 @@ from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.motion import displacements
 from slideviz.case.reduction import Reduction
 from slideviz.cli import run as command
-from slideviz.deformation import stepping
-from slideviz.deformation.setup import make_setup
 from slideviz.errors import DeformError, Note
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf.frames import make_frame
@@ -25,6 +23,8 @@ from slideviz.rbf.problem import Solution
 from slideviz.session import changes
 from slideviz.session.node_types import NodeTypes
 from slideviz.session.state import StepFrame
+from slideviz.solver import stepping
+from slideviz.solver.setup import make_setup
 from slideviz.terms import NODE_TYPES
 from tests import builders
 from tests.slow import one_of_each_fast

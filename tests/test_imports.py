@@ -44,7 +44,7 @@ import sys
 from slideviz.cli import run
 
 run(["run", *sys.argv[1:], "--steps", "1", "--quiet"])
-slow = ("scipy.spatial", "scipy.sparse", "h5py", "matplotlib", "slideviz.deformation.streaming")
+slow = ("scipy.spatial", "scipy.sparse", "h5py", "matplotlib", "slideviz.streaming.run")
 print(*(name for name in slow if name in sys.modules))
 """
 

@@ -9,10 +9,10 @@ from builders import annulus, far_field, grid, layered, square
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.reduction import Reduction
-from slideviz.deformation import output
-from slideviz.deformation.streaming import stream
 from slideviz.errors import UnsoundError
 from slideviz.rbf import methods
+from slideviz.streaming import output
+from slideviz.streaming.run import stream
 
 # A wall moves along itself; beside it, 1e-6 away, nodes of the sliding sides stay.
 SHEARED = Case(
@@ -111,7 +111,7 @@ def test_nodes_that_stray_are_named_with_the_remedy(tmp_path, monkeypatch):
     for better in ({"influence_factor": "auto"}, {"kernel": "wendland-c0"}):
         assert [*sv.deform(case.change(**better), mesh)][-1].warnings == ()
     # A radius that is small already is to be smaller yet.
-    monkeypatch.setattr("slideviz.deformation.growth.STRAY", 3.0)
+    monkeypatch.setattr("slideviz.solver.growth.STRAY", 3.0)
     (small,) = [*sv.deform(case.change(influence_factor="auto"), mesh)][-1].warnings
     factor = float(small.split("INFLUENCE_FACTOR= ")[1].split(",")[0])
     assert [*sv.deform(case.change(influence_factor=factor), mesh)][-1].warnings == ()

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slideviz.deformation.solver import deform
 from slideviz.errors import DeformError
-from slideviz.mesh.io.files import read
+from slideviz.formats.files import read
+from slideviz.solver.deform import deform
 from tools.laws import attempt
 from tools.laws.__main__ import main, of_seed, save
 from tools.laws.cases import random_run

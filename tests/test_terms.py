@@ -21,8 +21,8 @@ TABLES = {
     terms.Metric: terms.METRICS,
     terms.CellState: dict.fromkeys(terms.CELL_STATES, terms.Term("state")),
     terms.Quantity: terms.QUANTITIES,
-    terms.ColourBy: terms.COLOUR_BY,
-    terms.ColourMap: terms.COLOUR_MAPS,
+    terms.ColorBy: terms.COLOR_BY,
+    terms.ColorMap: terms.COLOR_MAPS,
     terms.PointsShown: terms.POINTS_SHOWN,
     terms.Shown: terms.SHOWN,
 }
@@ -35,11 +35,11 @@ def test_the_type_has_the_values_of_the_table_in_its_order(kind):
     assert all(term.label and term.name for term in table.values())
 
 
-def test_what_is_drawn_in_colours_has_one_of_its_own_for_each_value():
+def test_what_is_drawn_in_colors_has_one_of_its_own_for_each_value():
     for table in (terms.ROLES, terms.NODE_TYPES):
-        colours = [term.colour for term in table.values()]
-        assert all(len(bytes.fromhex(colour.removeprefix("#"))) == 3 for colour in colours)
-        assert len(set(colours)) == len(colours)
+        colors = [term.color for term in table.values()]
+        assert all(len(bytes.fromhex(color.removeprefix("#"))) == 3 for color in colors)
+        assert len(set(colors)) == len(colors)
 
 
 def test_each_list_in_which_one_chooses_has_words_that_differ():
@@ -64,7 +64,7 @@ def test_each_value_has_what_computes_or_draws_it():
     assert methods.SLIDING_METHODS.keys() == terms.SLIDING.keys()
     assert metrics.METRICS.keys() == terms.METRICS.keys()
     assert kernels.KERNELS.keys() == terms.KERNELS.keys()
-    assert set(terms.COLOUR_MAPS) <= set(colormaps)
+    assert set(terms.COLOR_MAPS) <= set(colormaps)
     assert set(COMPARED_METHODS) == {*terms.SLIDING, *terms.METHODS} - {"rbf"}
 
 

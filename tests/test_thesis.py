@@ -226,7 +226,7 @@ def test_node_counts_of_the_dense_square(thesis, method, expected):
 
 
 def node_counts(mesh, case):
-    from slideviz.deformation.setup import make_setup
+    from slideviz.solver.setup import make_setup
 
     return make_setup(case, mesh).classes.counts()
 

@@ -28,7 +28,7 @@ tell passage/mesh.su2 'the undeformed mesh'
 tell passage/passage.cfg 'the case: what moves, slides and repeats, by which method'
 for way in fixed sliding; do
     tell "passage_$way.su2" "the deformed mesh, outer boundaries $way"
-    tell "passage_$way.png" 'its picture: cells coloured by quality'
+    tell "passage_$way.png" 'its picture: cells colored by quality'
     tell "passage_${way}_qual.txt" 'its quality, a number for each cell (GENERATE_QUALITY= YES)'
 done
 tell passage_sliding.json 'the report of the run, for other programs'

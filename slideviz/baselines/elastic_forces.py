@@ -20,8 +20,8 @@ import numpy as np
 
 from slideviz.baselines.shapes import ShapeBlock
 from slideviz.baselines.stiffness import OPTIONS, POISSON, _gather, _jacobian, cell_volumes
-from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray, sealed
+from slideviz.system.jit_cache import njit
 
 MU = 1.0 / (2.0 * (1.0 + POISSON))
 LAM = POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 from numba import prange
 
-from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf import compiled
 from slideviz.rbf.compiled import BLOCK, OPTIONS, TARGETS_PER_TASK, one_minus_cos
@@ -26,6 +25,7 @@ from slideviz.rbf.evaluate import CHUNK, Basis, Tick, no_tick, padded_rows
 from slideviz.rbf.methods import within
 from slideviz.rbf.problem import Problem, Solution, Watch
 from slideviz.rbf.slopes import TINY
+from slideviz.system.jit_cache import njit
 
 
 @dataclass(frozen=True)

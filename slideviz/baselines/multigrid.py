@@ -18,10 +18,10 @@ from numba import prange
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import bsr_array, bsr_matrix
 
-from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.evaluate import Tick, no_tick
+from slideviz.system.jit_cache import njit
 
 TOLERANCE = 1e-8
 """Residual ratio, in the energy norm of the preconditioner, at which the iteration ends."""

@@ -21,9 +21,9 @@ from scipy.sparse import bsr_array, csr_array
 
 from slideviz.baselines.shapes import ShapeBlock
 from slideviz.errors import DeformError
-from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray, frozen_array, sealed
 from slideviz.rbf.evaluate import Tick, no_tick
+from slideviz.system.jit_cache import njit
 
 CHUNK = 20_000
 """Elements between two calls of ``tick``: some tens of milliseconds."""

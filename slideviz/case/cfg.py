@@ -28,7 +28,7 @@ from slideviz.case.lines import (
 from slideviz.case.model import Case, FromFile
 from slideviz.case.words import nearest, shown
 from slideviz.errors import CaseError
-from slideviz.mesh.io.atomic import atomic_write
+from slideviz.system.atomic import atomic_write
 from slideviz.terms import ROLES
 
 _ROLE_OF = {term.key: role for role, term in ROLES.items()}

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from slideviz.case.words import COMMENT_SIGNS, shown, without_comment
 from slideviz.errors import CaseError
-from slideviz.mesh.io.file_checks import require_length
+from slideviz.system.file_checks import require_length
 
 Problem = tuple[int, str]
 _END_OF_LINE = re.compile(r"\r\n|\n|\r")

@@ -1,7 +1,7 @@
 """Keys of a case file about data reduction: which boundary nodes are control nodes.
 
 The numbers of DATA_REDUCTION= AUTO in the text below are EXACT_NODES and AUTO_TOLERANCE of
-`slideviz.deformation.reduction`.
+`slideviz.solver.reduction`.
 """
 
 from __future__ import annotations

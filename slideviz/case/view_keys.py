@@ -16,7 +16,7 @@ from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.case.values import NAMES, Kind, choice, vector_text, whole
 from slideviz.case.words import list_of, number, shown
 from slideviz.errors import CaseError
-from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN, SHOWN
+from slideviz.terms import COLOR_BY, COLOR_MAPS, POINTS_SHOWN, SHOWN
 
 HIDDEN = "hidden"
 """The last word of a section that is not drawn."""
@@ -134,9 +134,9 @@ def _row(name: str, kind: Kind, meaning: str) -> Key:
 
 
 VIEW_ROWS = (
-    _row("VIEW_COLOR", choice({w: w for w in COLOUR_BY}), "What the colours say."),
-    _row("VIEW_RANGE", numbers(2, "two rising numbers", True), "Ends of the colour bar."),
-    _row("VIEW_MAP", choice({w: w for w in COLOUR_MAPS}), "The colour map."),
+    _row("VIEW_COLOR", choice({w: w for w in COLOR_BY}), "What the colors say."),
+    _row("VIEW_RANGE", numbers(2, "two rising numbers", True), "Ends of the color bar."),
+    _row("VIEW_MAP", choice({w: w for w in COLOR_MAPS}), "The color map."),
     _row("VIEW_THRESHOLD", numbers(2, "two rising numbers", True), "Only cells between them."),
     _row("VIEW_POINTS", choice({w: w for w in POINTS_SHOWN}), "Nodes drawn as points."),
     _row("VIEW_SHOW", words(tuple(map(hyphened, SHOWN))), "What is drawn beside the boundaries."),

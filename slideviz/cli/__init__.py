@@ -19,7 +19,7 @@ from slideviz.cli.terminal import terminal
 from slideviz.errors import Cancelled, SlidevizError
 
 if TYPE_CHECKING:
-    from slideviz.mesh.ranks import Ranks
+    from slideviz.system.ranks import Ranks
 
 
 def run(argv: Sequence[str]) -> int:
@@ -50,7 +50,7 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
         from slideviz.cli.parser import parse
         from slideviz.cli.places import inputs_of
         from slideviz.cli.progress import note_compilation
-        from slideviz.mesh.io.file_checks import protected
+        from slideviz.system.file_checks import protected
 
         arguments = parse(argv)
         arguments.inputs, arguments.ranks = inputs_of(arguments), ranks
@@ -62,7 +62,7 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
     except SystemExit as stop:  # argparse: --help is 0, wrong usage 2
         return int(stop.code or 0)
     except (KeyboardInterrupt, Cancelled):
-        from slideviz.mesh.io.cleanup import left
+        from slideviz.system.cleanup import left
 
         return _fail(f"cancelled; {left()}", CANCELLED)
     except SlidevizError as problem:

@@ -36,7 +36,7 @@ def _convert(arguments: argparse.Namespace) -> int:
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import OutputPath, require_places, tell_lost
     from slideviz.cli.report import cell_data
-    from slideviz.mesh.io.convert import convert as write_converted
+    from slideviz.formats.convert import convert as write_converted
     from slideviz.session.formats import holds_quality
 
     require_places(arguments, OutputPath(arguments.output, "OUT", is_mesh=True))
@@ -70,9 +70,9 @@ def _is_to_be_streamed(arguments: argparse.Namespace) -> bool:
     SlidevizError
         ``--stream`` is given for other formats, or the mesh cannot be read.
     """
-    from slideviz.deformation.converting import streamed_kind
-    from slideviz.deformation.memory import missing_memory_of
     from slideviz.errors import CaseError
+    from slideviz.streaming.converting import streamed_kind
+    from slideviz.streaming.memory import missing_memory_of
 
     kind = streamed_kind(arguments.mesh, arguments.output)
     if arguments.stream:
@@ -94,8 +94,8 @@ def _convert_streamed(arguments: argparse.Namespace) -> int:
 
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.progress import Bar
-    from slideviz.deformation.converting import convert_streamed
-    from slideviz.deformation.steps import Progress
+    from slideviz.solver.steps import Progress
+    from slideviz.streaming.converting import convert_streamed
 
     with Bar() as bar:
         convert_streamed(

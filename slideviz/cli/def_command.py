@@ -15,10 +15,10 @@ from slideviz.cli.terminal import holding, say
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.deformation.steps import Step
     from slideviz.design.su2.config import Su2Config
     from slideviz.design.su2.surface import MovingSurface
     from slideviz.mesh.model import Mesh
+    from slideviz.solver.steps import Step
 
 _OF_A_RUN = ("history", "picture", "steps_dir", "steps_file")
 """Options of ``slideviz run`` that `tell` reads, and this command does not have: set to None."""

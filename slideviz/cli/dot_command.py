@@ -93,7 +93,7 @@ def _write_surface(path: Path, found: Gradients) -> None:
     import numpy as np
 
     from slideviz.errors import CaseError
-    from slideviz.mesh.io.atomic import atomic_write
+    from slideviz.system.atomic import atomic_write
 
     table = np.zeros((len(found.points), 6))
     table[:, : found.points.shape[1]] = found.points
@@ -106,7 +106,7 @@ def _write_surface(path: Path, found: Gradients) -> None:
 def _write_gradient(path: Path, config: Su2Config, found: Gradients) -> None:
     """Write a line with the name of the objective, and one with the gradient of each variable."""
     from slideviz.errors import CaseError
-    from slideviz.mesh.io.atomic import atomic_write
+    from slideviz.system.atomic import atomic_write
 
     objective = config.words["OBJECTIVE_FUNCTION"].strip("() ").split(",")[0].strip()
     rows = [f"{objective} gradient", *(repr(value) for value in found.variables.tolist())]

@@ -66,7 +66,7 @@ def add_film(calls: argparse._SubParsersAction) -> None:
         "--color",
         choices=tuple(QUANTITIES),
         default="size-skew",
-        help="what the colours say (size-skew)",
+        help="what the colors say (size-skew)",
     )
     add_zoom(call)
     add_changes(call)

@@ -101,8 +101,8 @@ def require_places(arguments: argparse.Namespace, *outputs: OutputPath) -> None:
         permission, a folder has that name, or no mesh format has that ending.
     """
     from slideviz.errors import CaseError
-    from slideviz.mesh.io.atomic import require_writable
-    from slideviz.mesh.io.file_checks import require_no_input
+    from slideviz.system.atomic import require_writable
+    from slideviz.system.file_checks import require_no_input
 
     there = [one for one in outputs if one.path is not None and str(one.path) != "-"]
     for one in there:
@@ -154,7 +154,7 @@ def _meet(one: OutputPath, other: OutputPath) -> bool:
 
     False where ``other`` is a folder.
     """
-    from slideviz.mesh.io.file_checks import same_file
+    from slideviz.system.file_checks import same_file
 
     assert one.path is not None
     assert other.path is not None
@@ -169,7 +169,7 @@ def _meet(one: OutputPath, other: OutputPath) -> bool:
 
 def _require_mesh_ending(file: Path) -> None:
     if file.suffix.lower() not in (".su2", ".su2b", ".vtu", ".vtkhdf"):
-        from slideviz.mesh.io.meshio.calls import formats_of
+        from slideviz.formats.meshio.calls import formats_of
 
         formats_of(file)
 
@@ -186,13 +186,13 @@ def tell_lost(
     MeshError
         The format cannot store the mesh, or it is CGNS and the mesh was not read from CGNS.
     """
-    from slideviz.mesh.io.files import usual_ending
-    from slideviz.mesh.io.su2b.write import OTHER_ZONES, require_binary, sentence_of_lost
+    from slideviz.formats.files import usual_ending
+    from slideviz.formats.su2b.write import OTHER_ZONES, require_binary, sentence_of_lost
     from slideviz.session.formats import lost_in
 
     kind = file_format or output.suffix.lower().removeprefix(".")
     if kind == "cgns":
-        from slideviz.mesh.io.cgns.write import require_cgns
+        from slideviz.formats.cgns.write import require_cgns
 
         require_cgns(output, mesh)
     elif kind == "su2b":
@@ -212,7 +212,7 @@ def make_folder(folder: Path) -> None:
         It cannot be made.
     """
     from slideviz.errors import CaseError
-    from slideviz.mesh.io.atomic import reason_of
+    from slideviz.system.atomic import reason_of
 
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -12,7 +12,7 @@ from slideviz.cli.exit_codes import DONE
 from slideviz.errors import SlidevizError
 
 if TYPE_CHECKING:
-    from slideviz.mesh.ranks import Ranks
+    from slideviz.system.ranks import Ranks
 
 _LAUNCHERS = (
     ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"),
@@ -59,7 +59,7 @@ def run_shared(argv: Sequence[str], variable: str, run: Callable[[Ranks], int]) 
             "(for SU2 meshes) shares its work among several; add --stream, or start one "
             f"(unset {variable} where a program with MPI calls slideviz)"
         )
-    from slideviz.mesh.ranks import Ranks
+    from slideviz.system.ranks import Ranks
 
     try:
         ranks = Ranks.joined(count)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from slideviz.cli.terminal import control
 
 if TYPE_CHECKING:
-    from slideviz.deformation.solver import Progress
+    from slideviz.solver.deform import Progress
 
 _PHASES = {
     "classify": "sorting nodes",
@@ -38,7 +38,7 @@ def note_compilation(quiet: bool) -> Iterator[None]:
     if quiet:
         yield
         return
-    from slideviz.mesh.caching import compilation_watched
+    from slideviz.system.jit_cache import compilation_watched
 
     noted: list[bool] = []
 

@@ -109,7 +109,7 @@ def _told(
 def _write_csv(path: Path, found: Quality) -> None:
     """Write number, size-skew, size, skew and status of each cell as CSV."""
     from slideviz.errors import CaseError
-    from slideviz.mesh.io.atomic import atomic_write
+    from slideviz.system.atomic import atomic_write
     from slideviz.terms import CELL_STATES
 
     columns = zip(found.values, found.size, found.skew, found.status, strict=True)

@@ -13,14 +13,14 @@ from typing import Any
 from slideviz.case.method_keys import automatic_radius
 from slideviz.case.model import Case
 from slideviz.case.reduction_keys import get_reduction
-from slideviz.deformation.solver import Step, folded_at
 from slideviz.errors import CaseError, Note
 from slideviz.mesh.check import unused_nodes
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.session.formats import holds_quality
+from slideviz.solver.deform import Step, folded_at
+from slideviz.system.atomic import atomic_write
 
 LISTED = 100
 """Most inverted cells listed in a report."""

@@ -25,8 +25,8 @@ from slideviz.cli.terminal import holding
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.deformation.solver import Step
     from slideviz.mesh.model import Mesh
+    from slideviz.solver.deform import Step
     from slideviz.terms import FileFormat, Metric
 
 KEPT_BYTES = 1_000_000_000
@@ -132,7 +132,7 @@ def _require_places(
 ) -> None:
     """Raise where a result could not be written, before the work begins."""
     from slideviz.cli.places import OutputPath, require_places
-    from slideviz.mesh.io.file_checks import same_file
+    from slideviz.system.file_checks import same_file
 
     assert case.mesh_file is not None
     may_force = not arguments.force and same_file(output, case.mesh_file)
@@ -173,7 +173,7 @@ def _require_places(
 def _require_series(path: Path) -> None:
     """Raise CaseError where the file's ending is not that of a format for all steps."""
     from slideviz.errors import CaseError
-    from slideviz.mesh.io.vtkhdf import VTKHDF
+    from slideviz.formats.vtkhdf import VTKHDF
 
     if path.suffix.lower() != VTKHDF:
         raise CaseError(
@@ -214,7 +214,7 @@ def pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
     """
     from slideviz import deform, write
     from slideviz.cli.progress import Bar
-    from slideviz.mesh.io.files import usual_ending
+    from slideviz.formats.files import usual_ending
 
     steps: list[Step] = []
     folder = arguments.steps_dir
@@ -250,7 +250,7 @@ def _series(path: Path | None, mesh: Mesh, metric: Metric) -> Iterator[Callable[
         return
     from slideviz import quality
     from slideviz.cli.report import cell_data
-    from slideviz.mesh.io.vtkhdf import vtkhdf_series
+    from slideviz.formats.vtkhdf import vtkhdf_series
 
     with vtkhdf_series(path, mesh) as series:
 

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from slideviz.errors import Note, SlidevizError
-from slideviz.mesh.io.atomic import atomic_write
-from slideviz.mesh.io.file_checks import read_json
+from slideviz.system.atomic import atomic_write
+from slideviz.system.file_checks import read_json
 
 Folded = Mapping[int, tuple[int, int]]
 """VTK type and first inverted step of the inverted cells with the lowest numbers, by number."""
@@ -25,7 +25,7 @@ Folded = Mapping[int, tuple[int, int]]
 def note_finished(about: str, files: list[Path], report: dict, folded: Folded, advice: str) -> None:
     """Write the note of a finished run beside the first of its files, if it can be written.
 
-    ``about`` is the hash of case, mesh and version (`slideviz.deformation.streaming.about_run`),
+    ``about`` is the hash of case, mesh and version (`slideviz.streaming.run.about_run`),
     ``advice`` what may help against inverted cells (`slideviz.cli.run_outcome.advice_for`).
     """
     note: dict[str, Any] = {

@@ -88,7 +88,7 @@ def write_qualities(path: Path, found: Quality) -> None:
     import orjson
 
     from slideviz.errors import CaseError
-    from slideviz.mesh.io.atomic import atomic_write
+    from slideviz.system.atomic import atomic_write
 
     with atomic_write(path, CaseError) as file:
         for first in range(0, len(found), _ROWS):
@@ -154,7 +154,7 @@ def advice_for(
     """
     if found is not None and not found.inverted:
         return ""
-    from slideviz.deformation.remedies import beyond_pitch, fixed_beside, remedies
+    from slideviz.solver.remedies import beyond_pitch, fixed_beside, remedies
 
     beside: tuple[str, ...] = ()
     pitch = ""

@@ -36,8 +36,8 @@ def require_streamable(
     """
     if not (arguments.stream or arguments.resume):
         return
-    from slideviz.deformation.streaming import require_stream
     from slideviz.errors import CaseError
+    from slideviz.streaming.run import require_stream
 
     for name in _needing_memory(arguments):
         option = f"--{name.replace('_', '-')}"
@@ -56,7 +56,7 @@ def is_to_be_streamed(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> bool:
     """Return whether to stream a run: if asked for, or possible and memory is too small for it."""
-    from slideviz.deformation.memory import missing_memory
+    from slideviz.streaming.memory import missing_memory
 
     if arguments.stream:
         return True
@@ -93,8 +93,8 @@ def run_streamed(
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import LISTED, run_report
     from slideviz.cli.run_finished import finished, note_finished
-    from slideviz.deformation.streaming import about_run, stream
-    from slideviz.mesh.ranks import ALONE
+    from slideviz.streaming.run import about_run, stream
+    from slideviz.system.ranks import ALONE
 
     note = partial(say, "" if arguments.quiet else "note")
     about = about_run(case)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.cli.options import NONE, add_reference, add_shared, given_case, reference_of, words_of
 from slideviz.cli.section_options import limits, neighbours, pixels, reader
-from slideviz.terms import COLOUR_MAPS, METRICS, QUANTITIES
+from slideviz.terms import COLOR_MAPS, METRICS, QUANTITIES
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -53,9 +53,9 @@ def add_section(calls: argparse._SubParsersAction) -> None:
         "where it has the same cells",
     )
     add("--color", choices=tuple(QUANTITIES), default="size-skew", help="(default: size-skew)")
-    add("--range", type=limits, metavar="LO,HI", help="ends of the colour bar")
-    maps = tuple(COLOUR_MAPS)
-    add("--map", choices=maps, default=maps[0], help=f"colour map (default: {maps[0]})")
+    add("--range", type=limits, metavar="LO,HI", help="ends of the color bar")
+    maps = tuple(COLOR_MAPS)
+    add("--map", choices=maps, default=maps[0], help=f"color map (default: {maps[0]})")
     cells = call.add_mutually_exclusive_group()
     cells.add_argument("--whole", action="store_true", default=None, help="show cells whole")
     cells.add_argument("--cut", action="store_false", dest="whole", help=CUT_HELP)
@@ -142,7 +142,7 @@ def section(arguments: argparse.Namespace) -> int:
     scene = (_streamed if arguments.stream else _in_memory)(arguments, case)
     mesh, chosen = scene.mesh, scene.chosen
     painted = paint(mesh, scene.found, arguments.color, scene.base)
-    painted = replace(painted, colour_map=arguments.map)
+    painted = replace(painted, color_map=arguments.map)
     cutter = Cutter.of(mesh)
     pieces = show_passages(cutter, mesh.points, chosen, scene.matrices)
     note = "" if scene.base is not None or painted.label == "skew" else NONE

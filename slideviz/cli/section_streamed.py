@@ -12,13 +12,13 @@ import numpy as np
 
 from slideviz.cli.progress import Bar
 from slideviz.cli.streamed import Looked, looked
-from slideviz.deformation.rated import Rated, Zone, rated_blocks
-from slideviz.deformation.steps import Progress
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part
 from slideviz.mesh.quality import Quality
 from slideviz.sections.model import Section
 from slideviz.session.passages import keeps, moved
+from slideviz.solver.steps import Progress
+from slideviz.streaming.quality_blocks import Rated, Zone, rated_blocks
 from slideviz.terms import Metric
 
 if TYPE_CHECKING:

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.deformation.given_mesh import Given
-    from slideviz.deformation.rated import Whole, Zone
     from slideviz.mesh.model import Mesh
+    from slideviz.streaming.quality_blocks import Whole, Zone
+    from slideviz.streaming.stream_input import Given
     from slideviz.terms import FileFormat
 
 
@@ -59,10 +59,10 @@ def looked(arguments: argparse.Namespace, case: Case | None) -> Iterator[Looked]
         other cells.
     """
     from slideviz.cli.progress import Bar
-    from slideviz.deformation.given_mesh import given_mesh
-    from slideviz.deformation.rated import has_cells_of
-    from slideviz.deformation.steps import Progress
     from slideviz.errors import MeshError
+    from slideviz.solver.steps import Progress
+    from slideviz.streaming.quality_blocks import has_cells_of
+    from slideviz.streaming.stream_input import given_mesh
 
     folder = Path(tempfile.gettempdir())
     with ExitStack() as stack, Bar() as bar:
@@ -104,8 +104,8 @@ def rated(
         As by `looked`.
     """
     from slideviz.cli.progress import Bar
-    from slideviz.deformation.rated import rated_whole
-    from slideviz.deformation.steps import Progress
+    from slideviz.solver.steps import Progress
+    from slideviz.streaming.quality_blocks import rated_whole
 
     with ExitStack() as stack:
         seen = stack.enter_context(looked(arguments, case))

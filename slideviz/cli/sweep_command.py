@@ -168,7 +168,7 @@ def _pulled(
 ) -> list[DesignRow]:
     """Run all designs and return their rows, with a progress bar."""
     from slideviz.case.words import counted
-    from slideviz.mesh.io.cleanup import keep
+    from slideviz.system.cleanup import keep
 
     found: list[DesignRow] = []
     begin, earlier = time.monotonic(), 0

@@ -1,7 +1,7 @@
 r"""Output to the terminal, in which control characters are escaped, as ``\x1b``.
 
 Names of boundaries and files, and messages of libraries, may have control characters, which would
-clear the screen, change its colours or imitate another line.
+clear the screen, change its colors or imitate another line.
 """
 
 from __future__ import annotations

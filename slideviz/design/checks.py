@@ -8,9 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slideviz.case.motion import ROUNDING
-from slideviz.deformation.growth import GROWTH, HOPELESS, unsoundness
-from slideviz.deformation.reduction import AUTO_TOLERANCE
-from slideviz.deformation.setup import Setup
 from slideviz.design.doubt import largest_condition
 from slideviz.design.frozen.loops import farthest
 from slideviz.design.frozen.operations import flat
@@ -20,6 +17,9 @@ from slideviz.errors import DeformError, UnsoundError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf.images import FAR, largest_misfit, misfits
 from slideviz.rbf.problem import Solution
+from slideviz.solver.growth import GROWTH, HOPELESS, unsoundness
+from slideviz.solver.reduction import AUTO_TOLERANCE
+from slideviz.solver.setup import Setup
 
 
 @dataclass(frozen=True, eq=False)

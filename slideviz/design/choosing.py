@@ -9,12 +9,12 @@ from functools import partial
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.deformation.setup import Setup, elastic_body, idw_weights
-from slideviz.deformation.solver import Progress, all_steps, free_memory, require_memory
-from slideviz.deformation.stepping import Stepping, cartesian, followed, moved_by, one_step
 from slideviz.design.frozen.step import FrozenStep
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.problem import Lag, Levels, Problem, Solution, Watch
+from slideviz.solver.deform import Progress, all_steps, free_memory, require_memory
+from slideviz.solver.setup import Setup, elastic_body, idw_weights
+from slideviz.solver.stepping import Stepping, cartesian, followed, moved_by, one_step
 
 Tell = Callable[[Progress], None]
 

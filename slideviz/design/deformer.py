@@ -11,10 +11,6 @@ from slideviz.case import motion
 from slideviz.case.displacement import Displacements
 from slideviz.case.method_keys import automatic_radius
 from slideviz.case.model import Case, Translate
-from slideviz.deformation.prescribed import displaced
-from slideviz.deformation.radius import support_radius
-from slideviz.deformation.setup import make_setup
-from slideviz.deformation.solver import Progress
 from slideviz.design.checks import Checks, facets_of, usual_edge
 from slideviz.design.choosing import choose_steps
 from slideviz.design.doubt import (
@@ -31,6 +27,10 @@ from slideviz.errors import CaseError, DeformError
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 from slideviz.rbf.images import FAR
+from slideviz.solver.deform import Progress
+from slideviz.solver.prescribed import displaced
+from slideviz.solver.radius import support_radius
+from slideviz.solver.setup import make_setup
 
 TOGETHER = 128
 """Designs that are deformed together, so that each radial function is computed once for all."""

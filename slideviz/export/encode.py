@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from slideviz.errors import SlidevizError
 from slideviz.export.offscreen import png_bytes
-from slideviz.mesh.io.atomic import atomic_write, require_writable
-from slideviz.mesh.io.cleanup import draft, ended
-from slideviz.mesh.io.file_checks import require_no_input
+from slideviz.system.atomic import atomic_write, require_writable
+from slideviz.system.cleanup import draft, ended
+from slideviz.system.file_checks import require_no_input
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -154,10 +154,10 @@ def _start_ffmpeg(
     import imageio_ffmpeg
 
     given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate)]
-    # BT.709 colours, declared in the file: otherwise players guess by the size.
+    # BT.709 colors, declared in the file: otherwise players guess by the size.
     said = ":".join(f"{name}=bt709" for name in ("colorspace", "color_primaries", "color_trc"))
-    colours = f"scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,setparams={said}"
-    made = ["-vf", colours, "-c:v", "libx264", "-preset", "veryfast", "-crf", "16"]
+    colors = f"scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,setparams={said}"
+    made = ["-vf", colors, "-c:v", "libx264", "-preset", "veryfast", "-crf", "16"]
     made += ["-movflags", "+faststart", "-f", "mp4"]
     try:
         return subprocess.Popen(
@@ -197,12 +197,12 @@ def _gif(file: Path, take: Take) -> Iterator[Add]:
         def add(pixels: Pixels, seconds: float) -> None:
             nonlocal before, shown, ticks
             image = Image.fromarray(pixels).quantize(palette=palette, dither=Image.Dither.NONE)
-            colours = np.asarray(image)
+            colors = np.asarray(image)
             if before is None:
                 for block in GifImagePlugin.getheader(image.copy(), info={"loop": 0})[0]:
                     out.write(block)
-            box = _changed(colours, before)
-            before = colours
+            box = _changed(colors, before)
+            before = colors
             shown += seconds
             # A GIF counts hundredths of a second: round the sum, not each duration.
             duration = max(round(100 * shown) - ticks, 2)
@@ -215,11 +215,11 @@ def _gif(file: Path, take: Take) -> Iterator[Add]:
         out.write(b";")
 
 
-def _changed(colours: NDArray, before: NDArray | None) -> tuple[int, int, int, int]:
+def _changed(colors: NDArray, before: NDArray | None) -> tuple[int, int, int, int]:
     """Return left, top, right, bottom of the part that differs; one pixel if nothing does."""
     if before is None:
-        return 0, 0, colours.shape[1], colours.shape[0]
-    differs = colours != before
+        return 0, 0, colors.shape[1], colors.shape[0]
+    differs = colors != before
     rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
     if not len(rows):
         return 0, 0, 1, 1
@@ -227,10 +227,10 @@ def _changed(colours: NDArray, before: NDArray | None) -> tuple[int, int, int, i
 
 
 def _palette(samples: Sequence[Pixels]) -> Image:
-    """Return an image whose palette of 256 colours suits all samples.
+    """Return an image whose palette of 256 colors suits all samples.
 
-    One half covers the range of all colours, however rare (an inverted cell), the other has the
-    most frequent ones (shades of the colour map).
+    One half covers the range of all colors, however rare (an inverted cell), the other has the
+    most frequent ones (shades of the color map).
     """
     from PIL import Image
 

@@ -207,12 +207,12 @@ def _blend(
 
 
 def _showing(session: Session, frame: StepFrame) -> Session:
-    """Return the session with one frame in place of all its run's steps, and the same colours."""
+    """Return the session with one frame in place of all its run's steps, and the same colors."""
     run = session.run_shown
     assert run is not None
     runs = tuple(replace(run, frames=(frame,)) if one is run else one for one in session.runs)
-    # The colour range of the whole run: that of one frame would change from image to image.
-    view = replace(session.view, frame=1, colour_range=session.colour_range)
+    # The color range of the whole run: that of one frame would change from image to image.
+    view = replace(session.view, frame=1, color_range=session.color_range)
     return replace(session, runs=runs, view=view)
 
 
@@ -236,7 +236,7 @@ def _titles_of_runs(
     ``detail``: note that only a part of the mesh is shown; ``between``: there are images in
     between.
     """
-    pair, what = len(runs) == 2, runs[0].view.colour_by
+    pair, what = len(runs) == 2, runs[0].view.color_by
 
     def words(session: Session, place: str, found: Quality) -> str:
         run, text = session.run_shown, caption(place, found, what)

@@ -24,7 +24,6 @@ from slideviz.export.offscreen import (
 )
 from slideviz.export.picture_options import PictureOptions, headings, panes
 from slideviz.export.titles import name_mark
-from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.scene.moved import Overview, Zoom, lengths
@@ -32,6 +31,7 @@ from slideviz.session.changes import show_frame
 from slideviz.session.panes import shown_views
 from slideviz.session.pieces import appearing, whole
 from slideviz.session.state import Session
+from slideviz.system.atomic import atomic_write
 
 if TYPE_CHECKING:
     from slideviz.export.encode import Pixels

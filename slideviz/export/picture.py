@@ -31,7 +31,7 @@ _SMALL = 10
 def picture(
     session: Session, file: str | Path, size: tuple[int, int] = SIZE, zoom: Zoom = "auto"
 ) -> None:
-    """Write a PNG of a mesh in the colours of its quality, with name and quality as title.
+    """Write a PNG of a mesh in the colors of its quality, with name and quality as title.
 
     A 2D mesh is shown whole. Of a 3D mesh, the whole cells behind a plane are shown, which goes
     through the boundary that moved most, along its displacement.
@@ -83,6 +83,6 @@ def pictures_alike(frames: Sequence[StepFrame], base: Mesh, side: int) -> list[P
             return whole(renderer.drawing([shown], options, ([""], 1.0)))
 
         inked = int((draw(runs[0], options) < WHITE).any(axis=2).sum())
-        # The edges of small cells would hide their colours.
+        # The edges of small cells would hide their colors.
         options = replace(options, edges=inked >= scene.polygons * _SMALL**2)
         return [draw(run, options) for run in runs]

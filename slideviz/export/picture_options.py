@@ -43,7 +43,7 @@ class PictureOptions:
         Width and height in pixels.
     background : {"white", "shown", "transparent"}
     legend, edges, triad : bool
-        Whether there are the legend of roles or the colour bar; edges of cells; the axes.
+        Whether there are the legend of roles or the color bar; edges of cells; the axes.
     title : bool
         Whether there is a title: what is shown, with minimum, mean and inverted cells.
     fill : bool
@@ -123,7 +123,7 @@ class PictureOptions:
         session = as_drawn(session)
         view = session.view
         drawn: dict[Shown, bool] = {"legend": self.legend, "edges": self.edges, "triad": self.triad}
-        if view.colour_by != "role":
+        if view.color_by != "role":
             drawn["motion_ghost"] = False  # it would hide the values
         view = view.with_drawn(drawn)
         marked = view.marked_cell if self.marked else None

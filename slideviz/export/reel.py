@@ -148,7 +148,7 @@ def exposing(
     """
     total, pace = reel.count(frames), reel.pace(frames)
     samples = []
-    if kind_of(file) == ".gif":  # only there colours have to be chosen
+    if kind_of(file) == ".gif":  # only there colors have to be chosen
         for at in sorted({0, frames // 2, frames - 1}):
             image = yield from draw(float(at))
             samples.append(image)

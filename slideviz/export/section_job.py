@@ -65,7 +65,7 @@ def save_section(
     report: Report,
     stopped: Stopped,
 ) -> Path:
-    """Write the picture of a section as the view shows it: step, colours, neighbouring passages.
+    """Write the picture of a section as the view shows it: step, colors, neighbouring passages.
 
     With a comparison, it shows both views. Return the path.
 
@@ -106,11 +106,11 @@ def _shown(session: Session, name: str, section: Section) -> SectionInRun:
     """Return the cut of a section in one view, which is called ``name``."""
     frame = session.frame
     assert frame is not None
-    by = session.view.colour_by
+    by = session.view.color_by
     painted = paint(frame.mesh, frame.quality, quantity_of(by), session.mesh)
-    painted = replace(painted, colour_map=session.view.colour_map)
+    painted = replace(painted, color_map=session.view.color_map)
     if by != "role":
-        painted = painted.within(*session.colour_range)
+        painted = painted.within(*session.color_range)
     around = matrices(session, Period().of(session) if session.view.passages else None)
     every = {0: np.eye(4)} | around
     cutter, points = Cutter.of(frame.mesh), frame.mesh.points
@@ -132,7 +132,7 @@ def _choice(session: Session, section: Section) -> CellsInRange | None:
     curve = session.mesh is not None and session.mesh.dim == 2 and not section.whole
     if frame is None or threshold is None or curve:
         return None
-    return CellsInRange.of(frame.shown_values(session.view.colour_by, session.mesh), threshold)
+    return CellsInRange.of(frame.shown_values(session.view.color_by, session.mesh), threshold)
 
 
 def state_words(session: Session) -> str:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slideviz.color_scheme import PAPER, SELECTED_COLOUR
-from slideviz.mesh.check import printable
+from slideviz.color_scheme import PAPER, SELECTED_COLOR
+from slideviz.errors import printable
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.mesh.surfaces import padded
@@ -16,7 +16,7 @@ from slideviz.scene.color_legend import set_letters
 from slideviz.session.inspect import nodes_of
 from slideviz.session.runs_words import apart, differing, method_words, run_words
 from slideviz.session.state import Run, Session, StepFrame
-from slideviz.terms import ColourBy
+from slideviz.terms import ColorBy
 
 if TYPE_CHECKING:
     from slideviz.scene.scene import Scene
@@ -32,9 +32,9 @@ LONGEST = "step {0}.00 of {0}, interpolated"
 """The longest text of a place in a film, by which the form of its titles is chosen once."""
 
 
-def caption(name: str, found: Quality, colour_by: ColourBy = "size-skew") -> str:
+def caption(name: str, found: Quality, color_by: ColorBy = "size-skew") -> str:
     """Return a line with a name and the size-skew quality: min, mean, inverted cells."""
-    what = "" if colour_by == "size-skew" else "size-skew "
+    what = "" if color_by == "size-skew" else "size-skew "
     text = f"{printable(name)}: {what}min {found.min:.4f}, mean {found.mean:.4f}"
     if found.inverted:
         text += f", {found.inverted} of {found.cells} cells inverted"
@@ -84,7 +84,7 @@ def title_words(
     longest : str
         The longest place of a film, so that all its titles have the same form.
     """
-    what = session.view.colour_by
+    what = session.view.color_by
 
     def titled(name: str, place: str) -> str:
         return caption(f"{name}, {place}" if place else name, frame.quality, what)
@@ -148,7 +148,7 @@ def pair_titles(pair: Sequence[Session], quality: bool) -> list[str]:
         at = min(one.view.frame, steps)
         place = (f"step {at} of {steps}" if several else "") if at else "undeformed"
         place = "" if name == "Undeformed" else place
-        numbers = caption(place, frame.quality, one.view.colour_by).removeprefix(": ")
+        numbers = caption(place, frame.quality, one.view.color_by).removeprefix(": ")
         found.append(f"{name}\n{numbers}")
     return found
 
@@ -184,10 +184,10 @@ def mark_words(session: Session) -> str:
     words = f"cell {cell:,}"
     if frame.quality.status[cell] == INVERTED:
         return f"{words}: inverted"
-    if session.view.colour_by == "role" or session.mesh is None:
+    if session.view.color_by == "role" or session.mesh is None:
         return words
-    value = float(frame.values(session.view.colour_by, session.mesh)[cell])
-    number = ".4g" if session.view.colour_by == "displacement" else ".4f"
+    value = float(frame.values(session.view.color_by, session.mesh)[cell])
+    number = ".4g" if session.view.color_by == "displacement" else ".4f"
     return f"{words}: {value:{number}}"
 
 
@@ -240,7 +240,7 @@ def draw_mark(axes: Any, session: Session, pixel_pt: float) -> None:
     if not words:
         return
     corners = _corners(session)
-    outline = Polygon(corners, fill=False, edgecolor=SELECTED_COLOUR, linewidth=2.0 * pixel_pt)
+    outline = Polygon(corners, fill=False, edgecolor=SELECTED_COLOR, linewidth=2.0 * pixel_pt)
     outline.set(zorder=4, gid="mark")
     axes.add_patch(outline)
     middle = corners.mean(axis=0)

@@ -26,7 +26,7 @@ from slideviz.sections.line import box_around, trace
 from slideviz.sections.polygons import Polygons
 from slideviz.sections.threshold import CellsInRange
 from slideviz.session.state import Session
-from slideviz.terms import COLOUR_BY, ROLES
+from slideviz.terms import COLOR_BY, ROLES
 
 SUFFIXES = (".svg", ".pdf")
 """Suffixes of such pictures."""
@@ -105,7 +105,7 @@ def draw_vector(renderer: OffscreenRenderer, options: PictureOptions) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class _Paint:
-    """How cells are drawn: by values (m,) and a ScalarMappable, or in one colour (None).
+    """How cells are drawn: by values (m,) and a ScalarMappable, or in one color (None).
 
     ``edge`` is the width of their edges in points.
     """
@@ -124,7 +124,7 @@ class _Paint:
         draw_cells(axes, cells, values, self.colors, edges=self.edge, **style)
 
     def lines(self, cut: Polygons) -> dict[str, Any]:
-        """Return the colour arguments of a LineCollection of the lines that a section cuts."""
+        """Return the color arguments of a LineCollection of the lines that a section cuts."""
         if self.values is None:
             return {"colors": PAPER.cell}
         found = self.colors
@@ -141,9 +141,9 @@ def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: f
     mesh, cutter = frame.mesh, Cutter.of(frame.mesh)
     edge, only = _EDGE * pixel_pt * options.edges, None
     paint = _Paint(None, None, edge)
-    if view.colour_by != "role":
-        values = frame.shown_values(view.colour_by, session.mesh)
-        paint = _Paint(values, color_scale(view.colour_map, session.colour_range), edge)
+    if view.color_by != "role":
+        values = frame.shown_values(view.color_by, session.mesh)
+        paint = _Paint(values, color_scale(view.color_map, session.color_range), edge)
         only = None if view.threshold is None else CellsInRange.of(values, view.threshold)
     cells = cutter.all_cells(mesh.points)
     faint = FADED if is_faded(session) else None
@@ -173,7 +173,7 @@ def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: f
         axes.add_collection(LineCollection(parts, **style))
     for name in mesh.marker_names:
         if name not in view.hidden:
-            style = {"colors": ROLES[session.role(name)].colour, "linewidths": _LINE * pixel_pt}
+            style = {"colors": ROLES[session.role(name)].color, "linewidths": _LINE * pixel_pt}
             axes.add_collection(LineCollection(list(_lines(mesh, name)), **style))
     if options.marked:
         draw_mark(axes, session, pixel_pt)
@@ -193,17 +193,17 @@ def _title(figure: Any, words: str, options: PictureOptions, *, size: float, lef
 
 
 def _legend(figure: Any, session: Session, options: PictureOptions) -> None:
-    """Draw the legend at the right, on a half-transparent plate: the roles, or the colour bar."""
+    """Draw the legend at the right, on a half-transparent plate: the roles, or the color bar."""
     from matplotlib.patches import Patch, Rectangle
 
     width, scale = options.size[0], options.scale
     letters = _LETTERS * scale * 72.0 / figure.dpi
     clear = options.background == "transparent"
-    if session.view.colour_by == "role":
+    if session.view.color_by == "role":
         assert session.mesh is not None
         used = {session.role(name) for name in session.mesh.marker_names}
         roles = [
-            Patch(color=term.colour, label=term.label)
+            Patch(color=term.color, label=term.label)
             for role, term in ROLES.items()
             if role in used
         ]
@@ -215,11 +215,11 @@ def _legend(figure: Any, session: Session, options: PictureOptions) -> None:
     # The bar is above the plate, which is above the mesh.
     left, wide = 1.0 - (STRIP - 14) * scale / width, 20 * scale / width
     place = figure.add_axes((left, 0.16, wide, 0.62), zorder=1)
-    colors = color_scale(session.view.colour_map, session.colour_range)
+    colors = color_scale(session.view.color_map, session.color_range)
     bar = color_bar(place, colors, "", letters, inverted=inverted, upright=True)
     bar.outline.set_visible(False)
     place.tick_params(length=0, pad=0.3 * letters)  # the numbers do not touch the bar
-    name = COLOUR_BY[session.view.colour_by].label
+    name = COLOR_BY[session.view.color_by].label
     place.set_title(name, fontsize=letters, loc="left", color=PAPER.text)
     if not clear:
         box = place.get_tightbbox().padded(6.0 * scale)

@@ -14,8 +14,8 @@ import numpy as np
 from slideviz.ffd.box import Box
 from slideviz.ffd.coordinates import CARTESIAN, CoordinateSystem, given_of_polar
 from slideviz.ffd.reader import Entries, entries_of, key_of, read_boxes
-from slideviz.mesh.io.su2.keyword_blocks import is_ffd
-from slideviz.mesh.io.su2.read import Document
+from slideviz.formats.su2.keyword_blocks import is_ffd
+from slideviz.formats.su2.read import Document
 from slideviz.mesh.model import FloatArray, Mesh
 
 _LETTERS = "IJK"

@@ -19,7 +19,7 @@ from slideviz.session.colors import NO_DISPLACEMENT, unmoved
 from slideviz.session.motions import support_case, support_key, support_words
 from slideviz.session.state import Session
 from slideviz.session.store import Store
-from slideviz.terms import COLOUR_BY, SHOWN, labels
+from slideviz.terms import COLOR_BY, SHOWN, labels
 
 if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow
@@ -44,7 +44,7 @@ class Actions:
             self._make(window.menuBar(), menu)
         self.bar = ToolBar(window, self)
         window.addToolBar(self.bar)
-        window.store.listen(self._explain_colours)
+        window.store.listen(self._explain_colors)
         window.store.listen(self._explain_support)
 
     def _make(self, above: QMenu | QMenuBar, table: Menu) -> None:
@@ -68,7 +68,7 @@ class Actions:
                 if group is not None:
                     group.addAction(act)
 
-    def _explain_colours(self, old: Session, new: Session) -> None:
+    def _explain_colors(self, old: Session, new: Session) -> None:
         if unmoved(new) and not unmoved(old):
             self.window.say(NO_DISPLACEMENT)
 
@@ -91,13 +91,13 @@ class Actions:
 
 
 class ToolBar(QToolBar):
-    """The tool bar: the commands used most, the quantity to colour by, and the zone.
+    """The tool bar: the commands used most, the quantity to color by, and the zone.
 
     Attributes
     ----------
-    colour, zone : Choice
+    color, zone : Choice
     range : QToolButton
-        Opens the menu of the colour range.
+        Opens the menu of the color range.
     """
 
     def __init__(self, window: MainWindow, actions: Actions) -> None:
@@ -111,7 +111,7 @@ class ToolBar(QToolBar):
         self.addSeparator()
         self._add("undo", "redo")
         self.addSeparator()
-        self._add_colour(window.store)
+        self._add_color(window.store)
         self._add_range()
         self._add(*(name for name, term in SHOWN.items() if term.in_bar))
         self.addSeparator()
@@ -124,17 +124,17 @@ class ToolBar(QToolBar):
     def _add(self, *names: str) -> None:
         self.addActions([self._actions.by_name[name] for name in names])
 
-    def _add_colour(self, store: Store) -> None:
-        self.addWidget(QLabel(" Colour by "))
-        tip = "What the colours of the view say; the panel Display has their range."
-        self.colour = Choice(labels(COLOUR_BY), tip, "colour_by")
-        self.colour.chosen.connect(lambda value: store.change(changes.set_view, colour_by=value))
-        self.addWidget(self.colour)
+    def _add_color(self, store: Store) -> None:
+        self.addWidget(QLabel(" Color by "))
+        tip = "What the colors of the view say; the panel Display has their range."
+        self.color = Choice(labels(COLOR_BY), tip, "color_by")
+        self.color.chosen.connect(lambda value: store.change(changes.set_view, color_by=value))
+        self.addWidget(self.color)
 
     def _add_range(self) -> None:
-        menu = self._actions.menus["colours"]
+        menu = self._actions.menus["colors"]
         self.range = tool_button(
-            menu.menuAction().statusTip(), image="colours", menu=menu, name="colour_range"
+            menu.menuAction().statusTip(), image="colors", menu=menu, name="color_range"
         )
         self.addWidget(self.range)
         self.addSeparator()
@@ -149,9 +149,9 @@ class ToolBar(QToolBar):
         """Show the session's quantity and zone, and enable what can be used."""
         session: Session = now.session
         mesh = session.mesh
-        self.colour.setEnabled(mesh is not None)
+        self.color.setEnabled(mesh is not None)
         self.range.setEnabled(valued(now))
-        self.colour.show_value(session.view.colour_by)
+        self.color.show_value(session.view.color_by)
         zones = mesh.zones if mesh is not None else 1
         if self.zone.count() != zones:
             self.zone.clear()

@@ -166,22 +166,22 @@ _RUN = Menu("run", "&Run", entries=(
             tip_now=why_not(opened, "There is no mesh yet: open one first.")),
 ))
 
-_COLOURS = Menu("colours", "&Colours", "From which value to which the colours range.", (
-    Command("fit_colours", "Fit to this step",
-            "Let the colours range over the values of the step that is shown, and of the other "
+_COLORS = Menu("colors", "&Colors", "From which value to which the colors range.", (
+    Command("fit_colors", "Fit to this step",
+            "Let the colors range over the values of the step that is shown, and of the other "
             "one in a comparison.",
-            lambda window: window.store.change(changes.fit_colours, every=False),
+            lambda window: window.store.change(changes.fit_colors, every=False),
             ("R",), enabled=valued,
             button_tip="From the lowest to the highest value of what is shown now (R); of all "
             "steps: Shift+R."),
-    Command("fit_all_colours", "Fit to all steps",
-            "Let the colours range over the values of all steps, so that they say the same in a "
+    Command("fit_all_colors", "Fit to all steps",
+            "Let the colors range over the values of all steps, so that they say the same in a "
             "film.",
-            lambda window: window.store.change(changes.fit_colours, every=True),
+            lambda window: window.store.change(changes.fit_colors, every=True),
             ("Shift+R",), enabled=valued),
-    Command("usual_colours", "As ever", "Let the colours range as they do at first.",
-            lambda window: window.store.change(changes.set_view, colour_range=None),
-            enabled=lambda now: valued(now) and now.session.view.colour_range is not None,
+    Command("usual_colors", "As ever", "Let the colors range as they do at first.",
+            lambda window: window.store.change(changes.set_view, color_range=None),
+            enabled=lambda now: valued(now) and now.session.view.color_range is not None,
             title_now=lambda now: usual_range(now.session)),
 ))
 
@@ -225,10 +225,10 @@ def _theme(theme: str, tip: str) -> Command:
                    lambda window: window.set_theme(theme), checked=lambda now: now.theme == theme)
 
 
-_THEMES = Menu("theme", "&Theme", "Light or dark colours.", (
-    _theme("system", "Take light or dark colours as the desktop does."),
-    _theme("light", "Take light colours."),
-    _theme("dark", "Take dark colours."),
+_THEMES = Menu("theme", "&Theme", "Light or dark colors.", (
+    _theme("system", "Take light or dark colors as the desktop does."),
+    _theme("light", "Take light colors."),
+    _theme("dark", "Take dark colors."),
 ), one_of=True)
 
 
@@ -257,7 +257,7 @@ COMPARE = Menu("compare", "Co&mpare with",
 _VIEW = Menu("view", "&View", entries=(
     *(_toggle(name, term) for name, term in SHOWN.items()),
     None,
-    _COLOURS,
+    _COLORS,
     Command("fit", "&Fit all", "Make the whole mesh fill the view.",
             lambda window: window.viewing.fit(), ("F",), "fit", opened),
     Command("fit_boundary", "Fit to &boundary",

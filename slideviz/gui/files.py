@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING
 from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
 
 from slideviz.errors import SlidevizError
+from slideviz.formats.files import is_source, usual_ending
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import questions
 from slideviz.mesh.interfaces import torn_interfaces
-from slideviz.mesh.io.atomic import atomic_write
-from slideviz.mesh.io.files import is_source, usual_ending
 from slideviz.session import changes, jobs
 from slideviz.session.formats import left_out
 from slideviz.session.keep import files_beside, keep_view
 from slideviz.session.unsaved import Unsaved
+from slideviz.system.atomic import atomic_write
 
 if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow

@@ -126,8 +126,8 @@ class Running(QObject):
         self.banner.hide()
         self.store.change(changes.start_run, case, name)
         session = self.store.session
-        if session.view.colour_by == "role":
-            self.store.change(changes.set_view, colour_by="size-skew")
+        if session.view.color_by == "role":
+            self.store.change(changes.set_view, color_by="size-skew")
         periodic = PERIODIC_MODES[case.periodic].name
         steps = case.steps or "automatic"
         log.info("run: %s, %s, %s steps", method_words(case), periodic, steps)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from slideviz.errors import SlidevizError
 from slideviz.gui.shots_states import settle
-from slideviz.mesh.io.cleanup import draft, ended
+from slideviz.system.cleanup import draft, ended
 
 if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow
@@ -26,7 +26,7 @@ SIZE = (1280, 800)
 """Width and height of the window in pixels."""
 
 APART, MANY, EXACT = 192, 40, 24
-"""Numbers of colours in a picture's palette: mutually distant; of large areas; most frequent."""
+"""Numbers of colors in a picture's palette: mutually distant; of large areas; most frequent."""
 
 
 def shots(folder: Path) -> list[Path]:
@@ -137,7 +137,7 @@ def photograph(window: MainWindow, path: Path) -> Path:
 
 
 def shrink(path: Path) -> None:
-    """Reduce a PNG picture to a palette of 256 colours: a third of its size, hardly visible."""
+    """Reduce a PNG picture to a palette of 256 colors: a third of its size, hardly visible."""
     import numpy as np
     from PIL import Image
     from scipy.spatial import KDTree
@@ -148,12 +148,12 @@ def shrink(path: Path) -> None:
     apart = drawn.quantize(APART, Image.Quantize.MAXCOVERAGE, kmeans=1).getpalette() or []
     many = drawn.quantize(MANY, Image.Quantize.MEDIANCUT).getpalette() or []
     counted = sorted(drawn.getcolors(drawn.width * drawn.height) or [], reverse=True)
-    exact = np.ravel([colour for _, colour in counted[:EXACT]]).tolist()
+    exact = np.ravel([color for _, color in counted[:EXACT]]).tolist()
     palette = apart[: 3 * APART] + many[: 3 * MANY] + exact
-    # Pillow's own search for the nearest colour is coarse: it maps 255 to 250.
+    # Pillow's own search for the nearest color is coarse: it maps 255 to 250.
     tree = KDTree(np.reshape(palette, (-1, 3)))
-    colours, where = np.unique(np.asarray(drawn).reshape(-1, 3), axis=0, return_inverse=True)
-    nearest = np.asarray(tree.query(colours)[1], np.uint8)[where.ravel()]
+    colors, where = np.unique(np.asarray(drawn).reshape(-1, 3), axis=0, return_inverse=True)
+    nearest = np.asarray(tree.query(colors)[1], np.uint8)[where.ravel()]
     fewer = Image.fromarray(nearest.reshape(drawn.height, drawn.width), "P")
     fewer.putpalette(palette)
     fewer.save(path, optimize=True)

@@ -195,12 +195,12 @@ STATES = (
 
 def film_of_passage(path: Path) -> Path:
     """Write a film of the 2D passage, as in the dark picture, and return its path."""
-    from slideviz.deformation.solver import deform
     from slideviz.export.film import film
     from slideviz.export.reel import Reel
     from slideviz.mesh.quality import quality as quality_of
     from slideviz.session.opening import of_runs
     from slideviz.session.state import Run, StepFrame
+    from slideviz.solver.deform import deform
 
     made = sample("passage", 24)
     case = made.case.change(motions=FAR)

@@ -47,7 +47,6 @@ from slideviz.gui.widgets.icons import redraw_icons
 from slideviz.gui.widgets.labels import plain_labels, wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import Services
-from slideviz.mesh.io.file_checks import protected
 from slideviz.mesh.model import Mesh
 from slideviz.scene.scene import Scene
 from slideviz.session import changes, jobs
@@ -55,6 +54,7 @@ from slideviz.session.motions import boxes_hint
 from slideviz.session.run_messages import Requirement
 from slideviz.session.store import Store
 from slideviz.session.unsaved import title_of
+from slideviz.system.file_checks import protected
 
 log = logging.getLogger("slideviz")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,20 +10,10 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
-from slideviz.mesh.threads import in_parts
+from slideviz.system.threads import in_parts
 
 LARGEST = 1e50
 """Largest absolute coordinate that is computed with, so that products of several are finite."""
-
-
-def printable(path: str | Path) -> str:
-    """Return a path as text for a message; bytes that are no UTF-8 become escape sequences."""
-    return str(path).encode("utf-8", "backslashreplace").decode()
-
-
-def path_error(path: Path, message: str) -> MeshError:
-    """Return the error ``path: message``."""
-    return MeshError(f"{printable(path)}: {message}")
 
 
 def first_fault(cells: Cells, n_points: int) -> tuple[int, str] | None:

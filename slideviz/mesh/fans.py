@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray, frozen_array, sealed
 from slideviz.mesh.topology import (
     DEFAULT_FEATURE_ANGLE_DEG,
@@ -26,6 +25,7 @@ from slideviz.mesh.topology import (
     facet_vectors,
     unit,
 )
+from slideviz.system.jit_cache import njit
 
 
 @dataclass(frozen=True, eq=False)

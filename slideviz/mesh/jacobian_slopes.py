@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.mesh.caching import njit
 from slideviz.mesh.jacobians import (
     LANES,
     OPTIONS,
@@ -21,6 +20,7 @@ from slideviz.mesh.jacobians import (
     half_sum,
     spreads,
 )
+from slideviz.system.jit_cache import njit
 
 
 @njit(**OPTIONS)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slideviz.errors import MeshError
-from slideviz.mesh.caching import njit
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.system.jit_cache import njit
 from slideviz.terms import CELL_STATES
 
 if TYPE_CHECKING:

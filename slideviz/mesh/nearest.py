@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.threads import cores
+from slideviz.system.threads import cores
 
 OBLIQUE = np.array([1.0, 0.6180339887, 0.4142135624])
 """A direction of no symmetry: points of a mesh seldom have the same projection onto it."""

@@ -16,7 +16,7 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobians import CORNERS, write_corners
 from slideviz.mesh.metrics import total
 from slideviz.mesh.model import Mesh, sealed
-from slideviz.mesh.threads import in_parts
+from slideviz.system.threads import in_parts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

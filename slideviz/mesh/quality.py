@@ -30,8 +30,8 @@ from slideviz.mesh.metrics import METRICS, total
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality_derivative import QualityDerivative, derivative_of
-from slideviz.mesh.threads import in_parts
 from slideviz.mesh.validity import decide_unproven
+from slideviz.system.threads import in_parts
 from slideviz.terms import Metric
 
 if TYPE_CHECKING:

@@ -31,7 +31,7 @@ from slideviz.mesh.jacobians import (
 )
 from slideviz.mesh.metrics import EXPONENTS
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, sealed
-from slideviz.mesh.threads import PART, cores, in_parts
+from slideviz.system.threads import PART, cores, in_parts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
-from slideviz.mesh.caching import njit
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, sorted_nodes
-from slideviz.mesh.threads import in_parts
 from slideviz.mesh.unique_rows import row_groups, sorted_in_rows
+from slideviz.system.jit_cache import njit
+from slideviz.system.threads import in_parts
 
 DEFAULT_FEATURE_ANGLE_DEG = 40.0
 """Angle in degrees between smoothly joined facets; also the default in `Case.feature_angle_deg`."""

@@ -19,7 +19,7 @@ from slideviz.session.passages import moved
 MOST = 150_000
 """Number of cells above which they are drawn as pixels without visible edges, which is faster."""
 _EDGE, _FACE = "#c9d0d8", "#f3f5f7"
-"""Colours of the faint cells' edges and faces."""
+"""Colors of the faint cells' edges and faces."""
 
 _LINE = 0.7
 """Width of the section's line in points."""

@@ -1,10 +1,10 @@
-"""Colour bars of matplotlib, with numbers at their ends and the colour of inverted cells."""
+"""Color bars of matplotlib, with numbers at their ends and the color of inverted cells."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from slideviz.color_scheme import INVERTED_COLOUR, PAPER
+from slideviz.color_scheme import INVERTED_COLOR, PAPER
 from slideviz.plots.ticks import bar_ticks
 
 _LINE = 0.6
@@ -16,7 +16,7 @@ BELOW = 0.62
 
 
 def beside(axes: Any) -> Any:
-    """Return inset axes for a colour bar at the right of ``axes``, as high as these."""
+    """Return inset axes for a color bar at the right of ``axes``, as high as these."""
     from matplotlib.transforms import ScaledTranslation, blended_transform_factory
 
     right = axes.figure.dpi_scale_trans + ScaledTranslation(1.0, 0.0, axes.transAxes)
@@ -25,7 +25,7 @@ def beside(axes: Any) -> Any:
 
 
 def below(axes: Any, length: float, gap: float = BELOW) -> Any:
-    """Return inset axes for a colour bar below ``axes``; its length and their gap in inches."""
+    """Return inset axes for a color bar below ``axes``; its length and their gap in inches."""
     from matplotlib.transforms import ScaledTranslation
 
     middle = axes.figure.dpi_scale_trans + ScaledTranslation(0.5, 0.0, axes.transAxes)
@@ -35,7 +35,7 @@ def below(axes: Any, length: float, gap: float = BELOW) -> Any:
 def color_bar(
     axes: Any, scale: Any, label: str, letters: float, *, inverted: bool, upright: bool
 ) -> Any:
-    """Draw a colour bar, with as many numbers as fit, and return it.
+    """Draw a color bar, with as many numbers as fit, and return it.
 
     Parameters
     ----------
@@ -47,14 +47,14 @@ def color_bar(
     letters : float
         Size of the numbers in points; the label's is one point more.
     inverted : bool
-        Whether the colour of inverted cells is shown at the lower end.
+        Whether the color of inverted cells is shown at the lower end.
     upright : bool
         Whether the bar is vertical.
     """
     from matplotlib.cm import ScalarMappable
 
     bar = axes.figure.colorbar(
-        ScalarMappable(scale.norm, scale.cmap.with_extremes(under=INVERTED_COLOUR)),
+        ScalarMappable(scale.norm, scale.cmap.with_extremes(under=INVERTED_COLOR)),
         cax=axes,
         orientation="vertical" if upright else "horizontal",
         extend="min" if inverted else "neither",

@@ -1,4 +1,4 @@
-"""Cells drawn with matplotlib: polygons in the colours of their values, edges, light."""
+"""Cells drawn with matplotlib: polygons in the colors of their values, edges, light."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.color_scheme import INVERTED_COLOUR, PAPER
+from slideviz.color_scheme import INVERTED_COLOR, PAPER
 from slideviz.mesh.model import FloatArray
 from slideviz.sections.polygons import Polygons
 
@@ -16,19 +16,19 @@ MANY = 200_000
 THICKEST, _THINNEST, _PART = 0.45, 0.04, 0.06
 """Width of mesh lines: largest and smallest in points; relative to the cell's thickness."""
 _HAIR = 0.15
-"""Width in points of a line in the cell's own colour, which hides gaps between neighbours."""
+"""Width in points of a line in the cell's own color, which hides gaps between neighbours."""
 
 _AMBIENT = 0.7
 """Brightness of a surface seen edge-on, relative to one seen face-on, with ``lit``."""
 
 
-def color_scale(colour_map: str, limits: tuple[float, float]) -> Any:
-    """Return the ScalarMappable of a colour map and its limits; NaN has the inverted colour."""
+def color_scale(color_map: str, limits: tuple[float, float]) -> Any:
+    """Return the ScalarMappable of a color map and its limits; NaN has the inverted color."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    table = colormaps[colour_map].with_extremes(bad=INVERTED_COLOUR)
+    table = colormaps[color_map].with_extremes(bad=INVERTED_COLOR)
     return ScalarMappable(Normalize(*limits), table)
 
 
@@ -51,9 +51,9 @@ def draw_cells(
     cells : Polygons
         x and y are drawn; the last polygon is drawn over the others.
     values : (q,) float64 or None
-        The value of each polygon, NaN if inverted; None: all have one colour.
+        The value of each polygon, NaN if inverted; None: all have one color.
     scale : matplotlib.cm.ScalarMappable
-        The colours of the values; see `color_scale`.
+        The colors of the values; see `color_scale`.
     edges : float
         Largest width of mesh lines in points; they are thinner around thin cells, so that boundary
         layers do not turn black. 0: no lines.

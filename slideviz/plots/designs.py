@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slideviz.case.words import is_number
-from slideviz.color_scheme import SELECTED_COLOUR
+from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.design.sweeps.row import DesignRow
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.plots.style import PRINT, Style, add_legend, dress
@@ -28,7 +28,7 @@ RESULTS = {
 }
 """The results that can be drawn, and the labels of their axes."""
 _MOST_LINES = 12
-"""Most curves drawn as lines in different colours; if there are more, only points are drawn."""
+"""Most curves drawn as lines in different colors; if there are more, only points are drawn."""
 _MOST_WORDS = 12
 """Most texts along an axis whose column has no numbers."""
 
@@ -141,7 +141,7 @@ def against_designs(
         if shown is not None and shown in curve.design:
             k = int(np.flatnonzero(curve.design == shown)[0])
             ring: dict[str, Any] = {"markersize": 11, "markeredgewidth": 2.2, "zorder": 5}
-            ring |= {"markerfacecolor": "none", "markeredgecolor": SELECTED_COLOUR}
+            ring |= {"markerfacecolor": "none", "markeredgecolor": SELECTED_COLOR}
             axes.plot(curve.places[k], curve.values[k], "o", gid="shown", clip_on=False, **ring)
     if failed:
         bold: dict[str, Any] = {"color": style.alarm, "markersize": 8, "linestyle": ""}
@@ -193,7 +193,7 @@ def _draw_curve(
     look = style.series(series or 0)
     joined = series is not None and len(curve.places) > 1
     line: dict[str, Any] = {
-        "color": look.colour,
+        "color": look.color,
         "linestyle": look.dash if joined else "",
         "linewidth": style.width,
         "marker": look.marker,

@@ -1,7 +1,7 @@
 """Plots of runs, drawn onto axes that are given: no window, no global state.
 
-Each function draws onto empty matplotlib ``Axes``. Series differ by colour, line and marker, so
-that they can be told apart in grey and by colour-blind people. Qualities are size-skew, without
+Each function draws onto empty matplotlib ``Axes``. Series differ by color, line and marker, so
+that they can be told apart in grey and by color-blind people. Qualities are size-skew, without
 a unit, 0 to 1.
 """
 
@@ -159,12 +159,12 @@ def _line(style: Style, index: int) -> dict[str, Any]:
     """Return the arguments of ``Axes.plot`` for a series number."""
     look = style.series(index)
     return {
-        "color": look.colour,
+        "color": look.color,
         "linestyle": look.dash,
         "linewidth": style.width,
         "marker": look.marker,
         "markersize": 4.5,
-        "markerfacecolor": look.colour,
+        "markerfacecolor": look.color,
         "markeredgewidth": 1.0,
     }
 

@@ -1,6 +1,6 @@
 """The histogram of values of cells, drawn onto given axes, with inverted cells counted apart.
 
-One distribution may be drawn as bars; all others are outlines in steps, which differ by colour and
+One distribution may be drawn as bars; all others are outlines in steps, which differ by color and
 dashes, so that they can be told apart over the bars, over each other, and in grey.
 """
 
@@ -22,9 +22,9 @@ BAND, _STEMS = 0.12, 0.62
 """Width of the strip of inverted cells, left of the values, relative to the range of values; and
 the part of the strip for the counts, beside its label."""
 _PALER = 0.45
-"""Part of the background's colour mixed into bars, so that lines over them stand out."""
+"""Part of the background's color mixed into bars, so that lines over them stand out."""
 _SWATCH = 5
-"""Number of colours that represent the bars in a legend."""
+"""Number of colors that represent the bars in a legend."""
 
 
 def histogram(
@@ -85,7 +85,7 @@ def draw_distribution(
     """
     dress(axes, style, metric, "cells [-]")
     foot = 0.5 if log else 0.0
-    # The dotted line of the undeformed mesh alone is visible on bars of any colour.
+    # The dotted line of the undeformed mesh alone is visible on bars of any color.
     paler = any(outline.series is not None for outline in outlines)
     if bars is not None:
         _fill(axes, bars, paler, foot, style)
@@ -114,13 +114,13 @@ def _look(outline: Outline, style: Style) -> dict[str, Any]:
     if outline.series is None:
         return {"color": style.scheme.ghost, "linestyle": (0, (1, 2.2)), "linewidth": 1.2}
     look = style.series(outline.series)
-    return {"color": look.colour, "linestyle": look.dash, "linewidth": style.width}
+    return {"color": look.color, "linestyle": look.dash, "linewidth": style.width}
 
 
 def _fill(axes: Axes, bars: Bars, paler: bool, foot: float, style: Style) -> None:
     """Draw bars from ``foot`` up, with an outline wider than the lines that may cover it.
 
-    ``paler``: in colours mixed with the background.
+    ``paler``: in colors mixed with the background.
     """
     one = bars.distribution
     axes.bar(
@@ -129,7 +129,7 @@ def _fill(axes: Axes, bars: Bars, paler: bool, foot: float, style: Style) -> Non
         np.diff(one.edges),
         bottom=foot,
         align="edge",
-        color=_colours(bars, paler, style),
+        color=_colors(bars, paler, style),
         linewidth=0,
         gid="shown",
     )
@@ -144,12 +144,12 @@ def _fill(axes: Axes, bars: Bars, paler: bool, foot: float, style: Style) -> Non
     )
 
 
-def _colours(bars: Bars, paler: bool, style: Style) -> list[tuple[float, ...]]:
-    """Return the colour (red, green, blue) of each bar."""
+def _colors(bars: Bars, paler: bool, style: Style) -> list[tuple[float, ...]]:
+    """Return the color (red, green, blue) of each bar."""
     from matplotlib.colors import to_rgb
 
-    given = bars.colours if bars.colours is not None else [style.series(0).colour]
-    own = np.array([to_rgb(colour) for colour in given])
+    given = bars.colors if bars.colors is not None else [style.series(0).color]
+    own = np.array([to_rgb(color) for color in given])
     if paler:
         own += _PALER * (np.array(to_rgb(style.scheme.background)) - own)
     count = len(bars.distribution.counts)
@@ -220,9 +220,9 @@ def _entries(axes: Axes, bars: Bars | None, paler: bool, style: Style) -> dict[s
     if bars is None:
         return {"handles": handles, "labels": labels}
     key = Patch(edgecolor=style.scheme.text)
-    colours, there = _colours(bars, paler, style), np.flatnonzero(bars.distribution.counts)
-    first, last = (there[0], there[-1]) if len(there) else (0, len(colours) - 1)
-    some = [colours[at] for at in np.linspace(first, last, _SWATCH).astype(int)]
+    colors, there = _colors(bars, paler, style), np.flatnonzero(bars.distribution.counts)
+    first, last = (there[0], there[-1]) if len(there) else (0, len(colors) - 1)
+    some = [colors[at] for at in np.linspace(first, last, _SWATCH).astype(int)]
     return {
         "handles": [key, *handles],
         "labels": [bars.label, *labels],
@@ -230,8 +230,8 @@ def _entries(axes: Axes, bars: Bars | None, paler: bool, style: Style) -> dict[s
     }
 
 
-def _swatch(colours: Sequence[Any], edge: str) -> Any:
-    """Return a legend handler that draws a box with several colours side by side."""
+def _swatch(colors: Sequence[Any], edge: str) -> Any:
+    """Return a legend handler that draws a box with several colors side by side."""
     from matplotlib.legend_handler import HandlerBase
     from matplotlib.patches import Rectangle
 
@@ -240,10 +240,10 @@ def _swatch(colours: Sequence[Any], edge: str) -> Any:
             self, _legend: Any, _handle: Any, x: float, y: float, *rest: Any
         ) -> list[Any]:
             width, height, _, transform = rest
-            part = width / len(colours)
+            part = width / len(colors)
             boxes = [
-                Rectangle((part * i - x, -y), part, height, facecolor=colour, linewidth=0)
-                for i, colour in enumerate(colours)
+                Rectangle((part * i - x, -y), part, height, facecolor=color, linewidth=0)
+                for i, color in enumerate(colors)
             ]
             boxes.append(Rectangle((-x, -y), width, height, fill=False, edgecolor=edge))
             for box in boxes:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slideviz.color_scheme import COLOUR_MAP
+from slideviz.color_scheme import COLOR_MAP
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.plots.style import PRINT, Style, add_legend, dress, place
 from slideviz.plots.ticks import rounded_out
@@ -88,10 +88,10 @@ class CurveRow:
 
 
 @dataclass(frozen=True)
-class Colours:
-    """Colour map and range of the values, for the areas below a curve."""
+class Colors:
+    """Color map and range of the values, for the areas below a curve."""
 
-    colour_map: str = COLOUR_MAP
+    color_map: str = COLOR_MAP
     limits: tuple[float, float] = (0.0, 1.0)
 
 
@@ -100,7 +100,7 @@ def draw_curves(
     rows: Sequence[CurveRow],
     labels: tuple[str, str],
     style: Style = PRINT,
-    colours: Colours | None = None,
+    colors: Colors | None = None,
 ) -> None:
     """Draw curves as steps onto empty axes; they are interrupted where there is no cell.
 
@@ -112,8 +112,8 @@ def draw_curves(
     labels : (str, str)
         Labels of the positions and of the values.
     style : Style
-    colours : Colours, optional
-        Colours of the areas; without them no areas are drawn.
+    colors : Colors, optional
+        Colors of the areas; without them no areas are drawn.
     """
     dress(axes, style, *labels)
     good = np.concatenate([row.curve.values for row in rows])
@@ -124,15 +124,15 @@ def draw_curves(
     side = 0.02 * float(np.ptp(ends)) or 1.0
     axes.set_xlim(ends.min() - side, ends.max() + side)
     last = rows[-1].curve
-    if colours is not None:
-        _areas(axes, last, colours, low - room)
+    if colors is not None:
+        _areas(axes, last, colors, low - room)
     if last.inverted.any():
         _folded(axes, last, style)
     for index, row in enumerate(rows):
         look = style.series(place(row.series, index))
         axes.plot(
             *steps(row.curve),
-            color=look.colour,
+            color=look.color,
             linestyle=look.dash if index < len(rows) - 1 else "solid",
             linewidth=style.width,
             label=row.label,
@@ -149,15 +149,15 @@ def steps(curve: Curve) -> tuple[FloatArray, FloatArray]:
     return np.insert(x, 2 * breaks, np.nan), np.insert(y, 2 * breaks, np.nan)
 
 
-def _areas(axes: Any, curve: Curve, colours: Colours, bottom: float) -> None:
-    """Fill the area from ``bottom`` to a curve, in the colours of its values."""
+def _areas(axes: Any, curve: Curve, colors: Colors, bottom: float) -> None:
+    """Fill the area from ``bottom`` to a curve, in the colors of its values."""
     from matplotlib.collections import PolyCollection
 
     shown = PolyCollection(
         list(_columns(curve.ends, np.full(len(curve.values), bottom), curve.values)),
-        array=np.clip(curve.values, *colours.limits),
-        cmap=colours.colour_map,
-        clim=colours.limits,
+        array=np.clip(curve.values, *colors.limits),
+        cmap=colors.color_map,
+        clim=colors.limits,
         alpha=_FILLED,
         edgecolors="face",
         linewidths=0.2,

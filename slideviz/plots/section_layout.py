@@ -20,7 +20,7 @@ _LETTER_WIDTH = 0.075
 
 SIDES, ENDS, BAR = 0.7, 1.0, 0.7
 """Approximate room in inches for numbers and labels beside the axes; for these and titles above and
-below the axes; and for the colour bar. They decide the arrangement."""
+below the axes; and for the color bar. They decide the arrangement."""
 HIGHER = {True: 1.4, False: 2.0}
 """Largest height of a picture of two runs, relative to one of one run: side by side (True), or one
 above the other (False)."""
@@ -95,7 +95,7 @@ def laid_flat(
 def arranged(size: FloatArray, inches: tuple[float, float], count: int) -> tuple[bool, float]:
     """Return whether sections are side by side, and their scale in inches per mesh unit.
 
-    If they are, the colour bar is upright at their right; else they are one above the other, with
+    If they are, the color bar is upright at their right; else they are one above the other, with
     the bar below. Of one section, only the bar's place is chosen. The larger scale is preferred.
 
     Parameters

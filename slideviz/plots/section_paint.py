@@ -1,4 +1,4 @@
-"""The values by which a section's cells are coloured, and a summary of those that are cut."""
+"""The values by which a section's cells are colored, and a summary of those that are cut."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from slideviz.color_scheme import COLOUR_MAP
+from slideviz.color_scheme import COLOR_MAP
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
@@ -15,7 +15,7 @@ from slideviz.terms import Quantity
 
 @dataclass(frozen=True, eq=False)
 class Paint:
-    """A value for every cell of a mesh, with limits and colour map.
+    """A value for every cell of a mesh, with limits and color map.
 
     Attributes
     ----------
@@ -24,18 +24,18 @@ class Paint:
     values : (m,) float64
         Its value in every cell.
     inverted : (m,) bool
-        Whether each cell is inverted, and drawn in the colour of inverted cells.
+        Whether each cell is inverted, and drawn in the color of inverted cells.
     limits : (float, float)
-        The values at the ends of the colour map.
-    colour_map : str
-        A colour map of matplotlib.
+        The values at the ends of the color map.
+    color_map : str
+        A color map of matplotlib.
     """
 
     label: Quantity
     values: FloatArray
     inverted: np.ndarray
     limits: tuple[float, float]
-    colour_map: str = COLOUR_MAP
+    color_map: str = COLOR_MAP
 
     def within(self, low: float, high: float) -> Paint:
         """Return the paint with other limits.
@@ -47,7 +47,7 @@ class Paint:
         """
         if not (np.isfinite([low, high]).all() and low < high):
             raise CaseError(
-                f"colour range {low:.6g} to {high:.6g}: the first number must be the smaller one"
+                f"color range {low:.6g} to {high:.6g}: the first number must be the smaller one"
             )
         return replace(self, limits=(low, high))
 

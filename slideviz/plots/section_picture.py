@@ -14,7 +14,7 @@ from slideviz.mesh.model import IntArray
 from slideviz.plots.around import draw_around, window
 from slideviz.plots.bar import BELOW, GAP, below, beside, color_bar
 from slideviz.plots.cells import THICKEST, color_scale, draw_cells
-from slideviz.plots.section_curve import Colours, CurveRow, curve_of, draw_curves, position_label
+from slideviz.plots.section_curve import Colors, CurveRow, curve_of, draw_curves, position_label
 from slideviz.plots.section_layout import (
     BAR,
     ENDS,
@@ -212,14 +212,14 @@ def _curves(figure: Any, shown: Sequence[SectionInRun], section: Section) -> Non
             rows.append(CurveRow(one.name * (len(shown) > 1), curve))
     paint = shown[0].paint
     labels = position_label(section).full, QUANTITIES[paint.label].axis
-    colours = Colours(paint.colour_map, paint.limits)
-    draw_curves(figure.add_subplot(), rows, labels, replace(PRINT, size=LETTERS), colours)
+    colors = Colors(paint.color_map, paint.limits)
+    draw_curves(figure.add_subplot(), rows, labels, replace(PRINT, size=LETTERS), colors)
 
 
 def _cells(
     figure: Any, shown: Sequence[SectionInRun], section: Section, style: SectionStyle
 ) -> None:
-    """Draw the sections' polygons, each run into axes of its own, with one colour bar."""
+    """Draw the sections' polygons, each run into axes of its own, with one color bar."""
     flats, labels = _laid_beside(shown, section, style)
     labels = labels if style.axes else None
     corners = np.concatenate([flat.points[flat.connectivity, :2] for flat in flats if len(flat)])
@@ -243,7 +243,7 @@ def _cells(
             words, size = fitted(said, room, LETTERS)
             axes.set_title(words, fontsize=size)
     paint = shown[0].paint
-    colors = color_scale(paint.colour_map, paint.limits)
+    colors = color_scale(paint.color_map, paint.limits)
     folded = [
         one.paint.inverted[piece.cells].any() for one in shown for piece in one.drawn.values()
     ]

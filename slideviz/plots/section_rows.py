@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from slideviz.mesh.quality import INVERTED
 from slideviz.plots.curves import UNDEFORMED, series_of
-from slideviz.plots.section_curve import Colours, CurveRow, curve_of, position_label
+from slideviz.plots.section_curve import Colors, CurveRow, curve_of, position_label
 from slideviz.plots.section_paint import Paint
 from slideviz.sections.model import Section
 from slideviz.session.changes import show_frame
@@ -55,8 +55,8 @@ class CurveRows:
 
 
 def what_of(session: Session) -> Quantity:
-    """Return the quantity of the curve: that of the colours, or the quality for roles."""
-    return quantity_of(session.view.colour_by)
+    """Return the quantity of the curve: that of the colors, or the quality for roles."""
+    return quantity_of(session.view.color_by)
 
 
 def labels_of(session: Session, section: Section) -> tuple[str, str]:
@@ -64,10 +64,10 @@ def labels_of(session: Session, section: Section) -> tuple[str, str]:
     return position_label(section).full, QUANTITIES[what_of(session)].axis
 
 
-def colours_of(session: Session) -> Colours:
-    """Return the colours of the areas below a curve: those of the view."""
-    limits = session.colour_range if session.view.colour_by != "role" else (0.0, 1.0)
-    return Colours(session.view.colour_map, limits)
+def colors_of(session: Session) -> Colors:
+    """Return the colors of the areas below a curve: those of the view."""
+    limits = session.color_range if session.view.color_by != "role" else (0.0, 1.0)
+    return Colors(session.view.color_map, limits)
 
 
 def facts_of(session: Session, cuts: Cuts, section: Section) -> str:

@@ -63,11 +63,11 @@ class Distribution:
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """A distribution drawn as bars: its label, and a colour per bar (or a list of one for all)."""
+    """A distribution drawn as bars: its label, and a color per bar (or a list of one for all)."""
 
     label: str
     distribution: Distribution
-    colours: Sequence[Any] | None = None
+    colors: Sequence[Any] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from slideviz.plots.style import Style
 from slideviz.plots.ticks import rounded_out
 from slideviz.session.state import Run, Session, StepFrame
 from slideviz.session.whole import FINE, PartQuality
-from slideviz.terms import QUANTITIES, ColourBy, Quantity, quantity_of
+from slideviz.terms import QUANTITIES, ColorBy, Quantity, quantity_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,7 +37,7 @@ class FrameCounts:
 
     def __init__(self) -> None:
         self._kept: WeakKeyDictionary[StepFrame, dict[object, Distribution]] = WeakKeyDictionary()
-        self._spreads: WeakKeyDictionary[StepFrame, dict[ColourBy, Range | None]] = (
+        self._spreads: WeakKeyDictionary[StepFrame, dict[ColorBy, Range | None]] = (
             WeakKeyDictionary()
         )
 
@@ -103,7 +103,7 @@ def draw_histogram(
     if session.first is not None and session.view.frame > 0 and what != "displacement":
         outlines.append(Outline("undeformed", counts.of(session, session.first, limits), None))
     axes = figure.add_subplot()
-    bars = Bars(label, shown, _colours(session, shown))
+    bars = Bars(label, shown, _colors(session, shown))
     draw_distribution(axes, bars, outlines, metric, log, style)
     legend = axes.get_legend()
     if left_out and legend is not None:
@@ -136,21 +136,21 @@ def first_value(axes: Axes) -> float:
 
 
 def shown_measure(session: Session) -> Quantity:
-    """Return the quantity of the histogram: that of the view's colours.
+    """Return the quantity of the histogram: that of the view's colors.
 
     For a mesh that stays in its file it is size-skew, the only one known of all cells.
     """
-    return quantity_of("size-skew" if session.in_file else session.view.colour_by)
+    return quantity_of("size-skew" if session.in_file else session.view.color_by)
 
 
-def _colours(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
-    """Return the colour of each bar: that of its middle value in the view."""
+def _colors(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
+    """Return the color of each bar: that of its middle value in the view."""
     import matplotlib as mpl
 
-    low, high = session.colour_range
+    low, high = session.color_range
     middle = (shown.edges[1:] + shown.edges[:-1]) / 2.0
     part = np.clip((middle - low) / max(high - low, 1e-300), 0.0, 1.0)
-    return [tuple(rgba) for rgba in mpl.colormaps[session.view.colour_map](part)]
+    return [tuple(rgba) for rgba in mpl.colormaps[session.view.color_map](part)]
 
 
 _MIDDLES = (np.arange(FINE) + 0.5) / FINE
@@ -162,7 +162,7 @@ BINS = 25
 
 def distribution(
     frame: StepFrame,
-    what: ColourBy,
+    what: ColorBy,
     limits: tuple[float, float] = (0.0, 1.0),
     undeformed: Mesh | None = None,
 ) -> Distribution:
@@ -180,7 +180,7 @@ def distribution(
 
 
 def spread(
-    frame: StepFrame, what: ColourBy, undeformed: Mesh | None = None
+    frame: StepFrame, what: ColorBy, undeformed: Mesh | None = None
 ) -> tuple[float, float] | None:
     """Return the lowest and the highest value of the cells of a frame; None if all are inverted."""
     if isinstance(frame.quality, PartQuality):
@@ -191,6 +191,6 @@ def spread(
     return (float(right.min()), float(right.max())) if len(right) else None
 
 
-def _values(frame: StepFrame, what: ColourBy, undeformed: Mesh | None) -> FloatArray:
+def _values(frame: StepFrame, what: ColorBy, undeformed: Mesh | None) -> FloatArray:
     """Return the values of a frame's counted cells (those of a halo are not); NaN if inverted."""
     return np.asarray(frame.shown_values(what, undeformed)[frame.quality.counted])

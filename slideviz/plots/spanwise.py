@@ -204,7 +204,7 @@ def spanwise(
         axes.plot(
             values[there],
             height[there],
-            color=look.colour,
+            color=look.color,
             linestyle=look.dash,
             linewidth=style.width,
             marker=look.marker,

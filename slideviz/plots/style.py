@@ -1,11 +1,11 @@
-"""The style of plots: colours, lines and markers that tell series apart, also in grey."""
+"""The style of plots: colors, lines and markers that tell series apart, also in grey."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from slideviz.color_scheme import DARK, INVERTED_COLOUR, LIGHT, PAPER, ColorScheme
+from slideviz.color_scheme import DARK, INVERTED_COLOR, LIGHT, PAPER, ColorScheme
 from slideviz.plots.written import SMALLEST
 from slideviz.terms import PALETTE
 
@@ -16,13 +16,13 @@ _ON_LIGHT = tuple(
     PALETTE[name]
     for name in ("blue", "vermilion", "green", "purple", "black", "sky blue", "orange")
 )
-"""The colours of series on a light background."""
+"""The colors of series on a light background."""
 
 _ON_DARK = (
     *(PALETTE["sky blue"], PALETTE["orange"], "#2bc49a", "#e39bc4", "#ffffff"),
     *(PALETTE["yellow"], "#f08040"),
 )
-"""The colours of series on a dark background; those too dark for it are lighter."""
+"""The colors of series on a dark background; those too dark for it are lighter."""
 
 _DASHES: tuple[Any, ...] = (
     "solid",
@@ -41,28 +41,28 @@ _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 @dataclass(frozen=True)
 class Series:
-    """The look of a series: colour, marker and dash.
+    """The look of a series: color, marker and dash.
 
     Attributes
     ----------
-    colour, marker : str
+    color, marker : str
     dash : str or tuple
         A line style of matplotlib.
     """
 
-    colour: str
+    color: str
     marker: str
     dash: Any
 
 
 @dataclass(frozen=True)
 class Style:
-    """Colours, letters and lines of a plot.
+    """Colors, letters and lines of a plot.
 
     Attributes
     ----------
     scheme : ColorScheme
-        Colours of background and letters; series have lighter colours on a dark background.
+        Colors of background and letters; series have lighter colors on a dark background.
     size : float
         Size of letters in points, 8 or more at the printed size.
     width : float
@@ -93,8 +93,8 @@ class Style:
 
     @property
     def alarm(self) -> str:
-        """Return the colour of inverted cells."""
-        return "#ff5d6c" if self.dark else INVERTED_COLOUR
+        """Return the color of inverted cells."""
+        return "#ff5d6c" if self.dark else INVERTED_COLOR
 
 
 def place(given: int | None, index: int) -> int:
@@ -102,9 +102,9 @@ def place(given: int | None, index: int) -> int:
     return index if given is None else given
 
 
-def _brightness(colour: str) -> int:
-    """Return the sum of red, green and blue of a colour ``#rrggbb``."""
-    return sum(bytes.fromhex(colour[1:]))
+def _brightness(color: str) -> int:
+    """Return the sum of red, green and blue of a color ``#rrggbb``."""
+    return sum(bytes.fromhex(color[1:]))
 
 
 PRINT = Style(PAPER)
@@ -113,7 +113,7 @@ ON_DARK = Style(DARK)
 
 
 def dress(axes: Axes, style: Style, x_label: str, y_label: str) -> None:
-    """Set labels, colours, letters and a faint grid of axes."""
+    """Set labels, colors, letters and a faint grid of axes."""
     text, size = style.scheme.text, max(style.size, SMALLEST)
     axes.set_facecolor(style.scheme.background)
     figure = axes.get_figure()

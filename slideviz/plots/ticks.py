@@ -49,7 +49,7 @@ def tick_format(at: FloatArray) -> str:
 def bar_ticks(
     low: float, high: float, part: Callable[[str], float], most: int = 6
 ) -> tuple[FloatArray, str]:
-    """Return the numbers (k,) beside a colour bar, and their printf format.
+    """Return the numbers (k,) beside a color bar, and their printf format.
 
     Parameters
     ----------

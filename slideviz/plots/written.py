@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from slideviz.errors import CaseError, SlidevizError
-from slideviz.mesh.io.atomic import atomic_write
+from slideviz.system.atomic import atomic_write
 
 SETTINGS = {
     # Names that are not random: the same figure gives the same file.

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.compiled import one_at_a_time
+from slideviz.system.jit_cache import njit
 
 LEAF = 4
 """Triangles in a leaf of the tree, at most."""

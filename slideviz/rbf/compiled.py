@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numba import get_num_threads, prange, set_num_threads
 
-from slideviz.mesh.caching import njit
 from slideviz.rbf.kernels import SHAPE
+from slideviz.system.jit_cache import njit
 
 LOCK = threading.Lock()
 """Held by `one_at_a_time` while a compiled loop runs."""

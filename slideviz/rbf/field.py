@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.threads import in_parts
 from slideviz.rbf.evaluate import Basis, Tick, evaluate, no_tick
+from slideviz.system.threads import in_parts
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree

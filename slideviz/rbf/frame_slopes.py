@@ -6,9 +6,9 @@ import numpy as np
 
 from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.model import FloatArray
-from slideviz.mesh.threads import in_parts
 from slideviz.rbf.axis import ON_AXIS
 from slideviz.rbf.frames import Frame, _perpendicular
+from slideviz.system.threads import in_parts
 
 
 def coords_slopes(frame: Frame, points: FloatArray) -> FloatArray:

@@ -26,7 +26,7 @@ import numpy as np
 from slideviz.mesh.axis_frame import along, axis_basis, in_axis_frame
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
-from slideviz.mesh.threads import PART, in_parts
+from slideviz.system.threads import PART, in_parts
 
 SECTORS = 1 << 12
 """Number of sectors into which the circle is divided to find the largest one without nodes."""

@@ -17,13 +17,13 @@ from typing import Protocol
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray, largest_coordinate
-from slideviz.mesh.threads import in_parts
 from slideviz.rbf.constraint_rows import AGREE, ConstraintRows, full_rows, merge, sliding_rows
 from slideviz.rbf.evaluate import Tick
 from slideviz.rbf.exact import ExactFit
 from slideviz.rbf.field import Correction
 from slideviz.rbf.greedy import GreedyFit
 from slideviz.rbf.problem import GAMMA, Cycle, Interpolant, Lag, Levels, Problem, Solution, Watch
+from slideviz.system.threads import in_parts
 
 ROUNDING = 1e-14
 """Projection moves a point of a flat boundary by at most this part of the largest coordinate."""

@@ -20,11 +20,11 @@ import numpy as np
 
 from slideviz.mesh.fans import Fans, components
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.threads import cores
 from slideviz.mesh.topology import Boundary, corner_vectors, find_joints, unit
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.extension import Place, edge_extension, surface_extension
+from slideviz.system.threads import cores
 from slideviz.terms import ROLES
 
 ROLE_NUMBER: dict[str, int] = {role: number for number, role in enumerate(ROLES)}

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import unit
+from slideviz.system.jit_cache import njit
 
 RANK_TOLERANCE = 0.02
 """Sine of the angle (about one degree) from which a further normal counts as independent."""

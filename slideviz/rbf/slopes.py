@@ -16,12 +16,12 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf import compiled
 from slideviz.rbf.compiled import A2, BLOCK, OPTIONS, TARGETS_PER_TASK, distances, one_minus_cos
 from slideviz.rbf.evaluate import Basis, padded_rows
 from slideviz.rbf.kernels import KERNELS, SHAPE
+from slideviz.system.jit_cache import njit
 
 NEAR = 1e-12
 """Nodes coincide when their distance over R is at most this."""

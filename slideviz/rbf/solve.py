@@ -19,9 +19,9 @@ from scipy.linalg import solve_triangular
 from threadpoolctl import ThreadpoolController
 
 from slideviz.errors import DeformError
-from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import Tick, no_tick
+from slideviz.system.jit_cache import njit
 
 PIVOT_GUARD = 1e-12
 """A row whose pivot is smaller is left out. Absolute, for the diagonal of every factorised system

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf.compiled import _K, one_at_a_time
 from slideviz.rbf.evaluate import Basis, Tick, no_tick
 from slideviz.rbf.kernels import KERNELS
+from slideviz.system.jit_cache import njit
 
 # Without "fastmath", which takes a + b - a for b.
 _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}

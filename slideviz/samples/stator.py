@@ -20,7 +20,7 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile
 from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
-from slideviz.mesh.io.su2b.write import ZoneContent
+from slideviz.formats.su2b.write import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.samples.blade import BladeSection, Shares, camber, counts
 from slideviz.samples.passage import Grid, make_grid, smoothed, straight_points

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import CaseError
-from slideviz.mesh.io.su2b.write import ZoneContent
+from slideviz.formats.su2b.write import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 
 LINE, QUADRILATERAL, HEXAHEDRON = 3, 9, 12

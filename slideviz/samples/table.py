@@ -11,14 +11,14 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile
 from slideviz.case.words import nearest
 from slideviz.errors import CaseError, MeshError
-from slideviz.mesh.io.atomic import atomic_write
-from slideviz.mesh.io.su2b.write import ZoneContent, file_head, zone_blocks
+from slideviz.formats.su2b.write import ZoneContent, file_head, zone_blocks
 from slideviz.mesh.model import Mesh
 from slideviz.samples.airfoil import airfoil_case, airfoil_mesh
 from slideviz.samples.passage import passage_case, passage_mesh
 from slideviz.samples.stator import stator_case, stator_displacement, stator_mesh, stator_zone
 from slideviz.samples.thesis import FILE, thesis_case, thesis_zone
 from slideviz.samples.turbine_row import row_case, row_mesh
+from slideviz.system.atomic import atomic_write
 from slideviz.terms import FileFormat
 
 
@@ -242,7 +242,7 @@ def write_sample(
         As of ``sample``; or a file exists or cannot be written.
     """
     from slideviz.case.cfg import write_case
-    from slideviz.mesh.io.files import write
+    from slideviz.formats.files import write
 
     row, kind = _row(name, variant)
     made: Sample | StreamedSample

@@ -17,7 +17,7 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile, Motion, Rotate, Translate
 from slideviz.case.motion import displacement_of
 from slideviz.errors import CaseError
-from slideviz.mesh.io.su2b.write import ZoneContent
+from slideviz.formats.su2b.write import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.samples.structured import LINE, QUADRILATERAL, mesh_of, zone_of
 from slideviz.terms import Role

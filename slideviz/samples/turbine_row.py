@@ -17,10 +17,10 @@ import numpy as np
 from slideviz.case.model import Case, Scale, Translate
 from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
-from slideviz.mesh.caching import njit
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.samples.sizing import Sizing, find_sizing, relax
 from slideviz.samples.vane import AHEAD, LENGTH, camber_line, pitch, vane_layers
+from slideviz.system.jit_cache import njit
 
 LINE, TRIANGLE, QUADRILATERAL = 3, 5, 9
 """VTK identifiers."""

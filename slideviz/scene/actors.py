@@ -9,12 +9,12 @@ import numpy as np
 import pyvista as pv
 from vtkmodules.util.numpy_support import numpy_to_vtk
 
-from slideviz.color_scheme import COLOUR_MAP, INVERTED_COLOUR
+from slideviz.color_scheme import COLOR_MAP, INVERTED_COLOR
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted, padded
 
 VALUES = "values"
-"""Name of the cell data by which shapes are coloured."""
+"""Name of the cell data by which shapes are colored."""
 
 CELL, POINT = "vtkOriginalCellIds", "vtkOriginalPointIds"
 """Names of cell and point data with the indices of cells and nodes in the mesh."""
@@ -140,10 +140,10 @@ def place(shape: Any, points: FloatArray, lift: float = 0.0) -> None:
 
 
 def lookup_table() -> Any:
-    """Return a table of colours for 0 to 1, clamped; inverted cells have the colour of NaN."""
-    table = pv.LookupTable(COLOUR_MAP, n_values=256, scalar_range=(0.0, 1.0))
-    # Not the colour below the range, where valid cells may be too, if the user chose the range.
-    table.nan_color = INVERTED_COLOUR
+    """Return a table of colors for 0 to 1, clamped; inverted cells have the color of NaN."""
+    table = pv.LookupTable(COLOR_MAP, n_values=256, scalar_range=(0.0, 1.0))
+    # Not the color below the range, where valid cells may be too, if the user chose the range.
+    table.nan_color = INVERTED_COLOR
     return table
 
 
@@ -169,7 +169,7 @@ opposite that side, divided by the sine of the angle opposite the side in questi
 """
 
 _MIX = "ambientColor = mix( ambientColor, edgeColor, emix * edgeOpacity);"
-"""The line of VTK's shader that blends the edges over the colour of the face."""
+"""The line of VTK's shader that blends the edges over the color of the face."""
 _STRONGER = """vec3 luma = vec3(0.30, 0.59, 0.11);
   float gap = abs(dot(ambientColor + diffuseColor / max(1.0 - emix * edgeOpacity, 0.01), luma)
     - dot(edgeColor, luma));
@@ -178,7 +178,7 @@ _STRONGER = """vec3 luma = vec3(0.30, 0.59, 0.11);
   diffuseColor *= (1.0 - emix * strong) / max(1.0 - emix * edgeOpacity, 0.01);"""
 """The replacement of `_MIX`: edges are more opaque where the face is nearly as dark as they are.
 
-Their colour is the same everywhere: a change from dark to light lines would look like a jump of
+Their color is the same everywhere: a change from dark to light lines would look like a jump of
 the values.
 """
 
@@ -202,7 +202,7 @@ def draw_fine_edges(actor: Any) -> None:
 def see_through(actor: Any, opacity: float) -> None:
     """Set the opacity of an actor; below 1 it is drawn behind all opaque actors.
 
-    In front of a cut it would tint the colours, which would no longer be those of the colour bar.
+    In front of a cut it would tint the colors, which would no longer be those of the color bar.
     """
     actor.GetProperty().SetOpacity(opacity)
     glass = opacity < 1.0

@@ -69,14 +69,14 @@ class BoxLayer(Layer):
             name: (box.points, (box.points != boxes[name].points).any(axis=-1))
             for name, box in moved.items()
         }
-        colours = self.stage.scheme.text, ROLES["moving"].colour
-        for name, colour, found in zip((BASE, MOVED), colours, (every, changed), strict=True):
+        colors = self.stage.scheme.text, ROLES["moving"].color
+        for name, color, found in zip((BASE, MOVED), colors, (every, changed), strict=True):
             if not found:
                 continue
             shape = lattice_shape(list(found.values()), mesh.dim, lift)
-            self._add(shape, name, colour)
+            self._add(shape, name, color)
             if mesh.dim == 3:
-                behind = self._add(shape, BEHIND if name == BASE else f"{MOVED}:behind", colour)
+                behind = self._add(shape, BEHIND if name == BASE else f"{MOVED}:behind", color)
                 behind.prop.opacity = FAINT if name == BASE else CLEAR
                 behind.mapper.SetResolveCoincidentTopologyToPolygonOffset()
                 behind.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, IN_FRONT)
@@ -84,11 +84,11 @@ class BoxLayer(Layer):
         if boxes:
             self._label(boxes, mesh.dim, lift)
 
-    def _add(self, shape: Any, name: str, colour: str) -> Any:
+    def _add(self, shape: Any, name: str, color: str) -> Any:
         """Return a new actor of a lattice's lines and points."""
         actor = self.stage.add(shape, name, lighting=False, pickable=False)
         scale = self.stage.pixel_scale
-        actor.prop.color = colour
+        actor.prop.color = color
         actor.prop.line_width, actor.prop.point_size = 2.0 * scale, 8.0 * scale
         actor.prop.render_points_as_spheres = True
         return actor

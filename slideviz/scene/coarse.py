@@ -76,13 +76,13 @@ class CoarseLayer(Layer):
         assert session.frame is not None
         if not self.drawn:
             self.drawn = {name: self._add(one) for name, one in self.surfaces.items()}
-        made_of = session.frame, session.view.colour_by
+        made_of = session.frame, session.view.color_by
         again, self._made_of = made_of != self._made_of, made_of
         for name, one in self.drawn.items():
             whole = self._boundaries.drawn[name].actor
             if again:
                 actors.place(one.shape, session.frame.mesh.points[one.surface.nodes])
-            if again and session.view.colour_by != "role":
+            if again and session.view.color_by != "role":
                 one.shape.cell_data[VALUES] = self.stage.values_of(session, one.surface.owner)
             one.actor.prop.DeepCopy(whole.prop)
             one.actor.prop.show_edges = False

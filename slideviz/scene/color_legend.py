@@ -1,4 +1,4 @@
-"""The legend in a strip at the right of the view: the roles, or the colour bar."""
+"""The legend in a strip at the right of the view: the roles, or the color bar."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pyvista as pv
 from slideviz.color_scheme import ColorScheme
 from slideviz.mesh.model import FloatArray
 from slideviz.plots.ticks import bar_ticks
-from slideviz.terms import ROLES, ColourByTerm, Role
+from slideviz.terms import ROLES, ColorByTerm, Role
 
 if TYPE_CHECKING:
     from slideviz.scene.stage import Stage
@@ -26,7 +26,7 @@ Rect = tuple[float, float, float, float]
 
 
 class Plate:
-    """A half-transparent rectangle in the background's colours, between legend and mesh.
+    """A half-transparent rectangle in the background's colors, between legend and mesh.
 
     Parameters
     ----------
@@ -52,16 +52,16 @@ class Plate:
         plotter.add_actor(actor, name=name, reset_camera=False, render=False, pickable=False)
 
     def place(self, rect: Rect) -> None:
-        """Set the rectangle that the plate covers, and its colours, for the view's present size."""
+        """Set the rectangle that the plate covers, and its colors, for the view's present size."""
         left, bottom, right, top = rect
         high = max(self.plotter.window_size[1], 1)
         corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
         self._shape.points = np.array([(*corner, 0.0) for corner in corners])
-        colours = [self.colour_at(y / high) for _, y in corners]
-        self._shape.point_data["colour"] = np.array(colours, np.uint8)
-        self._shape.set_active_scalars("colour", preference="point")
+        colors = [self.color_at(y / high) for _, y in corners]
+        self._shape.point_data["color"] = np.array(colors, np.uint8)
+        self._shape.set_active_scalars("color", preference="point")
 
-    def colour_at(self, height: float) -> tuple[int, ...]:
+    def color_at(self, height: float) -> tuple[int, ...]:
         """Return red, green, blue and opacity (0 to 255) at a height from 0 to 1 of the view."""
         below, above = (
             np.array(pv.Color(name).int_rgb, float)
@@ -76,9 +76,9 @@ STRIP = 104
 
 _VTK_FONT_FILE = 4
 _AIR = 12.0
-"""Margin in pixels between the colour bar and the edge of its plate."""
+"""Margin in pixels between the color bar and the edge of its plate."""
 _BAR, _LONG = 20.0, 11
-"""Width of the colour bar in pixels; number of letters from which a title needs the whole strip."""
+"""Width of the color bar in pixels; number of letters from which a title needs the whole strip."""
 _LABEL, _GAP, _HEAD = 14.0, 4.0, 30.0
 """Height of a number beside the bar, distance between both, height of the title, in pixels."""
 _BOTTOM, _NAN, _INDENT = 0.16, 13.0, 4.0
@@ -95,7 +95,7 @@ def _font_file() -> str:
 
 
 def set_letters(text: Any, scheme: ColorScheme, size: float) -> None:
-    """Set font, the color scheme's text colour, and a size in points of a vtkTextProperty."""
+    """Set font, the color scheme's text color, and a size in points of a vtkTextProperty."""
     text.SetFontFamily(_VTK_FONT_FILE)
     text.SetFontFile(_font_file())
     text.SetFontSize(round(size))
@@ -117,9 +117,9 @@ right edge; size of the letters."""
 
 
 def add_role_legend(stage: Stage, roles: Sequence[Role]) -> None:
-    """Draw the roles in use in the upper right corner, a line each, with its colour."""
+    """Draw the roles in use in the upper right corner, a line each, with its color."""
     for row, role in enumerate(roles, start=1):
-        _line(stage, ROLE, ROLES[role].colour, ROLES[role].label, down=14 + 24 * row)
+        _line(stage, ROLE, ROLES[role].color, ROLES[role].label, down=14 + 24 * row)
 
 
 def add_point_legend(stage: Stage, top: float) -> float:
@@ -129,18 +129,18 @@ def add_point_legend(stage: Stage, top: float) -> float:
     """
     words = [(NODES, *line) for line in stage.point_words]
     words += [(RING, *line) for line in stage.ring_words]
-    for row, (sign, word, colour) in enumerate(words, start=1):
-        _line(stage, sign, colour, word, down=top + 21 * row)
+    for row, (sign, word, color) in enumerate(words, start=1):
+        _line(stage, sign, color, word, down=top + 21 * row)
     return top + 21 * len(words)
 
 
-def _line(stage: Stage, sign: str, colour: str, word: str, *, down: float) -> None:
-    """Draw a sign in its colour and a text, ``down`` pixels below the view's upper edge."""
+def _line(stage: Stage, sign: str, color: str, word: str, *, down: float) -> None:
+    """Draw a sign in its color and a text, ``down`` pixels below the view's upper edge."""
     # A role and the nodes of a type may have the same word.
     prefix, right, size = _SIGNS[sign]
     corner = _corner(1.0, 1.0)
     for what, shade, edge, letters in (
-        (sign, colour, STRIP - 8, 1.4 * size),
+        (sign, color, STRIP - 8, 1.4 * size),
         (word, stage.scheme.text, right, size),
     ):
         text = pv.Text(what)
@@ -166,7 +166,7 @@ def _corner(x: float, y: float) -> Any:
 
 
 def clear_legend(plotter: Any) -> None:
-    """Remove the lines of the legend, the colour bar, and the plate."""
+    """Remove the lines of the legend, the color bar, and the plate."""
     for name in list(plotter.actors):
         if name.startswith(("legend:", "plate:")):
             plotter.remove_actor(name, reset_camera=False, render=False)
@@ -174,8 +174,8 @@ def clear_legend(plotter: Any) -> None:
         plotter.remove_scalar_bar(name, render=False)
 
 
-def add_colour_bar(stage: Stage, mapper: Any, what: ColourByTerm, inverted: bool) -> None:
-    """Add the colour bar of a mapper; `place_bar` places it.
+def add_color_bar(stage: Stage, mapper: Any, what: ColorByTerm, inverted: bool) -> None:
+    """Add the color bar of a mapper; `place_bar` places it.
 
     ``inverted``: with a field for inverted cells at its lower end.
     """
@@ -214,7 +214,7 @@ def add_colour_bar(stage: Stage, mapper: Any, what: ColourByTerm, inverted: bool
 
 
 def place_bar(plotter: Any, title: str, below: float, scale: float) -> Rect:
-    """Place the colour bar at the right edge of the view, for the view's present size.
+    """Place the color bar at the right edge of the view, for the view's present size.
 
     It begins ``below`` pixels (at normal letter size) under the view's upper edge, where lines
     about points may be. Return the rectangle of the bar and its letters, with a margin.

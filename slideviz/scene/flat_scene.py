@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.color_scheme import LIGHT, SELECTED_COLOUR, ColorScheme
+from slideviz.color_scheme import LIGHT, SELECTED_COLOR, ColorScheme
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED
@@ -15,7 +15,7 @@ from slideviz.scene import pick
 from slideviz.scene.camera import Camera
 from slideviz.scene.marked_cell import IN_FRONT
 from slideviz.scene.passages import Period, matrices
-from slideviz.scene.polygon_actor import Instances, PolygonActor, plain_colour
+from slideviz.scene.polygon_actor import Instances, PolygonActor, plain_color
 from slideviz.scene.stage import Stage
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
@@ -90,8 +90,8 @@ class FlatScene:
         session = as_drawn(session)
         assert session.frame is not None
         self.session, self.section = session, section
-        self.stage.set_colours(session)
-        by_value = session.view.colour_by != "role"
+        self.stage.set_colors(session)
+        by_value = session.view.color_by != "role"
         cut, only = self.cuts.of(session.frame.mesh, section), self.stage.in_threshold(session)
         frame = cut_frame(session.frame, section)
         key = (cut, only, section, frame if by_value else None)
@@ -99,7 +99,7 @@ class FlatScene:
             self._made_of = key
             self._place(cut, only, section, session)
         cells = self._shown.polygons.cells
-        self._shown.colour(self.stage.values_of(session, cells, frame) if by_value else None)
+        self._shown.color(self.stage.values_of(session, cells, frame) if by_value else None)
         self._style(section)
         self._draw_neighbours(section)
         self._draw_mark()
@@ -141,12 +141,12 @@ class FlatScene:
 
     def _style(self, section: Section) -> None:
         prop = self._shown.actor.prop
-        prop.color = plain_colour(self.stage.scheme)
+        prop.color = plain_color(self.stage.scheme)
         prop.lighting = section.whole
         prop.ambient, prop.diffuse = (0.6, 0.4) if section.whole else (1.0, 0.0)
         prop.line_width = 1.0
         view = self.session.view
-        self.stage.edges(prop, "edges" in view.drawn, view.colour_by == "role")
+        self.stage.edges(prop, "edges" in view.drawn, view.color_by == "role")
 
     def _draw_neighbours(self, section: Section) -> None:
         found: dict[int, FloatArray] = {}
@@ -159,7 +159,7 @@ class FlatScene:
 
     def _style_mark(self) -> None:
         prop, mapper = self._mark.actor.prop, self._mark.mapper
-        prop.style, prop.color, prop.line_width = "wireframe", SELECTED_COLOUR, 4.0
+        prop.style, prop.color, prop.line_width = "wireframe", SELECTED_COLOR, 4.0
         mapper.SetResolveCoincidentTopologyToPolygonOffset()
         mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, IN_FRONT)
 
@@ -193,12 +193,12 @@ class FlatScene:
         assert frame is not None
         assert self.section is not None
         frame = cut_frame(frame, self.section)
-        what = quantity_of(self.session.view.colour_by)
+        what = quantity_of(self.session.view.color_by)
         paint = Paint(
             what,
             frame.values(what, mesh),
             frame.quality.status == INVERTED,
-            self.session.colour_range,
+            self.session.color_range,
         )
         return paint.sentence(cells) if only is None else paint.sentence(cells, every, only.words)
 
@@ -213,7 +213,7 @@ class FlatScene:
     # Camera ----------------------------------------------------------------------------
 
     def set_scheme(self, scheme: ColorScheme) -> None:
-        """Take the colours of another color scheme for background and edges."""
+        """Take the colors of another color scheme for background and edges."""
         self.stage.scheme = scheme
         self.stage.set_background()
         if self.section is not None and self.session.frame is not None:

@@ -9,7 +9,7 @@ import numpy as np
 import pyvista as pv
 
 from slideviz.case.model import Case
-from slideviz.color_scheme import INTERSECTION_COLOUR
+from slideviz.color_scheme import INTERSECTION_COLOR
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
@@ -100,28 +100,28 @@ class GhostLayer(Layer):
                         self._actors[f"{key}{part}"].visibility = False
                 continue
             hits = bool(session.intersection or session.folding)
-            colour = INTERSECTION_COLOUR if hits else ROLES["moving"].colour
+            color = INTERSECTION_COLOR if hits else ROLES["moving"].color
             for actor, shape in self._parts(key, surface, 0.55, ON_TOP):
                 actors.place(shape, points, 3 * self.stage.lift(session.mesh))
-                actor.prop.color = self._rim_colour(colour) if actor.name.endswith(RIM) else colour
+                actor.prop.color = self._rim_color(color) if actor.name.endswith(RIM) else color
                 actor.prop.line_width = 4.5 if hits else 2.5
                 actor.visibility = True
             if not surface.flat:
-                self._draw_wire(key, colour, not rim_goes_along(points, surface, session.mesh))
+                self._draw_wire(key, color, not rim_goes_along(points, surface, session.mesh))
 
-    def _draw_wire(self, key: str, colour: str, wanted: bool) -> None:
+    def _draw_wire(self, key: str, color: str, wanted: bool) -> None:
         """Show the edges of a ghost's faces in front of everything, or hide them."""
         shape = self._shapes[key]
         wanted = wanted and shape.n_cells <= MOST_WIRE
         if wanted or f"{key}{WIRE}" in self._actors:
             wire, _ = self._part(f"{key}{WIRE}", lambda *_: shape)
-            wire.prop.style, wire.prop.color, wire.prop.opacity = "wireframe", colour, 0.5
+            wire.prop.style, wire.prop.color, wire.prop.opacity = "wireframe", color, 0.5
             wire.prop.line_width, wire.visibility = 1.0, wanted
             _shift_depth(wire, -ON_TOP)
 
-    def _rim_colour(self, colour: str) -> tuple[float, float, float]:
-        """Return a colour that contrasts with a ghost's own: mixed with that of the text."""
-        own, text = (np.array(pv.Color(one).float_rgb) for one in (colour, self.stage.scheme.text))
+    def _rim_color(self, color: str) -> tuple[float, float, float]:
+        """Return a color that contrasts with a ghost's own: mixed with that of the text."""
+        own, text = (np.array(pv.Color(one).float_rgb) for one in (color, self.stage.scheme.text))
         red, green, blue = (0.5 * (own + text)).tolist()
         return red, green, blue
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from slideviz.color_scheme import INVERTED_COLOUR
+from slideviz.color_scheme import INVERTED_COLOR
 from slideviz.mesh.model import IntArray
 from slideviz.mesh.surfaces import lifted
 from slideviz.scene.marked_cell import IN_FRONT
@@ -80,7 +80,7 @@ class InvertedLayer(Layer):
             cells = cells[np.isin(cells, np.concatenate(cut))]
             count = len(cells)
         if count:
-            self.stage.ring_words = ((f"{count:,} inv.", INVERTED_COLOUR),)
+            self.stage.ring_words = ((f"{count:,} inv.", INVERTED_COLOR),)
         if len(cells) > MOST:
             cells = cells[np.linspace(0, len(cells) - 1, MOST).astype(np.int64)]
         if not len(cells):
@@ -88,7 +88,7 @@ class InvertedLayer(Layer):
         self._shape = pv.PolyData(lifted(middles(own.mesh, cells), 4.0 * self.stage.lift(own.mesh)))
         actor = self.stage.add(self._shape, NAME, lighting=False, pickable=False)
         size = next(size for least, size in reversed(SIZES) if len(cells) >= least)
-        actor.prop.color = INVERTED_COLOUR
+        actor.prop.color = INVERTED_COLOR
         actor.prop.point_size = size * self.stage.pixel_scale
         actor.prop.render_points_as_spheres = True
         actor.GetShaderProperty().AddFragmentShaderReplacement(_DISC, False, _RING, False)

@@ -1,4 +1,4 @@
-"""The legend of the scene: the roles in use, or the colour bar; and the axes in a corner."""
+"""The legend of the scene: the roles in use, or the color bar; and the axes in a corner."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pyvista as pv
 from slideviz.scene.color_legend import (
     OPACITY,
     Plate,
-    add_colour_bar,
+    add_color_bar,
     add_point_legend,
     add_role_legend,
     clear_legend,
@@ -19,13 +19,13 @@ from slideviz.scene.color_legend import (
 )
 from slideviz.scene.stage import Layer, Stage
 from slideviz.session.state import Session
-from slideviz.terms import COLOUR_BY, ROLES
+from slideviz.terms import COLOR_BY, ROLES
 
 PLATE = "plate:legend"
 
 
 class LegendLayer(Layer):
-    """The legend of roles or the colour bar, in a strip at the right."""
+    """The legend of roles or the color bar, in a strip at the right."""
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
@@ -55,7 +55,7 @@ class LegendLayer(Layer):
         self._place()
 
     def _make(self, session: Session) -> None:
-        stage, mesh, what = self.stage, session.mesh, session.view.colour_by
+        stage, mesh, what = self.stage, session.mesh, session.view.color_by
         assert mesh is not None
         self._placed = ()
         # First, as later actors are drawn over it.
@@ -66,8 +66,8 @@ class LegendLayer(Layer):
             add_role_legend(stage, roles)
             self._end = add_point_legend(stage, 24.0 * len(roles) + 16)
             return
-        term = COLOUR_BY[what]
-        add_colour_bar(stage, self._mapper, term, has_inverted(session))
+        term = COLOR_BY[what]
+        add_color_bar(stage, self._mapper, term, has_inverted(session))
         end = add_point_legend(stage, 4.0)
         self._bar, self._end = (term.label, end + (34 if self._has_lines else 0)), end
 
@@ -77,7 +77,7 @@ class LegendLayer(Layer):
         return bool(self.stage.point_words or self.stage.ring_words)
 
     def _place(self) -> None:
-        """Place colour bar and plate, if the view's size or pixel scale has changed."""
+        """Place color bar and plate, if the view's size or pixel scale has changed."""
         plotter, scale = self.stage.plotter, self.stage.pixel_scale
         size = (*plotter.window_size, scale)
         if size == self._placed or not self._drawn:
@@ -93,13 +93,13 @@ class LegendLayer(Layer):
     def _key(self, session: Session) -> tuple[object, ...]:
         """Return everything that the legend's content depends on."""
         mesh, view = session.mesh, session.view
-        names = mesh.marker_names if mesh is not None and view.colour_by == "role" else ()
+        names = mesh.marker_names if mesh is not None and view.color_by == "role" else ()
         said = frozenset(session.role(name) for name in names) or has_inverted(session)
-        colours = (view.colour_by, view.colour_map, session.colour_range)
+        colors = (view.color_by, view.color_map, session.color_range)
         points = self.stage.point_words, self.stage.ring_words
         style = self.stage.scheme, self.stage.font_scale, self.stage.pixel_scale
         shown = "legend" in view.drawn and self.stage.has_legend, self.stage.has_plate
-        return (id(mesh), shown, colours, said, points, style)
+        return (id(mesh), shown, colors, said, points, style)
 
 
 def has_inverted(session: Session) -> bool:
@@ -110,8 +110,8 @@ def has_inverted(session: Session) -> bool:
 SIZE = 92
 """Width and height in pixels of the corner with the axes, at normal letter size."""
 
-COLOURS = ("#c8452f", "#4c9a2a", "#3b7dd8")
-"""Colours of the axes x, y and z, visible on light and dark backgrounds."""
+COLORS = ("#c8452f", "#4c9a2a", "#3b7dd8")
+"""Colors of the axes x, y and z, visible on light and dark backgrounds."""
 
 
 class TriadLayer(Layer):
@@ -160,7 +160,7 @@ class TriadLayer(Layer):
             plotter.hide_axes()
 
     def _make(self) -> Any:
-        x, y, z = COLOURS
+        x, y, z = COLORS
         axes = self.stage.plotter.add_axes(
             interactive=False, line_width=3, x_color=x, y_color=y, z_color=z, xlabel="x", ylabel="y"
         )

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from slideviz.color_scheme import SELECTED_COLOUR
+from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.surfaces import lifted
@@ -25,7 +25,7 @@ IN_FRONT = -66_000.0
 
 
 class MarkLayer(Layer):
-    """The marked cell: its edges, its faces in the colour of its value (3D), and a dot.
+    """The marked cell: its edges, its faces in the color of its value (3D), and a dot.
 
     The dot shows a cell that is smaller than a pixel. If the cell is inside a 3D mesh, the
     boundaries are made transparent (`slideviz.scene.mesh.BoundaryLayer`).
@@ -85,7 +85,7 @@ class MarkLayer(Layer):
             self._drawn[name] = actor
             if name == FACES:
                 continue
-            actor.prop.color = SELECTED_COLOUR
+            actor.prop.color = SELECTED_COLOR
             actor.prop.line_width, actor.prop.point_size = 4.0, 9.0
             actor.prop.render_points_as_spheres = name == DOT
             actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()

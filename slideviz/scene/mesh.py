@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.color_scheme import SELECTED_COLOUR
+from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.mesh.enclosing import enclosing_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED
@@ -23,17 +23,17 @@ FADED = 0.3
 VEIL = 0.65
 """Opacity of the veil over the halo cells of a 2D mesh: they are no cells of the domain."""
 GLASS = 0.15
-"""Opacity of boundaries that enclose moving ones, while colours show roles."""
+"""Opacity of boundaries that enclose moving ones, while colors show roles."""
 SEE_THROUGH = 0.25
 """Opacity of boundaries while the marked cell is inside the mesh, beside none of them."""
 
 
-def recoloured(old: Session | None, new: Session) -> bool:
+def recolored(old: Session | None, new: Session) -> bool:
     """Return whether the cells' values may differ between two sessions."""
     return (
         old is None
         or old.frame is not new.frame
-        or old.view.colour_by != new.view.colour_by
+        or old.view.color_by != new.view.color_by
         or old.mesh is not new.mesh
     )
 
@@ -73,7 +73,7 @@ class CellLayer(Layer):
         self.actor = self.stage.add(shape, "cells", lighting=mesh.dim == 3)
         self.actor.prop.line_width = 1.0
         if mesh.dim == 3:
-            # A sum above 1 would give brighter colours than the colour bar has.
+            # A sum above 1 would give brighter colors than the color bar has.
             self.actor.prop.ambient, self.actor.prop.diffuse = 0.6, 0.4
         elif mesh.halo is not None:
             veil = actors.part_shape(mesh, np.flatnonzero(mesh.halo.cells))
@@ -107,12 +107,12 @@ class CellLayer(Layer):
         """Draw another state of the session."""
         if self.actor is None or new.mesh is None or new.frame is None:
             return
-        by_value = new.view.colour_by != "role"
+        by_value = new.view.color_by != "role"
         if old is None or old.frame is not new.frame:
             actors.place(self.shape, self.points(new.frame.mesh))
             if new.mesh.dim == 2:
                 self._stack(new.frame)
-        if by_value and recoloured(old, new):
+        if by_value and recolored(old, new):
             if new.mesh.dim == 3:
                 values = self.stage.values_of(new, self.shape.cell_data[CELL])
             else:
@@ -184,7 +184,7 @@ class BoundaryLayer(Layer):
         """Return a new band of a boundary, hidden or shown by `_style`."""
         rim = actors.rim_shape(surface, points, self._lift)
         band = self.stage.add(rim, f"selected:{surface.name}", lighting=False)
-        band.prop.color = SELECTED_COLOUR
+        band.prop.color = SELECTED_COLOR
         band.prop.line_width = 11 if surface.flat else 6
         band.prop.opacity = 1.0
         if not surface.flat:
@@ -198,8 +198,8 @@ class BoundaryLayer(Layer):
             return
         if old is None or old.frame is not new.frame:
             self._place(new.frame.mesh.points)
-        by_value = new.view.colour_by != "role" and new.mesh.dim == 3
-        if by_value and recoloured(old, new):
+        by_value = new.view.color_by != "role" and new.mesh.dim == 3
+        if by_value and recolored(old, new):
             for one in self.drawn.values():
                 one.shape.cell_data[VALUES] = self.stage.values_of(new, one.surface.owner)
         self.glass, self._buried = self._glass(new), self._hides_mark(new)
@@ -211,10 +211,10 @@ class BoundaryLayer(Layer):
             one.actor.prop.culling = "back" if culled else "none"
 
     def _glass(self, session: Session) -> frozenset[str]:
-        """Return the names of boundaries that enclose moving ones, if colours show roles."""
+        """Return the names of boundaries that enclose moving ones, if colors show roles."""
         view = session.view
         within = (name for name in self._enclosed if name not in view.hidden)
-        if view.colour_by != "role" or all(session.role(name) != "moving" for name in within):
+        if view.color_by != "role" or all(session.role(name) != "moving" for name in within):
             return frozenset()
         return frozenset(self.drawn) - self._enclosed
 
@@ -242,10 +242,10 @@ class BoundaryLayer(Layer):
             self.bands[name] = self._add_band(one.surface, session.frame.mesh.points)
         if name in self.bands:
             self.bands[name].actor.visibility = lit
-        one.actor.prop.color = ROLES[session.role(name)].colour
+        one.actor.prop.color = ROLES[session.role(name)].color
         one.actor.mapper.scalar_visibility = by_value
         if one.surface.flat:
-            one.actor.prop.line_width = 4.5 if view.colour_by == "role" else 3.0
+            one.actor.prop.line_width = 4.5 if view.color_by == "role" else 3.0
         else:
             self.stage.edges(one.actor.prop, "edges" in view.drawn)
             inside, glass = looks_inside(session), name in self.glass

@@ -18,7 +18,7 @@ from slideviz.session.passages import find_period, moved, passages, passages_aro
 from slideviz.session.state import Session
 
 PALER = 0.45
-"""Part of the cells' plain colour that is mixed into the colours of a neighbouring passage."""
+"""Part of the cells' plain color that is mixed into the colors of a neighbouring passage."""
 
 DIRECTIONS = 200
 """Number of directions, evenly spread over the sphere, in `outermost`."""
@@ -180,7 +180,7 @@ class PassageLayer(Layer):
         return mapper
 
     def _style(self) -> None:
-        """Set the colours of the passages: those of the mesh itself, paler."""
+        """Set the colors of the passages: those of the mesh itself, paler."""
         self._pale_table()
         plain = np.array(pv.Color(self.stage.scheme.cell).float_rgb)
         for name, (shape, actor) in self._sources().items():
@@ -197,7 +197,7 @@ class PassageLayer(Layer):
                 copy.SetForceOpaque(actor.GetForceOpaque())
 
     def _pale_table(self) -> None:
-        """Set the passages' table of colours: the stage's, paler, over the same range."""
+        """Set the passages' table of colors: the stage's, paler, over the same range."""
         own = self.stage.table
         key = (own.cmap.name, tuple(own.scalar_range), self.stage.scheme)
         if key == self._table_key:

@@ -18,10 +18,10 @@ from slideviz.terms import NODE_TYPES
 SIZES = ((0, 9.0), (1500, 7.0), (6000, 5.0))
 """Pairs of a number of points, and their diameter in pixels from that number on."""
 
-_COLOUR = "point_colour"
-"""Name of the point data with the colours."""
+_COLOR = "point_color"
+"""Name of the point data with the colors."""
 
-_RGB = np.array([pv.Color(term.colour).int_rgb for term in NODE_TYPES.values()], np.uint8)
+_RGB = np.array([pv.Color(term.color).int_rgb for term in NODE_TYPES.values()], np.uint8)
 """Red, green and blue (0 to 255) of each type of node, (t, 3)."""
 
 
@@ -72,7 +72,7 @@ class PointLayer(Layer):
         self._drawn = typed
         count = len(typed.nodes)
         present = [NODE_TYPES[kind] for kind in typed.present]
-        self.stage.point_words = tuple((term.label, term.colour) for term in present)
+        self.stage.point_words = tuple((term.label, term.color) for term in present)
         if self._actor is None:
             self._shape = pv.PolyData()
             self._actor = self._make()
@@ -80,7 +80,7 @@ class PointLayer(Layer):
         if not count:
             return
         shape = pv.PolyData(self._at(session, typed.nodes))
-        shape.point_data[_COLOUR] = _RGB[typed.kinds]
+        shape.point_data[_COLOR] = _RGB[typed.kinds]
         self._shape.copy_from(shape, deep=False)
         size = next(size for least, size in reversed(SIZES) if count >= least)
         self._actor.prop.point_size = size * self.stage.pixel_scale
@@ -102,13 +102,13 @@ class PointLayer(Layer):
         mapper.SetResolveCoincidentTopologyToPolygonOffset()
         mapper.SetRelativeCoincidentTopologyPointOffsetParameter(-10.0)
         mapper.SetScalarModeToUsePointFieldData()
-        mapper.SelectColorArray(_COLOUR)
+        mapper.SelectColorArray(_COLOR)
         mapper.SetColorModeToDirectScalars()
         mapper.scalar_visibility = True
         actor = pv.Actor(mapper=mapper, name="points:nodes")
         prop = actor.prop
         prop.style, prop.render_points_as_spheres = "points", True
-        # Shading makes a ball visible on a face of the same colour.
+        # Shading makes a ball visible on a face of the same color.
         prop.ambient, prop.diffuse = 0.25, 0.85
         self.stage.plotter.add_actor(
             actor, name=actor.name, reset_camera=False, render=False, pickable=False

@@ -1,4 +1,4 @@
-"""Actors of polygons in the colours of their cells, and instances of them at other places."""
+"""Actors of polygons in the colors of their cells, and instances of them at other places."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from slideviz.sections.polygons import Polygons
 
 
 class PolygonActor:
-    """An actor that draws polygons, or lines, in the colours of the cells they belong to.
+    """An actor that draws polygons, or lines, in the colors of the cells they belong to.
 
     Parameters
     ----------
@@ -53,15 +53,15 @@ class PolygonActor:
         self.mapper.dataset = self.shape
         self.actor.visibility = len(polygons) > 0
 
-    def colour(self, values: FloatArray | None) -> None:
-        """Colour the polygons by values (q,), one per polygon; None: by the actor's own colour."""
+    def color(self, values: FloatArray | None) -> None:
+        """Color the polygons by values (q,), one per polygon; None: by the actor's own color."""
         if values is not None:
             self.shape.cell_data[VALUES] = values
         self.mapper.scalar_visibility = values is not None
 
 
-def plain_colour(scheme: ColorScheme) -> tuple[float, float, float]:
-    """Return the colour of polygons without values, visible on any background."""
+def plain_color(scheme: ColorScheme) -> tuple[float, float, float]:
+    """Return the color of polygons without values, visible on any background."""
     cell, ghost = (np.array(pv.Color(name).float_rgb) for name in (scheme.cell, scheme.ghost))
     red, green, blue = (0.7 * cell + 0.3 * ghost).tolist()
     return red, green, blue

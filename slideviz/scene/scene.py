@@ -49,7 +49,7 @@ class Scene:
     plotter : pyvista.BasePlotter
         Where to draw.
     scheme : ColorScheme
-        Colours of background, text and edges.
+        Colors of background, text and edges.
     font_scale : float
         Factor of the letters' size, for pictures of many pixels.
     """
@@ -122,7 +122,7 @@ class Scene:
         if session.mesh is None:
             return
         self.session = session
-        self.stage.set_colours(session)
+        self.stage.set_colors(session)
         for layer in self.layers:
             layer.open(session, surfaces)
             layer.update(None, session)
@@ -142,7 +142,7 @@ class Scene:
         old, self.session = self.session, session
         if session.mesh is None or old.mesh is None:
             return
-        self.stage.set_colours(session)
+        self.stage.set_colors(session)
         tell_all((layer.update for layer in self.layers), old, session)
         if "perspective" in old.view.drawn ^ session.view.drawn:
             self.plotter.camera.parallel_projection = self._parallel()

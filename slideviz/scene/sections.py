@@ -1,4 +1,4 @@
-"""Sections in the scene: the polygons of their cuts, in the colours of the view."""
+"""Sections in the scene: the polygons of their cuts, in the colors of the view."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import pyvista as pv
 
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED
-from slideviz.scene.mesh import recoloured
+from slideviz.scene.mesh import recolored
 from slideviz.scene.passages import Period, matrices
-from slideviz.scene.polygon_actor import Instances, PolygonActor, plain_colour
+from slideviz.scene.polygon_actor import Instances, PolygonActor, plain_color
 from slideviz.scene.stage import Layer, Stage
 from slideviz.sections.line import Box, box_around, trace
 from slideviz.sections.model import Section
@@ -25,7 +25,7 @@ from slideviz.session.state import Session, StepFrame
 NAME, BAND, RIM = "section:", "band:", "rim:"
 """Prefixes of actors' names: the section's cells; in 2D also the line below them and its rim."""
 WIDTHS = {BAND: 8.0, RIM: 10.0}
-"""Widths in pixels, for a 2D mesh, of the line in the colours of the cut cells, and of its rim.
+"""Widths in pixels, for a 2D mesh, of the line in the colors of the cut cells, and of its rim.
 
 They make a section visible whose cells are smaller than pixels."""
 LIFTS = {NAME: 0.7, BAND: 0.6, RIM: 0.5}
@@ -110,7 +110,7 @@ class SectionLayer(Layer):
         return [*(one.actor for one in self.drawn.values() if len(one.polygons)), *instances]
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Draw another state of the session; cut or colour anew only what differs."""
+        """Draw another state of the session; cut or color anew only what differs."""
         if new.frame is None or not (new.view.sections or self.drawn):
             return
         wanted = self._wanted(new)
@@ -119,7 +119,7 @@ class SectionLayer(Layer):
                 self._instances.pop(name).show({})
             self.stage.remove(name)
             del self.drawn[name]
-        again = recoloured(old, new)
+        again = recolored(old, new)
         for name, (section, number, matrix) in wanted.items():
             self._draw(name, (section, number, matrix), new, again)
         neighbours = self._neighbours(new)
@@ -180,7 +180,7 @@ class SectionLayer(Layer):
     ) -> None:
         section, number, matrix = wanted
         kind = name[: name.index(":") + 1]
-        frame, by_value = session.frame, session.view.colour_by != "role" and kind != RIM
+        frame, by_value = session.frame, session.view.color_by != "role" and kind != RIM
         assert frame is not None
         # The matrix is part of the key, as another case may have another period.
         only = self.stage.in_threshold(session)
@@ -199,19 +199,19 @@ class SectionLayer(Layer):
             one.shown.show(polygons, LIFTS[kind] * self.stage.lift(frame.mesh))
             one.made_of, one.frame, one.of, again = key, cut, frame.mesh, True
         if not by_value:
-            one.shown.colour(None)
+            one.shown.color(None)
         elif again:
-            one.shown.colour(self.stage.values_of(session, one.polygons.cells, cut))
+            one.shown.color(self.stage.values_of(session, one.polygons.cells, cut))
         self._style(kind, one.shown, section, session)
 
     def _style(self, kind: str, shown: PolygonActor, section: Section, session: Session) -> None:
         prop, scheme = shown.actor.prop, self.stage.scheme
-        prop.color = scheme.text if kind == RIM else plain_colour(scheme)
+        prop.color = scheme.text if kind == RIM else plain_color(scheme)
         solid = session.mesh is not None and session.mesh.dim == 3 and section.whole
-        # A cut has exactly the colours of the bar; whole cells need shading.
+        # A cut has exactly the colors of the bar; whole cells need shading.
         prop.lighting = solid
         prop.ambient, prop.diffuse = (0.6, 0.4) if solid else (1.0, 0.0)
-        self.stage.edges(prop, "edges" in session.view.drawn, session.view.colour_by == "role")
+        self.stage.edges(prop, "edges" in session.view.drawn, session.view.color_by == "role")
         if session.mesh is not None and session.mesh.dim == 2:
             prop.line_width = 1.0 if section.whole else WIDTHS.get(kind, WIDTHS[BAND])
 
@@ -219,7 +219,7 @@ class SectionLayer(Layer):
 def _kinds(section: Section, session: Session) -> dict[str, Section]:
     """Return the sections to draw for one, by the prefix of their actors' names.
 
-    In 2D, whole cells are drawn above a line in their colours, and a line above its wider rim.
+    In 2D, whole cells are drawn above a line in their colors, and a line above its wider rim.
     """
     section = replace(section, name="")
     found = {NAME: section}
@@ -244,7 +244,7 @@ WIDTH = 1.2
 
 ABOVE, BELOW = 0.9, 0.4
 """Heights of the thin line above the mesh's cells, relative to `Stage.lift`: above whole cells, and
-below a band in the cells' colours."""
+below a band in the cells' colors."""
 
 
 class CutLines:

@@ -1,4 +1,4 @@
-"""The stage: plotter, color scheme and colours of values, shared by the layers of a scene."""
+"""The stage: plotter, color scheme and colors of values, shared by the layers of a scene."""
 
 from __future__ import annotations
 
@@ -47,15 +47,15 @@ class Stage:
     ----------
     plotter : pyvista.BasePlotter
     scheme : ColorScheme
-        Colours of background, text and edges.
+        Colors of background, text and edges.
     font_scale : float
         Factor of the letters' size, for pictures of many pixels.
     table : pyvista.LookupTable
-        The colours of values, and of inverted cells (NaN); changed in place.
+        The colors of values, and of inverted cells (NaN); changed in place.
     point_words : tuple of (str, str)
-        Texts and colours of the legend for the nodes drawn as points.
+        Texts and colors of the legend for the nodes drawn as points.
     ring_words : tuple of (str, str)
-        Texts and colours of the legend for the rings.
+        Texts and colors of the legend for the rings.
     has_legend : bool
         Whether this scene may have a legend, and leaves its strip free.
     has_plate : bool
@@ -83,7 +83,7 @@ class Stage:
         return float(self.font_scale * self.plotter.render_window.GetDPI() / USUAL_DPI)
 
     def add(self, shape: Any, name: str, **options: Any) -> Any:
-        """Add a data set to the plotter and return its actor, not yet coloured by values."""
+        """Add a data set to the plotter and return its actor, not yet colored by values."""
         valued = VALUES in shape.cell_data
         actor = self.plotter.add_mesh(
             shape,
@@ -111,7 +111,7 @@ class Stage:
     def edges(self, prop: Any, shown: bool, plain: bool = False) -> None:
         """Switch the edges of an actor's cells on or off.
 
-        ``plain``: in the color scheme's edge colour, else in that for cells coloured by values.
+        ``plain``: in the color scheme's edge color, else in that for cells colored by values.
         """
         prop.show_edges = shown
         prop.edge_color = self.scheme.edge if plain else VALUE_EDGE
@@ -128,11 +128,11 @@ class Stage:
         return min(STRIP * self.pixel_scale, 0.4 * self.plotter.window_size[0])
 
     def values(self, session: Session) -> FloatArray:
-        """Return the value (m,) of every cell of the shown frame by which it is coloured, cached.
+        """Return the value (m,) of every cell of the shown frame by which it is colored, cached.
 
         It is NaN for inverted cells.
         """
-        frame, what = session.frame, session.view.colour_by
+        frame, what = session.frame, session.view.color_by
         assert frame is not None
         key = (frame, what)
         if self._values is None or self._values[0] != key:
@@ -142,11 +142,11 @@ class Stage:
     def values_of(
         self, session: Session, cells: IntArray, of: StepFrame | None = None
     ) -> FloatArray:
-        """Return the values (k,) by which cells (k,) are coloured, computed for these only.
+        """Return the values (k,) by which cells (k,) are colored, computed for these only.
 
         ``of`` is the frame with the cells, by default the shown one.
         """
-        frame, what = of or session.frame, session.view.colour_by
+        frame, what = of or session.frame, session.view.color_by
         assert frame is not None
         if self._values is not None and self._values[0] == (frame, what):
             return self._values[1][cells]
@@ -156,7 +156,7 @@ class Stage:
         """Return the value of one cell, which may be a worst cell of a mesh in its file."""
         assert session.frame is not None
         frame, at = session.frame.place_of(cell)
-        what = session.view.colour_by
+        what = session.view.color_by
         return float(frame.shown_values(what, session.mesh, np.array([at]))[0])
 
     def in_threshold(self, session: Session) -> CellsInRange | None:
@@ -170,12 +170,12 @@ class Stage:
             known = self._in_threshold = values, threshold, CellsInRange.of(values, threshold)
         return known[2]
 
-    def set_colours(self, session: Session) -> None:
-        """Set colour map and range of the table of colours to those of the session."""
-        low, high = session.colour_range
+    def set_colors(self, session: Session) -> None:
+        """Set color map and range of the table of colors to those of the session."""
+        low, high = session.color_range
         self.table.scalar_range = (low, high)
-        if session.view.colour_map != self.table.cmap.name:
-            self.table.apply_cmap(session.view.colour_map, 256)
+        if session.view.color_map != self.table.cmap.name:
+            self.table.apply_cmap(session.view.color_map, 256)
 
     def set_background(self) -> None:
         """Set the plotter's background to that of the color scheme."""

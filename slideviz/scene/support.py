@@ -52,10 +52,10 @@ class SupportLayer(Layer):
             lifted(points, 4.0 * self.stage.lift(new.mesh)),
             lines=np.insert(lines, 0, PIECES + 1, axis=1).ravel(),
         )
-        # The seam in the background's colour keeps the circle apart from the cells.
+        # The seam in the background's color keeps the circle apart from the cells.
         for name, color, width in (
             (HALO, self.stage.scheme.background, 7.0),
-            (NAME, ROLES["moving"].colour, 3.5),
+            (NAME, ROLES["moving"].color, 3.5),
         ):
             actor = self.stage.add(shape, name, lighting=False, pickable=False)
             actor.prop.color = color

@@ -9,7 +9,7 @@ import numpy as np
 from slideviz.mesh.model import IntArray
 from slideviz.scene import actors
 from slideviz.scene.actors import CELL, POINT, VALUES, part_shape, see_through
-from slideviz.scene.mesh import CellLayer, looks_inside, recoloured
+from slideviz.scene.mesh import CellLayer, looks_inside, recolored
 from slideviz.scene.stage import Layer, Stage
 from slideviz.sections.threshold import cells_in_range
 from slideviz.session.state import Session
@@ -70,7 +70,7 @@ class ThresholdLayer(Layer):
             self.cells = None
             return
         moved = old is None or old.frame is not new.frame or self.cells is None
-        if moved or recoloured(old, new) or old.view.threshold != new.view.threshold:  # type: ignore[union-attr]
+        if moved or recolored(old, new) or old.view.threshold != new.view.threshold:  # type: ignore[union-attr]
             self._draw(new)
         if self.actor is not None:
             self.actor.visibility = self.shape.n_cells > 0

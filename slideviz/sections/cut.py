@@ -8,14 +8,14 @@ from functools import cache
 import numpy as np
 
 from slideviz.errors import CaseError
-from slideviz.mesh.caching import njit
 from slideviz.mesh.elements import ELEMENTS, ElementType
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import padded
-from slideviz.mesh.threads import in_parts
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons, offsets_of
 from slideviz.sections.threshold import CellsInRange
+from slideviz.system.jit_cache import njit
+from slideviz.system.threads import in_parts
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,14 +10,14 @@ import numpy as np
 
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import axis_basis
-from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.surfaces import padded
-from slideviz.mesh.threads import in_parts
 from slideviz.sections.cone import Cone
 from slideviz.sections.cylinder import Cylinder
 from slideviz.sections.plane import Plane
 from slideviz.sections.shape import InPlane, Shape
+from slideviz.system.jit_cache import njit
+from slideviz.system.threads import in_parts
 
 SHAPES: dict[str, Shape] = {shape.terms.value: shape for shape in (Plane(), Cylinder(), Cone())}
 """The shapes by name; their words are in `slideviz.case.section_shapes.SECTION_SHAPES`."""

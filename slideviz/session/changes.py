@@ -44,7 +44,7 @@ from slideviz.session.changes_view import (
     show_frame,
     show_handle,
 )
-from slideviz.session.colors import fit_colours
+from slideviz.session.colors import fit_colors
 from slideviz.session.opening import open_mesh, suggested_reduction
 from slideviz.session.run_messages import Requirement, run_requirements
 
@@ -57,7 +57,7 @@ __all__ = [
     "choose_section",
     "confirm",
     "end_run",
-    "fit_colours",
+    "fit_colors",
     "flat_one",
     "fresh_view",
     "isolate",

@@ -10,14 +10,14 @@ from slideviz.sections.threshold import ONLY_INVERTED
 from slideviz.session.rows import replaced, without
 from slideviz.session.state import Session, ViewState
 from slideviz.session.undoable import undoable
-from slideviz.terms import SHOWN, ColourBy
+from slideviz.terms import SHOWN, ColorBy
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
 UNDO_WORDS: dict[str, str] = {
-    "colour_range": "colour range",
-    "colour_map": "colours",
+    "color_range": "color range",
+    "color_map": "colors",
     "threshold": "range of cells",
     "points": "points",
     "sections": "sections",
@@ -29,8 +29,8 @@ UNDO_WORDS: dict[str, str] = {
 
 
 def _undo_words(values: Mapping[str, Any]) -> str | None:
-    if "colour_by" in values:
-        return None  # the quantity that the view is coloured by is not undone
+    if "color_by" in values:
+        return None  # the quantity that the view is colored by is not undone
     return UNDO_WORDS.get(next(iter(values)), "view") if len(values) == 1 else "view"
 
 
@@ -38,18 +38,18 @@ def _undo_words(values: Mapping[str, Any]) -> str | None:
 def set_view(session: Session, **values: Any) -> Session:
     """Return the session with other values of fields of `ViewState`, or of names in `SHOWN`.
 
-    Each quantity that the view is coloured by has its own colour range, which comes back with it.
+    Each quantity that the view is colored by has its own color range, which comes back with it.
     """
     old = session.view
-    what: ColourBy = values.get("colour_by", old.colour_by)
-    if what != old.colour_by:
+    what: ColorBy = values.get("color_by", old.color_by)
+    if what != old.color_by:
         ranges = dict(old.ranges)
-        if old.colour_range is not None:
-            ranges[old.colour_by] = old.colour_range
-        values = {"colour_range": ranges.pop(what, None)} | values
+        if old.color_range is not None:
+            ranges[old.color_by] = old.color_range
+        values = {"color_range": ranges.pop(what, None)} | values
         values["ranges"] = tuple(sorted(ranges.items()))
         # A threshold for a quality means nothing for a displacement, and the other way round.
-        if "displacement" in (what, old.colour_by) and old.threshold != ONLY_INVERTED:
+        if "displacement" in (what, old.color_by) and old.threshold != ONLY_INVERTED:
             values.setdefault("threshold", None)
     if "sections" in values:
         index = followed(old.section_index, old.sections, values["sections"])
@@ -152,9 +152,9 @@ def mark_cell(session: Session, cell: int | None) -> Session:
 
 
 def fresh_view(session: Session, old: ViewState) -> Session:
-    """Return a session just opened, with the things drawn and the colour map of the view ``old``.
+    """Return a session just opened, with the things drawn and the color map of the view ``old``.
 
     FFD boxes are drawn as ``session`` has them: if it has FFD motions.
     """
     drawn = old.with_drawn({"ffd": "ffd" in session.view.drawn}).drawn
-    return set_view(session, drawn=drawn, colour_map=old.colour_map)
+    return set_view(session, drawn=drawn, color_map=old.color_map)

@@ -1,4 +1,4 @@
-"""The colour range: fitted to the values that are shown, and in words."""
+"""The color range: fitted to the values that are shown, and in words."""
 
 from __future__ import annotations
 
@@ -12,42 +12,42 @@ from slideviz.session.state import Session
 from slideviz.session.undoable import undoable
 
 _PARTS = 100.0
-"""A colour range is rounded outwards to a power of ten, about its length over this number."""
+"""A color range is rounded outwards to a power of ten, about its length over this number."""
 
 
-@undoable("colour range")
-def fit_colours(session: Session, every: bool = True) -> Session:
-    """Return the session with a colour range from the lowest to the highest value.
+@undoable("color range")
+def fit_colors(session: Session, every: bool = True) -> Session:
+    """Return the session with a color range from the lowest to the highest value.
 
-    With ``every``, of all steps, so that a colour means the same throughout; else of the step
-    shown. Of both runs where there are two views. Inverted cells do not count: they have a colour
+    With ``every``, of all steps, so that a color means the same throughout; else of the step
+    shown. Of both runs where there are two views. Inverted cells do not count: they have a color
     of their own. Unchanged where all values are equal.
     """
     limits = _limits(session, every)
-    return session if limits is None else set_view(session, colour_range=limits)
+    return session if limits is None else set_view(session, color_range=limits)
 
 
 NO_DISPLACEMENT = "There is no displacement yet: run the case. Until then the roles are shown."
 
 
 def unmoved(session: Session) -> bool:
-    """Return whether the view is coloured by the displacement, and no run has a step yet."""
-    return session.view.colour_by == "displacement" and not any(run.frames for run in session.runs)
+    """Return whether the view is colored by the displacement, and no run has a step yet."""
+    return session.view.color_by == "displacement" and not any(run.frames for run in session.runs)
 
 
 def as_drawn(session: Session) -> Session:
-    """Return the session to draw: coloured by roles where there is no displacement yet."""
-    return set_view(session, colour_by="role") if unmoved(session) else session
+    """Return the session to draw: colored by roles where there is no displacement yet."""
+    return set_view(session, color_by="role") if unmoved(session) else session
 
 
 def usual_range(session: Session) -> str:
-    """Return the default colour range in words."""
-    far = session.view.colour_by == "displacement"
+    """Return the default color range in words."""
+    far = session.view.color_by == "displacement"
     return "0 to the largest of all runs" if far else "0 to 1"
 
 
 def _limits(session: Session, every: bool) -> tuple[float, float] | None:
-    what = session.view.colour_by
+    what = session.view.color_by
     if what == "role" or session.mesh is None:
         return None
     lows, highs = [], []
@@ -70,7 +70,7 @@ def _frames(session: Session, every: bool) -> set[StepFrame]:
             shown.add(one.frame)
         if every:
             # Displacements are largest in the last step, and measuring each step takes time.
-            far = one.view.colour_by == "displacement"
+            far = one.view.color_by == "displacement"
             shown.update((*one.frames[:1], *one.frames[-1:]) if far else one.frames)
     return shown
 

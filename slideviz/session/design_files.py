@@ -10,8 +10,8 @@ from slideviz.case.model import Case
 from slideviz.design.sweeps.designs import own_columns, read_designs
 from slideviz.design.sweeps.row import NUMBERS, DesignRow
 from slideviz.errors import CaseError
-from slideviz.mesh.io.atomic import atomic_write
 from slideviz.session.design_table import MOST, DesignTable, shown
+from slideviz.system.atomic import atomic_write
 
 
 def read_table(case: Case, path: Path) -> DesignTable:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from slideviz.mesh.io.su2b.write import OTHER_ZONES, listed, lost_in_binary, lost_of_mesh
+from slideviz.formats.su2b.write import OTHER_ZONES, listed, lost_in_binary, lost_of_mesh
 from slideviz.mesh.model import Mesh
 
 

@@ -1,7 +1,7 @@
 """Facts about cells: those within a threshold, the worst ones, and a single one.
 
-The *measure* of a cell is the quality that the view is coloured by, or size-skew where the view is
-coloured by something else. Inverted cells count as below every value: a threshold from 0 has them.
+The *measure* of a cell is the quality that the view is colored by, or size-skew where the view is
+colored by something else. Inverted cells count as below every value: a threshold from 0 has them.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import numpy as np
 
 from slideviz.errors import SlidevizError
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, corner_jacobians, quality
 from slideviz.mesh.surfaces import padded
 from slideviz.session.state import StepFrame
-from slideviz.terms import CELL_STATES, CellState, ColourBy
+from slideviz.system.atomic import atomic_write
+from slideviz.terms import CELL_STATES, CellState, ColorBy
 
 WORST = 100
 """Length of the list of the worst cells."""
@@ -83,7 +83,7 @@ class WorstCells:
     positions: FloatArray
     steps: IntArray
     kinds: tuple[str, ...]
-    measure: ColourBy
+    measure: ColorBy
     numbers: IntArray | None = None
 
     @property
@@ -95,13 +95,13 @@ class WorstCells:
         return len(self.cells)
 
 
-def measure(colour_by: ColourBy) -> ColourBy:
-    """Return ``colour_by`` where it is a quality, else size-skew."""
-    return colour_by if colour_by in ("size", "skew") else "size-skew"
+def measure(color_by: ColorBy) -> ColorBy:
+    """Return ``color_by`` where it is a quality, else size-skew."""
+    return color_by if color_by in ("size", "skew") else "size-skew"
 
 
 def worst_cells(
-    frames: Sequence[StepFrame], at: int, what: ColourBy, count: int = WORST
+    frames: Sequence[StepFrame], at: int, what: ColorBy, count: int = WORST
 ) -> WorstCells:
     """Return the worst cells of the frame ``at``, with the frame in which each was worst.
 

@@ -7,16 +7,16 @@ from pathlib import Path
 
 from slideviz.case.model import Case, FromFile
 from slideviz.case.motion import check_case, displacements
-from slideviz.deformation.intersection import (
-    folding_message,
-    intersection_message,
-    jump_message,
-)
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import Mesh
 from slideviz.session.jobs import Report, Stopped
 from slideviz.session.run_messages import in_window_words
 from slideviz.session.state import Session
+from slideviz.solver.intersection import (
+    folding_message,
+    intersection_message,
+    jump_message,
+)
 
 
 def intersection_key(session: Session) -> tuple[object, ...]:

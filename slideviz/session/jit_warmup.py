@@ -9,15 +9,15 @@ from typing import Any
 
 from slideviz.case.model import Case, Translate
 from slideviz.errors import Cancelled, SlidevizError
-from slideviz.mesh.caching import compilation_watched
-from slideviz.mesh.io.source import Source
-from slideviz.mesh.io.su2.read import read_su2
-from slideviz.mesh.io.su2.write import su2_blocks
+from slideviz.formats.source import Source
+from slideviz.formats.su2.read import read_su2
+from slideviz.formats.su2.write import su2_blocks
 from slideviz.samples.table import sample
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session.jobs import Stopped, require_going
 from slideviz.session.results import cell_displacement
+from slideviz.system.jit_cache import compilation_watched
 
 _RUNS: tuple[tuple[str, Mapping[str, Any]], ...] = (
     # The first compiles nearly everything: curved boundaries, and angles in the distance.
@@ -61,14 +61,14 @@ def _write_and_read() -> None:
 
 
 def _look() -> None:
-    """Cut a mesh, and colour it by its displacement."""
+    """Cut a mesh, and color it by its displacement."""
     mesh = sample("cylindrical", size=4).mesh
     Cutter.of(mesh).cut(mesh.points, Section("plane", tuple(mesh.points.mean(axis=0)), (0, 0, 1)))
     cell_displacement(mesh.with_points(mesh.points / 3.0), mesh)
 
 
 def _deform(name: str, settings: Mapping[str, Any], stopped: Stopped) -> None:
-    from slideviz.deformation.solver import deform
+    from slideviz.solver.deform import deform
 
     # Elasticity needs so many cells that its solver has more than one level.
     made = sample(name, size=8 if settings.get("method") == "elastic" else 4)

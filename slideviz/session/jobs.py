@@ -14,11 +14,9 @@ from pathlib import Path
 
 from slideviz.case.model import Case
 from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
+from slideviz.formats.source import unreadable
 from slideviz.mesh.coarse import coarse_surfaces
 from slideviz.mesh.enclosing import enclosing_of
-from slideviz.mesh.io.file_checks import require_ordinary
-from slideviz.mesh.io.private import private_folder
-from slideviz.mesh.io.source import unreadable
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
@@ -30,6 +28,8 @@ from slideviz.session.large import first_frame, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.passages import find_period
 from slideviz.session.state import Session, StepFrame
+from slideviz.system.file_checks import require_ordinary
+from slideviz.system.private import private_folder
 
 Report = Callable[[object], None]
 Stopped = Callable[[], bool]
@@ -86,7 +86,7 @@ def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) ->
     SlidevizError
         The file cannot be used; the message says what and where.
     """
-    from slideviz.mesh.io.files import read
+    from slideviz.formats.files import read
 
     case, mesh_path = None, path
     if path.suffix.lower() in CASE_SUFFIXES:
@@ -156,7 +156,7 @@ def _look_ahead(frame: StepFrame) -> None:
 
 def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
     """Deform the mesh; report every step as a `StepFrame`, and the progress as `Doing`."""
-    from slideviz.deformation.solver import Progress, deform
+    from slideviz.solver.deform import Progress, deform
 
     furthest = 0.0
 
@@ -222,7 +222,7 @@ def save_mesh(
     Cancelled
         It was stopped; what was at ``path`` is as before.
     """
-    from slideviz.mesh.io.files import write
+    from slideviz.formats.files import write
 
     report(Doing(f"Writing {path.name}"))
     data = cell_values(frame) if holds_quality(path) else None

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.errors import SlidevizError
+from slideviz.formats.vtkhdf import VTKHDF, vtkhdf_series
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.io.atomic import atomic_write
-from slideviz.mesh.io.vtkhdf import VTKHDF, vtkhdf_series
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.session.jobs import Doing, Report, Stopped, cell_values, require_going, save_mesh
 from slideviz.session.state import StepFrame
+from slideviz.system.atomic import atomic_write
 from slideviz.terms import CELL_STATES
 
 _ROWS = 5_000

@@ -6,12 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from slideviz.case.model import Case
-from slideviz.deformation.solver import Progress
-from slideviz.deformation.streaming import stream
 from slideviz.session.jobs import PHASES, Doing, Report, Stopped, overall, require_going
 from slideviz.session.large import frame_of
 from slideviz.session.results import StepFrame
 from slideviz.session.whole import tally_of
+from slideviz.solver.deform import Progress
+from slideviz.streaming.run import stream
 
 
 def compute_in_file(

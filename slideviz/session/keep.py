@@ -22,7 +22,7 @@ def keep_view(session: Session, camera: Camera | None = None) -> Case:
     view, first = session.view, ViewState()
     before = _plain(first)
     kept = {key: value for key, value in _plain(view).items() if before[key] != value}
-    ranges = {"VIEW_RANGE": view.colour_range, "VIEW_THRESHOLD": view.threshold}
+    ranges = {"VIEW_RANGE": view.color_range, "VIEW_THRESHOLD": view.threshold}
     kept |= {key: value for key, value in ranges.items() if value is not None}
     if view.hidden:
         names = session.mesh.marker_names if session.mesh is not None else ()
@@ -44,9 +44,9 @@ def kept_view(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
     """
     kept, values = case.view, dict[str, Any]()
     for key, field in (
-        ("VIEW_COLOR", "colour_by"),
-        ("VIEW_RANGE", "colour_range"),
-        ("VIEW_MAP", "colour_map"),
+        ("VIEW_COLOR", "color_by"),
+        ("VIEW_RANGE", "color_range"),
+        ("VIEW_MAP", "color_map"),
         ("VIEW_THRESHOLD", "threshold"),
         ("VIEW_POINTS", "points"),
         ("VIEW_COPIES", "passages"),
@@ -76,8 +76,8 @@ def kept_camera(case: Case) -> Camera | None:
 def _plain(view: ViewState) -> dict[str, Any]:
     """Return the values of a view that are never None, by key of the case file."""
     return {
-        "VIEW_COLOR": view.colour_by,
-        "VIEW_MAP": view.colour_map,
+        "VIEW_COLOR": view.color_by,
+        "VIEW_MAP": view.color_map,
         "VIEW_POINTS": view.points,
         "VIEW_SHOW": tuple(hyphened(name) for name in SHOWN if name in view.drawn),
         "VIEW_COPIES": view.passages,

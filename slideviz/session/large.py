@@ -6,15 +6,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from slideviz.deformation.memory import NEEDED
-from slideviz.deformation.solver import free_memory
-from slideviz.mesh.io.su2b.layout import BinaryFile, find_zone
-from slideviz.mesh.io.su2b.read import is_su2b
+from slideviz.formats.su2b.layout import BinaryFile, find_zone
+from slideviz.formats.su2b.read import is_su2b
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import quality
-from slideviz.mesh.skin import read_skin
 from slideviz.session.results import StepFrame
 from slideviz.session.whole import PartQuality, Tally, measure_all, worst_frame
+from slideviz.solver.deform import free_memory
+from slideviz.streaming.memory import NEEDED
+from slideviz.streaming.skin import read_skin
 from slideviz.terms import Metric
 
 LARGE_CELLS = 5_000_000

@@ -11,8 +11,8 @@ from slideviz.case.displacement import parse_displacements
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case, Target, named
 from slideviz.errors import CaseError
-from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import IntArray, Mesh
+from slideviz.system.atomic import atomic_write
 
 NAMED = Path("table")
 """Stands for the file in messages of `parse_displacements`; `TableRows.check` replaces it."""

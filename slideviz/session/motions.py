@@ -15,12 +15,12 @@ from slideviz.case.given import key_of, placed_displacements
 from slideviz.case.model import Case, FromFile, Target, moves
 from slideviz.case.motion import displacements, moved_together
 from slideviz.case.motion_words import direction_words
-from slideviz.deformation.prescribed import displaced
-from slideviz.deformation.radius import moving_bodies, support_radius
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.session.state import Session
+from slideviz.solver.prescribed import displaced
+from slideviz.solver.radius import moving_bodies, support_radius
 
 DIGITS = 12
 """Significant digits of a centroid, relative to the extent of the mesh, and of a direction."""

@@ -16,7 +16,7 @@ from slideviz.mesh.periodic import Pair
 from slideviz.session.changes_view import flat_one
 from slideviz.session.keep import kept_view
 from slideviz.session.state import Guess, Run, Session, StepFrame, ViewState
-from slideviz.terms import ColourBy, Role
+from slideviz.terms import ColorBy, Role
 
 RELATIVE_TOLERANCE = 1e-5
 """Suggested tolerance of data reduction, over the mesh's extent."""
@@ -71,9 +71,7 @@ def suggested_reduction(mesh: Mesh) -> Reduction:
     return Reduction(tolerance=float(f"{RELATIVE_TOLERANCE * mesh.extent:.2g}") or 1e-300)
 
 
-def of_runs(
-    first: StepFrame, runs: Sequence[Run] = (), colour_by: ColourBy = "size-skew"
-) -> Session:
+def of_runs(first: StepFrame, runs: Sequence[Run] = (), color_by: ColorBy = "size-skew") -> Session:
     """Return a session for a picture: the last step of a run, with that of a second run beside it.
 
     Parameters
@@ -82,15 +80,15 @@ def of_runs(
         The undeformed mesh.
     runs : sequence of Run
         Runs of that mesh: none, one or two, with different numbers.
-    colour_by : {"size-skew", "size", "skew", "displacement"}
-        The quantity to colour by, with one colour range for both.
+    color_by : {"size-skew", "size", "skew", "displacement"}
+        The quantity to color by, with one color range for both.
     """
     last, beside = 0, None
     if runs:
         last = len(runs[0].frames)
         beside = runs[1].number if len(runs) > 1 else None
     case = runs[0].case if runs else Case()
-    view = ViewState(colour_by=colour_by, frame=last, beside=beside)
+    view = ViewState(color_by=color_by, frame=last, beside=beside)
     shown = runs[0].number if runs else None
     return Session(first.mesh, None, case, first=first, runs=tuple(runs), shown=shown, view=view)
 

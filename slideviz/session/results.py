@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
-from slideviz.mesh.threads import in_parts
-from slideviz.terms import ColourBy
+from slideviz.system.jit_cache import njit
+from slideviz.system.threads import in_parts
+from slideviz.terms import ColorBy
 
 if TYPE_CHECKING:
-    from slideviz.deformation.solver import Step
+    from slideviz.solver.deform import Step
 
 
 LABEL = 20
@@ -30,7 +30,7 @@ class StepFrame:
     Attributes
     ----------
     mesh : Mesh
-        The mesh, or the skin of one that is larger than memory (see `slideviz.mesh.skin`).
+        The mesh, or the skin of one that is larger than memory (see `slideviz.streaming.skin`).
     quality : Quality
     step : Step or None
         The step; None for the undeformed mesh.
@@ -61,7 +61,7 @@ class StepFrame:
         return (self, cell) if self.extra is None or cell < own else (self.extra, cell - own)
 
     def values(
-        self, what: ColourBy, undeformed: Mesh | None = None, cells: IntArray | None = None
+        self, what: ColorBy, undeformed: Mesh | None = None, cells: IntArray | None = None
     ) -> FloatArray:
         """Return the values of a quantity ``what`` in all cells (m,), or in ``cells`` (k,).
 
@@ -75,9 +75,9 @@ class StepFrame:
         return every if cells is None else every[cells]
 
     def shown_values(
-        self, what: ColourBy, undeformed: Mesh | None = None, cells: IntArray | None = None
+        self, what: ColorBy, undeformed: Mesh | None = None, cells: IntArray | None = None
     ) -> FloatArray:
-        """Return `values` for colours: nan where a cell is inverted."""
+        """Return `values` for colors: nan where a cell is inverted."""
         status = self.quality.status if cells is None else self.quality.status[cells]
         return np.where(status == INVERTED, np.nan, self.values(what, undeformed, cells))
 

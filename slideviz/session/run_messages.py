@@ -24,11 +24,11 @@ from slideviz.case.model import (
     Translate,
     moves,
 )
-from slideviz.deformation.reduction import LOOSE
-from slideviz.deformation.remedies import MOST_NAMES, beyond_pitch, fixed_beside, remedies
 from slideviz.errors import Note
 from slideviz.mesh.model import Mesh
 from slideviz.session.state import PanelPlace, Run, Session
+from slideviz.solver.reduction import LOOSE
+from slideviz.solver.remedies import MOST_NAMES, beyond_pitch, fixed_beside, remedies
 from slideviz.terms import KERNELS
 
 LARGE = 1e9
@@ -43,7 +43,7 @@ def exact_cost(case: Case, mesh: Mesh) -> str:
     All boundary nodes are control nodes then: memory grows with the square of their number, and
     time with the cube.
     """
-    from slideviz.deformation.solver import free_memory
+    from slideviz.solver.deform import free_memory
 
     if case.method != "rbf" or case.reduction is not None:
         return ""

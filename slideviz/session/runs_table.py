@@ -10,7 +10,6 @@ from pathlib import Path
 
 from slideviz.case.motion_words import deformation, describe
 from slideviz.errors import SlidevizError
-from slideviz.mesh.io.atomic import atomic_write
 from slideviz.session.run_messages import notes_of, warnings_of
 from slideviz.session.runs_words import (
     control_nodes,
@@ -19,6 +18,7 @@ from slideviz.session.runs_words import (
     reduction_words,
 )
 from slideviz.session.state import Run
+from slideviz.system.atomic import atomic_write
 from slideviz.terms import KERNELS, PERIODIC_MODES
 
 DIGITS = 4

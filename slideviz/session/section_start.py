@@ -9,11 +9,11 @@ import numpy as np
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.surfaces import padded
-from slideviz.mesh.threads import in_parts
 from slideviz.sections.model import SHAPES, Section, Triple
 from slideviz.sections.round_number import round_middle
 from slideviz.sections.shape import triple
 from slideviz.session.state import Session
+from slideviz.system.threads import in_parts
 
 
 def cell_points(mesh: Mesh) -> FloatArray:

@@ -15,14 +15,14 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from slideviz.deformation.measuring import PointFiles
-from slideviz.mesh.io.su2b.elements import element_blocks, elements_between
+from slideviz.formats.su2b.elements import element_blocks, elements_between
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
-from slideviz.mesh.threads import Tick
 from slideviz.sections.cut import sides_of
 from slideviz.sections.model import ON_SECTION, Section
 from slideviz.session.results import StepFrame
 from slideviz.session.whole import measured_part, open_points
+from slideviz.streaming.measuring import PointFiles
+from slideviz.system.threads import Tick
 from slideviz.terms import Metric
 
 GROUP = 4096

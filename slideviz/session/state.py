@@ -15,7 +15,7 @@ from slideviz.case.model import Case
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.session.results import Run, StepFrame, cell_displacement
-from slideviz.terms import SHOWN, ColourBy, PointsShown, Role, Shown
+from slideviz.terms import SHOWN, ColorBy, PointsShown, Role, Shown
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ViewState:
-    """The view of a session: colours, threshold, sections, step, things drawn.
+    """The view of a session: colors, threshold, sections, step, things drawn.
 
     Attributes
     ----------
-    colour_by : ColourBy
-        The quantity that cells are coloured by.
-    colour_range : (float, float) or None
-        Values at the ends of the colour bar; None: 0 to 1 for quality, and 0 to a round number
+    color_by : ColorBy
+        The quantity that cells are colored by.
+    color_range : (float, float) or None
+        Values at the ends of the color bar; None: 0 to 1 for quality, and 0 to a round number
         above the largest of all runs for the displacement.
-    colour_map : str
-        One of `slideviz.terms.COLOUR_MAPS`.
+    color_map : str
+        One of `slideviz.terms.COLOR_MAPS`.
     threshold : (float, float) or None
         Draw only the cells whose value is in this range; None draws all.
     points : PointsShown
@@ -59,16 +59,16 @@ class ViewState:
     swapped : bool
         Whether the second view is to the left of the first.
     ranges : tuple of (str, (float, float))
-        The colour ranges of other quantities that the view was coloured by before.
+        The color ranges of other quantities that the view was colored by before.
     section_index : int or None
         The place in ``sections`` of the one that is selected.
     handle : bool
         Whether the selected section has its handle drawn.
     """
 
-    colour_by: ColourBy = "role"
-    colour_range: tuple[float, float] | None = None
-    colour_map: str = "viridis"
+    color_by: ColorBy = "role"
+    color_range: tuple[float, float] | None = None
+    color_map: str = "viridis"
     threshold: tuple[float, float] | None = None
     points: PointsShown = "none"
     drawn: frozenset[Shown] = frozenset(name for name, term in SHOWN.items() if term.at_first)
@@ -81,7 +81,7 @@ class ViewState:
     marked_in: int | None = None
     beside: int | None = None
     swapped: bool = False
-    ranges: tuple[tuple[ColourBy, tuple[float, float]], ...] = ()
+    ranges: tuple[tuple[ColorBy, tuple[float, float]], ...] = ()
     section_index: int | None = None
     handle: bool = False
 
@@ -273,11 +273,11 @@ class Session:
         return run is not None and bool(run.frames) and essence(run.case) != essence(self.case)
 
     @property
-    def colour_range(self) -> tuple[float, float]:
-        """Return the values at the ends of the colour bar."""
-        if self.view.colour_range is not None:
-            return self.view.colour_range
-        if self.view.colour_by != "displacement":
+    def color_range(self) -> tuple[float, float]:
+        """Return the values at the ends of the color bar."""
+        if self.view.color_range is not None:
+            return self.view.color_range
+        if self.view.color_by != "displacement":
             return 0.0, 1.0
         return 0.0, round_above(self.largest_displacement) or 1.0
 
@@ -295,7 +295,7 @@ class Session:
 
 
 def round_above(value: float) -> float:
-    """Return a round number that is at least ``value``, for a colour bar; 0 for no positive value.
+    """Return a round number that is at least ``value``, for a color bar; 0 for no positive value.
 
     Its fifths, at which the bar has labels, have few digits, too.
     """

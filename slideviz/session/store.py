@@ -77,7 +77,7 @@ class Memento:
     def put_into(self, session: Session) -> Session:
         """Return the session with the memento's state; the step that is shown stays."""
         session = self._put_runs(session)
-        coloured_by, view = session.view.colour_by, session.view.in_style(self.style)
+        colored_by, view = session.view.color_by, session.view.in_style(self.style)
         # File names of the case are not undone: it was saved there, undone or not.
         case = self.case.change(
             source=session.case.source,
@@ -85,8 +85,8 @@ class Memento:
             warnings=session.case.warnings,
         )
         session = replace(session, case=case, guesses=self.guesses, view=view)
-        # The quantity that the view is coloured by is not undone.
-        return set_view(session, colour_by=coloured_by)
+        # The quantity that the view is colored by is not undone.
+        return set_view(session, color_by=colored_by)
 
     def _put_runs(self, session: Session) -> Session:
         """Return the session with the memento's removed runs removed, and all others back."""

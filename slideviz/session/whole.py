@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.deformation.measuring import PointFiles
+from slideviz.formats.su2b.elements import ElementBlock, element_at, element_blocks
+from slideviz.formats.su2b.layout import BinaryFile, find_zone
 from slideviz.mesh.elements import SIZES
-from slideviz.mesh.io.su2b.elements import ElementBlock, element_at, element_blocks
-from slideviz.mesh.io.su2b.layout import BinaryFile, find_zone
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, frozen_array
 from slideviz.mesh.quality import INVERTED, UNPROVEN, Quality, quality
-from slideviz.mesh.threads import Tick
 from slideviz.session.inspect import WORST
 from slideviz.session.results import StepFrame
+from slideviz.streaming.measuring import PointFiles
+from slideviz.system.threads import Tick
 from slideviz.terms import Metric
 
 FINE = 10_000

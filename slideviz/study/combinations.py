@@ -16,15 +16,15 @@ import numpy as np
 
 from slideviz import terms
 from slideviz.case.model import Case, Translate
-from slideviz.deformation.setup import Setup, make_setup
-from slideviz.deformation.solver import deform
-from slideviz.deformation.steps import Progress, Step
 from slideviz.errors import Cancelled, SlidevizError
 from slideviz.mesh.model import FloatArray, Mesh, frozen_array
 from slideviz.mesh.quality import Quality, quality
 from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import sample
 from slideviz.session.jit_warmup import warm_up
+from slideviz.solver.deform import deform
+from slideviz.solver.setup import Setup, make_setup
+from slideviz.solver.steps import Progress, Step
 from slideviz.terms import PeriodicMode
 
 COMPARED_METHODS: Mapping[str, tuple[str, Mapping[str, Any]]] = {

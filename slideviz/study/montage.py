@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.color_scheme import COLOUR_MAP
+from slideviz.color_scheme import COLOR_MAP
 from slideviz.export.encode import Pixels
 from slideviz.export.picture import WHITE, pictures_alike
 from slideviz.mesh.model import Mesh
@@ -80,7 +80,7 @@ def montage(rows: Sequence[CombinationRow], base: Mesh) -> Any:
         row = places.get((at[0], at[1]))
         if row is not None:
             _fill(axes, words.get((at[0], at[1]), ""), row, wide)
-    colors = color_scale(COLOUR_MAP, (0.0, 1.0))
+    colors = color_scale(COLOR_MAP, (0.0, 1.0))
     _foot(figure, facets, colors, any(found.inverted for _, found in kept.values()), notes)
     return figure
 
@@ -186,7 +186,7 @@ def _numbers(result: Result) -> str:
 
 
 def _foot(figure: Any, facets: Any, colors: Any, inverted: bool, notes: Sequence[str]) -> None:
-    """Draw one colour bar for all facets and write the notes below it; trim the figure."""
+    """Draw one color bar for all facets and write the notes below it; trim the figure."""
     from matplotlib.colorbar import make_axes
 
     if notes:

@@ -9,8 +9,8 @@ from io import StringIO
 from pathlib import Path
 
 from slideviz.errors import CaseError
-from slideviz.mesh.io.atomic import atomic_write
 from slideviz.study.combinations import CombinationRow, Result
+from slideviz.system.atomic import atomic_write
 
 Value = str | int | float
 

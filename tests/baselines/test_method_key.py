@@ -14,9 +14,9 @@ from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Rotate
 from slideviz.case.reduction import Reduction
 from slideviz.cli import run
-from slideviz.deformation import solver
 from slideviz.errors import CaseError, DeformError
 from slideviz.samples.table import SAMPLES, sample, write_sample
+from slideviz.solver import deform as solver
 from slideviz.terms import METHODS
 from tests import builders
 from tests.slow import one_of_each_fast

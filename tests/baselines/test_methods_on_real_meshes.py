@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from slideviz.deformation.setup import make_setup
+from slideviz.solver.setup import make_setup
 from tests import test_real_meshes as real
 
 pytestmark = real.pytestmark

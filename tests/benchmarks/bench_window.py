@@ -124,10 +124,10 @@ def test_opening(benchmark, bench):
     benchmark.extra_info["cells"] = len(bench.window.store.session.mesh.cells)
 
 
-def test_colouring(benchmark, bench):
+def test_coloring(benchmark, bench):
     def work():
         for name in ("size-skew", "size", "displacement", "role"):
-            bench.change(colour_by=name)
+            bench.change(color_by=name)
 
     measure(benchmark, bench, work)
 

@@ -102,8 +102,8 @@ def test_turning(benchmark, bench):
 
 
 @pytest.mark.parametrize("what", ["size-skew", "displacement"])
-def test_colouring(benchmark, bench, what):
-    measure(benchmark, bench, lambda: bench.change(colour_by=what))
+def test_coloring(benchmark, bench, what):
+    measure(benchmark, bench, lambda: bench.change(color_by=what))
 
 
 def test_cutting_by_a_plane(benchmark, bench):

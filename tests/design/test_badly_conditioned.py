@@ -15,11 +15,11 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Scale, Translate
 from slideviz.case.reduction import Reduction
-from slideviz.deformation.stepping import _doubt_warning, _dropped_warning
 from slideviz.design.doubt import warn_of_condition, warn_of_doubt
 from slideviz.design.frozen.solve import whole
 from slideviz.errors import ConditionWarning, DeformError, Note, ToleranceWarning
 from slideviz.samples.table import sample
+from slideviz.solver.stepping import _doubt_warning, _dropped_warning
 from tests import builders
 from tests.oracles.digits import interpolated
 

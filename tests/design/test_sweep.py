@@ -376,7 +376,7 @@ def test_an_executor_that_is_broken(passage):
 def test_a_large_file_is_opened_in_the_other_process_too(passage, tmp_path, monkeypatch):
     import pickle
 
-    from slideviz.mesh.io import source
+    from slideviz.formats import source
 
     monkeypatch.setattr(source, "KEPT_BYTES", 100)
     file = tmp_path / "passage.su2"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from slideviz.color_scheme import SELECTED_COLOUR
+from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.errors import SlidevizError
 from slideviz.export import offscreen_renderer as renderer_module
 from slideviz.export import vector
@@ -47,7 +47,7 @@ def session(square):
     for scale in (1.02, 1.05):
         moved = square.with_points(square.points * [scale, 1.0])
         found = changes.add_frames(found, [StepFrame(moved, quality(moved, square))])
-    return changes.set_view(changes.end_run(found, "done"), colour_by="size-skew")
+    return changes.set_view(changes.end_run(found, "done"), color_by="size-skew")
 
 
 @pytest.fixture
@@ -81,10 +81,10 @@ def test_the_legend_has_its_strip_and_the_title_its_line(renderer):
 
 
 def test_edges_and_axes_are_drawn_when_wanted(renderer):
-    def colours(figure):
+    def colors(figure):
         return len(np.unique(renderer.image(figure).reshape(-1, 3), axis=0))
 
-    assert colours(PLAIN) > 1.5 * colours(replace(PLAIN, edges=False))
+    assert colors(PLAIN) > 1.5 * colors(replace(PLAIN, edges=False))
     with_axes = renderer.image(replace(PLAIN, triad=True))
     assert (with_axes != renderer.image(PLAIN)).any()
 
@@ -215,11 +215,11 @@ def test_titles_that_are_too_long_get_smaller_then_shorter():
 
 def test_a_marked_cell_is_named_in_both_views_or_left_out(session, renderer):
     renderer.session = changes.mark_cell(two_runs(session, sliding="ds"), 5)
-    colour = np.array(to_rgb(SELECTED_COLOUR)) * 255
+    color = np.array(to_rgb(SELECTED_COLOR)) * 255
 
     def orange(figure):
         image = renderer.image(figure)
-        found = (np.abs(image.astype(float) - colour).max(axis=2) < 8).any(axis=0)
+        found = (np.abs(image.astype(float) - color).max(axis=2) < 8).any(axis=0)
         return found[: found.size // 2].any(), found[found.size // 2 :].any()
 
     wide = replace(PLAIN, size=(900, 300))
@@ -229,7 +229,7 @@ def test_a_marked_cell_is_named_in_both_views_or_left_out(session, renderer):
     assert words == f"cell 5: {value:.4f}"
     assert orange(replace(wide, marked=False)) == (False, False)
     assert "mark:words" not in renderer._plotter.actors
-    assert mark_words(changes.set_view(renderer.session, colour_by="role")) == "cell 5"
+    assert mark_words(changes.set_view(renderer.session, color_by="role")) == "cell 5"
     assert "cell 5" in texts_of(draw_vector(renderer, wide))
     assert "cell 5" not in texts_of(draw_vector(renderer, replace(wide, marked=False)))
 
@@ -309,11 +309,11 @@ def test_drawings_are_whole_and_always_the_same(renderer, tmp_path):
     assert first == (tmp_path / "b.svg").read_bytes()
     cells = len(renderer.session.mesh.cells)
     assert first.count(b"<path") >= cells
-    renderer.session = changes.set_view(renderer.session, colour_by="role", undeformed=True)
+    renderer.session = changes.set_view(renderer.session, color_by="role", undeformed=True)
     write_vector(renderer, figure, tmp_path / "c.svg")
     roles = {renderer.session.role(name) for name in renderer.session.mesh.marker_names}
     text = (tmp_path / "c.svg").read_text()
-    assert all(ROLES[role].colour in text for role in roles)
+    assert all(ROLES[role].color in text for role in roles)
     write_vector(renderer, replace(figure, background="transparent"), tmp_path / "d.pdf")
     assert (tmp_path / "d.pdf").read_bytes().startswith(b"%PDF")
 

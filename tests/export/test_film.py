@@ -84,7 +84,7 @@ def frames(square):
 @pytest.fixture
 def ran(session, frames):
     run = Run(1, session.case, frames[1:], "done")
-    view = replace(session.view, colour_by="size-skew", frame=2)
+    view = replace(session.view, color_by="size-skew", frame=2)
     return replace(session, first=frames[0], runs=(run,), shown=1, view=view)
 
 
@@ -105,7 +105,7 @@ def test_an_mp4_has_the_size_the_time_and_the_steps(tmp_path, frames):
     assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"]
 
 
-def test_the_colours_of_an_mp4_are_those_of_the_picture(tmp_path, frames):
+def test_the_colors_of_an_mp4_are_those_of_the_picture(tmp_path, frames):
     shoot(frames, tmp_path / "a.mp4", Reel(SMALL))
     shoot(frames, tmp_path / "a%d.png", Reel(SMALL))
     image = mp4_images(tmp_path / "a.mp4")[1][-1]
@@ -131,7 +131,7 @@ def test_a_gif_repeats_for_ever_with_the_times_asked_for(tmp_path, frames):
         assert np.percentile(away, 99) < 32, f"image {k} from only its changes"
 
 
-def test_a_gif_keeps_the_shades_of_the_colour_map_and_rare_colours():
+def test_a_gif_keeps_the_shades_of_the_color_map_and_rare_colors():
     from slideviz.export.encode import _palette
 
     sample = np.full((200, 320, 3), 255, np.uint8)
@@ -305,7 +305,7 @@ def test_pictures_that_cannot_be_written_are_told(tmp_path, frames, monkeypatch)
     assert not list(tmp_path.iterdir())
 
 
-def test_the_view_is_filmed_with_its_camera_and_one_colour_range(tmp_path, ran):
+def test_the_view_is_filmed_with_its_camera_and_one_color_range(tmp_path, ran):
     mesh = ran.mesh
     surfaces = find_surfaces(mesh)
     with offscreen(SMALL) as plotter:
@@ -327,18 +327,18 @@ def test_the_view_is_filmed_with_its_camera_and_one_colour_range(tmp_path, ran):
 
 
 def test_displacement_of_the_view_keeps_the_range_of_the_last_step(tmp_path, ran, monkeypatch):
-    ran = replace(ran, view=replace(ran.view, colour_by="displacement"))
+    ran = replace(ran, view=replace(ran.view, color_by="displacement"))
     seen = []
     draw = OffscreenRenderer.drawing
 
     def watch(self, shown, *rest):
-        seen.extend((one.colour_range, one.frame) for one in shown)
+        seen.extend((one.color_range, one.frame) for one in shown)
         return draw(self, shown, *rest)
 
     monkeypatch.setattr(OffscreenRenderer, "drawing", watch)
     for _ in film_of(ran, tmp_path / "v%d.png", Reel(SMALL)):
         pass
-    assert {span for span, _ in seen} == {ran.colour_range}
+    assert {span for span, _ in seen} == {ran.color_range}
     assert [frame for _, frame in seen] == list(ran.frames)
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from slideviz.deformation.solver import deform
 from slideviz.errors import SlidevizError
 from slideviz.export import offscreen_renderer as module
 from slideviz.export.film import film, film_options, require_pair
@@ -18,6 +17,7 @@ from slideviz.samples.table import sample
 from slideviz.scene.color_legend import STRIP
 from slideviz.session.opening import of_runs
 from slideviz.session.state import Run, StepFrame, round_above
+from slideviz.solver.deform import deform
 
 SIZE = (800, 400)
 USUAL = Reel(SIZE)
@@ -44,8 +44,8 @@ def runs(made):
 
 @pytest.fixture(scope="module")
 def shoot(made):
-    def film_of(runs, file, reel=USUAL, colour_by="size-skew", **options):
-        session = of_runs(StepFrame(made.mesh, quality(made.mesh)), runs, colour_by)
+    def film_of(runs, file, reel=USUAL, color_by="size-skew", **options):
+        session = of_runs(StepFrame(made.mesh, quality(made.mesh)), runs, color_by)
         return list(film(session, file, reel, **options))[-1].done
 
     return film_of
@@ -82,7 +82,7 @@ def test_each_run_has_its_half_its_name_and_its_numbers(runs, tmp_path, told, sh
 
 def test_both_halves_are_one_picture_when_the_runs_are_the_same(runs, tmp_path, shoot):
     twice = [replace(runs[0], number=number, name="a") for number in (1, 2)]
-    shoot(twice, tmp_path / "p_%d.png", colour_by="displacement")
+    shoot(twice, tmp_path / "p_%d.png", color_by="displacement")
     with Image.open(tmp_path / "p_4.png") as image:
         whole = np.asarray(image).astype(int)
     figure = film_options(SIZE, both=True)
@@ -93,10 +93,10 @@ def test_both_halves_are_one_picture_when_the_runs_are_the_same(runs, tmp_path, 
     for ends in (np.min, np.max):
         assert np.abs(ends(boxes[0], axis=0) - ends(boxes[1], axis=0)).max() <= 1, "one camera"
     inside = [half[100:-100].reshape(-1, 3).mean(axis=0) for half in (left, right)]
-    assert np.abs(inside[0] - inside[1]).max() < 0.5, "one range of colours"
+    assert np.abs(inside[0] - inside[1]).max() < 0.5, "one range of colors"
     assert (left.min(axis=2) < 100).any()
     bar = whole[:, -round(STRIP * figure.scale) :]
-    assert (np.ptp(bar, axis=2) > 100).any(), "the colour bar is at the right"
+    assert (np.ptp(bar, axis=2) > 100).any(), "the color bar is at the right"
 
 
 def test_the_range_of_displacements_holds_both_runs(made, runs, tmp_path, monkeypatch, shoot):
@@ -104,7 +104,7 @@ def test_the_range_of_displacements_holds_both_runs(made, runs, tmp_path, monkey
     draw = OffscreenRenderer.drawing
 
     def spy(self, shown, *rest):
-        ranges.extend(one.colour_range for one in shown)
+        ranges.extend(one.color_range for one in shown)
         return draw(self, shown, *rest)
 
     monkeypatch.setattr(OffscreenRenderer, "drawing", spy)
@@ -114,7 +114,7 @@ def test_the_range_of_displacements_holds_both_runs(made, runs, tmp_path, monkey
     moved = Run(2, runs[0].case, frames, "done", name="far")
     for pair in ((runs[0], moved), (moved, runs[0])):
         ranges.clear()
-        shoot(pair, tmp_path / "p_%d.png", colour_by="displacement", overwrite=True)
+        shoot(pair, tmp_path / "p_%d.png", color_by="displacement", overwrite=True)
         assert len(set(ranges)) == 1
         assert ranges[0] == (
             0.0,

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
-from slideviz.color_scheme import INVERTED_COLOUR
+from slideviz.color_scheme import INVERTED_COLOR
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.export.vector import draw_vector
@@ -42,14 +42,14 @@ def folded(base):
 def session_of(base, folded, **view):
     found = changes.start_run(changes.open_mesh(StepFrame(base, quality(base)), None))
     found = changes.add_frames(found, [StepFrame(folded, quality(folded, base))])
-    return changes.set_view(changes.end_run(found, "done"), colour_by="size-skew", **view)
+    return changes.set_view(changes.end_run(found, "done"), color_by="size-skew", **view)
 
 
 def red_part(image):
-    """How much of what is drawn has the colour of inverted cells."""
-    colour = np.array(to_rgb(INVERTED_COLOUR)) * 255
+    """How much of what is drawn has the color of inverted cells."""
+    color = np.array(to_rgb(INVERTED_COLOR)) * 255
     ink = (image[..., :3] < 250).any(axis=2)
-    red = np.abs(image[..., :3].astype(float) - colour).max(axis=2) < 12
+    red = np.abs(image[..., :3].astype(float) - color).max(axis=2) < 12
     return red.sum() / ink.sum()
 
 
@@ -82,7 +82,7 @@ def test_inverted_cells_are_seen_in_the_picture_of_a_section(base, folded):
     painted = paint(folded, quality(folded, base), "size-skew", base)
     figure = draw_section([SectionInRun(pieces, painted)], section, SectionStyle())
     (cells,) = figure.axes[0].collections
-    assert cells.get_facecolors()[-1][:3] == pytest.approx(to_rgb(INVERTED_COLOUR))
+    assert cells.get_facecolors()[-1][:3] == pytest.approx(to_rgb(INVERTED_COLOR))
 
 
 def image_of(figure):

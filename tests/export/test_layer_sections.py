@@ -1,4 +1,4 @@
-"""Sections in the scene and laid flat: which cells are drawn, where, and in which colours."""
+"""Sections in the scene and laid flat: which cells are drawn, where, and in which colors."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import pytest
 import pyvista as pv
 from PIL import Image
 
-from slideviz.color_scheme import INVERTED_COLOUR, LIGHT
+from slideviz.color_scheme import INVERTED_COLOR, LIGHT
 from slideviz.errors import Cancelled, CaseError
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
@@ -23,7 +23,7 @@ from slideviz.scene.actors import VALUES
 from slideviz.scene.flat_scene import FlatScene
 from slideviz.scene.mesh import looks_inside
 from slideviz.scene.pick import to_display
-from slideviz.scene.polygon_actor import plain_colour
+from slideviz.scene.polygon_actor import plain_color
 from slideviz.sections.model import Section
 from slideviz.session import changes, section_start
 from slideviz.session.passages import find_period, moved
@@ -74,14 +74,14 @@ def cells_of(scene, name="section:0"):
     return np.unique(scene.sections.drawn[name].polygons.cells)
 
 
-def colours(plotter):
+def colors(plotter):
     plotter.render()
     return np.asarray(plotter.screenshot(return_img=True)).astype(int)[..., :3].reshape(-1, 3)
 
 
-def count(plotter, colour, within=14):
-    rgb = np.array(pv.Color(colour).int_rgb)
-    return int((np.abs(colours(plotter) - rgb).max(axis=1) <= within).sum())
+def count(plotter, color, within=14):
+    rgb = np.array(pv.Color(color).int_rgb)
+    return int((np.abs(colors(plotter) - rgb).max(axis=1) <= within).sum())
 
 
 # In space ---------------------------------------------------------------------------------
@@ -90,7 +90,7 @@ def count(plotter, colour, within=14):
 @pytest.mark.parametrize("whole", [False, True])
 def test_exactly_the_cells_that_are_cut_are_drawn(scene, cube, whole):
     section = Section("plane", (0.0, 0.0, 0.46), (0.0, 0.0, 1.0), whole=whole)
-    opened(scene, cube, sections=(section,), colour_by="size-skew")
+    opened(scene, cube, sections=(section,), color_by="size-skew")
     wanted = crossing(cube, 2, 0.46)
     assert 0 < len(wanted) < len(cube.cells)
     assert cells_of(scene).tolist() == wanted.tolist()
@@ -99,20 +99,20 @@ def test_exactly_the_cells_that_are_cut_are_drawn(scene, cube, whole):
 
 
 def test_a_section_has_the_values_of_its_cells(scene, cube):
-    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size-skew")
+    session = opened(scene, cube, sections=(MIDDLE,), color_by="size-skew")
     one = scene.sections.drawn["section:0"]
-    frame = changes.set_view(session, colour_by="skew")
+    frame = changes.set_view(session, color_by="skew")
     scene.update(frame)
     wanted = session.first.quality.skew[one.polygons.cells]
     assert one.shown.mapper.scalar_visibility
     assert np.array_equal(one.shown.shape.cell_data[VALUES], wanted)
-    scene.update(changes.set_view(frame, colour_by="role"))
+    scene.update(changes.set_view(frame, color_by="role"))
     assert not one.shown.mapper.scalar_visibility
-    assert one.actor.prop.color == pv.Color(plain_colour(LIGHT))
+    assert one.actor.prop.color == pv.Color(plain_color(LIGHT))
 
 
 def test_a_section_follows_the_step(scene, cube):
-    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size-skew")
+    session = opened(scene, cube, sections=(MIDDLE,), color_by="size-skew")
     points = cube.points.copy()
     points[:, 2] = points[:, 2] ** 2
     later = stepped(session, points)
@@ -124,10 +124,10 @@ def test_a_section_follows_the_step(scene, cube):
     assert cells_of(scene).tolist() == crossing(cube, 2, 0.46).tolist()
 
 
-def test_nothing_is_cut_again_when_only_the_colours_change(scene, cube):
-    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size-skew")
+def test_nothing_is_cut_again_when_only_the_colors_change(scene, cube):
+    session = opened(scene, cube, sections=(MIDDLE,), color_by="size-skew")
     before = scene.sections.drawn["section:0"].polygons
-    session = changes.set_view(session, colour_by="size", edges=False, colour_range=(0.2, 0.6))
+    session = changes.set_view(session, color_by="size", edges=False, color_range=(0.2, 0.6))
     scene.update(session)
     assert scene.sections.drawn["section:0"].polygons is before
     assert not scene.plotter.actors["section:0"].prop.show_edges
@@ -165,11 +165,11 @@ def test_a_section_beside_the_mesh_shows_nothing(scene, cube):
 def test_glass_in_front_of_a_cut_does_not_tint_it(scene, stator, passages):
     """The shell is seen beside it, and is what it was when the section is gone."""
     mesh, section = stator.mesh, Section("cylinder", radius=0.27)
-    view = {"colour_by": "size-skew", "edges": False, "passages": passages}
+    view = {"color_by": "size-skew", "edges": False, "passages": passages}
     session = opened(scene, mesh, stator.case, **view)
-    before = colours(scene.plotter)
+    before = colors(scene.plotter)
     scene.update(changes.add_section(session, section))
-    image = colours(scene.plotter)
+    image = colors(scene.plotter)
     one = scene.sections.drawn["section:0"].polygons
     values = session.first.quality.values[one.cells]
     big = np.argsort(-areas(one))[:40]
@@ -181,9 +181,9 @@ def test_glass_in_front_of_a_cut_does_not_tint_it(scene, stator, passages):
     assert np.abs(seen[height - 1 - y, x] - wanted).max() <= 2
     # The rest of the passage is still there, as glass.
     scene.update(changes.set_view(changes.add_section(session, section), hidden=set(scene.drawn)))
-    assert (np.abs(colours(scene.plotter) - image).max(axis=1) > 3).mean() > 0.05
+    assert (np.abs(colors(scene.plotter) - image).max(axis=1) > 3).mean() > 0.05
     scene.update(session)
-    assert np.array_equal(colours(scene.plotter), before)
+    assert np.array_equal(colors(scene.plotter), before)
 
 
 def middles(polygons):
@@ -232,7 +232,7 @@ def halved(session):
 @pytest.mark.parametrize("whole", [False, True])
 def test_a_range_leaves_its_cells_of_a_section_only(scene, cube, whole):
     section = replace(MIDDLE, whole=whole)
-    session = opened(scene, bent(cube), sections=(section,), colour_by="size-skew")
+    session = opened(scene, bent(cube), sections=(section,), color_by="size-skew")
     cut, full = cells_of(scene), scene.sections.drawn["section:0"].polygons
     some, kept = halved(session)
     scene.update(some)
@@ -256,7 +256,7 @@ def bent(cube):
 
 
 def test_a_click_on_a_section_is_none_on_the_glass_before_it(scene, cube):
-    session = opened(scene, cube, colour_by="size-skew")
+    session = opened(scene, cube, color_by="size-skew")
     scene.look_from("iso")
     on, beside = to_display(scene.plotter, np.array([[0.2, 0.2, 0.46], [0.9, 0.9, 0.99]]))
     assert scene.pick(*on)
@@ -272,7 +272,7 @@ def test_a_click_on_a_section_is_none_on_the_glass_before_it(scene, cube):
 
 def test_a_click_on_a_section_of_a_neighbour_is_none_on_glass(scene, stator):
     section = Section("cylinder", radius=0.27)
-    session = opened(scene, stator.mesh, stator.case, passages=1, colour_by="size-skew")
+    session = opened(scene, stator.mesh, stator.case, passages=1, color_by="size-skew")
     scene.update(changes.add_section(session, section))
     twin = scene.plotter.actors["section:0:1"]
     points = moved(middles(scene.sections.drawn["section:0"].polygons), np.array(twin.user_matrix))
@@ -287,18 +287,18 @@ def test_a_click_on_a_section_of_a_neighbour_is_none_on_glass(scene, stator):
 
 
 def test_inverted_cells_are_red_in_a_section(scene, cube):
-    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size-skew", edges=False)
+    session = opened(scene, cube, sections=(MIDDLE,), color_by="size-skew", edges=False)
     scene.look_from("+z")
-    assert count(scene.plotter, INVERTED_COLOUR, 30) == 0
+    assert count(scene.plotter, INVERTED_COLOR, 30) == 0
     points = cube.points.copy()
     inside = ((points > 0.3) & (points < 0.7)).all(axis=1)
     points[inside] = 1.0 - points[inside]
     scene.update(stepped(session, points))
-    assert count(scene.plotter, INVERTED_COLOUR, 30) > 50
+    assert count(scene.plotter, INVERTED_COLOR, 30) > 50
 
 
 def test_the_cell_under_the_mouse_is_that_of_the_section(scene, cube):
-    opened(scene, cube, sections=(MIDDLE,), colour_by="size-skew")
+    opened(scene, cube, sections=(MIDDLE,), color_by="size-skew")
     scene.look_from("+z")
     x, y = to_display(scene.plotter, np.array([[0.2, 0.2, 0.46]]))[0]
     assert scene.pick_cell(x, y) in crossing(cube, 2, 0.46)
@@ -309,7 +309,7 @@ WHOLE = replace(LINE, whole=True)
 
 
 def test_in_2d_a_plane_is_a_line_or_the_cells_on_it(scene, square):
-    session = opened(scene, square, sections=(LINE,), colour_by="size-skew")
+    session = opened(scene, square, sections=(LINE,), color_by="size-skew")
     one = scene.sections.drawn["section:0"]
     assert one.shown.shape.n_lines == 4
     assert one.shown.mapper.scalar_visibility
@@ -319,13 +319,13 @@ def test_in_2d_a_plane_is_a_line_or_the_cells_on_it(scene, square):
     scene.update(whole)
     assert cells_of(scene).tolist() == crossing(square, 1, 1.5).tolist()
     assert one.shown.mapper.scalar_visibility
-    # Below cells that may be smaller than pixels is a line in their colours.
+    # Below cells that may be smaller than pixels is a line in their colors.
     assert scene.sections.drawn["band:0"].shown.shape.n_lines == 4
     assert len(scene.sections.pickable()) == 1
 
 
 def test_in_2d_the_other_cells_step_back_while_a_section_is_shown(scene, square):
-    session = opened(scene, square, sections=(WHOLE,), colour_by="size-skew")
+    session = opened(scene, square, sections=(WHOLE,), color_by="size-skew")
     cells = scene.plotter.actors["cells"]
     assert cells.prop.opacity < 0.5
     scene.update(changes.replace_section(session, 0, replace(WHOLE, shown=False)))
@@ -338,7 +338,7 @@ def test_in_2d_the_other_cells_step_back_while_a_section_is_shown(scene, square)
 
 
 def test_the_cutting_line_goes_on_in_holes_and_beside_the_mesh(scene, square):
-    session = opened(scene, square, sections=(WHOLE,), colour_by="size-skew")
+    session = opened(scene, square, sections=(WHOLE,), color_by="size-skew")
     left, right = scene.plotter.actors["line:0"].bounds[:2]
     assert left < 0.0
     assert right > 4.0
@@ -360,7 +360,7 @@ def test_neighbours_show_the_section_too(scene, stator):
     cylinder = Section("cylinder", radius=0.27)
     plane = Section("plane", (0.27, 0.0, 0.0), (1.0, 0.2, 0.0))
     session = opened(
-        scene, stator.mesh, stator.case, sections=(cylinder, plane), passages=1, colour_by="size"
+        scene, stator.mesh, stator.case, sections=(cylinder, plane), passages=1, color_by="size"
     )
     base, twin = scene.sections.drawn["section:0"].shown, scene.plotter.actors["section:0:1"]
     assert twin.GetMapper() is base.mapper
@@ -448,7 +448,7 @@ def test_a_turned_plane_still_cuts(cube):
 
 def test_a_flat_cylinder_has_z_and_r_theta(scene, flat_plotter, stator):
     section = Section("cylinder", radius=0.27)
-    session = opened(scene, stator.mesh, stator.case, sections=(section,), colour_by="size-skew")
+    session = opened(scene, stator.mesh, stator.case, sections=(section,), color_by="size-skew")
     flat = FlatScene(flat_plotter, scene.sections.cuts)
     flat.update(session, section)
     flat.fit()
@@ -490,7 +490,7 @@ def test_a_flat_section_says_what_it_cuts_and_what_is_under_the_mouse(scene, fla
 @pytest.mark.parametrize("whole", [False, True])
 def test_a_flat_section_has_the_cells_of_the_range_and_says_so(scene, flat_plotter, cube, whole):
     section = replace(MIDDLE, whole=whole)
-    session = opened(scene, bent(cube), sections=(section,), colour_by="size-skew")
+    session = opened(scene, bent(cube), sections=(section,), color_by="size-skew")
     flat = FlatScene(flat_plotter, scene.sections.cuts)
     flat.update(session, section)
     bounds, every = flat.bounds(), flat.polygons.cell_ids
@@ -558,7 +558,7 @@ def test_the_marked_cell_has_a_rim_in_the_flat_view(scene, flat_plotter, cube):
 
 
 def test_a_fold_is_seen_in_the_flat_view(scene, flat_plotter, cube):
-    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size-skew", edges=False)
+    session = opened(scene, cube, sections=(MIDDLE,), color_by="size-skew", edges=False)
     points = cube.points.copy()
     inside = ((points > 0.3) & (points < 0.7)).all(axis=1)
     points[inside] = 1.0 - points[inside]
@@ -566,9 +566,9 @@ def test_a_fold_is_seen_in_the_flat_view(scene, flat_plotter, cube):
     flat = FlatScene(flat_plotter, scene.sections.cuts)
     flat.update(session, MIDDLE)
     flat.fit()
-    assert count(flat_plotter, INVERTED_COLOUR, 30) == 0
+    assert count(flat_plotter, INVERTED_COLOR, 30) == 0
     flat.update(later, MIDDLE)
-    assert count(flat_plotter, INVERTED_COLOUR, 30) > 50
+    assert count(flat_plotter, INVERTED_COLOR, 30) > 50
     assert "inverted" in flat.summary
 
 
@@ -577,7 +577,7 @@ def test_a_fold_is_seen_in_the_flat_view(scene, flat_plotter, cube):
 
 def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
     session = changes.open_mesh(StepFrame(stator.mesh, quality(stator.mesh)), None, (), stator.case)
-    session = changes.set_view(session, passages=1, colour_by="skew", colour_range=(0.2, 0.9))
+    session = changes.set_view(session, passages=1, color_by="skew", color_range=(0.2, 0.9))
     section = Section("cylinder", radius=0.27)
     told = []
     one, three = tmp_path / "one.svg", tmp_path / "three.svg"
@@ -594,7 +594,7 @@ def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
         save_section(one, session, section, Paper((1600, 1000)), told.append, lambda: True)
 
 
-def test_the_picture_of_a_section_has_the_colours_of_the_view_and_says_which_run_it_is_of(
+def test_the_picture_of_a_section_has_the_colors_of_the_view_and_says_which_run_it_is_of(
     cube, tmp_path, monkeypatch
 ):
     session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
@@ -606,7 +606,7 @@ def test_the_picture_of_a_section_has_the_colours_of_the_view_and_says_which_run
         frames = [StepFrame(moved, quality(moved, cube))] * 3
         session = changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
     session = changes.set_view(
-        session, colour_by="size", colour_range=(0.2, 0.9), colour_map="cividis"
+        session, color_by="size", color_range=(0.2, 0.9), color_map="cividis"
     )
     session = changes.show_frame(session, 2)
     drawn = []
@@ -635,7 +635,7 @@ def test_the_picture_of_a_section_has_the_colours_of_the_view_and_says_which_run
 def test_the_picture_of_a_section_has_the_cells_of_the_range(cube, tmp_path, monkeypatch):
     mesh = bent(cube)
     session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
-    session = changes.set_view(session, colour_by="size-skew")
+    session = changes.set_view(session, color_by="size-skew")
     some, kept = halved(session)
     drawn = []
     real = section_picture.draw_section
@@ -657,18 +657,18 @@ def test_the_picture_of_a_section_has_the_cells_of_the_range(cube, tmp_path, mon
 def test_sections_of_a_drawing_have_the_cells_of_the_range(square, whole):
     session = changes.open_mesh(StepFrame(square, quality(square)), None)
     session = changes.set_view(
-        session, colour_by="size-skew", sections=(replace(LINE, whole=whole),)
+        session, color_by="size-skew", sections=(replace(LINE, whole=whole),)
     )
 
-    def coloured():
+    def colored():
         axes = draw_vector(renderer, PictureOptions((400, 300), legend=False)).axes[0]
         above = [each for each in axes.collections if 1.0 < each.get_zorder() < 2.0]
         return [each for each in above if each.get_array() is not None]
 
     with OffscreenRenderer(session, find_surfaces(square)) as renderer:
-        assert coloured()
+        assert colored()
         renderer.session = changes.set_view(session, threshold=(2.0, 3.0))
-        assert not coloured()
+        assert not colored()
 
 
 def shapes_cells(session, section):

@@ -4,7 +4,7 @@ import pyvista as pv
 from PIL import Image
 
 from slideviz.case.model import Case
-from slideviz.color_scheme import COLOUR_MAP
+from slideviz.color_scheme import COLOR_MAP
 from slideviz.errors import MeshError, SlidevizError
 from slideviz.export.picture import picture, pictures_alike
 from slideviz.mesh.quality import quality
@@ -39,11 +39,11 @@ def test_a_2d_mesh_is_shown_whole_on_white_with_its_quality(tmp_path, square):
     image = pixels(file)
     assert image.shape[:2] == (500, 800)
     assert image[-2, 2].tolist() == [255, 255, 255, 255]
-    best = np.array(pv.LookupTable(COLOUR_MAP, scalar_range=(0, 1)).map_value(1.0)[:3]) * 255
+    best = np.array(pv.LookupTable(COLOR_MAP, scalar_range=(0, 1)).map_value(1.0)[:3]) * 255
     assert has(image, best) > 20_000, "squares are perfect"
     assert (image[:40, :400, :3].max(axis=2) < 90).sum() > 100, "a title in black"
-    dark = np.array(pv.LookupTable(COLOUR_MAP, scalar_range=(0, 1)).map_value(0.0)[:3]) * 255
-    assert has(image[:, 650:], dark, 14) > 10, "the colour bar begins at 0"
+    dark = np.array(pv.LookupTable(COLOR_MAP, scalar_range=(0, 1)).map_value(0.0)[:3]) * 255
+    assert has(image[:, 650:], dark, 14) > 10, "the color bar begins at 0"
 
 
 def test_the_half_of_a_3d_mesh_shows_the_hole_that_moved(tmp_path, cube):
@@ -108,7 +108,7 @@ def test_what_moves_is_shown_in_detail_when_it_is_tiny_in_the_mesh(tmp_path):
         if zoom == "auto":
             pale = (image[..., :3].min(axis=2) > 160) & (image[..., :3].max(axis=2) > 200)
             assert pale[12:26, 20:300].mean() > 0.5, "letters lie on a plate"
-            assert pale[100:300, 590:].mean() > 0.95, "so does the colour bar"
+            assert pale[100:300, 590:].mean() > 0.95, "so does the color bar"
             assert not pale[390:, 100:500].any(), "the mesh is all around"
     assert 5 * 5 < holes["auto"] < holes[str(Detail((0.1, 0.0), 2.4))]
     wide = 500 / 2.4
@@ -128,7 +128,7 @@ def test_a_detail_needs_a_coordinate_for_each_direction(tmp_path, square):
 def test_a_part_of_a_3d_mesh_is_drawn_with_its_outside_and_follows_the_steps(cube, plotter):
     cells, _, _ = half_of(cube, cube)
     scene, session = Scene(plotter), shown(cube.with_points(cube.points * 1.5), cube)
-    for _ in scene.opening(set_view(session, frame=0, colour_by="size-skew"), (), cells):
+    for _ in scene.opening(set_view(session, frame=0, color_by="size-skew"), (), cells):
         pass
     shape = plotter.actors["cells"].mapper.dataset
     assert scene.polygons == shape.n_cells

@@ -111,7 +111,7 @@ def session(square):
     found = changes.start_run(found)
     moved = square.with_points(square.points * [1.2, 1.0])
     found = changes.add_frames(found, [StepFrame(moved, quality(moved, square))])
-    return changes.set_view(changes.end_run(found, "done"), colour_by="size-skew")
+    return changes.set_view(changes.end_run(found, "done"), color_by="size-skew")
 
 
 def test_a_picture_in_pieces_is_the_one_that_is_drawn_at_once(session, square, monkeypatch):

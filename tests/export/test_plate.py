@@ -37,7 +37,7 @@ def image(scene):
 
 @pytest.mark.parametrize("scheme", [LIGHT, DARK])
 def test_beside_the_mesh_no_plate_is_seen(plotter, square, scheme):
-    scene, session = opened(plotter, square, scheme, colour_by="size-skew")
+    scene, session = opened(plotter, square, scheme, color_by="size-skew")
     with_plate = image(scene)
     scene.stage.has_plate = False
     scene.update(session)
@@ -46,8 +46,8 @@ def test_beside_the_mesh_no_plate_is_seen(plotter, square, scheme):
 
 @pytest.mark.parametrize("scheme", [LIGHT, DARK])
 @pytest.mark.parametrize("by", ["size-skew", "role"])
-def test_over_the_mesh_the_letters_lie_on_the_colour_of_the_background(plotter, square, scheme, by):
-    scene, session = opened(plotter, square, scheme, colour_by=by)
+def test_over_the_mesh_the_letters_lie_on_the_color_of_the_background(plotter, square, scheme, by):
+    scene, session = opened(plotter, square, scheme, color_by=by)
     scene.camera.aim((2.0, 2.0, 0.0), 0.3)
     covered = image(scene)
     scene.stage.has_plate = False
@@ -55,8 +55,8 @@ def test_over_the_mesh_the_letters_lie_on_the_colour_of_the_background(plotter, 
     bare = image(scene)
     # Most of the strip is neither bar nor letter.
     right = np.s_[90:300, -STRIP + 2 : -2] if by == "size-skew" else np.s_[4:50, -STRIP + 2 : -2]
-    colour = scheme.background if by == "size-skew" else scheme.background_top
-    background = np.array(pv.Color(colour).int_rgb, float)
+    color = scheme.background if by == "size-skew" else scheme.background_top
+    background = np.array(pv.Color(color).int_rgb, float)
 
     def away(picture):
         return np.median(np.abs(picture[right] - background).max(axis=2))
@@ -67,7 +67,7 @@ def test_over_the_mesh_the_letters_lie_on_the_colour_of_the_background(plotter, 
 
 
 def test_a_plate_follows_the_size_of_the_view(plotter, square):
-    scene, _ = opened(plotter, square, LIGHT, colour_by="size-skew")
+    scene, _ = opened(plotter, square, LIGHT, color_by="size-skew")
     plate = plotter.actors["plate:legend"]
     before = np.array(plate.GetMapper().GetInput().GetBounds()[:4])
     assert before[:2] == pytest.approx((SIZE[0] - STRIP, SIZE[0]))
@@ -80,7 +80,7 @@ def test_a_plate_follows_the_size_of_the_view(plotter, square):
 
 def test_a_transparent_picture_has_no_plate(square):
     session = changes.open_mesh(StepFrame(square, quality(square)), None)
-    session = changes.set_view(session, colour_by="size-skew")
+    session = changes.set_view(session, color_by="size-skew")
     with OffscreenRenderer(session, find_surfaces(square)) as renderer:
         clear = renderer.image(PictureOptions(SIZE, background="transparent"))
         strip = round(STRIP * PictureOptions(SIZE).scale)

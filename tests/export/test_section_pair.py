@@ -31,7 +31,7 @@ def compared(mesh):
         moved = mesh.with_points(mesh.points + np.eye(mesh.dim)[0] * push[:, None])
         frames = [StepFrame(moved, quality(moved, mesh))]
         session = changes.end_run(changes.add_frames(session, frames), "done")
-    session = changes.set_view(session, colour_by="size-skew", colour_range=(0.2, 0.9))
+    session = changes.set_view(session, color_by="size-skew", color_range=(0.2, 0.9))
     return changes.show_beside(changes.show_run(session, 2), 1)
 
 
@@ -70,7 +70,7 @@ def bars(figure):
 def test_both_runs_are_in_the_picture_alike_with_one_bar(save):
     figure = save(compared(cube(4, block=False)))
     first, second = figure.axes
-    assert len(bars(figure)) == 1, "one colour bar"
+    assert len(bars(figure)) == 1, "one color bar"
     assert (first.get_xlim(), first.get_ylim()) == (second.get_xlim(), second.get_ylim())
     shapes = [axes.collections[0] for axes in (first, second)]
     assert all(isinstance(one, PolyCollection) for one in shapes)

@@ -12,21 +12,21 @@ _OPERATORS = {"m": "paths begun", "Do": "images or groups", "Tj": "texts", "TJ":
 
 
 def facts(path: Path) -> list[str]:
-    """Return the size of a drawing, how many shapes it has and of which colours, and its texts."""
+    """Return the size of a drawing, how many shapes it has and of which colors, and its texts."""
     return _svg(path.read_text("utf-8")) if path.suffix == ".svg" else _pdf(path.read_bytes())
 
 
 def _svg(text: str) -> list[str]:
     root = ET.fromstring(text)
     kinds = Counter(node.tag.rpartition("}")[2] for node in root.iter())
-    colours = Counter(re.findall(r"#[0-9a-f]{6}\b", text))
+    colors = Counter(re.findall(r"#[0-9a-f]{6}\b", text))
     # Letters are drawn; what they say stands beside them.
     said = [note.strip() for note in re.findall(r"<!--(.*?)-->", text, re.DOTALL)]
     said += ["".join(node.itertext()) for node in root.iter() if node.tag.endswith("}text")]
     return [
         f"width {root.get('width')}, height {root.get('height')}, box {root.get('viewBox')}",
         *(f"{count} {kind}" for kind, count in sorted(kinds.items()) if kind != "date"),
-        f"{len(colours)} colours: " + ", ".join(name for name, _ in colours.most_common(6)),
+        f"{len(colors)} colors: " + ", ".join(name for name, _ in colors.most_common(6)),
         *(f"text {words}" for words in said),
     ]
 

@@ -23,10 +23,10 @@ def kept(folder, name):
         return image.convert("RGB")
 
 
-def painted(image, box, colour):
+def painted(image, box, color):
     """Return a picture with a rectangle over a part of it."""
     changed = image.copy()
-    ImageDraw.Draw(changed).rectangle(box, fill=colour)
+    ImageDraw.Draw(changed).rectangle(box, fill=color)
     return changed
 
 
@@ -51,7 +51,7 @@ def test_letters_that_are_smoothed_in_another_way_are_the_same():
     assert picture_difference(plot(), other) == ""
 
 
-def test_noise_and_colours_of_a_palette_are_the_same(tmp_path):
+def test_noise_and_colors_of_a_palette_are_the_same(tmp_path):
     shown = np.asarray(plot()).astype(int)
     noise = np.random.default_rng(3).integers(-12, 13, shown.shape)
     assert (
@@ -70,7 +70,7 @@ def test_another_number_at_an_axis_is_found():
 @pytest.mark.parametrize(
     ("folder", "name", "box", "what"),
     [
-        ("pictures", "passage", (413, 62, 428, 249), "the colour bar"),
+        ("pictures", "passage", (413, 62, 428, 249), "the color bar"),
         ("pictures", "passage", (431, 134, 451, 144), "a number beside it"),
         ("pictures", "passage", (10, 6, 240, 14), "the title"),
         ("pictures", "inverted", (425, 240, 440, 250), "the box for inverted cells"),
@@ -87,7 +87,7 @@ def test_what_is_missing_in_a_picture_is_found(folder, name, box, what):
     assert "pixels differ" in picture_difference(picture, painted(picture, box, near)), what
 
 
-def test_one_cell_of_another_colour_is_found():
+def test_one_cell_of_another_color_is_found():
     picture = kept("pictures", "passage")
     yellow = picture.getpixel((30, 112))
     green = (90, 200, 100)
@@ -115,7 +115,7 @@ def test_a_picture_of_another_size_is_told():
         ("inverted  3", "inverted  4", False),
         ("STEPS_GAIN= a number   [0.02]", "STEPS_GAIN= a number   [0.03]", False),
         ("a  6.6e-14     0", "a 1.06e-13  0", True),
-        ("colour bar", "color bar", False),
+        ("color bar", "color bar", False),
         ("  indented", "indented", False),
         ("wendland-c2", "wendland-c4", False),
         ("condition = [131.5]", "condition = [140.5]", True),

@@ -185,7 +185,7 @@ def with_runs(driver, computed):
 
         def run(session, settings):
             session = changes.start_run(changes.set_case(session, **settings))
-            session = changes.set_view(session, colour_by="size-skew")
+            session = changes.set_view(session, color_by="size-skew")
             return changes.end_run(changes.add_frames(session, frames(session.case)), "done")
 
         driver.window.show_opened(opened)

@@ -68,7 +68,7 @@ def crashed(qtbot, folder, case_file):
     session = jobs.open_file(case_file, None, lambda _: None, lambda: False).session
     store = Store()
     keeper = Autosave(store, folder, lambda: None, lambda: (DesignTable(), None))
-    store.put(changes.set_view(changes.set_case(session, steps=7), colour_by="skew"))
+    store.put(changes.set_view(changes.set_case(session, steps=7), color_by="skew"))
     keeper.save()
     qtbot.waitUntil(lambda: not keeper._runner.busy and keeper.path.exists())
     text = keeper.path.read_text()
@@ -149,7 +149,7 @@ def test_after_a_crash_it_is_offered_and_restored(make, qtbot, crashed, case_fil
     qtbot.waitUntil(lambda: window.store.session.mesh is not None and not window.runner.busy)
     session = window.store.session
     assert session.case.steps == 7
-    assert session.view.colour_by == "skew"
+    assert session.view.color_by == "skew"
     assert session.case.source == case_file
     assert session.unsaved_case
     assert not window.offer.isVisible()
@@ -351,7 +351,7 @@ from qtpy.QtWidgets import QApplication
 from slideviz.gui.window import MainWindow
 from slideviz.session import changes
 
-import slideviz.deformation.solver  # as `launch` does, before any thread
+import slideviz.solver.deform  # as `launch` does, before any thread
 
 app = QApplication([])
 folder = Path(sys.argv[1])
@@ -414,7 +414,7 @@ def test_case_and_mesh_are_saved_with_one_answer_before_the_window_closes(
     assert [can for _, can in asked] == [("case", "mesh")]
     assert "the deformed mesh of run 1" in asked[0][0]
     assert (tmp_path / "out.cfg").is_file()
-    from slideviz.mesh.io.files import read
+    from slideviz.formats.files import read
 
     last = window.store.session.frames[-1].mesh
     assert (read(tmp_path / "out.su2").points == last.points).all(), "the last step, not that shown"

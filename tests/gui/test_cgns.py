@@ -3,8 +3,8 @@
 import numpy as np
 from cgns_files import passage_grid, save_passage
 
+from slideviz.formats.cgns.read import read_cgns
 from slideviz.gui.widgets import questions
-from slideviz.mesh.io.cgns.read import read_cgns
 
 
 def test_a_cgns_file_is_opened_and_saved_again(driver, answers, tmp_path):

@@ -115,7 +115,7 @@ def test_a_section_that_is_dragged_goes_with_fewer_facets_and_what_changes_meanw
     window, scene = stator.window, stator.window.scene
     press_and_move(window.view)
     name = stator.session.mesh.marker_names[0]
-    window.store.change(changes.set_view, colour_by="size-skew")
+    window.store.change(changes.set_view, color_by="size-skew")
     window.store.change(changes.show, (name,), shown=False)
     every, some = shown(scene)
     assert not every

@@ -25,7 +25,7 @@ def test_no_name_and_no_key_stands_for_two_commands(qtbot):
 def test_the_tip_of_a_button_names_the_key_there_is():
     tips = {one.name: (re.search(r"\((.+)\)", one.button_tip), one) for one in EVERY}
     named = {name: (found[1], one) for name, (found, one) in tips.items() if found}
-    assert {"step_next", "fit_colours", "cancel"} <= set(named)
+    assert {"step_next", "fit_colors", "cancel"} <= set(named)
     for key, one in named.values():
         assert key in (*one.keys, one.button_key), one.name
 

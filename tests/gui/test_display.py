@@ -34,15 +34,15 @@ def view(driver):
     return driver.session.view
 
 
-def test_colours_map_and_points_are_chosen_and_undone(shown):
-    shown.choose(panel(shown).colour_by, "skew")
-    assert view(shown).colour_by == "skew"
-    assert shown.window.actions_.bar.colour.currentData() == "skew"
+def test_colors_map_and_points_are_chosen_and_undone(shown):
+    shown.choose(panel(shown).color_by, "skew")
+    assert view(shown).color_by == "skew"
+    assert shown.window.actions_.bar.color.currentData() == "skew"
     shown.choose(panel(shown).map, "cividis")
-    assert view(shown).colour_map == "cividis"
+    assert view(shown).color_map == "cividis"
     assert shown.window.scene.stage.table.cmap.name == "cividis"
     shown.window.actions_.by_name["undo"].trigger()
-    assert view(shown).colour_map == "viridis"
+    assert view(shown).color_map == "viridis"
     assert panel(shown).map.currentData() == "viridis"
     shown.choose(panel(shown).points, "types")
     assert view(shown).points == "types"
@@ -60,31 +60,31 @@ def test_the_range_is_typed_checked_reset_and_fits_the_values_of_the_step(shown)
     box = panel(shown)
     assert not box.range.isEnabled(), "roles have no range"
     assert box.range.low.toolTip() == box.map.toolTip() == ROLES_ONLY
-    shown.window.store.change(changes.set_view, colour_by="size-skew")
+    shown.window.store.change(changes.set_view, color_by="size-skew")
     assert box.range.isEnabled()
     assert (box.range.low.text(), box.range.high.text()) == ("0", "1")
     assert not box.reset_range.isEnabled()
     shown.type(box.range.low, "0.4")
-    assert view(shown).colour_range == (0.4, 1.0)
+    assert view(shown).color_range == (0.4, 1.0)
     assert tuple(shown.window.scene.stage.table.scalar_range) == (0.4, 1.0)
     box.range.high.setFocus()
     box.range.high.selectAll()
     QTest.keyClicks(box.range.high, "0.3")
     assert box.range.high.property("bad")
     assert box.range.high.toolTip() == "0.3 must be greater than 0.4"
-    assert view(shown).colour_range == (0.4, 1.0)
+    assert view(shown).color_range == (0.4, 1.0)
     shown.click(box.reset_range)
-    assert view(shown).colour_range is None
+    assert view(shown).color_range is None
     assert (box.range.low.value, box.range.high.value) == (0.0, 1.0)
-    shown.window.store.change(changes.set_view, colour_by="skew")
+    shown.window.store.change(changes.set_view, color_by="skew")
     shown.click(panel(shown).fit_range)
-    low, high = view(shown).colour_range
+    low, high = view(shown).color_range
     values = shown.session.frame.quality.skew
     assert low == pytest.approx(values.min(), rel=1e-2)
     assert high == pytest.approx(values.max(), rel=1e-2)
     assert low <= values.min() < values.max() <= high
     shown.click(panel(shown).reset_range)
-    assert view(shown).colour_range is None
+    assert view(shown).color_range is None
 
 
 def test_only_cells_of_a_range_are_chosen_and_steps_and_selection_leave_the_panel_alone(
@@ -198,38 +198,38 @@ def test_the_panel_fits_its_dock_and_is_off_without_a_mesh(driver, passage_file)
     driver.window.docks["display"].raise_()
     QApplication.processEvents()
     box = panel(driver)
-    for widget in (box.colour_by, box.threshold, box.passages, *box.shown.values()):
+    for widget in (box.color_by, box.threshold, box.passages, *box.shown.values()):
         right = widget.mapTo(box, widget.rect().topRight()).x()
         assert right < box.width(), widget.objectName()
         assert widget.width() >= widget.minimumSizeHint().width(), widget.objectName()
 
 
-def test_colours_fit_a_step_or_all_or_both_views_of_a_comparison_and_are_as_ever_again(shown):
+def test_colors_fit_a_step_or_all_or_both_views_of_a_comparison_and_are_as_ever_again(shown):
     window, acts = shown.window, shown.window.actions_.by_name
-    one, every, usual = (acts[f"{n}_colours"] for n in ("fit", "fit_all", "usual"))
+    one, every, usual = (acts[f"{n}_colors"] for n in ("fit", "fit_all", "usual"))
     assert not one.isEnabled(), "roles have no range"
     assert not window.actions_.bar.range.isEnabled()
-    shown.window.store.change(changes.set_view, colour_by="size-skew")
+    shown.window.store.change(changes.set_view, color_by="size-skew")
     window.start_run()
     shown.settle()
     assert not usual.isEnabled()
     values = shown.session.frame.quality.values
     one.trigger()
-    assert view(shown).colour_range == pytest.approx((values.min(), values.max()), abs=0.02)
-    assert shown.window.store.can_undo == "colour range"
-    high = view(shown).colour_range[1]
+    assert view(shown).color_range == pytest.approx((values.min(), values.max()), abs=0.02)
+    assert shown.window.store.can_undo == "color range"
+    high = view(shown).color_range[1]
     every.trigger()
-    assert view(shown).colour_range[1] > high, "the undeformed mesh is better"
+    assert view(shown).color_range[1] > high, "the undeformed mesh is better"
     usual.trigger()
-    assert view(shown).colour_range is None
+    assert view(shown).color_range is None
     shown.window.store.change(changes.show_frame, 0)
-    shown.window.store.change(changes.set_view, colour_by="size")
+    shown.window.store.change(changes.set_view, color_by="size")
     one.trigger()
-    assert view(shown).colour_range is None, "all cells have the size they had"
+    assert view(shown).color_range is None, "all cells have the size they had"
     shown.window.store.change(changes.show_frame, len(shown.session.frames) - 1)
-    shown.window.store.change(changes.set_view, colour_by="size-skew")
+    shown.window.store.change(changes.set_view, color_by="size-skew")
     shown.window.store.change(changes.show_beside, changes.UNDEFORMED)
     shown.click(panel(shown).fit_range)
     values = shown.session.frame.quality.values
-    assert view(shown).colour_range == pytest.approx((values.min(), 1.0), rel=1e-2)
+    assert view(shown).color_range == pytest.approx((values.min(), 1.0), rel=1e-2)
     assert values.max() < 0.999, "the best cells are those of the other view"

@@ -106,7 +106,7 @@ def test_a_blade_passage_from_mesh_to_case_and_the_command_line_agrees(
     quality = driver.session.deformed.quality
     assert quality.inverted == 0
     assert f"{quality.min:.4f}" in window.player.result.text()
-    assert driver.session.view.colour_by == "size-skew"
+    assert driver.session.view.color_by == "size-skew"
     airfoil = mesh.marker("airfoil").nodes
     moved = driver.session.deformed.mesh.points[airfoil] - mesh.points[airfoil]
     assert np.allclose(moved.mean(axis=0), [0.01, 0.02])

@@ -189,10 +189,10 @@ def test_what_rounding_left_of_zero_is_shown_as_zero(qtbot):
 
 
 def contrast(one: QColor, other: QColor) -> float:
-    """Return the contrast of two colours (WCAG 2.1)."""
+    """Return the contrast of two colors (WCAG 2.1)."""
 
-    def light(colour: QColor) -> float:
-        parts = [colour.redF(), colour.greenF(), colour.blueF()]
+    def light(color: QColor) -> float:
+        parts = [color.redF(), color.greenF(), color.blueF()]
         linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
         return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 

@@ -75,7 +75,7 @@ def marks(view):
 
 
 def blue(view):
-    """Pixels of the ball's colour, (k, 2) from the lower left."""
+    """Pixels of the ball's color, (k, 2) from the lower left."""
     image = view.snapshot().astype(int)
     found = np.argwhere(np.abs(image - (0x2F, 0x6F, 0xB5)).max(axis=2) < 12)
     return np.column_stack([found[:, 1], len(image) - 1 - found[:, 0]])

@@ -65,10 +65,10 @@ def test_it_shows_the_step_the_undeformed_mesh_and_other_runs(full, qtbot):
     assert sorted(labels(full)) == ["run 1", "undeformed"]
 
 
-def test_it_follows_the_colours_of_the_view(full, qtbot):
+def test_it_follows_the_colors_of_the_view(full, qtbot):
     for by, word in (("skew", "skew quality"), ("displacement", "displacement")):
         with qtbot.waitSignal(full.canvas.drawn):
-            full.store.change(changes.set_view, colour_by=by)
+            full.store.change(changes.set_view, color_by=by)
         assert full.canvas.figure.axes[0].get_xlabel().startswith(word)
     moved = full.store.session.frame.values("displacement", full.store.session.mesh)
     moved = moved[full.store.session.frame.quality.status != INVERTED]

@@ -4,7 +4,7 @@ import pytest
 
 from slideviz.errors import SlidevizError
 from slideviz.gui.widgets import questions
-from slideviz.mesh.io.atomic import atomic_write
+from slideviz.system.atomic import atomic_write
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.deformation.solver import deform
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.section_reader import READING
 from slideviz.mesh.quality import quality
@@ -14,6 +13,7 @@ from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import changes, large
 from slideviz.session.state import IN_FILE
+from slideviz.solver.deform import deform
 
 
 @pytest.fixture(scope="module")
@@ -102,10 +102,10 @@ def test_little_memory_makes_a_mesh_large(folder, monkeypatch):
     assert large.is_large(folder / "mesh.su2b", None)
 
 
-def test_a_section_has_the_cells_and_colours_of_the_whole_mesh(stator, folder):
+def test_a_section_has_the_cells_and_colors_of_the_whole_mesh(stator, folder):
     whole = sv.read(folder / "mesh.su2b")
     section = Section("cylinder", (0.0, 0.0, 0.0), (0, 0, 1), 0.27)
-    stator.window.store.change(changes.set_view, colour_by="skew")
+    stator.window.store.change(changes.set_view, color_by="skew")
     one = add(stator, section)
     there = Cutter.of(whole).cut(whole.points, section)
     np.testing.assert_array_equal(one.frame.mesh.part.cells[one.polygons.cells], there.cells)

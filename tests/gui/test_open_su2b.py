@@ -6,9 +6,9 @@ import numpy as np
 from qtpy.QtWidgets import QFileDialog
 
 import slideviz as sv
+from slideviz.formats.files import usual_ending
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.questions import ask_open  # the driver answers the others
-from slideviz.mesh.io.files import usual_ending
 from slideviz.samples.table import write_sample
 from slideviz.session.jobs import open_file, save_mesh
 

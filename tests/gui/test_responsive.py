@@ -10,8 +10,8 @@ import time
 import pytest
 
 from slideviz.errors import Cancelled
+from slideviz.formats.files import read
 from slideviz.gui.responsiveness import worker
-from slideviz.mesh.io.files import read
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality

@@ -384,11 +384,11 @@ def test_both_meshes_have_the_same_room_beside_one_legend_and_a_title(ran):
     assert viewing.second is None
     assert not viewing.titles[0].isVisible()
     viewing = compare(ran)
-    ran.window.store.change(changes.set_view, colour_by="displacement")
+    ran.window.store.change(changes.set_view, color_by="displacement")
     assert not viewing.view.scalar_bars.keys()
     assert list(viewing.second.scalar_bars.keys()) == ["displacement"]
     ranges = [tuple(scene.stage.table.scalar_range) for scene in viewing._scenes()]
-    assert ranges[0] == ranges[1] == ran.session.colour_range
+    assert ranges[0] == ranges[1] == ran.session.color_range
     ran.window.store.change(changes.show_beside, None)
     assert list(viewing.view.scalar_bars.keys()) == ["displacement"]
 

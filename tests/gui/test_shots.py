@@ -49,7 +49,7 @@ def test_quality_shows_the_last_step_with_neighbours(window, tmp_path):
     assert session.view.frame == 5
     assert session.frame.quality.inverted == 0
     assert session.view.passages == 1
-    assert session.view.colour_by == "size-skew"
+    assert session.view.color_by == "size-skew"
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ def test_one_click_deforms_a_blade_passage(driver, small):
     )
     assert not start.isVisible()
     assert driver.session.deformed.quality.inverted == 0
-    assert driver.session.view.colour_by == "size-skew"
+    assert driver.session.view.color_by == "size-skew"
     # A sample is no file of the user's.
     assert driver.window.files.recent() == []
 
@@ -156,10 +156,10 @@ def test_each_sample_has_a_picture_of_its_own(qapp):
         assert all(drawn[name] != drawn[other] for other in names[k + 1 :])
     orange = "#d55e00"
     for image in drawn.values():
-        colours = {
+        colors = {
             image.pixelColor(x, y).name()
             for x in range(0, image.width(), 2)
             for y in range(0, image.height(), 2)
             if image.pixelColor(x, y).alpha() == 255
         }
-        assert orange in colours
+        assert orange in colors

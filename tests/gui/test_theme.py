@@ -21,8 +21,8 @@ def themed(qapp):
     theme.apply("light")
 
 
-def luminance(colour):
-    parts = (QColor(colour).redF(), QColor(colour).greenF(), QColor(colour).blueF())
+def luminance(color):
+    parts = (QColor(color).redF(), QColor(color).greenF(), QColor(color).blueF())
     linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
@@ -58,7 +58,7 @@ def test_words_about_inverted_cells_can_be_read(themed, name):
 def test_boxes_stand_out_from_what_is_around_them(themed, name, kind):
     themed(name)
     palette = QApplication.palette(kind)
-    # Fusion draws the frame of a box so much darker than the colour of windows.
+    # Fusion draws the frame of a box so much darker than the color of windows.
     frame = palette.color(QPalette.ColorRole.Window).darker(140)
     assert contrast(frame, palette.color(QPalette.ColorRole.Base)) > 2.9
 

@@ -45,7 +45,7 @@ def ran(with_runs):
     return with_runs({"steps": 3})
 
 
-def colours(window):
+def colors(window):
     picture = window.view.snapshot().astype(int)
     return {tuple(rgb) for rgb in picture[::3, ::3].reshape(-1, 3)}
 
@@ -71,7 +71,7 @@ def test_a_mesh_opens_with_rows_roles_and_guesses_that_keep_all_confirms(opened)
     assert "guess" in choice.toolTip()
     assert not window.start.isVisible()
     assert window.windowTitle() == "passage.su2 – slideviz"
-    assert len(colours(window)) > 20
+    assert len(colors(window)) > 20
     opened.click(opened.window.boundaries.keep)
     choice = opened.window.boundaries.table.cellWidget(0, 2)
     assert not opened.session.guesses
@@ -172,7 +172,7 @@ def test_zones_can_be_chosen(driver, tmp_path, passage_file):
 def test_a_role_is_chosen_in_the_table_also_for_all_selected_rows_and_shown_in_the_view(opened):
     opened.role("inflow", "internal")
     assert opened.session.role("inflow") == "internal"
-    assert (0xCC, 0x79, 0xA7) in colours(opened.window)
+    assert (0xCC, 0x79, 0xA7) in colors(opened.window)
     opened.click_row("inflow")
     opened.click_row("outflow", Qt.KeyboardModifier.ControlModifier)
     assert set(opened.session.view.selected) == {"inflow", "outflow"}
@@ -277,7 +277,7 @@ def test_a_translation_and_a_scaling_are_typed_and_the_ghost_moves_at_once(opene
 def test_a_rotation_is_typed_and_an_intersection_is_told_meanwhile_of_the_last_motion_only(
     opened, monkeypatch
 ):
-    from slideviz.color_scheme import INTERSECTION_COLOUR
+    from slideviz.color_scheme import INTERSECTION_COLOR
     from slideviz.session import intersections
     from slideviz.terms import ROLES
 
@@ -305,16 +305,16 @@ def test_a_rotation_is_typed_and_an_intersection_is_told_meanwhile_of_the_last_m
     opened.qtbot.waitUntil(lambda: not window.intersection_check.busy)
     assert panel.run.isEnabled()
     drawn = window.scene.plotter.actors["motion:airfoil"]
-    assert drawn.prop.color == ROLES["moving"].colour
+    assert drawn.prop.color == ROLES["moving"].color
     opened.type(field, "-0.4")
     opened.qtbot.waitUntil(lambda: not panel.run.isEnabled())
     assert "puts airfoil through periodic_1" in panel.text.text()
     assert "move airfoil less" in panel.text.toolTip()
-    assert drawn.prop.color == INTERSECTION_COLOUR
+    assert drawn.prop.color == INTERSECTION_COLOR
     assert "href='motion'" in panel.text.text()
     opened.type(field, "0.02")
     opened.qtbot.waitUntil(panel.run.isEnabled)
-    assert drawn.prop.color == ROLES["moving"].colour
+    assert drawn.prop.color == ROLES["moving"].color
     assert panel.text.text() == "Ready."
     opened.window.store.change(changes.set_case, motions=())
     asked = []
@@ -497,7 +497,7 @@ def test_what_is_missing_leads_to_its_panel_and_what_does_nothing_is_said(opened
         "Periodicity is “none”: periodic_1 and periodic_2 will not repeat.",
         "Sliding is “none”: inflow and outflow will not slide.",
     ]
-    opened.window.store.change(changes.set_view, colour_by="displacement")
+    opened.window.store.change(changes.set_view, color_by="displacement")
     assert "no displacement yet" in opened.window.statusBar().currentMessage()
 
 
@@ -626,7 +626,7 @@ def test_a_run_shows_its_steps_and_the_quality_and_no_size_changes_with_the_numb
     session = ready.session
     assert len(session.frames) == 4
     assert session.view.frame == 3
-    assert session.view.colour_by == "size-skew"
+    assert session.view.color_by == "size-skew"
     assert window.player.step_text.text() == "Step 3 of 3"
     quality = session.deformed.quality
     window.resize(1920, 1080)
@@ -989,7 +989,7 @@ def test_the_question_promises_the_same_result_only_where_that_is_true(ready, an
 
 
 @pytest.mark.usefixtures("painted")
-def test_colours_edges_and_ghosts_are_switched_from_the_tool_bar_and_undo_says_what_it_undid(
+def test_colors_edges_and_ghosts_are_switched_from_the_tool_bar_and_undo_says_what_it_undid(
     opened,
 ):
     window, said = opened.window, opened.window.statusBar().currentMessage
@@ -1002,8 +1002,8 @@ def test_colours_edges_and_ghosts_are_switched_from_the_tool_bar_and_undo_says_w
     keys = {keys.toString() for keys in redo.shortcuts()}
     assert {"Ctrl+Shift+Z", "Ctrl+Y"} <= keys
     bar = opened.window.actions_
-    opened.choose(bar.bar.colour, "skew")
-    assert opened.session.view.colour_by == "skew"
+    opened.choose(bar.bar.color, "skew")
+    assert opened.session.view.color_by == "skew"
     for name in ("edges", "undeformed", "motion_ghost", "legend"):
         before = name in opened.session.view.drawn
         bar.by_name[name].trigger()

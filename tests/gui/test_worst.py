@@ -48,7 +48,7 @@ def with_runs(session):
         frames = [shaken(session.mesh, size, seed) for size in (0.004, 0.08)]
         session = changes.add_frames(changes.start_run(session), frames)
         session = changes.end_run(session, "done")
-    return changes.set_view(session, colour_by="size-skew")
+    return changes.set_view(session, color_by="size-skew")
 
 
 @cache
@@ -120,11 +120,11 @@ def test_it_lists_the_worst_hundred_of_the_step(full):
     assert column(full, QUALITY)[-1] == f"{wanted.values[-1]:.4f}"
 
 
-def test_it_follows_the_step_and_the_colours(full):
+def test_it_follows_the_step_and_the_colors(full):
     full.store.change(changes.show_frame, 1)
     session = full.store.session
     assert cells(full) == worst_cells(session.frames, 1, "size-skew").cells.tolist()
-    full.store.change(changes.set_view, colour_by="size")
+    full.store.change(changes.set_view, color_by="size")
     assert cells(full) == worst_cells(session.frames, 1, "size").cells.tolist()
 
 

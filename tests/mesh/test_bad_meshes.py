@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from su2_samples import MESSY, SAMPLES, SOLID, SQUARE, ZONES, meshes, save
 
 from slideviz.errors import MeshError
+from slideviz.formats.files import read, write
+from slideviz.formats.source import Source
+from slideviz.formats.su2.read import read_su2
+from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.check import check_mesh, first_fault
-from slideviz.mesh.io.files import read, write
-from slideviz.mesh.io.source import Source
-from slideviz.mesh.io.su2.read import read_su2
-from slideviz.mesh.io.su2.write import su2_blocks
 from slideviz.mesh.model import Cells, Marker, Mesh, Origin
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
@@ -264,7 +264,7 @@ def test_lost_coordinate_in_space(tmp_path):
 
 @pytest.mark.parametrize("block", [1, 30, 1 << 20])
 def test_first_of_several_faults_is_named(tmp_path, monkeypatch, block):
-    monkeypatch.setattr("slideviz.mesh.io.su2.scan.BLOCK_BYTES", block)
+    monkeypatch.setattr("slideviz.formats.su2.scan.BLOCK_BYTES", block)
     text = edited(edited(SQUARE, "1.1 0.3 1", "1.1 a 1"), "1.1 1.7 4", "b1 1.7 4")
     text = text.replace("b1 1.7 4", "1.1 b 4")
     with pytest.raises(MeshError, match=":8: 'a' stands"):
@@ -338,7 +338,7 @@ def test_system_refuses(tmp_path, monkeypatch, method, number, words):
 
 @pytest.mark.parametrize("works", range(4))
 def test_disk_fails_in_the_middle(tmp_path, monkeypatch, works):
-    monkeypatch.setattr("slideviz.mesh.io.source.KEPT_BYTES", 0)
+    monkeypatch.setattr("slideviz.formats.source.KEPT_BYTES", 0)
     path = save(tmp_path, SQUARE)
     pread, calls = os.pread, []
 
@@ -357,7 +357,7 @@ def test_no_memory(tmp_path, monkeypatch):
     def refuse(*_):
         raise MemoryError
 
-    monkeypatch.setattr("slideviz.mesh.io.files.read_su2", refuse)
+    monkeypatch.setattr("slideviz.formats.files.read_su2", refuse)
     with pytest.raises(MeshError, match="there is not enough memory to read it; use a machine"):
         read(save(tmp_path, SQUARE))
 

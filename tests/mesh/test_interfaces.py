@@ -7,7 +7,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run as command
-from slideviz.mesh.io.su2.write import su2_blocks
+from slideviz.formats.su2.write import su2_blocks
 from slideviz.session import changes
 from slideviz.session.opening import guess_roles
 from slideviz.session.state import StepFrame

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from slideviz.errors import CaseError, MeshError
-from slideviz.mesh import threads
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import INVERTED, VALID, corner_jacobians, quality
+from slideviz.system import threads
 from tests.oracles import quality as oracle
 
 TYPES = (5, 9, 10, 12, 13, 14)

@@ -7,12 +7,13 @@ import pytest
 from builders import grid, halo_text
 
 from slideviz.errors import CaseError, MeshError
-from slideviz.mesh import jacobian_slopes, quality_derivative, threads
+from slideviz.formats.files import read
+from slideviz.mesh import jacobian_slopes, quality_derivative
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.io.files import read
 from slideviz.mesh.metrics import EXPONENTS, METRICS
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import INVERTED, quality
+from slideviz.system import threads
 from tests.oracles import quality as oracle
 
 TYPES = (5, 9, 10, 12, 13, 14)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from slideviz.case.model import Translate
 from slideviz.errors import MeshError
-from slideviz.mesh.io.files import write
+from slideviz.formats.files import write
 from slideviz.mesh.periodic import find_pairs, pair_up
 from slideviz.mesh.quality import quality
 from slideviz.plots.written import figure_bytes

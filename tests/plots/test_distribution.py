@@ -38,7 +38,7 @@ def test_every_cell_is_counted_once_inverted_ones_apart(frames, what, index):
     assert len(found.edges) == BINS + 1
 
 
-def test_displacements_are_counted_between_the_limits_of_the_colours(frames, square):
+def test_displacements_are_counted_between_the_limits_of_the_colors(frames, square):
     found = distribution(frames[1], "displacement", (0.0, 0.5), square)
     values = frames[1].values("displacement", square)
     assert found.counts.tolist() == np.histogram(values, BINS, range=(0.0, 0.5))[0].tolist()
@@ -113,10 +113,10 @@ def test_the_legend_shows_what_is_drawn_as_it_is_drawn(frames):
     axes, _, _ = drawn(frames, False)
     legend = axes.get_legend()
     assert [text.get_text() for text in legend.get_texts()] == ["run 1", "run 2", "undeformed"]
-    colours = [to_rgb(bar.get_facecolor()) for bar in axes.containers[0].patches]
+    colors = [to_rgb(bar.get_facecolor()) for bar in axes.containers[0].patches]
     boxes = [part for part in legend.findobj(Rectangle) if part.get_transform() is not None]
     filled = [to_rgb(box.get_facecolor()) for box in boxes if box.get_fill()]
-    assert colours[0] in filled, "the key of the bars has their colours"
+    assert colors[0] in filled, "the key of the bars has their colors"
     lines = [to_rgb(handle.get_color()) for handle in legend.legend_handles[1:]]
     stairs = outlines_of(axes)
     assert lines == [to_rgb(stairs[name].get_edgecolor()) for name in ("run 2", "undeformed")]
@@ -150,7 +150,7 @@ def test_inverted_cells_have_a_strip_left_of_the_values(frames, log):
     stem, cap = axes.lines
     assert stem.get_ydata()[1] == cap.get_ydata()[0] == bad
     assert max(*stem.get_xdata(), *cap.get_xdata()) < 0
-    assert stem.get_color() == cap.get_color() == ON_DARK.series(1).colour
+    assert stem.get_color() == cap.get_color() == ON_DARK.series(1).color
 
 
 def test_without_inverted_cells_there_is_no_strip(frames):

@@ -189,8 +189,8 @@ def test_letters_are_large_enough_and_stand_out(axes, style):
 def test_a_run_can_keep_its_look_when_others_are_left_out(axes, draw, run):
     draw(axes, [run])
     artist = axes.patches[0] if draw is histogram else axes.lines[0]
-    colour = artist.get_edgecolor() if draw is histogram else artist.get_color()
-    assert to_rgb(colour) == to_rgb(PRINT.series(4).colour)
+    color = artist.get_edgecolor() if draw is histogram else artist.get_color()
+    assert to_rgb(color) == to_rgb(PRINT.series(4).color)
 
 
 def test_a_style_without_legend_leaves_it_to_the_figure(axes):
@@ -202,10 +202,10 @@ def test_a_style_without_legend_leaves_it_to_the_figure(axes):
 
 
 @pytest.mark.parametrize("style", [PRINT, ON_DARK])
-def test_series_differ_without_their_colour(style):
+def test_series_differ_without_their_color(style):
     looks = [style.series(index) for index in range(49)]
     assert len({(look.marker, str(look.dash)) for look in looks[:7]}) == 7
-    assert len({(look.colour, look.marker, str(look.dash)) for look in looks}) == 49
+    assert len({(look.color, look.marker, str(look.dash)) for look in looks}) == 49
     for one, other in itertools.combinations(looks[:7], 2):
         assert one.marker != other.marker
         assert str(one.dash) != str(other.dash)

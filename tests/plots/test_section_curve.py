@@ -6,13 +6,13 @@ import pytest
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
-from slideviz.color_scheme import COLOUR_MAP
+from slideviz.color_scheme import COLOR_MAP
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.plots import around as section_around
 from slideviz.plots.around import surroundings, window
 from slideviz.plots.curves import UNDEFORMED, series_of
 from slideviz.plots.section_curve import (
-    Colours,
+    Colors,
     Curve,
     CurveRow,
     curve_of,
@@ -22,7 +22,7 @@ from slideviz.plots.section_curve import (
 )
 from slideviz.plots.section_paint import paint
 from slideviz.plots.section_picture import SectionInRun, SectionStyle, draw_section
-from slideviz.plots.section_rows import CurveRows, colours_of, facts_of, labels_of
+from slideviz.plots.section_rows import CurveRows, colors_of, facts_of, labels_of
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import changes
@@ -118,11 +118,11 @@ def test_a_position_tells_its_cell():
 # Its plot ---------------------------------------------------------------------------------
 
 
-def test_the_areas_below_a_curve_have_the_colours_of_the_view():
+def test_the_areas_below_a_curve_have_the_colors_of_the_view():
     values = (0.4, 0.9)
     limits = (0.2, 1.0)
     one = CurveRow("run 1", row([(0, 1), (1, 2)], values), 0)
-    axes = axes_of([one], colours=Colours("plasma", limits))
+    axes = axes_of([one], colors=Colors("plasma", limits))
     (areas,) = axes.collections
     areas.update_scalarmappable()
     wanted = mpl.colormaps["plasma"]((np.array(values) - 0.2) / 0.8)[:, :3]
@@ -188,15 +188,15 @@ def test_of_two_runs_that_are_compared_both_have_a_curve(session):
     assert [one.label for one in rows] == ["undeformed", "run 1", "run 2"]
 
 
-def test_the_curve_is_of_what_the_colours_say(session):
-    moved = changes.set_view(session, colour_by="displacement")
+def test_the_curve_is_of_what_the_colors_say(session):
+    moved = changes.set_view(session, color_by="displacement")
     (only,) = CurveRows().of([(moved, Cuts())], LINE)
     assert only.curve.values.max() > 0.02
     assert labels_of(moved, LINE) == ("x", "displacement [mesh units]")
-    assert colours_of(moved).limits == moved.colour_range
-    role = changes.set_view(session, colour_by="role")
+    assert colors_of(moved).limits == moved.color_range
+    role = changes.set_view(session, color_by="role")
     assert labels_of(role, RING) == ("angle [°]", "size-skew [-]")
-    assert colours_of(role) == Colours(COLOUR_MAP, (0.0, 1.0))
+    assert colors_of(role) == Colors(COLOR_MAP, (0.0, 1.0))
 
 
 def test_the_facts_are_those_of_the_cut_cells(session):

@@ -1,4 +1,4 @@
-"""Pictures of sections: what is drawn where, in which colour, and the files."""
+"""Pictures of sections: what is drawn where, in which color, and the files."""
 
 import re
 from itertools import pairwise
@@ -10,7 +10,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgba
 from PIL import Image
 
-from slideviz.color_scheme import COLOUR_MAP, INVERTED_COLOUR
+from slideviz.color_scheme import COLOR_MAP, INVERTED_COLOR
 from slideviz.errors import CaseError
 from slideviz.mesh.periodic import match
 from slideviz.mesh.quality import quality
@@ -56,7 +56,7 @@ def words_of(figure):
 
 
 def bar_of(figure):
-    """The axes of the colour bar."""
+    """The axes of the color bar."""
     (bar,) = [bar for axes in figure.axes for bar in axes.child_axes]
     return bar
 
@@ -65,7 +65,7 @@ def bar_says(figure):
     return [text.get_text() for text in bar_of(figure).texts]
 
 
-def test_cells_have_the_colours_of_their_values():
+def test_cells_have_the_colors_of_their_values():
     base = cube(4, block=False)
     mesh = bent(base)
     section = Section("plane", (0, 0, 0.4))
@@ -79,7 +79,7 @@ def test_cells_have_the_colours_of_their_values():
         at = np.array([*path.vertices[:4].mean(axis=0), 0.375])
         nodes = mesh.points[mesh.cells.by_type[12][1]].mean(axis=1)
         cell = cells[np.argmin(np.linalg.norm(nodes[cells] - at, axis=1))]
-        assert face == pytest.approx(mpl.colormaps[COLOUR_MAP](painted.values[cell]))
+        assert face == pytest.approx(mpl.colormaps[COLOR_MAP](painted.values[cell]))
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_inverted_cells_are_red_on_top_and_explained():
     ids = Cutter.of(mesh).which_cells(mesh.points, section)
     number = int(painted.inverted[ids].sum())
     assert number > 0
-    red = np.all(np.isclose(shapes.get_facecolor(), to_rgba(INVERTED_COLOUR)), axis=1)
+    red = np.all(np.isclose(shapes.get_facecolor(), to_rgba(INVERTED_COLOR)), axis=1)
     assert red.sum() >= number
     assert red[-number:].all()
     assert bar_says(figure) == ["inverted"]
@@ -271,11 +271,11 @@ def test_every_number_can_be_drawn(by):
         assert np.array_equal(painted.values, wanted)
 
 
-def test_a_range_ends_the_colours_but_no_valid_cell_turns_red():
+def test_a_range_ends_the_colors_but_no_valid_cell_turns_red():
     base = cube(4, block=False)
     painted = paint(base, quality(base), "size-skew").within(1.5, 2.0)
     assert painted.shown(np.arange(5)).tolist() == [1.5] * 5
-    with pytest.raises(CaseError, match="colour range 2 to 1: the first number must be"):
+    with pytest.raises(CaseError, match="color range 2 to 1: the first number must be"):
         painted.within(2.0, 1.0)
 
 
@@ -299,7 +299,7 @@ def test_a_png_has_the_size_that_was_asked_for(tmp_path, size):
     save(tmp_path / "x.png", size=size)
     image = Image.open(tmp_path / "x.png").convert("RGB")
     assert image.size == size
-    yellow = np.array(mpl.colormaps[COLOUR_MAP](1.0)[:3]) * 255
+    yellow = np.array(mpl.colormaps[COLOR_MAP](1.0)[:3]) * 255
     near = np.abs(np.asarray(image, float) - yellow).max(axis=2) < 3
     assert near.mean() > 0.1
 
@@ -388,5 +388,5 @@ def test_without_title_and_axes_the_section_has_the_room():
         sizes.append(figure.axes[0].bbox.width)
         assert bool(words_of(figure)) is shown
         assert figure.axes[0].axison is shown
-        assert bar_of(figure).get_ylabel() == "size-skew", "the colours are always explained"
+        assert bar_of(figure).get_ylabel() == "size-skew", "the colors are always explained"
     assert sizes[1] > 1.4 * sizes[0]

@@ -70,7 +70,7 @@ def test_the_legend_says_how_many_runs_are_left_out(many):
 
 def test_runs_are_called_by_their_names_and_nothing_is_compared_with_where_nothing_moved(many):
     named = changes.rename_run(changes.rename_run(many, 7, "stiff"), 3, "soft")
-    words = [text.get_text() for text in legend(named, colour_by="displacement").get_texts()]
+    words = [text.get_text() for text in legend(named, color_by="displacement").get_texts()]
     assert words == ["run 7: stiff", "run 1", "run 3: soft", "run 5", "run 6"]
     words = [text.get_text() for text in legend(named, frame=0).get_texts()]
     assert words == ["undeformed", "run 1", "run 3: soft", "run 5", "run 6"]

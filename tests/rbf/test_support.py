@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.deformation import solver
-from slideviz.deformation.setup import make_setup
-from slideviz.deformation.solver import _systems
 from slideviz.errors import DeformError
 from slideviz.rbf import evaluate as module
 from slideviz.rbf.evaluate import Basis, connected, evaluate, reached
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Problem
+from slideviz.solver import deform as solver
+from slideviz.solver.deform import _systems
+from slideviz.solver.setup import make_setup
 from tests.builders import airfoil, far_field, sphere_in_box
 
 COMPACT = [name for name, kernel in KERNELS.items() if kernel.compact]

@@ -188,7 +188,7 @@ def test_sample_meshes_folder_holds_a_small_stator():
 
 @pytest.mark.parametrize("block", [1000, pytest.param(1 << 18, marks=pytest.mark.slow)])
 def test_a_stream_writes_what_memory_holds(tmp_path, monkeypatch, block):
-    from slideviz.mesh.io.su2b import write as su2b_write
+    from slideviz.formats.su2b import write as su2b_write
 
     monkeypatch.setattr(su2b_write, "BLOCK", block)
     whole = stator(7_777)
@@ -204,7 +204,7 @@ def test_a_stream_writes_what_memory_holds(tmp_path, monkeypatch, block):
 
 @pytest.mark.parametrize("name", ["square", "polar", "hexahedron", "cylindrical"])
 def test_the_cases_of_the_thesis_are_streamed_too(tmp_path, monkeypatch, name):
-    from slideviz.mesh.io.su2b import write as su2b_write
+    from slideviz.formats.su2b import write as su2b_write
 
     monkeypatch.setattr(su2b_write, "BLOCK", 100)
     write_sample(name, tmp_path, 30, file_format="su2b")

@@ -1,4 +1,4 @@
-"""Edges of cells stand out on every colour, and step back where cells are small."""
+"""Edges of cells stand out on every color, and step back where cells are small."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def test_edges_are_dark_on_low_and_on_high_values(value, scheme, stage):
     # Between the lines, and on the one in the middle.
     face, line = light[SIZE // 2 + 36, SIZE // 2 + 36], light[SIZE // 2 + 36, SIZE // 2]
     assert line < face - 25
-    assert line < 130, "lines are dark even where the colours are light"
+    assert line < 130, "lines are dark even where the colors are light"
 
 
 def test_edges_fade_where_cells_are_hardly_wider_than_lines(stage):

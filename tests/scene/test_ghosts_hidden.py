@@ -60,7 +60,7 @@ def side_of(cube, normal):
     )
 
 
-def test_a_boundary_that_slides_in_its_surface_keeps_its_colour_within_the_rim(scene, cube):
+def test_a_boundary_that_slides_in_its_surface_keeps_its_color_within_the_rim(scene, cube):
     top = side_of(cube, (0, 0, 1))
     session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_role(session, (top,), "moving")

@@ -1,4 +1,4 @@
-"""Points, neighbouring passages and axes in the scene, judged by where which colours are."""
+"""Points, neighbouring passages and axes in the scene, judged by where which colors are."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from slideviz.ffd.section import with_boxes
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.samples.table import sample
-from slideviz.scene.legend import COLOURS, SIZE
+from slideviz.scene.legend import COLORS, SIZE
 from slideviz.scene.passages import (
     PALER,
     THRESHOLD,
@@ -60,7 +60,7 @@ def image(scene):
 
 
 def near(scene, point, reach=3):
-    """Return the colours around a point of the mesh, (k, 3)."""
+    """Return the colors around a point of the mesh, (k, 3)."""
     picture = image(scene)
     x, y = to_display(scene.plotter, np.array([list(point) + [0.0] * (3 - len(point))]))[0]
     row, column = picture.shape[0] - 1 - round(y), round(x)
@@ -68,9 +68,9 @@ def near(scene, point, reach=3):
     return part.reshape(-1, 3)
 
 
-def has(colours, wanted, within=45, least=1):
-    """Tell whether so many pixels have about that colour."""
-    off = np.abs(colours - np.array(pv.Color(wanted).int_rgb)).max(axis=1)
+def has(colors, wanted, within=45, least=1):
+    """Tell whether so many pixels have about that color."""
+    off = np.abs(colors - np.array(pv.Color(wanted).int_rgb)).max(axis=1)
     return int((off < within).sum()) >= least
 
 
@@ -84,35 +84,35 @@ def deformed(session, shift):
 # Points -----------------------------------------------------------------------------------
 
 
-def test_points_have_the_colour_of_their_type_where_the_nodes_are(scene, row):
-    session = opened(scene, row, points="types", colour_by="size-skew", edges=False, triad=False)
+def test_points_have_the_color_of_their_type_where_the_nodes_are(scene, row):
+    session = opened(scene, row, points="types", color_by="size-skew", edges=False, triad=False)
     mesh = row.mesh
     blade = mesh.points[mesh.marker("BLADE").nodes]
     inflow = mesh.points[mesh.marker("INFLOW").nodes]
-    # The line of the boundary has the colour of its role: a point is wider.
-    assert has(near(scene, blade[5]), NODE_TYPES["moving"].colour, least=22)
-    assert has(near(scene, inflow[len(inflow) // 2]), NODE_TYPES["sliding_edge"].colour)
+    # The line of the boundary has the color of its role: a point is wider.
+    assert has(near(scene, blade[5]), NODE_TYPES["moving"].color, least=22)
+    assert has(near(scene, inflow[len(inflow) // 2]), NODE_TYPES["sliding_edge"].color)
     scene.update(changes.set_view(session, points="none"))
-    assert not has(near(scene, blade[5]), NODE_TYPES["moving"].colour, least=22)
-    assert not has(near(scene, inflow[len(inflow) // 2]), NODE_TYPES["sliding_edge"].colour)
+    assert not has(near(scene, blade[5]), NODE_TYPES["moving"].color, least=22)
+    assert not has(near(scene, inflow[len(inflow) // 2]), NODE_TYPES["sliding_edge"].color)
 
 
 def test_points_follow_the_step_and_their_boundary(scene, row):
-    session = opened(scene, row, points="types", colour_by="size-skew", edges=False, triad=False)
+    session = opened(scene, row, points="types", color_by="size-skew", edges=False, triad=False)
     at = row.mesh.points[row.mesh.marker("BLADE").nodes][5]
     moved = deformed(session, LEFT)
     scene.update(moved)
-    assert has(near(scene, at + LEFT), NODE_TYPES["moving"].colour)
-    assert not has(near(scene, at), NODE_TYPES["moving"].colour, 25)
+    assert has(near(scene, at + LEFT), NODE_TYPES["moving"].color)
+    assert not has(near(scene, at), NODE_TYPES["moving"].color, 25)
     hidden = changes.show(moved, ("BLADE",), False)
     scene.update(hidden)
-    assert not has(near(scene, at + LEFT), NODE_TYPES["moving"].colour)
+    assert not has(near(scene, at + LEFT), NODE_TYPES["moving"].color)
     scene.update(changes.show_frame(changes.show(hidden, ("BLADE",)), 0))
-    assert has(near(scene, at), NODE_TYPES["moving"].colour)
+    assert has(near(scene, at), NODE_TYPES["moving"].color)
 
 
 def test_the_legend_names_the_points(scene, row):
-    session = opened(scene, row, points="types", colour_by="size-skew")
+    session = opened(scene, row, points="types", color_by="size-skew")
 
     def words():
         found = [name.split(":") for name in scene.plotter.actors if name.startswith("legend:")]
@@ -121,10 +121,10 @@ def test_the_legend_names_the_points(scene, row):
     assert words() == {"moving", "sliding edge", "periodic"}
     bar = scene.plotter.scalar_bars["size-skew"]
     with_points = bar.GetHeight()
-    scene.update(changes.set_view(session, points="none", colour_by="size-skew"))
+    scene.update(changes.set_view(session, points="none", color_by="size-skew"))
     assert not words()
     assert scene.plotter.scalar_bars["size-skew"].GetHeight() > with_points
-    scene.update(changes.set_view(session, colour_by="role"))
+    scene.update(changes.set_view(session, color_by="role"))
     assert words() == {"moving", "sliding edge", "periodic"}
     assert "legend:moving:moving" in scene.plotter.actors, "the role is named, too"
 
@@ -137,13 +137,13 @@ def test_neighbours_of_a_row_are_drawn_one_pitch_away(scene, row):
     nodes = row.mesh.marker("BLADE").nodes
     at = row.mesh.points[nodes[len(nodes) // 3]]
     session = opened(scene, row, passages=1, edges=False, triad=False)
-    orange = np.array(pv.Color(ROLES["moving"].colour).int_rgb)
+    orange = np.array(pv.Color(ROLES["moving"].color).int_rgb)
     plain = np.array(pv.Color(LIGHT.cell).int_rgb)
     paler = pv.Color((orange + PALER * (plain - orange)).astype(int).tolist())
-    assert has(near(scene, at), ROLES["moving"].colour, 20)
+    assert has(near(scene, at), ROLES["moving"].color, 20)
     for side in (-1, 1):
         assert has(near(scene, at + side * pitch), paler, 20), side
-        assert not has(near(scene, at + side * pitch), ROLES["moving"].colour, 20), "not paler"
+        assert not has(near(scene, at + side * pitch), ROLES["moving"].color, 20), "not paler"
     assert scene.pick(*to_display(scene.plotter, [[*(at + pitch), 0.0]])[0]) != "BLADE"
     scene.update(changes.set_view(session, passages=0))
     assert not has(near(scene, at + pitch), paler, 20)
@@ -186,7 +186,7 @@ def test_a_whole_wheel_is_drawn_once_and_fits_the_view(scene, stator):
     assert (seen.max(axis=0) < [620 - 100, 460]).all()
 
 
-def test_neighbours_follow_the_step_and_the_colours(scene, row):
+def test_neighbours_follow_the_step_and_the_colors(scene, row):
     session = opened(scene, row, passages=1, edges=False, triad=False)
     pitch = Period().of(session).vector
     nodes = row.mesh.marker("BLADE").nodes
@@ -198,20 +198,20 @@ def test_neighbours_follow_the_step_and_the_colours(scene, row):
     assert np.abs(after - before).max() < 25
     inside = row.mesh.points.mean(axis=0) + pitch
     plain = near(scene, inside, 1).mean(axis=0)
-    scene.update(changes.set_view(session, colour_by="skew"))
+    scene.update(changes.set_view(session, color_by="skew"))
     _, green, blue = near(scene, inside, 1).mean(axis=0)
     assert green > blue + 40, "yellow to green, as good cells are"
     assert np.ptp(plain) < 30
 
 
 def test_neighbours_show_the_chosen_cells_only(scene, row):
-    session = opened(scene, row, passages=1, edges=False, triad=False, colour_by="skew")
+    session = opened(scene, row, passages=1, edges=False, triad=False, color_by="skew")
     half = float(np.median(session.frame.values("skew")))
     at = middles(row.mesh, np.arange(len(row.mesh.cells)))
     shifted = at + Period().of(session).vector
 
     def yellow(points):
-        """Tell where a picture shows the colour of a value: yellow to green."""
+        """Tell where a picture shows the color of a value: yellow to green."""
         picture = image(scene)
         x, y = (
             np.rint(to_display(scene.plotter, np.c_[points, np.zeros(len(points))])).astype(int).T
@@ -230,7 +230,7 @@ def test_neighbours_show_the_chosen_cells_only(scene, row):
 
 
 def test_neighbours_of_a_3d_mesh_share_the_chosen_cells(scene, stator):
-    session = opened(scene, stator, passages=1, colour_by="size-skew")
+    session = opened(scene, stator, passages=1, color_by="size-skew")
     chosen = next(layer for layer in scene.layers if isinstance(layer, ThresholdLayer))
     for threshold, seen in (((0.0, 0.9), True), ((0.5, 0.95), True), ((-1.0, -0.5), False)):
         scene.update(changes.set_view(session, threshold=threshold))
@@ -282,23 +282,23 @@ def test_the_axes_are_in_the_lower_left_corner(scene, stator, scheme):
     assert differs(without, image(scene)).sum() > len(rows) / 2
 
 
-def test_the_axes_turn_with_the_camera_and_have_their_colours(scene, stator):
+def test_the_axes_turn_with_the_camera_and_have_their_colors(scene, stator):
     opened(scene, stator)
     counts = []
     for side in ("+x", "+y", "+z"):
         scene.look_from(side)
         corner = image(scene)[-SIZE:, :SIZE].reshape(-1, 3)
-        counts.append([has_hue(corner, colour) for colour in COLOURS])
+        counts.append([has_hue(corner, color) for color in COLORS])
     found = np.array(counts)
     for axis in range(3):
         others = np.delete(found[:, axis], axis)
         assert found[axis, axis] < others.min(), "seen from its end, it is a dot"
 
 
-def has_hue(colours, wanted):
-    """Count the pixels of about the hue of a colour, whatever their shade."""
+def has_hue(colors, wanted):
+    """Count the pixels of about the hue of a color, whatever their shade."""
     rgb = np.array(pv.Color(wanted).float_rgb)
-    parts = colours - colours.min(axis=1, keepdims=True)
+    parts = colors - colors.min(axis=1, keepdims=True)
     wanted = (rgb - rgb.min()) / (rgb - rgb.min()).max()
     strong = parts.max(axis=1) > 60
     parts = parts[strong] / parts[strong].max(axis=1, keepdims=True)
@@ -344,11 +344,11 @@ def test_of_a_box_only_what_moves_is_drawn_again(scene, boxed):
     assert not any(name.startswith("boxes:") for name in scene.plotter.actors)
 
 
-def test_the_displacement_has_no_colours_before_a_run(scene, passage):
+def test_the_displacement_has_no_colors_before_a_run(scene, passage):
     frame = StepFrame(passage.mesh, quality(passage.mesh))
     session = changes.open_mesh(frame, None, (), passage.case)
     scene.open(session, find_surfaces(passage.mesh))
-    session = changes.set_view(session, colour_by="displacement")
+    session = changes.set_view(session, color_by="displacement")
     scene.update(session)
     assert not scene._cells.actor.mapper.scalar_visibility
     moved = StepFrame(passage.mesh.with_points(passage.mesh.points + 0.1), frame.quality)

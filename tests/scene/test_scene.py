@@ -1,4 +1,4 @@
-"""Scenes judged by meaning: which colours are where, not by golden pictures."""
+"""Scenes judged by meaning: which colors are where, not by golden pictures."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pyvista as pv
 from builders import grid, halo_text
 
 import slideviz as sv
-from slideviz.color_scheme import COLOUR_MAP, DARK, INVERTED_COLOUR, LIGHT
+from slideviz.color_scheme import COLOR_MAP, DARK, INVERTED_COLOR, LIGHT
 from slideviz.mesh.enclosing import enclosed, is_closed
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import facet_connectivity, find_surfaces
@@ -24,14 +24,14 @@ def image(scene):
     return np.asarray(scene.plotter.screenshot(return_img=True)).astype(int)
 
 
-def count(picture, colour, within=14):
-    """Return how many pixels have about that colour."""
-    rgb = np.array(pv.Color(colour).int_rgb)
+def count(picture, color, within=14):
+    """Return how many pixels have about that color."""
+    rgb = np.array(pv.Color(color).int_rgb)
     return int((np.abs(picture[..., :3] - rgb).max(axis=2) <= within).sum())
 
 
 def pixel(scene, point):
-    """Return the colour at a point of the mesh."""
+    """Return the color at a point of the mesh."""
     picture = image(scene)
     x, y = to_display(scene.plotter, np.array([point], float))[0]
     return picture[picture.shape[0] - 1 - int(y), int(x)]
@@ -42,14 +42,14 @@ def opened(scene, session):
     return session
 
 
-def test_roles_have_their_colours(scene, session):
+def test_roles_have_their_colors(scene, session):
     session = opened(scene, changes.set_role(session, ("left",), "moving"))
-    before = count(image(scene), ROLES["moving"].colour)
+    before = count(image(scene), ROLES["moving"].color)
     assert before > 200
     scene.update(changes.set_role(session, ("left",), "sliding"))
     after = image(scene)
-    assert count(after, ROLES["moving"].colour) == 0
-    assert count(after, ROLES["sliding"].colour) > 200
+    assert count(after, ROLES["moving"].color) == 0
+    assert count(after, ROLES["sliding"].color) > 200
 
 
 def test_cells_of_a_halo_are_paler_than_those_of_the_domain(scene, tmp_path):
@@ -58,7 +58,7 @@ def test_cells_of_a_halo_are_paler_than_those_of_the_domain(scene, tmp_path):
     (tmp_path / "a.su2").write_text(text)
     mesh = sv.read(tmp_path / "a.su2")
     session = open_mesh(StepFrame(mesh, quality(mesh)), None)
-    session = opened(scene, changes.set_view(session, edges=False, colour_by="size-skew"))
+    session = opened(scene, changes.set_view(session, edges=False, color_by="size-skew"))
     inside, beyond = ((0.1, y) for y in (0.6, 1.1))
     colors = [pixel(scene, (*at, 0.0)) for at in (inside, beyond)]
     assert (colors[1] - colors[0]).max() > 60
@@ -72,36 +72,36 @@ def test_cells_of_a_halo_are_paler_than_those_of_the_domain(scene, tmp_path):
     assert (colors[1] - colors[0]).max() > 60
 
 
-def test_quality_is_coloured_from_0_to_1_whatever_the_values(scene, session):
+def test_quality_is_colored_from_0_to_1_whatever_the_values(scene, session):
     points = session.mesh.points.copy()
     points[12] += 0.45
     mesh = session.mesh.with_points(points)
     frame = StepFrame(mesh, quality(mesh, session.mesh))
-    session = changes.set_view(opened(scene, session), colour_by="size-skew", edges=False)
+    session = changes.set_view(opened(scene, session), color_by="size-skew", edges=False)
     session = changes.add_frames(changes.start_run(session), [frame])
     scene.update(session)
-    table = pv.LookupTable(COLOUR_MAP, scalar_range=(0.0, 1.0))
+    table = pv.LookupTable(COLOR_MAP, scalar_range=(0.0, 1.0))
     for cell, middle in ((0, (0.3, 0.3, 0)), (10, (2.75, 2.75, 0)), (5, (1.5, 1.5, 0))):
         value = float(frame.quality.values[cell])
         wanted = np.array(table.map_value(value)[:3]) * 255
         assert np.abs(pixel(scene, middle)[:3] - wanted).max() < 12, (cell, value)
 
 
-def test_an_inverted_cell_has_its_own_colour(scene, session):
+def test_an_inverted_cell_has_its_own_color(scene, session):
     points = session.mesh.points.copy()
     points[12] += 3.0
     mesh = session.mesh.with_points(points)
     frame = StepFrame(mesh, quality(mesh, session.mesh))
     assert frame.quality.inverted
-    session = changes.set_view(opened(scene, session), colour_by="skew", edges=False)
+    session = changes.set_view(opened(scene, session), color_by="skew", edges=False)
     scene.update(session)
-    assert count(image(scene), INVERTED_COLOUR) == 0
+    assert count(image(scene), INVERTED_COLOR) == 0
     scene.update(changes.add_frames(changes.start_run(session), [frame]))
-    assert count(image(scene), INVERTED_COLOUR) > 50
+    assert count(image(scene), INVERTED_COLOR) > 50
 
 
 def test_the_legend_has_more_room_where_pixels_are_small(scene, session):
-    opened(scene, changes.set_view(session, colour_by="skew"))
+    opened(scene, changes.set_view(session, color_by="skew"))
     strip, left = scene.stage.strip(), scene.plotter.scalar_bars["skew"].GetPosition()[0]
     scene.plotter.render_window.SetDPI(108)  # VTK's letters are half as large again there
     scene.resized()
@@ -122,19 +122,19 @@ def test_a_sliver_is_found_by_a_ring_of_the_same_size_at_any_zoom(scene, session
     session = changes.add_frames(changes.start_run(session), [frame])
     scene.update(session)
     word = f"{frame.quality.inverted} inv."
-    assert scene.stage.ring_words == ((word, INVERTED_COLOUR),)
+    assert scene.stage.ring_words == ((word, INVERTED_COLOR),)
     assert f"legend:rings:{word}:○" in scene.plotter.actors
-    near = count(image(scene), INVERTED_COLOUR)
+    near = count(image(scene), INVERTED_COLOR)
     scene.camera.aim((2.0, 2.0, 0.0), 400.0, 10.0)
-    far = count(image(scene), INVERTED_COLOUR)
+    far = count(image(scene), INVERTED_COLOR)
     assert far > 40
     assert near < 3 * far
-    # No colours of values: what is red are the rings alone, and the line about them.
+    # No colors of values: what is red are the rings alone, and the line about them.
     scene.update(changes.set_view(session, inverted=False))
-    assert count(image(scene), INVERTED_COLOUR) == 0
-    scene.update(changes.set_view(session, colour_by="size-skew", threshold=(0.5, 1.0)))
+    assert count(image(scene), INVERTED_COLOR) == 0
+    scene.update(changes.set_view(session, color_by="size-skew", threshold=(0.5, 1.0)))
     assert "points:inverted" not in scene.plotter.actors
-    scene.update(changes.set_view(session, colour_by="size-skew", threshold=(0.0, 1.0)))
+    scene.update(changes.set_view(session, color_by="size-skew", threshold=(0.0, 1.0)))
     assert "points:inverted" in scene.plotter.actors
 
 
@@ -157,8 +157,8 @@ def test_hidden_boundaries_are_not_drawn_and_not_picked(scene, session):
     x, y = to_display(scene.plotter, np.array([[0.0, 1.5, 0.0]]))[0]
     assert scene.pick(x, y) == "left"
     scene.update(changes.show(session, ("left",), False))
-    # The legend still names the role, so that some of its colour remains.
-    assert count(image(scene), ROLES["moving"].colour) < 250
+    # The legend still names the role, so that some of its color remains.
+    assert count(image(scene), ROLES["moving"].color) < 250
     assert scene.pick(x, y) is None
 
 
@@ -258,10 +258,10 @@ def test_perspective_is_for_3d_only(scene, session, cube):
 def test_the_legend_says_roles_or_shows_the_bar(scene, session):
     session = opened(scene, session)
     assert any(name.startswith("legend:fixed") for name in scene.plotter.actors)
-    scene.update(changes.set_view(session, colour_by="size"))
+    scene.update(changes.set_view(session, color_by="size"))
     assert list(scene.plotter.scalar_bars.keys()) == ["size"]
     assert not any(name.startswith("legend:") for name in scene.plotter.actors)
-    scene.update(changes.set_view(session, legend=False, colour_by="size"))
+    scene.update(changes.set_view(session, legend=False, color_by="size"))
     assert not list(scene.plotter.scalar_bars.keys())
 
 
@@ -269,7 +269,7 @@ def test_the_legend_says_roles_or_shows_the_bar(scene, session):
 def test_the_bar_has_the_numbers_of_its_ends(scene, session, height, count):
     scene.plotter.window_size = 500, height
     session = opened(scene, session)
-    scene.update(changes.set_view(session, colour_by="size-skew", colour_range=(0.946, 0.967)))
+    scene.update(changes.set_view(session, color_by="size-skew", color_range=(0.946, 0.967)))
     bar = scene.plotter.scalar_bars["size-skew"]
     labels = bar.GetCustomLabels()
     values = [labels.GetValue(row) for row in range(labels.GetNumberOfTuples())]
@@ -281,7 +281,7 @@ def test_the_bar_has_the_numbers_of_its_ends(scene, session, height, count):
 
 def test_the_title_of_the_bar_keeps_away_from_the_edge_in_a_view_of_any_size(scene, session):
     session = opened(scene, session)
-    scene.update(changes.set_view(session, colour_by="size-skew"))
+    scene.update(changes.set_view(session, color_by="size-skew"))
     for width in (900, 400, 900):
         scene.plotter.window_size = width, 600
         scene.resized()
@@ -337,7 +337,7 @@ def test_the_legend_is_made_anew_only_when_it_says_something_else(scene, session
     from slideviz.scene import legend as module
 
     session, made = opened(scene, session), []
-    for name in ("add_role_legend", "add_colour_bar"):
+    for name in ("add_role_legend", "add_color_bar"):
         real = getattr(module, name)
 
         def counted(*values, real=real):
@@ -349,7 +349,7 @@ def test_the_legend_is_made_anew_only_when_it_says_something_else(scene, session
         (0, lambda s: changes.select(s, ["left"])),
         (1, lambda s: changes.set_role(s, ["left"], "internal")),
         (0, lambda s: changes.set_view(s, edges=False)),
-        (1, lambda s: changes.set_view(s, colour_by="size-skew")),
+        (1, lambda s: changes.set_view(s, color_by="size-skew")),
         (0, lambda s: changes.set_role(s, ["left"], "fixed")),
         (0, lambda s: changes.set_view(s, legend=False)),
         (1, lambda s: changes.set_view(s, legend=True)),
@@ -361,7 +361,7 @@ def test_the_legend_is_made_anew_only_when_it_says_something_else(scene, session
         assert len(made) == wanted
     made.clear()
     scene.set_scheme(DARK)
-    assert len(made) == 1, "its letters have another colour"
+    assert len(made) == 1, "its letters have another color"
 
 
 def legend_actors(plotter):
@@ -371,7 +371,7 @@ def legend_actors(plotter):
 @pytest.mark.parametrize("by", ["role", "size-skew"])
 def test_in_a_view_of_another_size_the_same_legend_is_where_a_new_one_would_be(cube, by):
     session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
-    session = changes.set_view(session, colour_by=by, points="types")
+    session = changes.set_view(session, color_by=by, points="types")
     pictures = []
     for first, last in (((300, 260), (500, 420)), ((500, 420), (500, 420))):
         plotter = pv.Plotter(off_screen=True, window_size=first)
@@ -385,23 +385,23 @@ def test_in_a_view_of_another_size_the_same_legend_is_where_a_new_one_would_be(c
         plotter.close()
     differs = np.abs(pictures[0] - pictures[1]).max(axis=2) > 40
     assert differs.sum() < 40
-    assert count(pictures[0], ROLES["fixed"].colour) > 20 or by != "role"
+    assert count(pictures[0], ROLES["fixed"].color) > 20 or by != "role"
 
 
-def test_another_map_and_another_range_give_other_colours(scene, session):
-    session = changes.set_view(opened(scene, session), colour_by="size-skew", edges=False)
+def test_another_map_and_another_range_give_other_colors(scene, session):
+    session = changes.set_view(opened(scene, session), color_by="size-skew", edges=False)
     scene.update(session)
     highest = np.array(pv.LookupTable("viridis").map_value(1.0)[:3]) * 255
     assert np.abs(pixel(scene, (1.5, 1.5, 0))[:3] - highest).max() < 12
-    scene.update(changes.set_view(session, colour_range=(0.0, 2.0)))
+    scene.update(changes.set_view(session, color_range=(0.0, 2.0)))
     middle = np.array(pv.LookupTable("viridis").map_value(0.5)[:3]) * 255
     assert np.abs(pixel(scene, (1.5, 1.5, 0))[:3] - middle).max() < 12
-    scene.update(changes.set_view(session, colour_map="cividis"))
+    scene.update(changes.set_view(session, color_map="cividis"))
     highest = np.array(pv.LookupTable("cividis").map_value(1.0)[:3]) * 255
     assert np.abs(pixel(scene, (1.5, 1.5, 0))[:3] - highest).max() < 12
 
 
-def test_the_displacement_is_coloured_from_0_to_the_largest_of_all_runs(scene, session):
+def test_the_displacement_is_colored_from_0_to_the_largest_of_all_runs(scene, session):
     session = opened(scene, session)
     for shift in (0.5, 1.0):
         points = session.mesh.points.copy()
@@ -409,14 +409,14 @@ def test_the_displacement_is_coloured_from_0_to_the_largest_of_all_runs(scene, s
         mesh = session.mesh.with_points(points)
         frame = StepFrame(mesh, quality(mesh, session.mesh))
         session = changes.add_frames(changes.start_run(session), [frame])
-    assert session.colour_range == (0.0, 1.0)
-    session = changes.set_view(session, colour_by="displacement", edges=False)
-    assert session.colour_range == (0.0, 1.0)
+    assert session.color_range == (0.0, 1.0)
+    session = changes.set_view(session, color_by="displacement", edges=False)
+    assert session.color_range == (0.0, 1.0)
     scene.update(session)
     top = np.array(pv.LookupTable("viridis").map_value(0.5)[:3]) * 255
     assert np.abs(pixel(scene, (1.5, 3.6, 0))[:3] - top).max() < 12
     session = changes.show_run(session, 1)
-    assert session.colour_range == (0.0, 1.0)
+    assert session.color_range == (0.0, 1.0)
     scene.update(session)
     half = np.array(pv.LookupTable("viridis").map_value(0.25)[:3]) * 255
     assert np.abs(pixel(scene, (1.5, 3.6, 0))[:3] - half).max() < 12
@@ -516,7 +516,7 @@ def test_a_moving_boundary_inside_is_seen_and_clicked_through_those_around_it(sc
     for picture, orange in ((image(scene)[patch], True), (hidden[patch], False)):
         assert ((picture[..., 0] > picture[..., 2] + 40).mean() > 0.9) == orange
     # Values are looked at on the boundaries; without what is inside there is no reason for glass.
-    for view in ({"colour_by": "size-skew"}, {"hidden": frozenset({"BLOCK"})}):
+    for view in ({"color_by": "size-skew"}, {"hidden": frozenset({"BLOCK"})}):
         scene.update(changes.set_view(moving, **view))
         assert {one.actor.prop.opacity for one in scene.drawn.values()} == {1.0}
         assert scene.pick(*middle) == front

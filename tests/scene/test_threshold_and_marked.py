@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from slideviz.color_scheme import INVERTED_COLOUR, SELECTED_COLOUR
+from slideviz.color_scheme import INVERTED_COLOR, SELECTED_COLOR
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.mesh.surfaces import find_surfaces
@@ -46,7 +46,7 @@ def stepped(session, *sizes):
         moved = mesh.with_points(mesh.points + size * mesh.extent * shake)
         frames.append(StepFrame(moved, quality(moved, mesh)))
     session = changes.add_frames(changes.start_run(session), frames)
-    return changes.set_view(session, colour_by="size-skew", motion_ghost=False)
+    return changes.set_view(session, color_by="size-skew", motion_ghost=False)
 
 
 def opened(scene, session):
@@ -59,8 +59,8 @@ def image(scene):
     return np.asarray(scene.plotter.screenshot(return_img=True)).astype(int)
 
 
-def count(picture, colour, within=14):
-    rgb = np.array(pv.Color(colour).int_rgb)
+def count(picture, color, within=14):
+    rgb = np.array(pv.Color(color).int_rgb)
     return int((np.abs(picture[..., :3] - rgb).max(axis=2) <= within).sum())
 
 
@@ -113,7 +113,7 @@ def test_3d_exactly_the_cells_in_the_range_are_drawn(scene, bent):
     assert 0 < len(wanted) < len(values)
     assert layer.cells.tolist() == wanted.tolist()
     assert drawn(layer.shape) == outside(session.mesh, wanted)
-    # They have the colours of their values and are where the step has put them.
+    # They have the colors of their values and are where the step has put them.
     assert np.array_equal(layer.shape.cell_data[VALUES], values[layer.owner])
     nodes = layer.shape.point_data["vtkOriginalPointIds"]
     assert np.allclose(layer.shape.points, session.frame.mesh.points[nodes])
@@ -125,9 +125,9 @@ def test_3d_exactly_the_cells_in_the_range_are_drawn(scene, bent):
     assert all(one.actor.prop.opacity == 1.0 for one in scene.drawn.values())
 
 
-def test_the_range_is_that_of_what_the_view_is_coloured_by(scene, bent):
+def test_the_range_is_that_of_what_the_view_is_colored_by(scene, bent):
     session = opened(scene, changes.set_view(bent, threshold=(0.0, 0.9)))
-    by_size = changes.set_view(session, colour_by="size")
+    by_size = changes.set_view(session, color_by="size")
     scene.update(by_size)
     wanted = np.flatnonzero(by_size.frame.quality.size <= 0.9)
     assert scene._threshold.cells.tolist() == wanted.tolist()
@@ -156,7 +156,7 @@ def test_inverted_cells_alone_can_be_chosen(scene, cube):
     assert session.frame.quality.inverted
     session = opened(scene, changes.set_view(session, threshold=ONLY_INVERTED))
     assert len(scene._threshold.cells) == session.frame.quality.inverted
-    assert count(image(scene), INVERTED_COLOUR, 60) > 50
+    assert count(image(scene), INVERTED_COLOR, 60) > 50
 
 
 def test_rings_are_at_all_inverted_cells_or_at_those_that_sections_cut(scene, cube):
@@ -192,20 +192,20 @@ def test_2d_the_other_cells_vanish(scene, session):
     session = changes.add_frames(
         changes.start_run(session), [StepFrame(mesh, quality(mesh, session.mesh))]
     )
-    session = opened(scene, changes.set_view(session, colour_by="size-skew", edges=True))
+    session = opened(scene, changes.set_view(session, color_by="size-skew", edges=True))
     whole = image(scene)
     scene.update(changes.set_view(session, threshold=(0.0, 0.99)))
     assert scene._threshold.cells.tolist() == [5, 6, 9, 10]
     picture = image(scene)
 
-    def colour(picture, point):
+    def color(picture, point):
         x, y = seen_at(scene, point)
         return picture[picture.shape[0] - 1 - int(y), int(x), :3]
 
-    assert np.abs(colour(picture, (2.8, 2.6)) - colour(whole, (2.8, 2.6))).max() < 12
-    # Outside a chosen cell the faint area, without colour.
-    assert np.ptp(colour(whole, (0.4, 3.6))) > 60
-    assert np.ptp(colour(picture, (0.4, 3.6))) < 25
+    assert np.abs(color(picture, (2.8, 2.6)) - color(whole, (2.8, 2.6))).max() < 12
+    # Outside a chosen cell the faint area, without color.
+    assert np.ptp(color(whole, (0.4, 3.6))) > 60
+    assert np.ptp(color(picture, (0.4, 3.6))) < 25
     x, y = seen_at(scene, (0.4, 3.6))
     assert scene.pick_cell(x, y) is None
     scene.update(session)
@@ -249,10 +249,10 @@ def test_a_marked_cell_is_outlined_and_followed(scene, session):
         changes.start_run(session), [StepFrame(mesh, quality(mesh, session.mesh))]
     )
     session = opened(scene, session)
-    assert count(image(scene), SELECTED_COLOUR) == 0
+    assert count(image(scene), SELECTED_COLOR) == 0
     marked = changes.mark_cell(session, 10)
     scene.update(marked)
-    assert count(image(scene), SELECTED_COLOUR) > 150
+    assert count(image(scene), SELECTED_COLOR) > 150
     for frame in (1, 0):
         shown = changes.show_frame(marked, frame)
         scene.update(shown)
@@ -261,7 +261,7 @@ def test_a_marked_cell_is_outlined_and_followed(scene, session):
         assert np.allclose(lines.points[:, :2], wanted)
         assert lines.n_cells == 4
     scene.update(session)
-    assert count(image(scene), SELECTED_COLOUR) == 0
+    assert count(image(scene), SELECTED_COLOR) == 0
     assert OUTLINE not in scene.plotter.actors
     assert DOT not in scene.plotter.actors
 
@@ -273,7 +273,7 @@ def test_a_marked_cell_inside_a_3d_mesh_is_seen_through_its_boundaries(scene, be
     marked = changes.mark_cell(session, inner)
     scene.update(marked)
     assert all(one.actor.prop.opacity < 0.5 for one in scene.drawn.values())
-    assert count(image(scene), SELECTED_COLOUR) > 60
+    assert count(image(scene), SELECTED_COLOR) > 60
     faces = scene.plotter.actors[FACES].mapper.dataset
     assert drawn(faces) == outside(session.mesh, [inner])
     assert set(faces.cell_data[VALUES]) == {session.frame.quality.values[inner]}
@@ -282,7 +282,7 @@ def test_a_marked_cell_inside_a_3d_mesh_is_seen_through_its_boundaries(scene, be
     assert all(one.actor.prop.opacity == 1.0 for one in scene.drawn.values())
     for side in ("+x", "-x"):
         scene.look_from(side)
-        assert count(image(scene), SELECTED_COLOUR) > 60
+        assert count(image(scene), SELECTED_COLOR) > 60
 
 
 def test_flying_to_a_cell_puts_it_into_the_middle_at_a_good_size(scene, bent):

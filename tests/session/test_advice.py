@@ -8,14 +8,14 @@ import pytest
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.reduction import Reduction
 from slideviz.cli.run_outcome import advice_for
-from slideviz.deformation import solver
-from slideviz.deformation.remedies import beyond_pitch
-from slideviz.deformation.solver import deform
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.session.motions import largest_prescribed
 from slideviz.session.run_messages import ended, exact_cost, help_for, inverted_words, loose_words
 from slideviz.session.state import Run, StepFrame
+from slideviz.solver import deform as solver
+from slideviz.solver.deform import deform
+from slideviz.solver.remedies import beyond_pitch
 from tests.builders import sector
 
 

@@ -15,7 +15,7 @@ from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.keep import keep_view, kept_camera, kept_view
 from slideviz.session.state import ViewState
-from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN, SHOWN
+from slideviz.terms import COLOR_BY, COLOR_MAPS, POINTS_SHOWN, SHOWN
 
 number = st.floats(-1e3, 1e3)
 triple = st.tuples(number, number, number)
@@ -35,9 +35,9 @@ sections = st.one_of(*(section_of(row) for row in SECTION_SHAPES.values()))
 rising = st.none() | st.tuples(st.floats(-5, 0.4), st.floats(0.5, 5))
 views = st.builds(
     ViewState,
-    st.sampled_from(list(COLOUR_BY)),
+    st.sampled_from(list(COLOR_BY)),
     rising,
-    st.sampled_from(list(COLOUR_MAPS)),
+    st.sampled_from(list(COLOR_MAPS)),
     rising,
     st.sampled_from(list(POINTS_SHOWN)),
     st.sets(st.sampled_from(list(SHOWN))).map(frozenset),
@@ -66,7 +66,7 @@ def test_a_fresh_view_needs_no_key(session):
 
 def test_a_view_is_no_setting_of_the_run(session):
     session = changes.add_frames(changes.start_run(session), [session.first])
-    case = keep_view(changes.set_view(session, colour_by="skew"))
+    case = keep_view(changes.set_view(session, color_by="skew"))
     assert not changes.set_case(session, view=case.view).outdated
 
 

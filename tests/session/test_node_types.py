@@ -7,13 +7,13 @@ import pytest
 
 from slideviz.case.model import Translate
 from slideviz.case.reduction import Reduction
-from slideviz.deformation.solver import deform
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.samples.table import sample
 from slideviz.session import changes
 from slideviz.session.node_types import NOTHING, NodeTypes
 from slideviz.session.state import StepFrame
+from slideviz.solver.deform import deform
 from slideviz.terms import NODE_TYPES
 
 
@@ -67,7 +67,7 @@ def test_types_follow_the_roles_and_those_of_steps_stay_as_they_ran(passage):
 
 
 def test_types_are_worked_out_once_for_a_case(passage, monkeypatch):
-    from slideviz.deformation import classes as module
+    from slideviz.solver import classes as module
 
     asked, real = [], module.find_classes
 

@@ -9,7 +9,6 @@ import pytest
 from slideviz.case.model import Rotate
 from slideviz.case.motion_words import describe
 from slideviz.case.reduction import Reduction
-from slideviz.deformation.solver import deform
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
@@ -22,6 +21,7 @@ from slideviz.session.runs_words import (
     steps_words,
 )
 from slideviz.session.state import Run, StepFrame
+from slideviz.solver.deform import deform
 
 
 @pytest.fixture(scope="module")

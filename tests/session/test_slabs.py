@@ -6,13 +6,13 @@ import pytest
 import slideviz as sv
 from slideviz.errors import Cancelled
 from slideviz.mesh.quality import quality
-from slideviz.mesh.skin import read_skin
 from slideviz.samples.table import sample
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import slabs
 from slideviz.session.results import StepFrame
 from slideviz.session.slabs import Groups, keep_slab, read_slab, slab_of
+from slideviz.streaming.skin import read_skin
 from tests.slow import one_of_each_fast
 
 

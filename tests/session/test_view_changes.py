@@ -266,24 +266,24 @@ def test_the_range_of_the_displacement_ends_at_a_round_number():
         assert round_above(value) == pytest.approx(wanted, rel=1e-12)
 
 
-def test_each_quantity_has_a_colour_range_of_its_own(session):
-    session = changes.set_view(session, colour_by="size-skew", colour_range=(0.949, 0.967))
-    moved = changes.set_view(session, colour_by="displacement")
-    assert moved.view.colour_range is None
-    assert moved.colour_range == (0.0, 1.0)
-    moved = changes.set_view(moved, colour_range=(0.0, 0.02))
-    assert changes.set_view(moved, colour_by="skew").view.colour_range is None
-    back = changes.set_view(changes.set_view(moved, colour_by="role"), colour_by="size-skew")
-    assert back.view.colour_range == (0.949, 0.967)
-    assert changes.set_view(back, colour_by="displacement").view.colour_range == (0.0, 0.02)
+def test_each_quantity_has_a_color_range_of_its_own(session):
+    session = changes.set_view(session, color_by="size-skew", color_range=(0.949, 0.967))
+    moved = changes.set_view(session, color_by="displacement")
+    assert moved.view.color_range is None
+    assert moved.color_range == (0.0, 1.0)
+    moved = changes.set_view(moved, color_range=(0.0, 0.02))
+    assert changes.set_view(moved, color_by="skew").view.color_range is None
+    back = changes.set_view(changes.set_view(moved, color_by="role"), color_by="size-skew")
+    assert back.view.color_range == (0.949, 0.967)
+    assert changes.set_view(back, color_by="displacement").view.color_range == (0.0, 0.02)
 
 
 def test_cells_chosen_by_quality_are_not_chosen_by_displacement(session):
-    session = changes.set_view(session, colour_by="skew", threshold=(0.2, 0.4))
-    assert changes.set_view(session, colour_by="size").view.threshold == (0.2, 0.4)
-    assert changes.set_view(session, colour_by="displacement").view.threshold is None
+    session = changes.set_view(session, color_by="skew", threshold=(0.2, 0.4))
+    assert changes.set_view(session, color_by="size").view.threshold == (0.2, 0.4)
+    assert changes.set_view(session, color_by="displacement").view.threshold is None
     session = changes.set_view(session, threshold=ONLY_INVERTED)
-    assert changes.set_view(session, colour_by="displacement").view.threshold == ONLY_INVERTED
+    assert changes.set_view(session, color_by="displacement").view.threshold == ONLY_INVERTED
 
 
 def test_one_section_is_laid_flat(session):
@@ -342,31 +342,31 @@ def ran(session):
     return changes.add_frames(started, [moved(session, 0.1), moved(session, 0.3)])
 
 
-def test_the_colours_fit_all_steps_whichever_is_shown(ran):
-    session = changes.set_view(ran, colour_by="size-skew", frame=0)
+def test_the_colors_fit_all_steps_whichever_is_shown(ran):
+    session = changes.set_view(ran, color_by="size-skew", frame=0)
     values = [frame.quality.values for frame in session.frames]
     lowest, highest = (pick(values) for pick in (np.min, np.max))
-    fitted = changes.fit_colours(session)
-    low, high = fitted.view.colour_range
+    fitted = changes.fit_colors(session)
+    low, high = fitted.view.color_range
     assert low <= lowest < highest <= high
     assert high - low < 1.03 * (highest - lowest)
     assert high <= 1.0
     for frame in range(len(session.frames)):
-        again = changes.fit_colours(changes.set_view(fitted, frame=frame))
-        assert again.view.colour_range == (low, high)
+        again = changes.fit_colors(changes.set_view(fitted, frame=frame))
+        assert again.view.color_range == (low, high)
 
 
-def test_the_colours_fit_the_step_that_is_shown(ran):
-    session = changes.set_view(ran, colour_by="size-skew", frame=1)
-    low, high = changes.fit_colours(session, every=False).view.colour_range
+def test_the_colors_fit_the_step_that_is_shown(ran):
+    session = changes.set_view(ran, color_by="size-skew", frame=1)
+    low, high = changes.fit_colors(session, every=False).view.color_range
     values = session.frames[1].quality.values
     assert low <= values.min() < low + 0.02
     assert high - 0.02 < values.max() <= high
     assert low > session.frames[2].quality.min + 0.02
 
 
-def test_inverted_cells_do_not_widen_the_colours(ran):
-    session = changes.set_view(ran, colour_by="size-skew")
+def test_inverted_cells_do_not_widen_the_colors(ran):
+    session = changes.set_view(ran, color_by="size-skew")
     last = session.run_shown.last
     status = last.quality.status.copy()
     worst = np.argmin(last.quality.values)
@@ -374,14 +374,14 @@ def test_inverted_cells_do_not_widen_the_colours(ran):
     folded = replace(last, quality=replace(last.quality, status=status))
     runs = (replace(session.run_shown, frames=(folded,)),)
     left = np.delete(last.quality.values, worst).min()
-    low, _ = changes.fit_colours(replace(session, runs=runs)).view.colour_range
+    low, _ = changes.fit_colors(replace(session, runs=runs)).view.color_range
     assert last.quality.values[worst] < low <= left
 
 
 def test_roles_and_equal_values_have_no_range(ran, session):
-    assert changes.fit_colours(ran) is ran, "roles"
-    equal = changes.set_view(session, colour_by="size")
-    assert changes.fit_colours(equal) is equal
+    assert changes.fit_colors(ran) is ran, "roles"
+    equal = changes.set_view(session, color_by="size")
+    assert changes.fit_colors(equal) is equal
 
 
 def test_invalid_fields_of_two_panels_do_not_change_in_turns(session):

@@ -14,7 +14,7 @@ from slideviz.session.changes_view import UNDO_WORDS
 from slideviz.session.state import Session, StepFrame, ViewState
 from slideviz.session.store import TOGETHER_S, Memento, Store
 from slideviz.session.undoable import undo_words
-from slideviz.terms import COLOUR_BY, ROLES, SHOWN
+from slideviz.terms import COLOR_BY, ROLES, SHOWN
 
 
 class Clock:
@@ -118,7 +118,7 @@ def test_each_change_that_can_be_undone_has_words():
         "add_section": "new section",
         "choose_section": "choice of a section",
         "confirm": "confirming guesses",
-        "fit_colours": "colour range",
+        "fit_colors": "color range",
         "isolate": "hidden boundaries",
         "lay_flat": "flat view",
         "move_motion": "order of motions",
@@ -138,42 +138,42 @@ def test_each_change_that_can_be_undone_has_words():
 
 def test_each_field_of_the_view_that_can_be_undone_has_a_word():
     passing = {"selected", "frame", "marked_cell", "marked_in", "beside", "swapped", "ranges"}
-    passing |= {"colour_by"}
+    passing |= {"color_by"}
     other_changes = {"section_index", "handle"}
     those = {field.name for field in fields(ViewState)} - passing - other_changes
     assert set(UNDO_WORDS) == those - {"drawn"} | set(SHOWN)
 
 
 def test_undo_says_what_of_the_view_it_brings_back(store, clock):
-    for values in ({"colour_by": "skew"}, {"colour_range": (0.5, 1.0)}, {"passages": 1}):
+    for values in ({"color_by": "skew"}, {"color_range": (0.5, 1.0)}, {"passages": 1}):
         store.change(changes.set_view, **values)
         clock.now += 10
     said = []
     while store.can_undo:
         said.append(store.can_undo)
         store.undo()
-    assert said == ["neighbours", "colour range"]
+    assert said == ["neighbours", "color range"]
 
 
-def test_what_the_view_is_coloured_by_is_not_undone(store, clock):
+def test_what_the_view_is_colored_by_is_not_undone(store, clock):
     def change(**values):
         store.change(changes.set_view, **values)
         clock.now += 10
 
-    change(colour_by="size-skew")
+    change(color_by="size-skew")
     assert not store.can_undo
-    change(colour_range=(0.5, 1.0))
-    change(colour_by="skew")
+    change(color_range=(0.5, 1.0))
+    change(color_by="skew")
     change(passages=1)
     store.undo()
-    assert (store.session.view.passages, store.session.view.colour_by) == (0, "skew")
+    assert (store.session.view.passages, store.session.view.color_by) == (0, "skew")
     # Nor does undoing change it; the range that goes is that of the other quality.
     store.undo()
-    assert (store.session.view.colour_by, store.session.view.colour_range) == ("skew", None)
-    change(colour_by="size-skew")
-    assert store.session.view.colour_range is None
+    assert (store.session.view.color_by, store.session.view.color_range) == ("skew", None)
+    change(color_by="size-skew")
+    assert store.session.view.color_range is None
     store.redo()
-    assert store.session.view.colour_range == (0.5, 1.0)
+    assert store.session.view.color_range == (0.5, 1.0)
 
 
 def test_what_the_mouse_holds_is_undone_as_one_however_long_it_takes(store, clock):
@@ -262,7 +262,7 @@ intents = st.one_of(
     st.tuples(st.just("mark_cell"), st.none() | st.integers(0, 15)),
     st.tuples(st.just("show_frame"), st.integers(-2, 9)),
     st.tuples(st.just("steps"), st.integers(0, 9)),
-    st.tuples(st.just("colour"), st.sampled_from(list(COLOUR_BY))),
+    st.tuples(st.just("color"), st.sampled_from(list(COLOR_BY))),
     st.tuples(st.just("run"), st.integers(0, 2)),
     st.tuples(st.just("show_run"), st.integers(0, 4)),
     st.tuples(st.just("show_beside"), st.none() | st.integers(0, 4)),
@@ -283,8 +283,8 @@ def perform(store, intent):
             store.change(getattr(changes, name), *values)
     elif name == "steps":
         store.change(changes.set_case, steps=values[0])
-    elif name == "colour":
-        store.change(changes.set_view, colour_by=values[0])
+    elif name == "color":
+        store.change(changes.set_view, color_by=values[0])
     elif name == "run":
         store.change(changes.start_run)
         frame = replace(session.first, mesh=session.mesh.with_points(session.mesh.points + 0.1))
@@ -311,7 +311,7 @@ def require_valid(session: Session):
     numbers = [run.number for run in session.runs]
     assert numbers == sorted(set(numbers))
     assert changes.seen_beside(session).frame is not None
-    assert np.isfinite(session.colour_range).all()
+    assert np.isfinite(session.color_range).all()
 
 
 @settings(max_examples=150, deadline=None)
@@ -328,8 +328,8 @@ def test_any_intents_keep_the_session_valid_and_undoing_all_gives_the_first_back
     while store.can_undo:
         store.undo()
         require_valid(store.session)
-    # But for what the view is coloured by.
-    back = changes.set_view(store.session, colour_by=session.view.colour_by)
+    # But for what the view is colored by.
+    back = changes.set_view(store.session, color_by=session.view.color_by)
     assert Memento.of(back) == Memento.of(session)
     while store.can_redo:
         store.redo()

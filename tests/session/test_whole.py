@@ -5,12 +5,12 @@ import pytest
 
 import slideviz as sv
 from slideviz.mesh.quality import quality
-from slideviz.mesh.skin import read_skin
 from slideviz.samples.table import sample
 from slideviz.session.inspect import WORST, cell_info, worst_cells
 from slideviz.session.large import frame_of
 from slideviz.session.results import StepFrame
 from slideviz.session.whole import PartQuality, Tallying, measure_all, tally_of
+from slideviz.streaming.skin import read_skin
 
 
 @pytest.fixture(scope="module")

@@ -270,7 +270,7 @@ def test_names_of_files_sort_by_steps():
 
 
 @pytest.mark.parametrize(("cells", "edges"), [(6, True), (80, False)])
-def test_edges_that_would_hide_the_colours_are_left_out(monkeypatch, cells, edges):
+def test_edges_that_would_hide_the_colors_are_left_out(monkeypatch, cells, edges):
     monkeypatch.setattr("slideviz.study.montage.DPI", 100)
     made = sample("square", cells, "motion")
     (block,) = made.case.markers_with("moving")
@@ -280,7 +280,7 @@ def test_edges_that_would_hide_the_colours_are_left_out(monkeypatch, cells, edge
     image = figure.axes[0].images[0].get_array()
     high, wide = (length // 4 for length in image.shape[:2])
     middle = image[high // 2 : high, wide : 3 * wide]
-    # All cells are perfect: without edges there is one colour.
+    # All cells are perfect: without edges there is one color.
     assert (len(np.unique(middle.reshape(-1, 3), axis=0)) > 3) == edges
 
 

@@ -12,9 +12,9 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-from slideviz.deformation.solver import deform
 from slideviz.errors import SlidevizError
-from slideviz.mesh.io.files import write
+from slideviz.formats.files import write
+from slideviz.solver.deform import deform
 from tools.laws.cases import random_run
 from tools.laws.check import Outcome, check, simplified
 

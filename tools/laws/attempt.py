@@ -8,9 +8,9 @@ import warnings
 from types import FrameType
 
 from slideviz.case.model import Case
-from slideviz.deformation.solver import deform
-from slideviz.deformation.steps import Step
 from slideviz.mesh.model import Mesh
+from slideviz.solver.deform import deform
+from slideviz.solver.steps import Step
 
 LIMIT_S = 60.0
 """Seconds that one deformation may take: the meshes are small."""

@@ -15,9 +15,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from slideviz.case.model import Translate
-from slideviz.deformation.steps import Step
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import GAMMA
+from slideviz.solver.steps import Step
 from tools.laws.attempt import told, tried
 from tools.laws.cases import Run
 from tools.laws.meshes import images, renumbered
@@ -29,7 +29,7 @@ SAME = {"rbf": 1e-9, "idw": 1e-9, "elastic": 1e-7}
 """Linear elasticity is solved by iteration, to 1e-8 (``multigrid.TOLERANCE``) of the displacement;
 where it was not solved so far, the run says it and nothing is asked."""
 
-# The like of `slideviz.deformation.growth`, written again so that each checks the other.
+# The like of `slideviz.solver.growth`, written again so that each checks the other.
 GROWTH = 5.0
 """Times what the motion of boundaries carries over the mesh."""
 

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from slideviz.case.cfg import set_key
-from slideviz.deformation.solver import deform
 from slideviz.plots.draw import GreedyRun, convergence
 from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import sample
+from slideviz.solver.deform import deform
 from slideviz.study.plots import WIDTH, save_figure
 from tools.study.cases import GREEDY, Greedy
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.baselines.conditions import Body
-from slideviz.deformation.stepping import problem_at
 from slideviz.design.frozen.elastic import Equilibrium
 from slideviz.design.frozen.method import Method, Solved
 from slideviz.design.frozen.operations import columns, weighted_mean
 from slideviz.design.frozen.tape import Array, join, put, take, value
 from slideviz.mesh.model import IntArray
 from slideviz.rbf.constraint_rows import AGREE
+from slideviz.solver.stepping import problem_at
 
 
 class Weighting(Method):

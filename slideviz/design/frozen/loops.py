@@ -10,10 +10,10 @@ from numba import prange
 from scipy.sparse import csr_array
 
 from slideviz.mesh.axis_frame import axis_basis
-from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.frames import Frame
+from slideviz.system.jit_cache import njit
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.deformation.setup import Setup
 from slideviz.design.frozen.tape import (
     Array,
     Variable,
@@ -29,6 +28,7 @@ from slideviz.design.frozen.tape import (
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import TINY
 from slideviz.rbf.axis import corners as corners_of
+from slideviz.solver.setup import Setup
 
 TURN = {2: np.array([[0.0, 1.0], [-1.0, 0.0]])}
 """Rotates the direction of a segment (2D) into its normal."""

@@ -11,13 +11,13 @@ from slideviz.baselines.idw import weighted_means
 from slideviz.design.frozen.loops import place
 from slideviz.design.frozen.tape import Array, Linear, Link, Variable, recorded, value
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.threads import in_parts
 from slideviz.rbf.evaluate import Basis, evaluate, matrix, reached
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.frame_slopes import coords_slopes, features_slopes, points_slopes
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.slopes import pull_positions, push_positions, sum_powers
 from slideviz.rbf.solve import enough_threads
+from slideviz.system.threads import in_parts
 
 PAIRS = 1_000_000
 """Pairs whose radial functions are in memory at a time, in each thread, when many columns of

@@ -8,7 +8,6 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
-from slideviz.deformation.setup import Setup
 from slideviz.design.frozen.operations import points
 from slideviz.design.frozen.tape import (
     Array,
@@ -21,6 +20,7 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.field import Correction, share
 from slideviz.rbf.methods import NEGLIGIBLE
 from slideviz.rbf.problem import GAMMA
+from slideviz.solver.setup import Setup
 
 
 @dataclass(frozen=True, eq=False)

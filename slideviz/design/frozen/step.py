@@ -1,6 +1,6 @@
 """One step of a deformation with everything discrete kept, for any displacement.
 
-The same mathematics as in `slideviz.rbf.methods` and `slideviz.deformation.stepping`, on a tape;
+The same mathematics as in `slideviz.rbf.methods` and `slideviz.solver.stepping`, on a tape;
 without a variable it computes values only. Discrete choices are made when the step runs first, at
 the reference design, and kept: rows of the systems, primitives that nodes are projected on,
 nearest boundary nodes and radius of the correction.
@@ -17,7 +17,6 @@ import numpy as np
 
 from slideviz.baselines.conditions import Body
 from slideviz.baselines.idw import Weights
-from slideviz.deformation.setup import Setup
 from slideviz.design.frozen.baselines import Elasticity, Weighting
 from slideviz.design.frozen.interpolation import Interpolation
 from slideviz.design.frozen.loops import keep_rest, shift
@@ -35,6 +34,7 @@ from slideviz.design.frozen.tape import (
 )
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.rbf.problem import Levels
+from slideviz.solver.setup import Setup
 from slideviz.terms import Sliding
 
 

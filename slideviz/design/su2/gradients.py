@@ -9,8 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from slideviz.deformation.solver import deform
-from slideviz.deformation.steps import Progress
 from slideviz.design.deformer import Deformer
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.convexity import convex_part
@@ -25,6 +23,8 @@ from slideviz.design.su2.sensitivities import (
 from slideviz.design.su2.surface import MovingSurface, make_surface
 from slideviz.errors import ConditionWarning, ToleranceWarning
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
+from slideviz.solver.deform import deform
+from slideviz.solver.steps import Progress
 
 DIRECTIONS = 16
 """Most displacements for which control nodes are chosen at a design of zeros."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from slideviz.case.lines import read_text
 from slideviz.errors import CaseError
-from slideviz.mesh.io.file_checks import require_ordinary
 from slideviz.mesh.model import FloatArray
+from slideviz.system.file_checks import require_ordinary
 
 MAGIC = 535532
 """The first number of SU2's binary restart files."""

@@ -12,8 +12,6 @@ import numpy as np
 
 from slideviz.case.check import raise_all
 from slideviz.case.model import Case, Prescribed
-from slideviz.deformation.setup import make_setup
-from slideviz.deformation.steps import Step
 from slideviz.design.su2.boxes import move_boxes, problems_of_boxes
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.markers import problems_of_markers
@@ -24,6 +22,8 @@ from slideviz.errors import CaseError, Note, SlidevizError
 from slideviz.ffd.section import boxes_of
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.solver.setup import make_setup
+from slideviz.solver.steps import Step
 
 RIGID = ("TRANSLATION", "ROTATION", "SCALE")
 """Kinds of variables that move boundaries as a rigid body, or scale them."""

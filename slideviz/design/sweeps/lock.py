@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 from slideviz.errors import CaseError
-from slideviz.mesh.io.atomic import reason_of
-from slideviz.mesh.io.cleanup import open_temporary
+from slideviz.system.atomic import reason_of
+from slideviz.system.cleanup import open_temporary
 
 NAME = "sweep.lock"
 _TAKEN = (errno.EAGAIN, errno.EACCES)

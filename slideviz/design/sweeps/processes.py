@@ -19,7 +19,7 @@ from multiprocessing import get_context, parent_process, resource_tracker
 from typing import Any, NamedTuple, NoReturn
 
 from slideviz.design.sweeps.worker import Packed, hold
-from slideviz.mesh.io.cleanup import clean_up
+from slideviz.system.cleanup import clean_up
 
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _QUIET = "ignore::UserWarning:multiprocessing.resource_tracker"

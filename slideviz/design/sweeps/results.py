@@ -29,9 +29,9 @@ from slideviz.design.sweeps.lock import FolderLock
 from slideviz.design.sweeps.row import NUMBERS, DesignRow
 from slideviz.errors import CaseError
 from slideviz.ffd.section import boxes_of
-from slideviz.mesh.io.atomic import atomic_write, reason_of
-from slideviz.mesh.io.file_checks import read_json
 from slideviz.mesh.model import Mesh
+from slideviz.system.atomic import atomic_write, reason_of
+from slideviz.system.file_checks import read_json
 
 RESULTS, SOURCES = "results.csv", "sweep.json"
 _WORDS = ("mesh", "warnings", "problem")

@@ -17,7 +17,7 @@ from slideviz.design.sweeps.results import SweepResults, sources_of
 from slideviz.design.sweeps.row import DesignRow
 from slideviz.design.sweeps.worker import Answer, Packed, Task, packed, work
 from slideviz.errors import CaseError, DeformError
-from slideviz.mesh.io.files import read, usual_ending
+from slideviz.formats.files import read, usual_ending
 from slideviz.mesh.model import Mesh, Origin
 
 LOST = 3

@@ -21,13 +21,13 @@ from typing import Any
 
 from slideviz import __version__
 from slideviz.case.model import Case
-from slideviz.deformation.solver import deform
-from slideviz.deformation.steps import Step
 from slideviz.design.sweeps.row import DesignRow
 from slideviz.errors import Note, SlidevizError
-from slideviz.mesh.io.files import write
+from slideviz.formats.files import write
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import quality
+from slideviz.solver.deform import deform
+from slideviz.solver.steps import Step
 from slideviz.terms import FileFormat
 
 _KEPT = 2

@@ -13,13 +13,13 @@ from slideviz.export.offscreen import LETTERS
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.export.vector import MOST_CELLS, SUFFIXES, write_vector
+from slideviz.formats.files import usual_ending
+from slideviz.formats.vtkhdf import VTKHDF
 from slideviz.gui.dialogs.film import FilmDialog
 from slideviz.gui.dialogs.picture import PictureDialog
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import copy_image, to_image, wait_cursor
 from slideviz.gui.widgets.services import Services
-from slideviz.mesh.io.files import usual_ending
-from slideviz.mesh.io.vtkhdf import VTKHDF
 from slideviz.session import changes, jobs_export
 from slideviz.session.state import Session
 

@@ -74,7 +74,7 @@ PAPER_POINTS = 8.5
 """Size of normal letters on paper in points; journals ask for 8 at least."""
 
 OPTIONS = {
-    "legend": ("Legend or colour bar", "What the colours mean, at the right."),
+    "legend": ("Legend or color bar", "What the colors mean, at the right."),
     "edges": (SHOWN["edges"].name, SHOWN["edges"].tip),
     "triad": ("Directions of the axes", "Small arrows in the lower left corner."),
     "title": ("Title with the quality", "Run and step, with minimum, mean and inverted cells."),

@@ -14,7 +14,7 @@ from qtpy.QtCore import Qt
 from qtpy.QtGui import QMouseEvent
 from qtpy.QtWidgets import QHBoxLayout, QWidget
 
-from slideviz.color_scheme import SELECTED_COLOUR
+from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.errors import SlidevizError
 from slideviz.gui.widgets.build import boxed, check_box, in_column, in_row, push_button
 from slideviz.gui.widgets.choice import Choice
@@ -201,7 +201,7 @@ def draw_steps(session: Session, whole: bool, figure: Figure, style: Style) -> N
     if not whole:
         axes.set_ylim(close_limits(part for run in runs for part in (run.minimum, run.mean)))
     at = session.view.frame
-    axes.axvline(at, color=SELECTED_COLOUR, linewidth=2.0, zorder=0.5, gid="shown")
+    axes.axvline(at, color=SELECTED_COLOR, linewidth=2.0, zorder=0.5, gid="shown")
     last = max(len(run.frames) for run in session.runs)
     axes.set_xlim(-0.03 * last, 1.03 * last)
 

@@ -1,4 +1,4 @@
-"""The display panel: colours and their range, threshold, points, passages, toggles."""
+"""The display panel: colors and their range, threshold, points, passages, toggles."""
 
 # ruff: noqa: N802  (Qt's names)
 
@@ -35,14 +35,14 @@ from slideviz.session.colors import usual_range
 from slideviz.session.passages import passages_around
 from slideviz.session.state import IN_FILE, Session
 from slideviz.session.store import Store
-from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN, SHOWN, Shown, labels
+from slideviz.terms import COLOR_BY, COLOR_MAPS, POINTS_SHOWN, SHOWN, Shown, labels
 
 TIPS = {
-    "map": "The colours of values; all are told apart by colour-blind people.",
-    "range": "The values at the ends of the colour bar.",
-    "fit": COMMANDS["fit_colours"].button_tip,
+    "map": "The colors of values; all are told apart by color-blind people.",
+    "range": "The values at the ends of the color bar.",
+    "fit": COMMANDS["fit_colors"].button_tip,
 }
-ROLES_ONLY = "Roles have colours of their own: colour by a value first."
+ROLES_ONLY = "Roles have colors of their own: color by a value first."
 NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbouring passages."
 
 
@@ -132,7 +132,7 @@ class Span(QWidget):
 
 
 def map_icon(name: str) -> QIcon:
-    """Return an icon of a colour map, from low to high."""
+    """Return an icon of a color map, from low to high."""
     from matplotlib import colormaps
 
     row = (np.asarray(colormaps[name](np.linspace(0.0, 1.0, 64))) * 255).astype(np.uint8)
@@ -142,7 +142,7 @@ def map_icon(name: str) -> QIcon:
 
 
 class DisplayPanel(Panel):
-    """The panel of the view's colours, threshold, points, passages and toggles."""
+    """The panel of the view's colors, threshold, points, passages and toggles."""
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
@@ -154,23 +154,23 @@ class DisplayPanel(Panel):
         self.form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
         self.form.setContentsMargins(6, 6, 6, 4)
         grow_fields(self.form, 5)
-        self._make_colours()
+        self._make_colors()
         self._make_threshold()
         self._make_rest()
         self.follow()
 
-    def _make_colours(self) -> None:
-        self.colour_by = self._choice("display_colour_by", labels(COLOUR_BY), "colour_by")
-        self.colour_by.setToolTip("What the colours of the view say.")
-        self.form.addRow("Colour by", self.colour_by)
-        self.map = self._choice("colour_map", labels(COLOUR_MAPS), "colour_map")
+    def _make_colors(self) -> None:
+        self.color_by = self._choice("display_color_by", labels(COLOR_BY), "color_by")
+        self.color_by.setToolTip("What the colors of the view say.")
+        self.form.addRow("Color by", self.color_by)
+        self.map = self._choice("color_map", labels(COLOR_MAPS), "color_map")
         self.map.setIconSize(QSize(64, 12))
-        for index, name in enumerate(COLOUR_MAPS):
+        for index, name in enumerate(COLOR_MAPS):
             self.map.setItemIcon(index, map_icon(name))
-        self.form.addRow("Colours", self.map)
-        self.range = Span("range", lambda values: self._set(colour_range=values))
-        self.fit_range = self._button("fit_range", "Fit", "fit_colours")
-        self.reset_range = self._button("reset_range", "Reset", "usual_colours")
+        self.form.addRow("Colors", self.map)
+        self.range = Span("range", lambda values: self._set(color_range=values))
+        self.fit_range = self._button("fit_range", "Fit", "fit_colors")
+        self.reset_range = self._button("reset_range", "Reset", "usual_colors")
         parts = (self.range, self.fit_range, self.reset_range)
         self.form.addRow("Range", in_row(*parts, wide=[self.range], spacing=3))
 
@@ -221,7 +221,7 @@ class DisplayPanel(Panel):
         """Fill the panel from the session; skipped if nothing shown here has changed."""
         case, view = session.case, session.view
         periodic = case.markers_with("periodic"), case.periodic_type, case.axis, case.origin
-        runs = session.runs if view.colour_by == "displacement" else ()
+        runs = session.runs if view.color_by == "displacement" else ()
         key = (session.mesh, session.pairs, view.style, periodic, runs)
         if key == self._key:
             return
@@ -232,16 +232,16 @@ class DisplayPanel(Panel):
     def _sync(self, session: Session) -> None:
         view, opened = session.view, session.mesh is not None
         self.setEnabled(opened)
-        self.colour_by.show_value(view.colour_by)
-        self.map.show_value(view.colour_map)
-        valued = view.colour_by != "role"
+        self.color_by.show_value(view.color_by)
+        self.map.show_value(view.color_map)
+        valued = view.color_by != "role"
         for widget in (self.map, self.range, self.fit_range):
             widget.setEnabled(valued)
         self.map.setToolTip(TIPS["map"] if valued else ROLES_ONLY)
         self.range.set_tip(TIPS["range"] if valued else ROLES_ONLY)
         self.fit_range.setToolTip(TIPS["fit"] if valued else ROLES_ONLY)
-        self.range.show_values(session.colour_range)
-        self.reset_range.setEnabled(valued and view.colour_range is not None)
+        self.range.show_values(session.color_range)
+        self.reset_range.setEnabled(valued and view.color_range is not None)
         back = f"Back to {usual_range(session)}"
         self.reset_range.setToolTip(back if valued else ROLES_ONLY)
         low_high = "The lowest and highest value of the cells that are drawn."
@@ -291,6 +291,6 @@ class DisplayPanel(Panel):
 
 
 def _worse_half(session: Session) -> tuple[float, float]:
-    """Return the lower half of the colour range: the first threshold, as low quality is worse."""
-    low, high = session.colour_range
+    """Return the lower half of the color range: the first threshold, as low quality is worse."""
+    low, high = session.color_range
     return low, low + 0.5 * (high - low)

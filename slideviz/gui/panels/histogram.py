@@ -12,7 +12,7 @@ from qtpy.QtCore import QRectF, Qt, QTimer, Signal
 from qtpy.QtGui import QColor, QKeySequence, QMouseEvent, QPainter, QPaintEvent, QPen, QShortcut
 from qtpy.QtWidgets import QLabel
 
-from slideviz.color_scheme import SELECTED_COLOUR
+from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.gui.responsiveness.settings import SELECTING_MS
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.widgets.build import FoldingRow, check_box, in_column, push_button
@@ -122,10 +122,10 @@ class BrushCanvas(PlotCanvas):
         left, right = (self.pixel_of(value) for value in self.band)
         top, height = self.axes_rows()
         painter = QPainter(self)
-        colour = QColor(SELECTED_COLOUR)
-        painter.setPen(QPen(colour, 2))
-        colour.setAlpha(60)
-        painter.fillRect(QRectF(left, top, right - left, height), colour)
+        color = QColor(SELECTED_COLOR)
+        painter.setPen(QPen(color, 2))
+        color.setAlpha(60)
+        painter.fillRect(QRectF(left, top, right - left, height), color)
         for x in (left, right):
             painter.drawLine(round(x), round(top), round(x), round(top + height))
         painter.end()
@@ -179,7 +179,7 @@ class HistogramPanel(Panel):
 
     def sync(self, session: Session) -> None:
         """Plot the histogram of the session's step, with the threshold as selected range."""
-        self.whole.setText("from 0" if session.view.colour_by == "displacement" else "0–1")
+        self.whole.setText("from 0" if session.view.color_by == "displacement" else "0–1")
         for widget in (self.numbers, self.log, self.whole, self.save):
             widget.setVisible(session.frame is not None)
         self.show_all.setVisible(session.frame is not None)
@@ -280,11 +280,11 @@ class HistogramPanel(Panel):
 
 def _concerned(old: Session, new: Session) -> bool:
     """Return whether the histogram differs between two sessions."""
-    names = ("colour_by", "colour_map", "threshold", "beside")
+    names = ("color_by", "color_map", "threshold", "beside")
     same = (
         old.frame is new.frame,
         old.runs is new.runs or old.runs == new.runs,
-        old.colour_range == new.colour_range,
+        old.color_range == new.color_range,
         *(getattr(old.view, name) == getattr(new.view, name) for name in names),
     )
     return not all(same)

@@ -73,12 +73,12 @@ class RunPanel(Panel):
         in_column(row, self.bar, spacing=5, on=self, margins=(6, 6, 6, 6))
         self.follow()
 
-    def _button(self, command: Command, colour: str) -> QPushButton:
+    def _button(self, command: Command, color: str) -> QPushButton:
         words = command.title.replace("&", "")
         button = push_button(
             words, command.button_tip, lambda: command.do(main_window(self)), command.name
         )
-        button.setIcon(icon(command.image, colour))
+        button.setIcon(icon(command.image, color))
         button.setShortcut(command.button_key)
         return button
 
@@ -160,7 +160,7 @@ class RunPanel(Panel):
             self.place_wanted.emit((*self._missing, asked)[0])
 
     def take_theme(self, _scheme: ColorScheme) -> None:
-        """Set the text again: a label's links keep the colours of the old theme otherwise."""
+        """Set the text again: a label's links keep the colors of the old theme otherwise."""
         text = self.text.text()
         self.text.clear()
         self.text.setText(text)

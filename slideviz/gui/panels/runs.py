@@ -48,7 +48,7 @@ class RunsPanel(Panel):
         self.tree.customContextMenuRequested.connect(self._menu_wanted)
 
     def take_theme(self, _scheme: ColorScheme) -> None:
-        """Draw the icons of the rows in the colours of another theme."""
+        """Draw the icons of the rows in the colors of another theme."""
         self._drawn = ()
         if self.store.session.runs:
             self.sync(self.store.session)

@@ -68,7 +68,7 @@ class _FirstLine(QStyledItemDelegate):
         rect.setHeight(item.fontMetrics.height())
         painter.save()
         painter.setFont(item.font)
-        painter.setPen(text_colour(item, QPalette.ColorRole.Text))
+        painter.setPen(text_color(item, QPalette.ColorRole.Text))
         image = index.data(Qt.ItemDataRole.DecorationRole)
         if image is not None and not image.isNull():
             image.paint(painter, rect.right() - 15, rect.top(), 16, rect.height())
@@ -103,8 +103,8 @@ class _FirstLine(QStyledItemDelegate):
         editor.setGeometry(option.rect.left(), option.rect.top(), width, option.rect.height())
 
 
-def text_colour(option: QStyleOptionViewItem, plain: QPalette.ColorRole) -> QColor:
-    """Return the text colour of a row: ``plain`` of the palette, or that of a selected row."""
+def text_color(option: QStyleOptionViewItem, plain: QPalette.ColorRole) -> QColor:
+    """Return the text color of a row: ``plain`` of the palette, or that of a selected row."""
     chosen = bool(option.state & QStyle.StateFlag.State_Selected)
     active = bool(option.state & QStyle.StateFlag.State_Active)
     group = QPalette.ColorGroup.Active if active else QPalette.ColorGroup.Inactive
@@ -228,7 +228,7 @@ class RunTree(QTreeWidget):
         if self.selectionModel().isSelected(index):
             row.state |= QStyle.StateFlag.State_Selected
         painter.save()
-        painter.setPen(text_colour(row, QPalette.ColorRole.PlaceholderText))
+        painter.setPen(text_color(row, QPalette.ColorRole.PlaceholderText))
         text = str(index.siblingAtColumn(RUN).data(WORDS))
         shown = option.fontMetrics.elidedText(text, Qt.TextElideMode.ElideRight, rect.width())
         painter.drawText(rect, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, shown)

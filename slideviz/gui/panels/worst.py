@@ -33,7 +33,7 @@ from slideviz.session.inspect import (
 from slideviz.session.locate import Around, axis_of, coordinates, nearest_boundary
 from slideviz.session.state import Session
 from slideviz.session.store import Store
-from slideviz.terms import COLOUR_BY
+from slideviz.terms import COLOR_BY
 
 
 class WorstPanel(Panel):
@@ -101,7 +101,7 @@ class WorstPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def take_theme(self, _scheme: ColorScheme) -> None:
-        """Write the facts of the marked cell again, in the colours of another theme."""
+        """Write the facts of the marked cell again, in the colors of another theme."""
         self._told = ()
         self._sync_mark(self.store.session)
 
@@ -130,7 +130,7 @@ class WorstPanel(Panel):
         return (
             session.frame,
             len(session.frames),
-            measure(session.view.colour_by),
+            measure(session.view.color_by),
             axis_of(session),
         )
 
@@ -140,9 +140,9 @@ class WorstPanel(Panel):
             return
         self._seen, self._last = self._key(session), time.monotonic()
         at = session.frames.index(session.frame)
-        what = measure(session.view.colour_by)
+        what = measure(session.view.color_by)
         worst = worst_cells(session.frames, at, what)
-        title = f"Quality: {COLOUR_BY[what].label} of the step that is shown"
+        title = f"Quality: {COLOR_BY[what].label} of the step that is shown"
         self.table.horizontalHeader().setToolTip(title)
         self.model.show(worst, axis_of(session))
 

@@ -33,7 +33,7 @@ def ready_numerics() -> None:
     """
     # Once, here: if two threads (the warm-up and a run) import Numba at the same time, one finds
     # it partly initialized.
-    import_module("slideviz.deformation.solver")
+    import_module("slideviz.solver.deform")
     hold_libraries_back()
     blas = ThreadpoolController().select(user_api="blas").lib_controllers
     numpys = [one for one in blas if "numpy.libs" in one.filepath]

@@ -11,10 +11,10 @@ import pyvista as pv
 from qtpy.QtCore import QObject, QTimer, Signal
 
 from slideviz.gui.responsiveness.threads import start_thread
-from slideviz.mesh.caching import compilation_watched
 from slideviz.scene.actors import VALUES
 from slideviz.scene.stage import Stage
 from slideviz.session import jit_warmup
+from slideviz.system.jit_cache import compilation_watched
 
 
 def prepare_drawing(view: Any, stage: Stage) -> None:

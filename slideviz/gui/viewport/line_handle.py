@@ -10,11 +10,11 @@ import pyvista as pv
 from qtpy.QtCore import QPoint
 from vtkmodules.vtkCommonCore import vtkObject
 
-from slideviz.color_scheme import SELECTED_COLOUR, ColorScheme
+from slideviz.color_scheme import SELECTED_COLOR, ColorScheme
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.mouse_handle import (
     EDGE_PX,
-    HANDLE_COLOUR,
+    HANDLE_COLOR,
     POINT_PX,
     REACH_PX,
     RIM_PX,
@@ -94,12 +94,12 @@ class Handle2D(MouseHandle[tuple[Section, Box]]):
         assert scheme is not None
         # VTK draws points as balls: to cover another, one must be higher by more than its radius.
         ball = RIM_PX * float((seen[1] - seen[0]).max()) / max(self.view.window_size)
-        self._draw(NAMES[0], points, ball, colour=scheme.text, size=RIM_PX)
-        self._draw(NAMES[1], points, 2.0 * ball, colour=HANDLE_COLOUR, size=POINT_PX)
-        self._draw(NAMES[2], held, 3.0 * ball, colour=SELECTED_COLOUR, size=POINT_PX)
+        self._draw(NAMES[0], points, ball, color=scheme.text, size=RIM_PX)
+        self._draw(NAMES[1], points, 2.0 * ball, color=HANDLE_COLOR, size=POINT_PX)
+        self._draw(NAMES[2], held, 3.0 * ball, color=SELECTED_COLOR, size=POINT_PX)
 
     def _draw(
-        self, name: str, points: FloatArray, above: float, *, colour: str, size: float
+        self, name: str, points: FloatArray, above: float, *, color: str, size: float
     ) -> None:
         actor = self.view.actors.get(name)
         if not len(points):
@@ -120,7 +120,7 @@ class Handle2D(MouseHandle[tuple[Section, Box]]):
                 pickable=False,
             )
         actor.mapper.dataset = shape
-        actor.prop.color = colour
+        actor.prop.color = color
         actor.visibility = True
 
     # Mouse -----------------------------------------------------------------------------

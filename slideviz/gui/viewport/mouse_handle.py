@@ -16,8 +16,8 @@ from slideviz.gui.viewport.canvas import View3D
 from slideviz.mesh.model import FloatArray
 from slideviz.sections.model import Section
 
-HANDLE_COLOUR = "#2f6fb5"
-"""Colour of a handle that the mouse is not over."""
+HANDLE_COLOR = "#2f6fb5"
+"""Color of a handle that the mouse is not over."""
 
 POINT_PX, RIM_PX = 11.0, 15.0
 """Diameters of a handle's point and of the rim around it, in pixels."""

@@ -11,10 +11,10 @@ from vtkmodules.vtkInteractionWidgets import (
     vtkImplicitPlaneWidget2,
 )
 
-from slideviz.color_scheme import SELECTED_COLOUR, ColorScheme
+from slideviz.color_scheme import SELECTED_COLOR, ColorScheme
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.mouse_handle import HANDLE_COLOUR
+from slideviz.gui.viewport.mouse_handle import HANDLE_COLOR
 from slideviz.sections.model import Section, Triple
 
 HANDLE_PX = 11.0
@@ -67,7 +67,7 @@ class PlaneHandle:
 
     def show(self, section: Section, bounds: Bounds, scheme: ColorScheme) -> None:
         """Show the handle of a section, its frame in a box; during a drag the plane stays."""
-        self._colour(scheme)
+        self._color(scheme)
         if bounds != self._bounds:
             self._bounds = bounds
             self.shape.PlaceWidget(list(bounds))
@@ -105,12 +105,12 @@ class PlaneHandle:
             self.report()
         self._dragging(dragging)
 
-    def _colour(self, scheme: ColorScheme) -> None:
-        strong, plain = (pv.Color(name).float_rgb for name in (SELECTED_COLOUR, scheme.text))
+    def _color(self, scheme: ColorScheme) -> None:
+        strong, plain = (pv.Color(name).float_rgb for name in (SELECTED_COLOR, scheme.text))
         shape = self.shape
         shape.SetForegroundColor(*plain)
         shape.SetEdgeColor(*plain)
-        shape.SetHandleColor(*pv.Color(HANDLE_COLOUR).float_rgb)
+        shape.SetHandleColor(*pv.Color(HANDLE_COLOR).float_rgb)
         shape.SetInteractionColor(*strong)
         shape.GetPlaneProperty().SetColor(*plain)
         shape.GetPlaneProperty().SetOpacity(0.06)

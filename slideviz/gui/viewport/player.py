@@ -293,11 +293,11 @@ def result_parts(session: Session) -> list[list[str]]:
     if frame is None:
         return []
     quality = frame.quality
-    colour = f" style='color:{alarm()}'" if quality.inverted else ""
+    color = f" style='color:{alarm()}'" if quality.inverted else ""
 
     def form(word: str) -> list[str]:
         return [
-            f"<span{colour}><b>{quality.inverted:,}</b> {word}</span>",
+            f"<span{color}><b>{quality.inverted:,}</b> {word}</span>",
             f"min <b>{quality.min:.4f}</b>",
             f"mean <b>{quality.mean:.4f}</b>",
         ]

@@ -11,11 +11,11 @@ from qtpy.QtCore import QPoint
 from vtkmodules.vtkCommonCore import vtkObject
 from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
 
-from slideviz.color_scheme import SELECTED_COLOUR, ColorScheme
+from slideviz.color_scheme import SELECTED_COLOR, ColorScheme
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.mouse_handle import (
     EDGE_PX,
-    HANDLE_COLOUR,
+    HANDLE_COLOR,
     POINT_PX,
     REACH_PX,
     RIM_PX,
@@ -54,7 +54,7 @@ class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
     def show(self, section: Section, patch: Patch, scheme: ColorScheme) -> None:
         """Show the handle of a section, its frame around the patch that is cut of the mesh."""
         self.section, self._patch = section, patch
-        self._drawn.colour(scheme, self._part is not None)
+        self._drawn.color(scheme, self._part is not None)
         self._drawn.draw_frame(frame_of(section, patch))
         self.put()
 
@@ -171,15 +171,15 @@ class HandleActors:
         for name in (FRAME, RIM, BALL):
             self.view.remove_actor(name, reset_camera=False, render=False)  # type: ignore[arg-type]
 
-    def colour(self, scheme: ColorScheme, held: bool) -> None:
-        """Set the colours from a color scheme; ``held``: the mouse is over the ball or drags it."""
+    def color(self, scheme: ColorScheme, held: bool) -> None:
+        """Set the colors from a color scheme; ``held``: the mouse is over the ball or drags it."""
         self._text = scheme.text
         self._actors[RIM].GetProperty().SetColor(*pv.Color(scheme.text).float_rgb)
         self.highlight(held)
 
     def highlight(self, held: bool) -> None:
-        """Colour the ball as selected if the mouse is over it or drags it."""
-        name = SELECTED_COLOUR if held else HANDLE_COLOUR
+        """Color the ball as selected if the mouse is over it or drags it."""
+        name = SELECTED_COLOR if held else HANDLE_COLOR
         self._actors[BALL].GetProperty().SetColor(*pv.Color(name).float_rgb)
 
     def draw_frame(self, lines: list[FloatArray]) -> None:

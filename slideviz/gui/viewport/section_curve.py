@@ -1,4 +1,4 @@
-"""The plot beside the view of a 2D mesh: the coloured quantity along a line or circle."""
+"""The plot beside the view of a 2D mesh: the colored quantity along a line or circle."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from slideviz.gui.widgets.build import in_column
 from slideviz.gui.widgets.labels import ElidedLabel
 from slideviz.gui.widgets.plot_canvas import PlotArea, ask_and_write_plot
 from slideviz.gui.widgets.plot_image import Draw
-from slideviz.plots.section_curve import Colours, CurveRow, draw_curves
-from slideviz.plots.section_rows import CurveRows, colours_of, facts_of, labels_of
+from slideviz.plots.section_curve import Colors, CurveRow, draw_curves
+from slideviz.plots.section_rows import CurveRows, colors_of, facts_of, labels_of
 from slideviz.plots.style import Style
 from slideviz.sections.model import Section
 from slideviz.session import changes
@@ -59,14 +59,14 @@ class CurveView(QWidget):
         in_column(self.title, self.facts, self.area, wide=[self.area], spacing=0, on=self)
         self._made = CurveRows()
         self.rows: tuple[CurveRow, ...] = ()
-        self._labels, self._colours = ("", ""), Colours()
+        self._labels, self._colors = ("", ""), Colors()
         self.set_scheme(scheme)
 
     def show_section(self, shown: Sequence[tuple[Session, Cuts]], section: Section) -> None:
         """Show the curves along a section, given each view's session and cuts, the first first."""
         session, cuts = shown[0]
         self.rows = self._made.of(shown, section)
-        self._labels, self._colours = labels_of(session, section), colours_of(session)
+        self._labels, self._colors = labels_of(session, section), colors_of(session)
         self.title.set_text(section.describe(2))
         facts = facts_of(session, cuts, section)
         self.facts.setText(facts)
@@ -79,7 +79,7 @@ class CurveView(QWidget):
 
     def drawing(self) -> Draw:
         """Return a function that draws the present curves into a figure."""
-        return partial(_draw, self.rows, self._labels, self._colours)
+        return partial(_draw, self.rows, self._labels, self._colors)
 
     def set_scheme(self, scheme: ColorScheme) -> None:
         """Draw in another color scheme."""
@@ -101,9 +101,9 @@ class CurveView(QWidget):
 def _draw(
     rows: Sequence[CurveRow],
     labels: tuple[str, str],
-    colours: Colours,
+    colors: Colors,
     figure: Figure,
     style: Style,
 ) -> None:
     if rows:
-        draw_curves(figure.add_subplot(), rows, labels, style, colours)
+        draw_curves(figure.add_subplot(), rows, labels, style, colors)

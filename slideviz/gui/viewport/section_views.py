@@ -41,7 +41,7 @@ class SectionViews(QSplitter):
     flats
         The flat views; None while no section is laid flat.
     scheme : ColorScheme
-        The colours of handles and flat views.
+        The colors of handles and flat views.
     """
 
     def __init__(self, viewing: Viewing, multi_samples: int, parent: QWidget | None = None) -> None:

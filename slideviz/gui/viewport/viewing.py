@@ -27,7 +27,7 @@ from slideviz.session.store import Store
 
 
 class Viewing(QWidget):
-    """The 3D views: one, or two side by side with linked cameras and the same range of colours.
+    """The 3D views: one, or two side by side with linked cameras and the same range of colors.
 
     Attributes
     ----------

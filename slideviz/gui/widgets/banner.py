@@ -1,6 +1,6 @@
 """The banner above the view: a message or a question that stays until it is closed.
 
-Its colours are in the style sheet of `slideviz.gui.widgets.theme` (``QFrame#banner``).
+Its colors are in the style sheet of `slideviz.gui.widgets.theme` (``QFrame#banner``).
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ class Banner(QFrame):
     ) -> None:
         """Show a message, with ``full`` behind “Details”, and a button for each of ``answers``.
 
-        ``calm``: in the colours of a note, otherwise of an alarm.
+        ``calm``: in the colors of a note, otherwise of an alarm.
         """
         self._offer(answers)
         set_style(self, "calm", calm)

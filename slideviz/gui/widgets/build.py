@@ -285,7 +285,7 @@ def dialog_buttons(dialog: QDialog, *kinds: QDialogButtonBox.StandardButton) -> 
 
 
 def hint_label(text: str = "", align: Qt.AlignmentFlag | None = None) -> QLabel:
-    """Return a label for a hint: word-wrapped, in the theme's soft colour."""
+    """Return a label for a hint: word-wrapped, in the theme's soft color."""
     label = QLabel(text)
     label.setWordWrap(True)
     label.setProperty("hint", True)

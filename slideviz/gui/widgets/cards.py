@@ -17,15 +17,15 @@ from slideviz.terms import ROLES
 
 SIZE = (152, 96)
 """Width and height of a picture in pixels, at a device pixel ratio of 1."""
-BODY, WALL, REPEAT = (ROLES[role].colour for role in ("moving", "sliding", "periodic"))
-"""Colours of moving, sliding and periodic boundaries."""
+BODY, WALL, REPEAT = (ROLES[role].color for role in ("moving", "sliding", "periodic"))
+"""Colors of moving, sliding and periodic boundaries."""
 
 Map = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 """A map from coordinates (u, v) in the unit square, (n,) each, to pixels (x, y) of a picture."""
 
 
 def card(name: str, line: str) -> QPixmap:
-    """Return the picture of a sample by its name, with mesh lines in the colour ``line``."""
+    """Return the picture of a sample by its name, with mesh lines in the color ``line``."""
     svg = (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {SIZE[0]} {SIZE[1]}">'
         f"{_drawing(name).replace('{line}', line)}</svg>"
@@ -67,8 +67,8 @@ def _grid(to: Map, columns: int, rows: int, walls: bool = True) -> str:
     zero, one = np.zeros(33), np.ones(33)
     edges = [(along, zero, REPEAT), (along, one, REPEAT), (zero, along, WALL), (one, along, WALL)]
     drawn = [
-        _path(*to(u, v), f'fill="none" stroke="{colour}" stroke-width="1.8"')
-        for u, v, colour in edges
+        _path(*to(u, v), f'fill="none" stroke="{color}" stroke-width="1.8"')
+        for u, v, color in edges
     ]
     return _lines(to, columns, rows) + "".join(drawn if walls else ())
 

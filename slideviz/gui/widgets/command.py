@@ -195,8 +195,8 @@ def boxed(now: Now) -> bool:
 
 
 def valued(now: Now) -> bool:
-    """Return whether cells are coloured by a value."""
-    return opened(now) and now.session.view.colour_by != "role"
+    """Return whether cells are colored by a value."""
+    return opened(now) and now.session.view.color_by != "role"
 
 
 def stepped(now: Now) -> bool:

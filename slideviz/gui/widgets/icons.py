@@ -1,4 +1,4 @@
-"""The icons, drawn here as SVG strokes, in the colour of the text."""
+"""The icons, drawn here as SVG strokes, in the color of the text."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from qtpy.QtGui import QAction, QIcon, QPainter, QPixmap
 from qtpy.QtSvg import QSvgRenderer
 from qtpy.QtWidgets import QAbstractButton, QWidget
 
-from slideviz.gui.widgets.theme import icon_colour
+from slideviz.gui.widgets.theme import icon_color
 from slideviz.terms import ROLES, Role
 
 STROKES = {
@@ -32,7 +32,7 @@ STROKES = {
     "previous": '<path d="M15 6l-6 6 6 6"/>',
     "next": '<path d="M9 6l6 6-6 6"/>',
     "fit": '<path d="M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5"/><circle cx="12" cy="12" r="3"/>',
-    "colours": '<rect x="4" y="3" width="7" height="18" rx="1"/><path d="M4 9h7M4 15h7"/>'
+    "colors": '<rect x="4" y="3" width="7" height="18" rx="1"/><path d="M4 9h7M4 15h7"/>'
     '<path d="M17.5 4v16M14.5 7l3-3 3 3M14.5 17l3 3 3-3"/>',
     "edges": '<path d="M4 4h16v16H4zM4 9.3h16M4 14.6h16M9.3 4v16M14.6 4v16"/>',
     "undeformed": '<path d="M5 16c2-9 8-11 14-11" stroke-dasharray="2.5 2.5"/>'
@@ -59,7 +59,7 @@ STROKES = {
     "log": '<path d="M4 5h16v14H4z"/><path d="M7 9l3 3-3 3M12 15h5"/>',
     "theme": '<circle cx="12" cy="12" r="8"/><path d="M12 4a8 8 0 0 1 0 16z" fill="{c}"/>',
 }
-"""SVG elements of each icon in a box of 24 by 24; ``{c}`` is the colour."""
+"""SVG elements of each icon in a box of 24 by 24; ``{c}`` is the color."""
 
 _ROLE_STROKES = {
     "moving": '<path d="M4 12h14M12.5 6l6 6-6 6"/>',
@@ -98,9 +98,9 @@ def _faded(pixmap: QPixmap) -> QPixmap:
     return out
 
 
-def icon(name: str, colour: str = "") -> QIcon:
-    """Return the icon of a name in `STROKES`, in a colour; by default in the theme's."""
-    return _drawn(name, colour or icon_colour())
+def icon(name: str, color: str = "") -> QIcon:
+    """Return the icon of a name in `STROKES`, in a color; by default in the theme's."""
+    return _drawn(name, color or icon_color())
 
 
 def set_icon(button: QAbstractButton | QAction, name: str) -> None:
@@ -110,7 +110,7 @@ def set_icon(button: QAbstractButton | QAction, name: str) -> None:
 
 
 def redraw_icons(window: QWidget) -> None:
-    """Draw the icons set by `set_icon` in a window again, in the colour of the present theme."""
+    """Draw the icons set by `set_icon` in a window again, in the color of the present theme."""
     drawn: list[QAbstractButton | QAction] = [
         *window.findChildren(QAbstractButton),
         *window.findChildren(QAction),
@@ -122,8 +122,8 @@ def redraw_icons(window: QWidget) -> None:
 
 
 @lru_cache(maxsize=256)
-def _drawn(name: str, colour: str) -> QIcon:
-    svg = _SVG.format(c=colour, w=1.8, body=STROKES[name].format(c=colour))
+def _drawn(name: str, color: str) -> QIcon:
+    svg = _SVG.format(c=color, w=1.8, body=STROKES[name].format(c=color))
     found = QIcon()
     for size in (20, 40):
         pixmap = _pixmap(svg, size)
@@ -134,13 +134,13 @@ def _drawn(name: str, colour: str) -> QIcon:
 
 @lru_cache(maxsize=16)
 def role_icon(role: Role) -> QIcon:
-    """Return the icon of a role: a white sign, different for each role, on the role's colour."""
+    """Return the icon of a role: a white sign, different for each role, on the role's color."""
     body = _ROLE_STROKES[role].format(c="#ffffff")
     sign = _SVG.format(c="#ffffff", w=2.4, body=body)
     inner = sign[sign.index("<g") : -len("</svg>")]
     svg = (
         '<svg xmlns="http://www.w3.org/2000/svg" viewBox="-4 -4 32 32"><rect x="-4" y="-4" '
-        f'width="32" height="32" rx="6" fill="{ROLES[role].colour}"/>{inner}</svg>'
+        f'width="32" height="32" rx="6" fill="{ROLES[role].color}"/>{inner}</svg>'
     )
     return QIcon(_pixmap(svg, 40))
 

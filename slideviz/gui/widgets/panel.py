@@ -49,7 +49,7 @@ class Panel(QWidget):
         return -1 if layout is None else layout.totalMinimumHeightForWidth(width)
 
     def take_theme(self, scheme: ColorScheme) -> None:
-        """Draw plots again in another theme's colours; subclasses: all else without a palette."""
+        """Draw plots again in another theme's colors; subclasses: all else without a palette."""
         for canvas in self.findChildren(PlotCanvas):
             canvas.set_scheme(scheme)
 

@@ -23,9 +23,9 @@ from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import hint_label
 from slideviz.gui.widgets.plot_image import Draw, Picture, PlotFormat, draw_in_thread
 from slideviz.gui.widgets.services import folder_of, main_window
-from slideviz.mesh.io.atomic import atomic_write
 from slideviz.plots.draw import PRINT, Style
 from slideviz.plots.written import figure_bytes
+from slideviz.system.atomic import atomic_write
 
 FIGURE_INCHES = (4.2, 3.1)
 """Width and height of a saved figure, in inches."""

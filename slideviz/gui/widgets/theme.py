@@ -1,4 +1,4 @@
-"""The light and the dark theme: colours of widgets, icons and texts, in Qt's Fusion style."""
+"""The light and the dark theme: colors of widgets, icons and texts, in Qt's Fusion style."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ _PALETTE = {
     "disabled": ("#7f8994", "#7d8894"),
     "Light": ("", "#4d5763"),
 }
-"""Colours of Qt's palette, by role, in the light and the dark theme; empty: Qt's own.
+"""Colors of Qt's palette, by role, in the light and the dark theme; empty: Qt's own.
 
-``disabled`` is the text colour of all disabled widgets."""
+``disabled`` is the text color of all disabled widgets."""
 
 _STYLE = {
     "title": ("#e4e9ee", "#30363e"),
@@ -50,7 +50,7 @@ _STYLE = {
     "noted": ("#8fb3dc", "#4f76a3"),
     "frame": ("#87919c", "#818c98"),
 }
-"""The other colours of the style sheet `_SHEET`, in the light and the dark theme.
+"""The other colors of the style sheet `_SHEET`, in the light and the dark theme.
 
 ``bad`` is for invalid fields, warning labels and the alarm banner's border; ``banner`` is that
 banner's background; ``note`` and ``noted`` are background and border of the calm banner; ``soft``
@@ -99,7 +99,7 @@ QPushButton[recent="true"]:focus {{ border: 1px solid {accent}; }}
 QFrame#banner {{ background: {banner}; border: 1px solid {bad}; border-radius: 4px; }}
 QFrame#banner[calm="true"] {{ background: {note}; border: 1px solid {noted}; }}
 """
-"""The style sheet, with the keys of `_PALETTE` and `_STYLE` in place of colours."""
+"""The style sheet, with the keys of `_PALETTE` and `_STYLE` in place of colors."""
 
 FRAMED = (
     "QCheckBox",
@@ -110,10 +110,10 @@ FRAMED = (
     "QTableView",
     "QListView",
 )
-"""Classes of widgets whose frame or box is drawn in the colour ``frame``."""
+"""Classes of widgets whose frame or box is drawn in the color ``frame``."""
 
 _OUTLINE = 140
-"""Percentage for `QColor.lighter`, as Fusion draws outlines in the window colour, darkened."""
+"""Percentage for `QColor.lighter`, as Fusion draws outlines in the window color, darkened."""
 
 
 def resolved(theme: str) -> str:
@@ -134,26 +134,26 @@ def apply(theme: str) -> ColorScheme:
     """Set style, palette and style sheet of the application; return the view's color scheme."""
     name = resolved(theme)
     dark = name == "dark"
-    colours = {role: pair[dark] for role, pair in (_PALETTE | _STYLE).items()}
+    colors = {role: pair[dark] for role, pair in (_PALETTE | _STYLE).items()}
     palette = QPalette()
     for role in _PALETTE:
-        if role != "disabled" and colours[role]:
-            palette.setColor(getattr(QPalette.ColorRole, role), QColor(colours[role]))
+        if role != "disabled" and colors[role]:
+            palette.setColor(getattr(QPalette.ColorRole, role), QColor(colors[role]))
     for role in ("WindowText", "Text", "ButtonText"):
         group = QPalette.ColorGroup.Disabled
-        palette.setColor(group, getattr(QPalette.ColorRole, role), QColor(colours["disabled"]))
+        palette.setColor(group, getattr(QPalette.ColorRole, role), QColor(colors["disabled"]))
     app = _app()
     app.setStyle("Fusion")
     app.setPalette(palette)
     # Tooltips have a palette of their own.
     QToolTip.setPalette(palette)
     framed = QPalette(palette)
-    outline = QColor(colours["frame"]).lighter(_OUTLINE)
+    outline = QColor(colors["frame"]).lighter(_OUTLINE)
     framed.setColor(QPalette.ColorRole.Window, outline)
     for kind in FRAMED:
         app.setPalette(framed, kind)  # type: ignore[arg-type]  # a str is taken, too
     signs = Path(__file__).with_name("dock_signs").as_posix()
-    app.setStyleSheet(_SHEET.format(**colours, name=name, signs=signs))
+    app.setStyleSheet(_SHEET.format(**colors, name=name, signs=signs))
     return DARK if dark else LIGHT
 
 
@@ -162,11 +162,11 @@ def is_dark() -> bool:
     return QApplication.palette().color(QPalette.ColorRole.Window).lightness() < 128
 
 
-def icon_colour() -> str:
-    """Return the colour of icons in the present theme."""
+def icon_color() -> str:
+    """Return the color of icons in the present theme."""
     return "#dfe5ec" if is_dark() else "#3b4652"
 
 
 def alarm() -> str:
-    """Return the colour of texts about inverted cells in the present theme."""
+    """Return the color of texts about inverted cells in the present theme."""
     return _STYLE["bad"][is_dark()]

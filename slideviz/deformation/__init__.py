@@ -1,1 +1,0 @@
-"""The deformation: from a case and a mesh to arrays, steps, and checks of the result."""

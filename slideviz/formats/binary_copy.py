@@ -1,0 +1,290 @@
+"""The binary form of an SU2 text mesh: an SU2 binary mesh, written piece by piece.
+
+The place of a number in a text is known only after reading all before it; in a binary it is
+computed. So parts of a text mesh are read from its binary form. Only the boundary is ever in memory
+as a whole, and every mistake of the text is found, as by its reader.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.formats.su2.lines import Piece, number_of
+from slideviz.formats.su2.numbers import (
+    fill_cells,
+    fill_points,
+    parse_cells,
+    require_all_coordinates,
+)
+from slideviz.formats.su2.scan import Progress
+from slideviz.formats.su2.text import Text
+from slideviz.formats.su2b.layout import NAME_BYTES
+from slideviz.formats.su2b.write import LARGEST_4, SORTED, marker_table, padded, rows_of
+from slideviz.mesh.check import LARGEST, too_large, within
+from slideviz.mesh.elements import SIZES
+from slideviz.mesh.model import Cells, IntArray
+from slideviz.system.cleanup import open_temporary
+from slideviz.system.in_order import in_order
+from slideviz.system.ranks import ALONE, Alone
+
+HEAD = 8
+"""Bytes before the first zone."""
+PIECES = 16
+"""Pieces of a text, each about a megabyte, in one task."""
+_Task = tuple[str, int, int]
+"""``cells`` or ``points``, index of the first piece, and of the one after the last."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The layout of the binary form of a text mesh: at which byte each part begins.
+
+    `slideviz.formats.su2b.layout` describes the format.
+
+    Attributes
+    ----------
+    text : Text
+        The text mesh.
+    width : int
+        Bytes of a count or an index, 4 or 8.
+    named : bool
+        Whether the file gets the names of the markers; else numbers, which always fit.
+    before : (p + 1, t) int64
+        Number of elements of each type before each of the p pieces, and in the last row of all.
+        Types are in the order of ``SORTED``.
+    begin : int
+        First byte of its zone.
+    number : int
+        Number of its zone.
+    """
+
+    text: Text
+    width: int
+    named: bool
+    before: IntArray
+    begin: int = HEAD
+    number: int = 1
+
+    @property
+    def conn(self) -> np.dtype:
+        """Return the data type of counts and indices."""
+        return np.dtype(f"<u{self.width}")
+
+    @property
+    def point(self) -> np.dtype:
+        """Return the data type of a point: its coordinates and its index."""
+        return np.dtype([("x", "<f8", (self.text.zone.dim,)), ("i", self.conn)])
+
+    @property
+    def offsets(self) -> int:
+        """Return the first byte of the offsets of the elements."""
+        return self.begin + 8 + self.width
+
+    @property
+    def entries(self) -> int:
+        """Return the first byte of the list of the elements (type, nodes, index of each)."""
+        return self.offsets + self.width * (self.text.n_cells + 1)
+
+    @property
+    def length(self) -> int:
+        """Return how many numbers the list of the elements has."""
+        return int(self.before[-1] @ _WIDTHS)
+
+    @property
+    def points(self) -> int:
+        """Return the first byte of the points."""
+        return self.entries + self.width * (self.length + 1)
+
+    @property
+    def markers(self) -> int:
+        """Return the first byte of the markers."""
+        return self.points + self.text.n_points * self.point.itemsize
+
+    @property
+    def size(self) -> int:
+        """Return the end of the zone, which is the size of the file if it is the last."""
+        sizes = (
+            NAME_BYTES + self.width * (2 + 2 * piece_rows + nodes)
+            for piece_rows, nodes in (
+                (number_of(m.rows), sum(piece.nodes for piece in m.rows))
+                for m in self.text.zone.markers
+            )
+        )
+        return self.markers + 4 + sum(sizes)
+
+    def names(self) -> list[bytes]:
+        """Return the names of the markers as bytes of the file, filled up to ``NAME_BYTES``."""
+        markers = self.text.zone.markers
+        return [padded((m.name if self.named else str(k)).encode()) for k, m in enumerate(markers)]
+
+
+_WIDTHS = SIZES[list(SORTED)] + 2
+"""How many numbers an element has in the list, by type in the order of ``SORTED``."""
+
+
+def planned(text: Text, *, is_result: bool, begin: int = HEAD, number: int = 1) -> Plan:
+    """Return the layout of the binary form of a text mesh.
+
+    Parameters
+    ----------
+    text : Text
+        The text mesh.
+    is_result : bool
+        Whether the binary is made for users, as by `slideviz.convert`: with the markers' names and
+        8 bytes for each index. If not, markers have numbers, and indices 4 bytes where they fit.
+    begin, number : int
+        First byte and number of its zone.
+    """
+    pieces = text.zone.elements
+    before = np.zeros((len(pieces) + 1, len(SORTED)), np.int64)
+    np.cumsum(_counted(text), axis=0, out=before[1:])
+    length = int(before[-1] @ _WIDTHS)
+    short = not is_result and max(length, text.n_points) <= LARGEST_4
+    return Plan(text, 4 if short else 8, is_result, before, begin, number)
+
+
+def _counted(text: Text) -> IntArray:
+    """Return the number (p, t) of elements of each type (as ``SORTED``) in each piece."""
+    from slideviz.formats.su2.loops import count_types
+
+    pieces, rows = text.zone.elements, text.n_cells
+    out = np.zeros((len(pieces), len(SORTED)), np.int64)
+    # The types with fewest and most nodes: if all elements are one of these, the total tells it.
+    for vtk in (5, 9) if text.zone.dim == 2 else (10, 12):
+        if sum(piece.nodes for piece in pieces) == rows * SIZES[vtk]:
+            out[:, SORTED.index(vtk)] = [piece.rows for piece in pieces]
+            return out
+
+    def count(piece: Piece) -> IntArray:
+        counts = np.zeros(257, np.int64)
+        count_types(np.frombuffer(text.lines.text(piece), np.uint8), counts)
+        return counts[list(SORTED)]
+
+    out[:] = list(in_order(count, pieces))
+    return out
+
+
+def fill(plan: Plan, path: Path, progress: Progress, ranks: Alone = ALONE) -> bytes:
+    """Write the binary form of a text into an existing file of its size, but for the file's head.
+
+    Returns the head (``HEAD`` bytes) for a file with only this zone; the caller writes it.
+
+    Raises
+    ------
+    MeshError
+        The text has a mistake; the message has its line.
+    """
+    text, conn = plan.text, plan.conn
+    zone, lines = text.zone, text.lines
+    tasks: list[_Task] = [
+        (kind, first, min(first + PIECES, len(pieces)))
+        for kind, pieces in (("cells", zone.elements), ("points", zone.points))
+        for first in range(0, len(pieces), PIECES)
+    ]
+    found: list[IntArray] = []
+    with ranks.sharing(_filling, plan, path, ranks.size > 1) as do:
+        for k, (task, lost) in enumerate(zip(tasks, do(tasks), strict=True)):
+            if task[0] == "points":
+                found.append(lost)
+            progress((k + 1) / len(tasks))
+    require_all_coordinates(lines, zone.points, zone.dim, np.concatenate(found))
+    markers = [
+        name + marker_table(parse_cells(lines, m.rows, zone.dim - 1, text.n_points, _silent), conn)
+        for name, m in zip(plan.names(), zone.markers, strict=True)
+    ]
+    lines.raw.require_same()
+    with open_temporary(path) as file:
+        for at, content in (
+            (plan.begin, np.array([plan.number, zone.dim], "<i4").tobytes()),
+            (plan.begin + 8, np.array(text.n_cells, conn).tobytes()),
+            (plan.entries - plan.width, np.array(plan.length, conn).tobytes()),
+            (plan.points - plan.width, np.array(text.n_points, conn).tobytes()),
+            (plan.markers, np.array(len(markers), "<i4").tobytes() + b"".join(markers)),
+        ):
+            file.seek(at)
+            file.write(content)
+    return np.array([plan.width, 1], "<i4").tobytes()
+
+
+def _silent(_: float) -> None:
+    """Ignore the progress."""
+
+
+@contextmanager
+def _filling(plan: Plan, path: Path, synced: bool) -> Iterator[Callable[[_Task], IntArray]]:
+    """Context with a function that writes the pieces of a task and returns their results.
+
+    These are the results of `_put_cells` or `_put_points`, (k, ...). ``synced``: the bytes are on
+    the disk when the function returns.
+    """
+    out = os.open(path, os.O_WRONLY | os.O_NOFOLLOW)
+
+    def work(task: _Task) -> IntArray:
+        kind, first, end = task
+        put = _put_cells if kind == "cells" else _put_points
+        found = list(in_order(partial(put, plan, out), range(first, end)))
+        if synced:
+            os.fsync(out)
+        return np.array(found)
+
+    try:
+        yield work
+    finally:
+        os.close(out)
+
+
+def _put_cells(plan: Plan, out: int, k: int) -> int:
+    """Write the elements of piece ``k``, sorted by type, to file descriptor ``out``; return 0."""
+    text = plan.text
+    piece = text.zone.elements[k]
+    types, nodes = np.empty(piece.rows, np.uint8), np.empty(piece.nodes, np.int64)
+    fill_cells(text.lines, piece, types, nodes, dim=text.zone.dim, n_points=text.n_points)
+    cells = Cells.from_types(types, nodes)
+    totals = plan.before[-1]
+    for column, (vtk, width) in enumerate(zip(SORTED, _WIDTHS.tolist(), strict=True)):
+        mine = np.flatnonzero(types == vtk)
+        if not len(mine):
+            continue
+        before = int(plan.before[k, column])
+        row = int(totals[:column].sum()) + before
+        start = int(totals[:column] @ _WIDTHS[:column]) + before * width
+        some = cells if len(mine) == len(types) else cells.take(mine)
+        table = rows_of(some.types, some.connectivity, piece.row + mine)
+        offsets = start + width * np.arange(len(mine))
+        _put(out, plan.offsets + row * plan.width, offsets.astype(plan.conn))
+        _put(out, plan.entries + start * plan.width, table.astype(plan.conn))
+    return 0
+
+
+def _put_points(plan: Plan, out: int, k: int) -> IntArray:
+    """Write the points of piece ``k`` to the file descriptor ``out``; return as `fill_points`.
+
+    Raises MeshError if a coordinate is too large.
+    """
+    text = plan.text
+    piece = text.zone.points[k]
+    points = np.empty((piece.rows, text.zone.dim))
+    found = fill_points(text.lines, piece, points)
+    if not within(points, LARGEST):
+        at = int(np.argmax((np.abs(points) > LARGEST).any(axis=1)))
+        raise too_large(text.lines.name, piece.row + at, points[at])
+    block = np.empty(piece.rows, plan.point)
+    block["x"], block["i"] = points, np.arange(piece.row, piece.row + piece.rows)
+    _put(out, plan.points + piece.row * plan.point.itemsize, block)
+    return found
+
+
+def _put(out: int, at: int, content: NDArray) -> None:
+    """Write the bytes of an array to the file descriptor ``out``, from byte ``at`` on."""
+    left = content.view(np.uint8).data
+    while left:
+        written = os.pwrite(out, left, at)
+        at, left = at + written, left[written:]

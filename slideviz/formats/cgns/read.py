@@ -1,0 +1,227 @@
+"""Reading CGNS meshes: the zones of a base as one mesh, with its boundaries.
+
+Read with h5py: VTK's reader returns neither one-to-one interfaces nor where each coordinate is in
+the file, which writing needs; and meshes need no VTK elsewhere. The standard is the SIDS (CGNS 4),
+mapped onto HDF5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.errors import path_error, printable
+from slideviz.formats.cgns.join import Interface, Joined, join
+from slideviz.formats.cgns.tree import Node, cgns_file
+from slideviz.formats.cgns.zone import CgnsZone, conditions, facets_of, read_zone, region_of
+from slideviz.formats.meshio.bridge import flattened, require_own
+from slideviz.formats.meshio.markers import in_node_sets
+from slideviz.mesh.cached_boundary import outer_facets, smooth_parts
+from slideviz.mesh.check import check_mesh
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
+from slideviz.mesh.unique_rows import row_groups
+
+
+@dataclass(frozen=True, eq=False)
+class CgnsForm(Origin):
+    """Where the coordinates of a mesh are in the CGNS file it was read from.
+
+    Attributes
+    ----------
+    datasets : tuple of tuple of str
+        For each zone the paths of the datasets of its coordinates.
+    numbers : tuple of (n_z,) int64
+        For each zone the index of each of its vertices among the points of the mesh.
+    points : (n, d) float64
+        The points as read.
+    """
+
+    ending = ".cgns"
+    datasets: tuple[tuple[str, ...], ...]
+    numbers: tuple[IntArray, ...]
+    points: FloatArray
+
+
+def read_cgns(path: Path) -> Mesh:
+    """Return the mesh of a CGNS file based on HDF5: all zones of its base.
+
+    Boundaries are the families of boundary conditions, named by the condition where it has no
+    family; for a zone without conditions, its sections of boundary elements; if there are none of
+    these at all, the outer surface divided at its edges. Open interfaces are boundaries with their
+    names, those of the same period together.
+
+    Raises
+    ------
+    MeshError
+        It cannot be read, or has what slideviz cannot use: the node, the rule and the remedy.
+    """
+    with cgns_file(path) as root:
+        require_own(path)
+        base = _base(root)
+        dim, physical = base.whole(2).tolist()
+        if dim not in (2, 3) or not dim <= physical <= 3:
+            raise base.fault(
+                f"has cells of dimension {dim} and {physical} coordinates; needed are 2 or 3, and "
+                "as many coordinates or more: export the volume mesh"
+            )
+        zones = [read_zone(node, dim, physical) for node in base.children("Zone_t")]
+        joined = join(zones)
+        return _mesh(path, base, zones, joined)
+
+
+def _base(root: Node) -> Node:
+    """Return the base that has zones; raise MeshError if none or several have."""
+    bases = root.children("CGNSBase_t")
+    full = [base for base in bases if base.children("Zone_t")]
+    if len(full) == 1:
+        return full[0]
+    if full:
+        raise path_error(
+            root.file,
+            f"has {len(full)} bases ({', '.join(base.name for base in full)}), each a mesh of its "
+            "own; export one base to a file",
+        )
+    raise path_error(
+        root.file, "has no zones (CGNSBase_t, Zone_t in it), so there is no mesh; export it again"
+    )
+
+
+def _mesh(path: Path, base: Node, zones: Sequence[CgnsZone], joined: Joined) -> Mesh:
+    """Return the mesh of joined zones, with its boundaries; raise MeshError if it is unusable."""
+    cells = _renumbered([zone.cells for zone in zones], joined.numbers)
+    dim = zones[0].dim
+    points = (
+        joined.points if joined.points.shape[1] == dim else flattened(path, joined.points, cells)
+    )
+    form = CgnsForm(
+        tuple(zone.datasets[:dim] for zone in zones), joined.numbers, frozen_array(points, float)
+    )
+    mesh = Mesh(form.points, cells, name=printable(path.name), source=path.resolve(), origin=form)
+    check_mesh(mesh)
+    markers, remarks = _markers(mesh, base, zones, joined)
+    mesh = replace(mesh, markers=markers, remarks=remarks)
+    check_mesh(mesh)
+    return mesh
+
+
+def _renumbered(parts: Sequence[Cells], numbers: Sequence[IntArray]) -> Cells:
+    """Return the cells of all zones together, with the mesh's node numbers.
+
+    ``numbers`` are those of `Joined`.
+    """
+    flats = [number[part.connectivity] for part, number in zip(parts, numbers, strict=True)]
+    return Cells.from_types(np.concatenate([part.types for part in parts]), np.concatenate(flats))
+
+
+def _markers(
+    mesh: Mesh, base: Node, zones: Sequence[CgnsZone], joined: Joined
+) -> tuple[tuple[Marker, ...], tuple[str, ...]]:
+    """Return the boundaries, and remarks (sentences) on those that are empty or not joined."""
+    groups: dict[str, list[Cells]] = {}
+    remarks: list[str] = []
+    inner: Cells | None = None
+    for zone, number in zip(zones, joined.numbers, strict=True):
+        given = list(conditions(zone))
+        for node, facets in _of_conditions(zone, given):
+            if not len(facets):
+                remarks.append(f"{node.path} covers no face of its zone and is left out.")
+                continue
+            groups.setdefault(_family(base, node), []).append(_renumbered([facets], [number]))
+        if given or zone.sides is None:
+            continue
+        inner = outer_facets(mesh) if inner is None else inner
+        for index, section in enumerate(zone.sections):
+            facets = _renumbered([zone.sides.where(zone.sides.section == index).cells], [number])
+            facets = facets.take(among(facets, inner))
+            if len(facets):
+                groups.setdefault(section.name, []).append(facets)
+    _add_open(groups, remarks, zones, joined)
+    if len(zones) > 1 and joined.parts.max() > 0:
+        parts = [
+            " and ".join(zones[k].node.name for k in np.flatnonzero(joined.parts == part).tolist())
+            for part in range(joined.parts.max() + 1)
+        ]
+        remarks.append(
+            f"The zones are not all joined: {'; '.join(parts)}. Where they touch, nothing keeps "
+            "them together; export the mesh with its one-to-one interfaces if they should be."
+        )
+    if not groups:
+        return smooth_parts(mesh, outer_facets(mesh)), tuple(remarks)
+    markers = [Marker(name, _together(parts)) for name, parts in groups.items()]
+    return tuple(markers), tuple(remarks)
+
+
+def _of_conditions(zone: CgnsZone, nodes: Sequence[Node]) -> list[tuple[Node, Cells]]:
+    """Return the facets of each boundary condition of a zone.
+
+    A facet of several conditions that are given by vertices goes to the one with fewest.
+    """
+    regions = {node: region_of(zone, node) for node in nodes}
+    by_nodes = {node: at for node, at in regions.items() if not isinstance(at, Cells)}
+    found = in_node_sets(len(zone.points), zone.outer, by_nodes) if by_nodes else {}
+    return [
+        (node, at if isinstance(at, Cells) else Cells.from_blocks(found[node]))
+        for node, at in regions.items()
+    ]
+
+
+def _family(base: Node, node: Node) -> str:
+    """Return the name of the boundary that a condition is a part of."""
+    name = node.word("FamilyName_t", "", "FamilyName").removeprefix(f"{base.path}/")
+    return name or node.name
+
+
+def _add_open(
+    groups: dict[str, list[Cells]], remarks: list[str], zones: Sequence[CgnsZone], joined: Joined
+) -> None:
+    """Add the facets of open interfaces that are in no group yet, and remarks on these."""
+    known = _together([part for parts in groups.values() for part in parts])
+    names: dict[object, str] = {}
+    taken = list(groups)
+    for one in joined.open:
+        facets = _renumbered([facets_of(zones[one.zone], one.node)], [joined.numbers[one.zone]])
+        facets = facets.take(~among(facets, known))
+        key = one.period or (one.node.name,)
+        if len(facets):
+            names.setdefault(key, _free_name(one, [*taken, *names.values()]))
+            groups.setdefault(names[key], []).append(facets)
+        if one.why:
+            where = f" {names[key]!r}" if len(facets) else ", as the file has it"
+            remarks.append(
+                f"{one.node.path} is not joined: {one.why}. Its faces are a boundary{where}."
+            )
+
+
+def _free_name(one: Interface, taken: Sequence[str]) -> str:
+    """Return the name of an interface, with a number where another boundary has it."""
+    name, number = one.node.name, 1
+    while name in taken:
+        number += 1
+        name = f"{one.node.name}_{number}"
+    return name
+
+
+def _together(parts: Sequence[Cells]) -> Cells:
+    """Return the cells of all parts as one."""
+    if not parts:
+        return Cells.from_blocks([])
+    return Cells.from_types(
+        np.concatenate([part.types for part in parts]),
+        np.concatenate([part.connectivity for part in parts]),
+    )
+
+
+def among(facets: Cells, others: Cells) -> NDArray[np.bool_]:
+    """Return a mask (m,) of the facets that have the same nodes as any of the others."""
+    tables = []
+    for cells in (facets, others):
+        table = np.zeros((len(cells), 4), np.int64)
+        for ids, nodes in cells.by_type.values():
+            table[ids, : nodes.shape[1]] = np.sort(nodes, axis=1) + 1
+        tables.append(table)
+    groups = row_groups(np.concatenate(tables))
+    return np.isin(groups[: len(facets)], groups[len(facets) :])

@@ -1,0 +1,201 @@
+"""The tree of nodes of a CGNS file, as the manual "CGNS/HDF5" maps it onto HDF5.
+
+A node is a group with the attributes ``name``, ``label`` (its kind, such as ``Zone_t``) and
+``type``; its value is the dataset ``" data"`` in it. Axes are reversed: the first index in the
+standard, in Fortran's order, is the last axis of the dataset. A node of type ``LK`` is a link to
+another node, which is at ``" link"`` in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.errors import MeshError, path_error, printable
+from slideviz.mesh.model import IntArray
+
+if TYPE_CHECKING:
+    import h5py
+
+_ADF = b"ADF Database"
+"""In the first ``_HEAD_BYTES`` of a CGNS file of the old kind."""
+_HEAD_BYTES = 32
+DATA = " data"
+"""Name of the dataset with the value of a node."""
+_LINK = " link"
+"""Name of the HDF5 link in a node that is a link."""
+
+
+@contextmanager
+def cgns_file(path: Path) -> Iterator[Node]:
+    """Context with the root node of an open CGNS file.
+
+    Raises
+    ------
+    MeshError
+        It is no HDF5 file, or h5py raises any other error in the block.
+    """
+    import h5py
+
+    with path.open("rb") as file:
+        head = file.read(_HEAD_BYTES)
+    if _ADF in head:
+        raise path_error(
+            path,
+            "is a CGNS file of the old kind (ADF), but only those based on HDF5 are read; convert "
+            "it with the CGNS tools: cgnsconvert -h OLD.cgns NEW.cgns",
+        )
+    try:
+        with h5py.File(path, "r") as tree:
+            yield Node(path, tree)
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as problem:
+        reason = " ".join(str(problem).split())[:160] or type(problem).__name__
+        raise path_error(
+            path,
+            f"cannot be read as CGNS: {reason}; the file is damaged or no CGNS file: export it "
+            "again",
+        ) from problem
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A node of the tree: the file, its group in it, and its path, ``/Base/Zone/ZoneBC``.
+
+    The path of a node found by a link is that of the link.
+    """
+
+    file: Path
+    group: h5py.Group
+    path: str = ""
+
+    @property
+    def name(self) -> str:
+        """Return the last part of its path."""
+        return self.path.rpartition("/")[2]
+
+    @property
+    def label(self) -> str:
+        """Return its kind, as ``Zone_t``; "" if it has none."""
+        return _words(self.group.attrs.get("label", b""))
+
+    def fault(self, message: str) -> MeshError:
+        """Return the error ``file: node: message``."""
+        return path_error(self.file, f"{self.path or '/'}: {message}")
+
+    def children(self, *labels: str) -> list[Node]:
+        """Return the children whose kind is one of ``labels``, in their order in the file.
+
+        Raises
+        ------
+        MeshError
+            A link leads to no node.
+        """
+        import h5py
+
+        found = []
+        for name in self.group:
+            thing = self.group.get(name)
+            if not isinstance(thing, h5py.Group) or name.startswith(" "):
+                continue
+            place = f"{self.path}/{printable(name)}"
+            if _words(thing.attrs.get("type", b"")) == "LK":
+                thing = thing.get(_LINK)
+                if not isinstance(thing, h5py.Group):
+                    raise path_error(
+                        self.file,
+                        f"{place}: is a link to a node that is not there; export the mesh as one "
+                        "file",
+                    )
+            node = Node(self.file, thing, place)
+            if node.label in labels:
+                found.append(node)
+        return found
+
+    def child(self, label: str, *names: str) -> Node | None:
+        """Return the first child of a kind, with one of these names if any are given, or None."""
+        found = self.children(label)
+        return next((node for node in found if not names or node.name in names), None)
+
+    def needed(self, label: str, *names: str) -> Node:
+        """Return the first child of a kind, with one of these names if any are given.
+
+        Raises
+        ------
+        MeshError
+            There is none.
+        """
+        node = self.child(label, *names)
+        if node is None:
+            what = f"{' or '.join(names)} ({label})" if names else label
+            raise self.fault(f"has no {what}; export the mesh again, or check it with cgnscheck")
+        return node
+
+    def value(self) -> NDArray:
+        """Return its value, with the axes as in the dataset.
+
+        Raises
+        ------
+        MeshError
+            It has no value.
+        """
+        import h5py
+
+        data = self.group.get(DATA)
+        if not isinstance(data, h5py.Dataset):
+            raise self.fault("has no value; export the mesh again, or check it with cgnscheck")
+        return np.asarray(data[()])
+
+    def text(self) -> str:
+        """Return its value as text, without the spaces and zero bytes at its end.
+
+        Raises
+        ------
+        MeshError
+            The value is no text, or there is none.
+        """
+        data = self.value()
+        if data.dtype.kind not in "iuS":
+            raise self.fault(
+                f"has a value of type {data.dtype}; a text is needed (C1): export it again"
+            )
+        return _words(data.tobytes() if data.dtype.kind == "S" else data.astype("u1").tobytes())
+
+    def whole(self, *shape: int) -> IntArray:
+        """Return its value as integers, reshaped to ``shape``; -1 in it is any length.
+
+        Raises
+        ------
+        MeshError
+            The value is not of integers, or does not fit the shape.
+        """
+        data = self.value()
+        if data.dtype.kind not in "iu":
+            raise self.fault(
+                f"has a value of type {data.dtype}; needed is I4 or I8: export it again"
+            )
+        try:
+            return data.astype(np.int64).reshape(shape)
+        except ValueError:
+            wanted = " x ".join("n" if size < 0 else str(size) for size in shape)
+            raise self.fault(
+                f"has {data.size} numbers of shape {data.shape}; needed are {wanted}: export the "
+                "mesh again"
+            ) from None
+
+    def word(self, label: str, default: str, *names: str) -> str:
+        """Return the text of the child that `child` returns, or ``default`` if there is none."""
+        node = self.child(label, *names)
+        return default if node is None else node.text()
+
+
+def _words(value: object) -> str:
+    """Return the printable part of a text in HDF5, up to its first zero byte, stripped."""
+    raw = value if isinstance(value, bytes) else str(value).encode("utf-8", "surrogateescape")
+    text = raw.partition(b"\0")[0].decode("utf-8", "backslashreplace")
+    return "".join(sign for sign in text if sign.isprintable()).strip()

@@ -1,0 +1,309 @@
+"""Zones of a CGNS file, each with its own node numbers, and the facets of their boundaries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from slideviz.formats.cgns.elements import (
+    CgnsElements,
+    grid_cells,
+    grid_nodes,
+    read_sections,
+)
+from slideviz.formats.cgns.tree import DATA, Node
+from slideviz.formats.meshio.markers import in_node_sets
+from slideviz.mesh.cached_boundary import outer_facets
+from slideviz.mesh.elements import DIMS
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+
+_AXES = ("CoordinateX", "CoordinateY", "CoordinateZ")
+# Values of GridLocation: vertices; facets, by the dimension of the cells; those across i, j, k.
+_BY_NODES = "Vertex"
+_BY_FACETS = {2: ("EdgeCenter", "FaceCenter"), 3: ("FaceCenter",)}
+_BY_DIRECTION = ("IFaceCenter", "JFaceCenter", "KFaceCenter")
+_LABELS = ("IndexRange_t", "IndexArray_t")
+
+
+@dataclass(frozen=True, eq=False)
+class CgnsZone:
+    """A zone: its vertices, its cells, and where its coordinates are in the file.
+
+    Attributes
+    ----------
+    node : Node
+        Its place in the tree.
+    shape : tuple of int
+        Vertices along i, j (and k) of a structured zone; their number in an unstructured one.
+    points : (n, p) float64
+        Vertices, i running fastest; p is the number of coordinates.
+    cells : Cells
+        Its cells.
+    sides : CgnsElements or None
+        Elements of an unstructured zone with one dimension less; None for a structured zone.
+    sections : tuple of Node
+        Its sections of elements; empty for a structured zone.
+    datasets : tuple of str
+        Paths of the datasets of the p coordinates.
+    """
+
+    node: Node
+    shape: tuple[int, ...]
+    points: FloatArray
+    cells: Cells
+    sides: CgnsElements | None
+    sections: tuple[Node, ...]
+    datasets: tuple[str, ...]
+
+    @property
+    def dim(self) -> int:
+        """Return the dimension of its cells."""
+        return len(self.shape) if self.sides is None else int(DIMS[self.cells.types[0]])
+
+    @cached_property
+    def outer(self) -> Cells:
+        """Return the facets that only one cell of the zone has."""
+        return outer_facets(Mesh(self.points[:, : self.dim], self.cells))
+
+    def nodes_at(self, node: Node, indices: IntArray) -> IntArray:
+        """Return the numbers (m,), from 0, of vertices at ``indices`` (m, len(shape)), from 1.
+
+        Raises MeshError, which names ``node``, if an index is out of range.
+        """
+        bad = ((indices < 1) | (indices > self.shape)).any(axis=1)
+        if bad.any():
+            raise node.fault(
+                f"names the vertex {tuple(indices[bad][0].tolist())}, but those of {self.node.name}"
+                f" are numbered from 1 to {' x '.join(map(str, self.shape))}; export the mesh again"
+            )
+        return np.asarray((indices - 1) @ np.cumprod([1, *self.shape[:-1]]), np.int64)
+
+
+def read_zone(node: Node, dim: int, physical: int) -> CgnsZone:
+    """Return a zone of a base whose cells have dimension ``dim``, with ``physical`` coordinates.
+
+    Raises
+    ------
+    MeshError
+        It is wrong, or has what slideviz cannot use; the message has the node.
+    """
+    kind = node.needed("ZoneType_t", "ZoneType").text()
+    if kind not in ("Structured", "Unstructured"):
+        raise node.fault(
+            f"its ZoneType is {kind!r}; it must be Structured or Unstructured: export it again"
+        )
+    sizes = node.whole(3, -1)[0]
+    shape = tuple(sizes.tolist())
+    if len(shape) != (dim if kind == "Structured" else 1) or min(shape) < 2:
+        raise node.fault(
+            f"it is {kind.lower()} with {' x '.join(map(str, shape)) or 'no'} vertices, but has "
+            f"cells of dimension {dim}; export the mesh again"
+        )
+    points, datasets = _points(node, shape, physical)
+    if kind == "Structured":
+        flat = points[:, :dim]
+        return CgnsZone(node, shape, points, grid_cells(shape, flat), None, (), datasets)
+    elements, sections = read_sections(node, len(points))
+    dims = DIMS[elements.cells.types]
+    if not (dims == dim).any():
+        raise node.fault(f"has no cells of dimension {dim}; export the mesh with its volume cells")
+    cells = elements.cells.take(dims == dim)
+    return CgnsZone(
+        node, shape, points, cells, elements.where(dims == dim - 1), tuple(sections), datasets
+    )
+
+
+def _points(zone: Node, shape: tuple[int, ...], count: int) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return the vertices (n, count) of a zone, and the paths of their datasets.
+
+    Raises MeshError if a coordinate is missing, is of another type or shape, or is not finite.
+    """
+    grid = zone.needed("GridCoordinates_t", "GridCoordinates")
+    if (rind := grid.child("Rind_t")) is not None and rind.whole(-1).any():
+        raise rind.fault(
+            "the coordinates have rind planes (copies of neighbours), which are not read; export "
+            "the mesh without them"
+        )
+    nodes = {node.name: node for node in grid.children("DataArray_t")}
+    columns, datasets = [], []
+    for axis in _AXES[:count]:
+        if axis not in nodes:
+            raise grid.fault(
+                f"has no {axis}, but {', '.join(nodes) or 'nothing'}; export the mesh with "
+                f"Cartesian coordinates ({', '.join(_AXES[:count])})"
+            )
+        values = nodes[axis].value()
+        if values.dtype.kind != "f" or values.dtype.itemsize not in (4, 8):
+            raise nodes[axis].fault(
+                f"is of type {values.dtype}; needed is R4 or R8: export it again"
+            )
+        if values.shape != shape[::-1]:
+            raise nodes[axis].fault(
+                f"has {' x '.join(map(str, values.shape[::-1]))} values, but the zone has "
+                f"{' x '.join(map(str, shape))} vertices; export the mesh again"
+            )
+        if not np.isfinite(values).all():
+            at = int(np.argmin(np.isfinite(values.ravel())))
+            raise nodes[axis].fault(
+                f"is {values.ravel()[at]} at vertex {at + 1}, which is not finite; correct the file"
+            )
+        columns.append(values.ravel().astype(np.float64))
+        datasets.append(f"{nodes[axis].group.name}/{DATA}")
+    return np.stack(columns, axis=1), tuple(datasets)
+
+
+def region_of(zone: CgnsZone, node: Node) -> Cells | IntArray:
+    """Return the facets, or the vertices (k,), that a boundary condition or interface is on.
+
+    Raises MeshError if the node is wrong.
+
+    Parameters
+    ----------
+    node : Node
+        One with ``PointRange``, ``PointList``, ``ElementRange`` or ``ElementList``, and perhaps a
+        ``GridLocation``: vertices (as without one) or faces (edges in 2D).
+    """
+    where = node.word("GridLocation_t", _BY_NODES, "GridLocation")
+    found = node.children(*_LABELS)
+    named = {one.name: one for one in found}
+    elements = named.get("ElementRange", named.get("ElementList"))
+    if elements is not None:
+        return faces_by_number(zone, elements, elements.whole(-1))
+    given = named.get("PointRange", named.get("PointList"))
+    if given is None:
+        raise node.fault(
+            "has no PointRange, PointList, ElementRange or ElementList, so it is nowhere; export "
+            "the mesh again"
+        )
+    allowed = (_BY_NODES, *_BY_FACETS[zone.dim])
+    if zone.sides is None:
+        allowed += _BY_DIRECTION[: zone.dim]
+    if where not in allowed:
+        raise node.fault(
+            f"its GridLocation is {where}; boundaries are read at {', '.join(allowed)}: export "
+            "the mesh with one of them"
+        )
+    if zone.sides is not None and where != _BY_NODES:
+        return faces_by_number(zone, given, given.whole(-1))
+    indices = given.whole(-1, len(zone.shape))
+    if given.name == "PointList":
+        if where == _BY_NODES:
+            return np.unique(zone.nodes_at(given, indices))
+        return _listed_faces(zone, given, where, indices)
+    if len(indices) != 2:
+        raise given.fault(f"has {len(indices)} corners; a range has two: export the mesh again")
+    if zone.sides is not None:
+        low, high = np.sort(zone.nodes_at(given, indices)).tolist()
+        return np.arange(low, high + 1)
+    return _range_faces(zone, given, where, np.sort(indices, axis=0))
+
+
+def facets_of(zone: CgnsZone, node: Node) -> Cells:
+    """Return the facets of a boundary condition or interface, with the zone's node numbers.
+
+    If it is given by vertices, they are the outer facets that have no other vertices.
+    """
+    region = region_of(zone, node)
+    if isinstance(region, Cells):
+        return region
+    return Cells.from_blocks(in_node_sets(len(zone.points), zone.outer, {0: region})[0])
+
+
+def faces_by_number(zone: CgnsZone, node: Node, numbers: IntArray) -> Cells:
+    """Return the facets whose element numbers are ``numbers`` or, of a range node, in its range.
+
+    Raises
+    ------
+    MeshError
+        The zone has no such elements of one dimension less than its cells.
+    """
+    if zone.sides is None:
+        raise node.fault(
+            "names elements, which a structured zone does not have; export it with PointRange"
+        )
+    if node.name.endswith("Range"):
+        low, high = np.sort(node.whole(2)).tolist()
+        have = zone.sides.numbers
+        numbers = have[(have >= low) & (have <= high)]
+        missing = [] if len(numbers) == high - low + 1 else [f"all of {low} to {high}"]
+    else:
+        missing = np.setdiff1d(numbers, zone.sides.numbers)[:1].tolist()
+    if missing:
+        raise node.fault(
+            f"names element {missing[0]}, but the sections of {zone.node.name} do not have it as a "
+            f"{'face' if zone.dim == 3 else 'edge'}; export the mesh with its boundary elements"
+        )
+    return zone.sides.cells.take(np.isin(zone.sides.numbers, numbers))
+
+
+def _range_faces(zone: CgnsZone, node: Node, where: str, corners: IntArray) -> Cells:
+    """Return the faces of a structured zone in the range of indices ``corners`` (2, d), from 1.
+
+    ``where`` is the GridLocation of the indices. Empty for a range of vertices that is a line or a
+    point; MeshError if it is no face.
+    """
+    low, high = corners
+    flat = np.flatnonzero(low == high)
+    if where in _BY_DIRECTION:
+        flat = np.array([_BY_DIRECTION.index(where)])
+        if low[flat[0]] != high[flat[0]]:
+            flat = flat[:0]
+    elif where != _BY_NODES and len(flat) > 1:
+        # One cell in some direction: the face is where the boundary of the zone is.
+        flat = flat[(low[flat] == 1) | (low[flat] == np.array(zone.shape)[flat])]
+    if where == _BY_NODES and len(flat) > 1:
+        return Cells.from_blocks([])  # a line or a point, as of a degenerate boundary
+    if len(flat) != 1:
+        raise node.fault(
+            f"goes from {tuple(low.tolist())} to {tuple(high.tolist())}, which is no "
+            f"{'face' if zone.dim == 3 else 'edge'} of the zone; export the mesh again"
+        )
+    axis = int(flat[0])
+    zone.nodes_at(node, corners)
+    ends = high if where == _BY_NODES else high + 1
+    along = [np.arange(a - 1, b - 1) for a, b in zip(low, ends, strict=True)]
+    along[axis] = np.array([low[axis] - 1])
+    if where != _BY_NODES:
+        last = np.array(zone.shape) - 1
+        beyond = [k for k in range(zone.dim) if k != axis and high[k] > last[k]]
+        if beyond:
+            raise node.fault(
+                f"ends at {tuple(high.tolist())}, but the zone has {' x '.join(map(str, last))} "
+                "cells; export the mesh again"
+            )
+    return _faces(zone, axis, grid_nodes(along, zone.shape))
+
+
+def _listed_faces(zone: CgnsZone, node: Node, where: str, indices: IntArray) -> Cells:
+    """Return the faces of a structured zone at ``indices`` (m, d), from 1, across one direction.
+
+    It is that of the GridLocation ``where``. Raises MeshError if ``where`` is another one.
+    """
+    if where not in _BY_DIRECTION:
+        raise node.fault(
+            f"lists faces of a structured zone at {where}, which does not tell their direction; "
+            f"export the mesh with {', '.join(_BY_DIRECTION[: zone.dim])} or PointRange"
+        )
+    axis = _BY_DIRECTION.index(where)
+    across = indices + (np.arange(zone.dim) != axis)
+    zone.nodes_at(node, across)
+    return _faces(zone, axis, zone.nodes_at(node, indices))
+
+
+def _faces(zone: CgnsZone, axis: int, first: IntArray) -> Cells:
+    """Return the faces of a structured zone across ``axis`` (0 to 2 for i, j, k).
+
+    ``first`` (m,) is the vertex of each face with the lowest indices.
+    """
+    steps = np.delete(np.cumprod([1, *zone.shape[:-1]]), axis)
+    corners = [0, steps[0]] if zone.dim == 2 else [0, steps[0], steps.sum(), steps[1]]
+    return Cells.from_blocks([(3 if zone.dim == 2 else 9, first[:, None] + np.array(corners))])
+
+
+def conditions(zone: CgnsZone) -> Iterator[Node]:
+    """Yield the boundary conditions of a zone."""
+    for group in zone.node.children("ZoneBC_t"):
+        yield from group.children("BC_t")

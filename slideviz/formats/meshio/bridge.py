@@ -1,0 +1,262 @@
+"""Reading meshes of other formats through meshio.
+
+A mesh file from somebody else must not make the program read any file of this disk: files that it
+names are read only if they are in its own folder, external links of HDF5 not at all.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from slideviz.errors import path_error, printable
+from slideviz.formats.meshio.calls import formats_of, load, meshio_errors
+from slideviz.formats.meshio.markers import MeshioBlock, find_markers
+from slideviz.formats.su2.scan import Progress
+from slideviz.mesh.check import check_mesh, first_fault
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import Cells, FloatArray, Mesh
+
+if TYPE_CHECKING:
+    import h5py
+    import meshio
+
+
+MESHIO_TYPES = {
+    "vertex": 1,
+    "line": 3,
+    "triangle": 5,
+    "quad": 9,
+    "tetra": 10,
+    "hexahedron": 12,
+    "wedge": 13,
+    "pyramid": 14,
+}
+"""VTK identifier by meshio's name of an element type."""
+_FLAT = 1e-9
+"""Largest range of z, as a fraction of the extent, of a mesh in the xy-plane."""
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+"""First bytes of an HDF5 file."""
+_MOST_SHRUNK = 1_100
+"""Bytes that a byte of a compressed dataset has at most: zlib's 1,032, and some more."""
+_UNWRITTEN = 1 << 20
+"""Bytes of a dataset that may be missing in its file: HDF5 fills them."""
+_INCLUDE = re.compile(rb"^\*INCLUDE\b[^=\n]*=([^\n]*)", re.IGNORECASE | re.MULTILINE)
+_MOST_FILES = 100
+"""Most files that are searched for names of further files: two may name each other."""
+
+
+def read_with_meshio(path: Path, progress: Progress) -> Mesh:
+    """Return the mesh of a file that meshio reads.
+
+    Its cells are those of the highest dimension; those of one dimension less are its boundaries,
+    with the names of the file. A file without named boundaries gets its outer surface, divided
+    at its edges: ``boundary_1``, ``boundary_2`` and so on, the largest first.
+
+    Raises
+    ------
+    MeshError
+        meshio cannot read the file, it names files elsewhere, or slideviz cannot use the mesh.
+    """
+    progress(0.0)
+    with meshio_errors(path, "read"):
+        require_own(path)
+    data = load(path, formats_of(path))
+    progress(0.5)
+    with meshio_errors(path, "understood"):
+        mesh = _mesh(path, data)
+    progress(1.0)
+    return mesh
+
+
+def _mesh(path: Path, data: meshio.Mesh) -> Mesh:
+    """Return the mesh that meshio read as a `Mesh`, or raise MeshError."""
+    blocks = [
+        _block(path, cells.type, cells.data, index)
+        for index, cells in enumerate(data.cells)
+        if len(cells.data) and cells.type != "empty"
+    ]
+    dim = max((ELEMENTS[block.vtk].dim for block in blocks), default=0)
+    if dim < 2:
+        raise path_error(path, "there are no cells, only points and lines; export the mesh")
+    cells = Cells.from_blocks(
+        (block.vtk, block.nodes) for block in blocks if ELEMENTS[block.vtk].dim == dim
+    )
+    points = _points(path, data, cells)
+    if dim == 2 and points.shape[1] == 3:
+        points = flattened(path, points, cells)
+    mesh = Mesh(points=points, cells=cells, name=printable(path.name), source=path.resolve())
+    # The outer surface can be looked for only in sound cells.
+    check_mesh(mesh)
+    sides = [block for block in blocks if ELEMENTS[block.vtk].dim == dim - 1]
+    mesh = replace(mesh, markers=find_markers(mesh, data, sides))
+    check_mesh(mesh)
+    return mesh
+
+
+def _block(path: Path, name: str, nodes: object, index: int) -> MeshioBlock:
+    """Return a block of meshio's cells; MeshError if their type ``name`` or nodes are unusable."""
+    if name not in MESHIO_TYPES:
+        kind = "has many sides" if name.startswith(("poly", "pixel")) else "is of high order"
+        raise path_error(
+            path,
+            f"the element type {name!r} {kind}, but slideviz needs linear elements "
+            f"({', '.join(list(MESHIO_TYPES)[1:])}); export the mesh with these",
+        )
+    table = np.asarray(nodes)
+    vtk = MESHIO_TYPES[name]
+    if table.ndim != 2 or table.shape[1] != ELEMENTS[vtk].n_nodes or table.dtype.kind not in "iu":
+        raise path_error(
+            path,
+            f"the nodes of its {ELEMENTS[vtk].name} cells cannot be understood; export "
+            "the mesh again",
+        )
+    return MeshioBlock(index, vtk, table.astype(np.int64))
+
+
+def _points(path: Path, data: meshio.Mesh, cells: Cells) -> FloatArray:
+    """Return the points (n, 2) or (n, 3); MeshError for another shape or wrong nodes of cells."""
+    points = np.asarray(data.points, float)
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise path_error(
+            path, f"the points have shape {points.shape}, not (n, 2) or (n, 3); export it again"
+        )
+    fault = first_fault(cells, len(points))
+    if fault:
+        raise path_error(path, f"cell {fault[0]}: {fault[1]}")
+    return points
+
+
+def flattened(path: Path, points: FloatArray, cells: Cells) -> FloatArray:
+    """Return x and y (n, 2) of points (n, 3); MeshError if those of cells differ in z."""
+    used = points[cells.nodes]
+    if np.ptp(used[:, 2]) > _FLAT * np.ptp(used, axis=0).max():
+        raise path_error(
+            path,
+            "this is a surface in space, but a mesh of triangles and quadrilaterals must "
+            "lie in the xy-plane; export the volume mesh, or turn the surface into that plane",
+        )
+    return points[:, :2]
+
+
+def require_own(path: Path) -> None:
+    """Raise if a file, or one that it names, names files that are not in its folder.
+
+    Raises
+    ------
+    MeshError
+        It names a file in another folder, or has an external link of HDF5.
+    OSError
+        It cannot be read.
+    """
+    seen: set[Path] = set()
+    waiting = [path]
+    while waiting and len(seen) < _MOST_FILES:
+        one = waiting.pop()
+        seen.add(one)
+        for name, found in _named(one):
+            if found.parent != Path(os.path.realpath(path.parent)):
+                raise path_error(
+                    one,
+                    f"names a file of another folder, {printable(name)!r}, which is not read; "
+                    "put it beside this one, or export the mesh as one file",
+                )
+            if found.is_file() and found not in seen:
+                waiting.append(found)
+
+
+def _named(path: Path) -> Iterator[tuple[str, Path]]:
+    """Yield each name of another file in a file, and the path that meshio would read for it.
+
+    Raises MeshError for an external link of HDF5.
+    """
+    with path.open("rb") as file:
+        is_hdf5 = file.read(len(_HDF5)) == _HDF5
+    if is_hdf5:
+        _require_no_links(path)
+    elif path.suffix.lower() in (".xdmf", ".xmf"):
+        yield from _of_xdmf(path)
+    elif path.suffix.lower() == ".inp":
+        for match in _INCLUDE.finditer(path.read_bytes()):
+            name = match[1].strip().decode("utf-8", "surrogateescape")
+            yield name, _place(Path(name) if Path(name).exists() else path.parent / name)
+
+
+def _of_xdmf(path: Path) -> Iterator[tuple[str, Path]]:
+    """Yield the same as `_named` for an XDMF file."""
+    try:
+        items = [item for _, item in ET.iterparse(path) if item.tag == "DataItem"]
+    except ET.ParseError:
+        return  # meshio says what is wrong with it
+    for item in items:
+        text, kind = (item.text or "").strip(), item.get("Format")
+        if kind == "HDF":
+            name = text.rpartition(":")[0]
+            yield name, _place(path.parent / name)
+        elif kind == "Binary":
+            yield text, _place(Path(text))
+
+
+def _place(path: Path) -> Path:
+    """Return a path with its folder resolved (no ``..``, no links); its last part stays."""
+    return Path(os.path.realpath(path.parent)) / path.name
+
+
+def _require_no_links(path: Path) -> None:
+    """Raise MeshError if an HDF5 file has a link to, or numbers in, another file, or lacks them."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        seen: set[object] = set()
+        groups: list[h5py.Group] = [file]
+        while groups:
+            group = groups.pop()
+            for name in group:
+                link = group.get(name, getlink=True)
+                other = link.filename if isinstance(link, h5py.ExternalLink) else None
+                thing = None if other else group.get(name)
+                if isinstance(thing, h5py.Dataset):
+                    other = _storage(thing)
+                    _require_stored(path, thing)
+                if other is not None:
+                    raise path_error(
+                        path,
+                        f"{printable(f'{group.name}/{name}')!r} is an external link to "
+                        f"{printable(other)!r}, which is not read; export the mesh as one file",
+                    )
+                if isinstance(thing, h5py.Group):
+                    key = h5py.h5o.get_info(thing.id).addr
+                    if key not in seen:  # a group may contain one of its own parents
+                        seen.add(key)
+                        groups.append(thing)
+
+
+def _require_stored(path: Path, data: h5py.Dataset) -> None:
+    """Raise MeshError if reading a dataset takes far more memory than the file has bytes for it."""
+    stored = data.id.get_storage_size()
+    needed = data.dtype.itemsize * max(data.size or 0, math.prod(data.chunks or (0,)))
+    if not data.external and not data.is_virtual and needed > _MOST_SHRUNK * stored + _UNWRITTEN:
+        raise path_error(
+            path,
+            f"{printable(data.name)!r} is said to have {needed / 1e6:,.0f} MB, and the file has "
+            f"{stored:,} bytes for it; the file is damaged: export it again",
+        )
+
+
+def _storage(data: h5py.Dataset) -> str | None:
+    """Return the other file that the numbers of a dataset are in, or None."""
+    if data.external:
+        return str(data.external[0][0])
+    if data.is_virtual:
+        names = [source.file_name for source in data.virtual_sources()]
+        return next((name for name in names if name != "."), None)
+    return None

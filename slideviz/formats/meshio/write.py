@@ -1,0 +1,316 @@
+"""Writing meshes as VTU, by our own code, or in one of meshio's formats, by meshio.
+
+meshio writes VTU too, but reorders cells of mixed type and loses the names of boundaries.
+"""
+
+from __future__ import annotations
+
+import shutil
+from base64 import b64encode
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.errors import MeshError, path_error
+from slideviz.formats.meshio.bridge import MESHIO_TYPES
+from slideviz.formats.meshio.calls import formats_of, load, meshio_errors
+from slideviz.mesh.check import check_mesh
+from slideviz.mesh.model import IntArray, Mesh
+from slideviz.system.atomic import atomic_write
+from slideviz.system.cleanup import draft
+
+if TYPE_CHECKING:
+    import meshio
+
+
+_NAMES = {vtk: name for name, vtk in MESHIO_TYPES.items()}
+"""meshio's name of an element type by VTK identifier."""
+# Name of the cell data with the numbers of the boundaries, by format; else "marker".
+_TAG = {
+    "gmsh": "gmsh:physical",
+    "med": "cell_tags",
+    "medit": "medit:ref",
+    "nastran": "nastran:ref",
+    "netgen": "netgen:index",
+    "ugrid": "ugrid:ref",
+}
+_NAMED = ("gmsh", "netgen")
+"""The formats with a table of names for these numbers."""
+_WRITTEN_AS = {"gmsh": "gmsh22"}
+"""Name of the version that meshio is to write; Gmsh 2.2 has a group on each element."""
+_EXACT = 1e-12
+"""Largest error of a coordinate in a written file, as a fraction of the extent."""
+
+_TYPES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "u1": "UInt8"}
+"""VTK's name of a data type by NumPy's."""
+_BLOCK_BYTES = 3 << 18
+"""A multiple of 3, so that the encoded blocks join."""
+# Order of a prism's nodes in VTU files. Until VTK 9.7 (vtk!12988) the first triangle faced outward.
+# Files do not say which order they have; other readers (older ParaView, meshio) expect this one.
+# VTKHDF files have the new order.
+_PRISM = np.array([0, 2, 1, 3, 5, 4])
+
+
+def write_other_format(
+    path: Path,
+    mesh: Mesh,
+    cell_data: Mapping[str, NDArray],
+    point_data: Mapping[str, NDArray] | None = None,
+    replaces: Path | None = None,
+) -> None:
+    """Write a mesh as VTU, or in the format of meshio that the ending names.
+
+    Only VTU files get the point data. VTU, Gmsh, MED and Abaqus files have the names of
+    boundaries; other formats have their numbers at most. What meshio wrote is read again and
+    compared, for meshio leaves out what a format cannot hold.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be written, or the format cannot hold the mesh.
+    """
+    check_mesh(mesh)
+    if path.suffix.lower() == ".vtu":
+        with atomic_write(path, replaces=replaces) as file:
+            for block in vtu_blocks(mesh, cell_data, point_data):
+                file.write(block)
+        return
+    name = formats_of(path)[0]
+    data = _to_meshio(mesh, cell_data, name)
+    with atomic_write(path, replaces=replaces) as file:
+        # meshio wants a name, and some formats write several files.
+        try:
+            with draft(path.parent, is_folder=True) as folder:
+                trial = folder / path.name
+                _write(path, trial, data, name)
+                _compare(path, trial, data, name)
+                with trial.open("rb") as source:
+                    shutil.copyfileobj(source, file)
+        except OSError as problem:
+            raise path_error(
+                path,
+                f"cannot be written: {problem.strerror or problem}; free some space or "
+                "choose another folder",
+            ) from problem
+
+
+def _write(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
+    """Write meshio's mesh to ``trial``, in a folder of its own, in the format ``name``.
+
+    Raises MeshError, which names ``path``, if it cannot be written or needs several files.
+    """
+    try:
+        _write_by_meshio(path, trial, data, name)
+    except MeshError as problem:
+        # A full disk or a missing package says nothing of the mesh.
+        if isinstance(problem.__cause__, ImportError) or getattr(problem.__cause__, "errno", None):
+            raise
+        lost = _not_written(path, trial, data, name)
+        raise _not_held(path, name, lost) if lost else problem from problem
+    if len(list(trial.parent.iterdir())) != 1:
+        raise path_error(
+            path,
+            f"cannot be written: the format {name} needs several files; use another, such as .vtu",
+        )
+
+
+def _write_by_meshio(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
+    import meshio
+
+    # Without this XDMF puts the numbers in a second file.
+    options = {"data_format": "XML"} if name == "xdmf" else {}
+    with meshio_errors(path, f"written as {name}"):
+        meshio.write(trial, data, file_format=_WRITTEN_AS.get(name, name), **options)
+
+
+def _not_written(path: Path, trial: Path, data: meshio.Mesh, name: str) -> list[str]:
+    """Return words for what of ``data`` meshio cannot write, found by writing its parts alone."""
+    import meshio
+
+    bare, lost = meshio.Mesh(data.points, data.cells), []
+    for block in data.cells:
+        part = meshio.Mesh(data.points, [(block.type, block.data[:1])])
+        try:
+            _write_by_meshio(path, trial, part, name)
+        except MeshError:
+            lost.append(f"{block.type} cells")
+    if not lost and data.cell_data:
+        with suppress(MeshError):
+            _write_by_meshio(path, trial, bare, name)
+            lost.append("numbers of the boundaries")
+    return lost
+
+
+def _not_held(path: Path, name: str, lost: list[str]) -> MeshError:
+    return path_error(
+        path,
+        f"cannot be written: the format {name} does not hold the {', '.join(lost)} of "
+        "this mesh; use another, such as .vtu",
+    )
+
+
+def _compare(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
+    """Raise MeshError, which names ``path``, if the file ``trial`` lacks some of ``data``."""
+    try:
+        found = load(trial, [name])
+    except MeshError as problem:
+        raise path_error(
+            path,
+            f"cannot be written: meshio cannot read again what it writes as {name}; use "
+            "another format, such as .vtu",
+        ) from problem
+    lost = []
+    if found.points.shape != data.points.shape:
+        lost.append("points")
+    elif np.abs(found.points - data.points).max() > _EXACT * np.ptp(data.points, axis=0).max():
+        lost.append("digits of the coordinates")
+    counts = [
+        {kind: sum(len(c.data) for c in m.cells if c.type == kind) for kind in _NAMES.values()}
+        for m in (data, found)
+    ]
+    lost += [f"{kind} cells" for kind in _NAMES.values() if counts[0][kind] != counts[1][kind]]
+    lost += [f"cell data {key!r}" for key in data.cell_data if key not in found.cell_data]
+    if lost:
+        raise _not_held(path, name, lost)
+
+
+def _to_meshio(mesh: Mesh, cell_data: Mapping[str, NDArray], name: str) -> meshio.Mesh:
+    """Return the mesh for meshio and its format ``name``, a block for each type of element.
+
+    Blocks of cells come first, then those of boundary elements, whose cell data are NaN.
+    """
+    import meshio
+
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : mesh.dim] = mesh.points
+    blocks, tags = [], []
+    values: dict[str, list[NDArray]] = {key: [] for key in cell_data}
+    for vtk, (ids, nodes) in mesh.cells.by_type.items():
+        blocks.append((_NAMES[vtk], nodes))
+        tags.append(np.zeros(len(nodes), np.int32))
+        for key, array in cell_data.items():
+            values[key].append(array[ids].astype(float))
+    for vtk, nodes, numbers in _boundary_blocks(mesh):
+        blocks.append((_NAMES[vtk], nodes))
+        tags.append(numbers.astype(np.int32))
+        for key, array in cell_data.items():
+            values[key].append(np.full((len(nodes), *array.shape[1:]), np.nan))
+    names = dict(enumerate(mesh.marker_names, 1))
+    # Only MED keeps two coordinates.
+    data = meshio.Mesh(points if name != "med" else mesh.points, blocks, cell_data=values)
+    if name == "abaqus":
+        data.cell_sets = {
+            marker: [np.flatnonzero(t == number) for t in tags] for number, marker in names.items()
+        }
+        return data
+    if name == "med":
+        # Families of elements have negative numbers there.
+        tags = [-t for t in tags]
+        data.cell_tags = {-number: [marker] for number, marker in names.items()}
+    if name in _NAMED:
+        data.field_data = {
+            marker: np.array([number, mesh.dim - 1]) for number, marker in names.items()
+        }
+    if name == "gmsh":
+        data.cell_data["gmsh:geometrical"] = tags
+    if names:
+        data.cell_data[_TAG.get(name, "marker")] = tags
+    return data
+
+
+def _boundary_blocks(mesh: Mesh) -> list[tuple[int, NDArray, NDArray]]:
+    """Return for each type of boundary element: type, nodes (m, n), marker's number from 1 (m,)."""
+    found: dict[int, list[tuple[NDArray, NDArray]]] = {}
+    for number, marker in enumerate(mesh.markers, 1):
+        for vtk, (_, nodes) in marker.cells.by_type.items():
+            found.setdefault(vtk, []).append((nodes, np.full(len(nodes), number)))
+    return [
+        (vtk, np.concatenate([n for n, _ in parts]), np.concatenate([t for _, t in parts]))
+        for vtk, parts in found.items()
+    ]
+
+
+def vtu_blocks(
+    mesh: Mesh, cell_data: Mapping[str, NDArray], point_data: Mapping[str, NDArray] | None = None
+) -> Iterator[bytes]:
+    """Yield a VTU file, block by block.
+
+    The cells come first, in their order, then the elements of the markers. The cell data
+    ``marker`` is 0 on cells and 1, 2, ... on the markers; the field data has for each marker
+    name its number and dimension.
+
+    Parameters
+    ----------
+    cell_data : mapping of str to (n_cells,) or (n_cells, k)
+        Values by name; they are NaN on the elements of the markers.
+    point_data : mapping of str to (n,) or (n, d), optional
+        Values on the points; vectors get a third component, as ParaView's arrows want.
+    """
+    groups = [mesh.cells, *(marker.cells for marker in mesh.markers)]
+    lengths = [len(cells) for cells in groups]
+    types = np.concatenate([cells.types for cells in groups])
+    offsets = np.cumsum(np.concatenate([np.diff(cells.offsets) for cells in groups]))
+    nodes = np.concatenate([cells.connectivity for cells in groups])
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : mesh.dim] = mesh.points
+
+    yield (
+        b'<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="1.0" '
+        b'byte_order="LittleEndian" header_type="UInt64">\n<UnstructuredGrid>\n<FieldData>\n'
+    )
+    for number, marker in enumerate(mesh.markers, 1):
+        name = quoteattr(marker.name)
+        yield (
+            f'<DataArray type="Int64" Name={name} NumberOfComponents="2" NumberOfTuples="1" '
+            f'format="ascii">{number} {mesh.dim - 1}</DataArray>\n'
+        ).encode()
+    yield (
+        f'</FieldData>\n<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(types)}">\n'
+        "<Points>\n"
+    ).encode()
+    yield from _array("Points", points)
+    yield b"</Points>\n<Cells>\n"
+    yield from _array("connectivity", _in_vtk_order(nodes, offsets, types))
+    yield from _array("offsets", offsets)
+    yield from _array("types", types)
+    yield b"</Cells>\n<CellData>\n"
+    yield from _array("marker", np.repeat(np.arange(len(groups)), lengths))
+    for name, values in cell_data.items():
+        padded = np.full((len(types), *values.shape[1:]), np.nan)
+        padded[: len(values)] = values
+        yield from _array(name, padded)
+    yield b"</CellData>\n<PointData>\n"
+    for name, values in (point_data or {}).items():
+        vectors = values.ndim == 2 and values.shape[1] == 2
+        yield from _array(name, np.pad(values, ((0, 0), (0, 1))) if vectors else values)
+    yield b"</PointData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
+
+
+def _in_vtk_order(nodes: IntArray, offsets: IntArray, types: NDArray[np.uint8]) -> IntArray:
+    """Return the connectivity with the nodes of prisms in the order of VTU files.
+
+    ``offsets`` (m,) are where the nodes of each element end.
+    """
+    first = offsets[types == 13][:, None] - len(_PRISM)
+    turned = nodes.copy()
+    turned[first + np.arange(len(_PRISM))] = nodes[first + _PRISM]
+    return turned
+
+
+def _array(name: str, values: NDArray) -> Iterator[bytes]:
+    """Yield the XML of one array, uncompressed: its length and its bytes in base64."""
+    kind = values.dtype.str[1:]
+    width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
+    yield (
+        f'<DataArray type="{_TYPES[kind]}" Name={quoteattr(name)}{width} format="binary">'
+    ).encode()
+    little = np.ascontiguousarray(values, dtype=f"<{kind}" if kind != "u1" else "u1")
+    content = np.array([little.nbytes], "<u8").tobytes() + little.tobytes()
+    for begin in range(0, len(content), _BLOCK_BYTES):
+        yield b64encode(content[begin : begin + _BLOCK_BYTES])
+    yield b"</DataArray>\n"

@@ -1,0 +1,221 @@
+"""Conversion of decimal numbers in text to the nearest float64, compiled.
+
+The result is that of Python's `float`. Method: product with a power of five of 128 bits (D. Lemire,
+Number Parsing at a Gigabyte per Second, 2021). Where that does not decide (one number in billions),
+and for words that are no plain decimal numbers, no result is returned: the caller uses Python.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.system.jit_cache import njit
+
+OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
+"""Options of `njit` for the loops over text."""
+
+_LEAST, _MOST = -342, 308
+"""Powers of ten beyond which a number of 19 digits is zero or infinite."""
+_DIGITS = 19
+"""How many decimal digits fit into 64 bits."""
+
+
+def _powers_of_five() -> NDArray[np.uint64]:
+    """Return the first 128 bits of 5^q for q from _LEAST to _MOST: (651, 2), high and low 64."""
+    rows = []
+    for q in range(_LEAST, _MOST + 1):
+        power = 5 ** abs(q)
+        if q < 0:
+            size = power.bit_length()
+            # For q below -27 the quotient is rounded up, for it is never exact.
+            power = (1 << (size + 127 if q >= -27 else 2 * size + 128)) // power + 1
+        shift = power.bit_length() - 128
+        first = power >> shift if shift > 0 else power << -shift
+        rows.append((first >> 64, first & ((1 << 64) - 1)))
+    return np.array(rows, np.uint64)
+
+
+_POWERS = _powers_of_five()
+_U0, _U1, _U3, U10, _U32, U48, _U63 = (np.uint64(n) for n in (0, 1, 3, 10, 32, 48, 63))
+# Bits of uint64 and of a float64: lowest 32; all; numbers with the highest byte or bit set are not
+# below these; the mantissa's limit, and the highest bit of it, which a float64 does not store.
+_LOW = np.uint64(0xFFFFFFFF)
+_ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
+_BYTE_FREE, _BIT_FREE = np.uint64(1 << 56), np.uint64(1 << 63)
+_WHOLE = np.uint64(1 << 53)
+_SPARE = np.uint64(0x1FF)
+"""The bits of a product's high half that a float64 and its rounding do not need."""
+_HIDDEN = np.uint64(1 << 52)
+
+
+@njit(inline="always", **OPTIONS)
+def _product(a, b):  # type: ignore[no-untyped-def]
+    """Return the high and the low 64 bits of the product of two uint64."""
+    a0, a1, b0, b1 = a & _LOW, a >> _U32, b & _LOW, b >> _U32
+    low, middle = a0 * b0, a1 * b0
+    middle += low >> _U32
+    cross = a0 * b1 + (middle & _LOW)
+    return a1 * b1 + (middle >> _U32) + (cross >> _U32), a * b
+
+
+@njit(**OPTIONS)
+def nearest_bits(digits, q):  # type: ignore[no-untyped-def]
+    """Return the bits (uint64) of the float64 nearest to digits x 10^q, or all ones if undecided.
+
+    Undecided are also numbers that are subnormal or infinite.
+
+    Parameters
+    ----------
+    digits : uint64
+        Not 0.
+    q : int64
+        The power of ten.
+    """
+    if q < _LEAST or q > _MOST:
+        return _ALL
+    shift = 0
+    while digits < _BYTE_FREE:
+        digits <<= np.uint64(8)
+        shift += 8
+    while digits < _BIT_FREE:
+        digits <<= _U1
+        shift += 1
+    high, low = _product(digits, _POWERS[q - _LEAST, 0])
+    if high & _SPARE == _SPARE:
+        more = _product(digits, _POWERS[q - _LEAST, 1])[0]
+        low += more
+        if low < more:
+            high += _U1
+        if low == _ALL and (q < -27 or q > 55):
+            return _ALL
+    top = high >> _U63
+    down = top + np.uint64(9)
+    mantissa = high >> down
+    power = ((217706 * q) >> 16) + 63 + np.int64(top) - shift + 1023
+    if power <= 0:
+        return _ALL
+    # Exactly between two float64: the even one.
+    halfway = low <= _U1 and -4 <= q <= 23 and mantissa & _U3 == _U1
+    if halfway and mantissa << down == high:
+        mantissa &= ~_U1
+    mantissa = (mantissa + (mantissa & _U1)) >> _U1
+    if mantissa >= _WHOLE:
+        mantissa = _HIDDEN
+        power += 1
+    if power >= 2047:
+        return _ALL
+    return (mantissa & ~_HIDDEN) | (np.uint64(power) << np.uint64(52))
+
+
+@njit(inline="always", **OPTIONS)
+def ends(code):  # type: ignore[no-untyped-def]
+    """Return whether a byte ends a word: a blank, a line break or ``%`` (begin of a comment)."""
+    return code == 32 or 9 <= code <= 13 or code == 37
+
+
+@njit(**OPTIONS)
+def decimal(text, at, bits, k):  # type: ignore[no-untyped-def]
+    """Write the bits of the number that begins at ``text[at]`` to ``bits[k]``; return its end.
+
+    The result is -1, and nothing is written, if it is no plain number or `nearest_bits` is
+    undecided.
+
+    Parameters
+    ----------
+    text : (b,) uint8
+        The text; its last byte is a line break.
+    at : int
+        Index of the first byte of the number.
+    bits : (v,) uint64
+        Receives the bits of the float64.
+    k : int
+        The place in ``bits``.
+    """
+    sign = np.uint64(text[at] == 45) << _U63
+    at += (text[at] == 45) | (text[at] == 43)
+    first, q, more = at, 0, False
+    digits, at = _digits(text, at, _U0)
+    given = at - first
+    if text[at] == 46:
+        digits, stop = _digits(text, at + 1, digits)
+        q = at + 1 - stop
+        given -= q
+        at = stop
+    if given == 0:
+        return -1
+    if given > _DIGITS:
+        digits, q, more = _first_digits(text, first)
+    code = text[at]
+    if code == 101 or code == 69:
+        at, exponent = _exponent(text, at + 1)
+        if at < 0:
+            return -1
+        q += exponent
+    if not ends(text[at]):
+        return -1
+    if digits == _U0:
+        bits[k] = sign
+        return at
+    found = nearest_bits(digits, q)
+    if found == _ALL or (more and found != nearest_bits(digits + _U1, q)):
+        return -1
+    bits[k] = found | sign
+    return at
+
+
+@njit(inline="always", **OPTIONS)
+def _digits(text, at, value):  # type: ignore[no-untyped-def]
+    """Append the decimal digits from ``text[at]`` on to ``value``, modulo 2^64.
+
+    Returns the new value and where the digits end.
+    """
+    digit = np.uint64(text[at]) - U48
+    while digit < U10:
+        value = value * U10 + digit
+        at += 1
+        digit = np.uint64(text[at]) - U48
+    return value, at
+
+
+@njit(**OPTIONS)
+def _first_digits(text, at):  # type: ignore[no-untyped-def]
+    """Return the first 19 digits of a long number, its power of ten, and whether more follow.
+
+    Leading zeros do not count. The number begins at ``text[at]``; its exponent is not read.
+    """
+    value, count, q, point, more = _U0, 0, 0, False, False
+    while True:
+        digit = np.uint64(text[at]) - U48
+        if digit < U10 and count < _DIGITS:
+            value = value * U10 + digit
+            count += value != _U0
+            q -= point
+        elif digit < U10:
+            more = True
+            q += not point
+        elif text[at] == 46 and not point:
+            point = True
+        else:
+            return value, q, more
+        at += 1
+
+
+@njit(inline="always", **OPTIONS)
+def _exponent(text, at):  # type: ignore[no-untyped-def]
+    """Return where the exponent from ``text[at]`` on ends, and its value.
+
+    The end is -1 if there are no digits, or more than five.
+    """
+    down = text[at] == 45
+    if down or text[at] == 43:
+        at += 1
+    first, value = at, 0
+    while 48 <= text[at] <= 57 and at < first + 6:
+        value = value * 10 + (text[at] - 48)
+        at += 1
+    if at == first or at == first + 6:
+        return -1, 0
+    return at, -value if down else value

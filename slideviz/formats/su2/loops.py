@@ -1,0 +1,270 @@
+"""Compiled loops over the text of SU2 files: where lines are, and the numbers on them.
+
+They read plain rows only. A row with anything else (a sign before a node, a wrong type, a word that
+is no number, a number that is not finite) is *left*: only listed, for `su2.numbers` to read it in
+Python.
+
+``text`` is an array of bytes, (b,) uint8, that ends with a line break; ``at`` is an index into it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slideviz.formats.su2.decimal import OPTIONS, U10, U48, decimal
+from slideviz.formats.su2.lines import KEYWORD, ROWS, TEXT
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.system.jit_cache import njit
+
+SIZES = np.zeros(257, np.int64)
+"""Number of nodes by element type, 0 for no type; the last entry is for all numbers above 255."""
+DIMS = np.full(257, -1)
+"""Dimension by element type, likewise; -1 for no type."""
+for _row in ELEMENTS.values():
+    SIZES[_row.vtk], DIMS[_row.vtk] = _row.n_nodes, _row.dim
+
+RUN_COLUMNS = 5
+"""Columns of a table of runs: first byte, first line, kind, rows, nodes (see `Lines`)."""
+
+
+@njit(inline="always", **OPTIONS)
+def _is_blank(code):  # type: ignore[no-untyped-def]
+    """Return whether a byte is a blank within a line."""
+    return code == 32 or code == 9 or 11 <= code <= 13
+
+
+@njit(inline="always", **OPTIONS)
+def is_numeric(code):  # type: ignore[no-untyped-def]
+    """Return whether a number may begin with this byte: a digit, a sign or a point."""
+    return 48 <= code <= 57 or code == 43 or code == 45 or code == 46
+
+
+@njit(inline="always", **OPTIONS)
+def _next_line(text, at):  # type: ignore[no-untyped-def]
+    """Return where the next line begins."""
+    while text[at] != 10:
+        at += 1
+    return at + 1
+
+
+@njit(inline="always", **OPTIONS)
+def _first_word(text, at):  # type: ignore[no-untyped-def]
+    """Return where the first word, or comment, of the line from ``at`` on begins, or its end."""
+    # Control characters stand before words like blanks, but not between numbers.
+    while text[at] <= 32 and text[at] != 10:
+        at += 1
+    return at
+
+
+@njit(inline="always", **OPTIONS)
+def _next_word(text, at):  # type: ignore[no-untyped-def]
+    """Return where the next word begins: ``at``, or behind the blanks there."""
+    while _is_blank(text[at]):
+        at += 1
+    return at
+
+
+@njit(inline="always", **OPTIONS)
+def _type_of(text, at):  # type: ignore[no-untyped-def]
+    """Return the whole number that a row begins with, an element type; 256 if it is larger.
+
+    It is 0 if there are no digits.
+    """
+    at += text[at] == 43
+    value = np.int64(0)
+    while 48 <= text[at] <= 57:
+        value = value * 10 + np.int64(text[at]) - 48
+        value = np.int64(256) if value > 256 else value
+        at += 1
+    return value
+
+
+@njit(**OPTIONS)
+def scan_block(text, runs):  # type: ignore[no-untyped-def]
+    """Write the runs (see `Lines`) of a block of lines into ``runs``; return how many there are.
+
+    Parameters
+    ----------
+    text : (b,) uint8
+        The lines.
+    runs : (l, 5) int64
+        Receives the runs, columns as in ``RUN_COLUMNS``, with bytes and lines counted from the
+        start of the block; l is the number of lines. The first run may have no line of text.
+
+    Returns
+    -------
+    n_runs, n_lines : int
+        Numbers of runs and lines.
+    """
+    at, line, n = 0, 0, 0
+    while at < len(text):
+        begin, at = at, _first_word(text, at)
+        code = text[at]
+        empty = code == 10 or code == 37
+        if not empty and not is_numeric(code):
+            runs[n, 0], runs[n, 1], runs[n, 2], runs[n, 3], runs[n, 4] = begin, line, TEXT, 0, 0
+            n += 1
+            while text[at] != 10 and text[at] != 37:
+                if text[at] == 61:
+                    runs[n - 1, 2] = KEYWORD
+                at += 1
+        else:
+            if n == 0:
+                runs[n, 0], runs[n, 1], runs[n, 2], runs[n, 3], runs[n, 4] = 0, 0, ROWS, 0, 0
+                n += 1
+            if not empty:
+                runs[n - 1, 3] += 1
+                runs[n - 1, 4] += SIZES[_type_of(text, at)]
+        at = _next_line(text, at)
+        line += 1
+    return n, line
+
+
+@njit(**OPTIONS)
+def count_types(text, counts):  # type: ignore[no-untyped-def]
+    """Add to ``counts`` (257,) the number of rows of each element type; the last is for others."""
+    at = 0
+    while at < len(text):
+        at = _first_word(text, at)
+        if is_numeric(text[at]):
+            counts[_type_of(text, at)] += 1
+        at = _next_line(text, at)
+
+
+@njit(inline="always", **OPTIONS)
+def _whole_number(text, at):  # type: ignore[no-untyped-def]
+    """Return the whole number from ``at`` on, of plain digits, and where it ends.
+
+    The number is -1 if there are no digits or more than 18.
+    """
+    first, value = at, np.int64(0)
+    digit = np.uint64(text[at]) - U48
+    while digit < U10:
+        value = value * 10 + np.int64(digit)
+        at += 1
+        digit = np.uint64(text[at]) - U48
+    return -1 if at == first or at > first + 18 else value, at
+
+
+@njit(inline="always", **OPTIONS)
+def _nodes(text, at, size, n_points, nodes, k):  # type: ignore[no-untyped-def]
+    """Write the ``size`` nodes of an element to ``nodes[k:]``; return where they end in the text.
+
+    The result is -1 if one is not a whole number below ``n_points``, or is there twice.
+    """
+    for j in range(k, k + size):
+        node, at = _whole_number(text, _next_word(text, at))
+        if node < 0 or node >= n_points:
+            return -1
+        for i in range(k, j):
+            if nodes[i] == node:
+                return -1
+        nodes[j] = node
+    return at
+
+
+@njit(**OPTIONS)
+def cell_block(text, dim, n_points, types, nodes, odd):  # type: ignore[no-untyped-def]
+    """Read the rows of elements (type, nodes, perhaps an index, ignored) into types and nodes.
+
+    Parameters
+    ----------
+    text : (b,) uint8
+        Whole lines; those that are no rows are skipped.
+    dim, n_points : int
+        Dimension that elements must have; number that nodes must be below.
+    types : (m,) uint8
+        Receives the types.
+    nodes : (k,) int64
+        Receives the nodes.
+    odd : (m, 3) int64
+        Receives for each row left: its number, the first byte of its line, and the index of its
+        first node in ``nodes``.
+
+    Returns
+    -------
+    rows, left : int
+        Number of rows (-1 if more than m; if it is not m, the file was changed), and of rows left.
+    """
+    at, row, k, n = 0, 0, 0, 0
+    while at < len(text):
+        line, begin = at, _first_word(text, at)
+        if is_numeric(text[begin]):
+            kind = _type_of(text, begin)
+            size = SIZES[kind]
+            if row == len(types) or k + size > len(nodes):
+                return -1, n
+            types[row] = np.uint8(kind)
+            at = -1
+            if DIMS[kind] == dim and _next_word(text, line) == begin:
+                at = _whole_number(text, begin)[1]
+                at = _nodes(text, at, size, n_points, nodes, k)
+            if at < 0 or not _ends_row(text, at):
+                odd[n, 0], odd[n, 1], odd[n, 2] = row, line, k
+                n += 1
+            row += 1
+            k += size
+        at = _next_line(text, max(at, begin))
+    return row, n
+
+
+@njit(inline="always", **OPTIONS)
+def _ends_row(text, at):  # type: ignore[no-untyped-def]
+    """Return whether a row of whole numbers ends at ``at``, or after one more number."""
+    at = _next_word(text, at)
+    if text[at] == 10 or text[at] == 37:
+        return True
+    index, at = _whole_number(text, at)
+    at = _next_word(text, at)
+    return index >= 0 and (text[at] == 10 or text[at] == 37)
+
+
+@njit(**OPTIONS)
+def point_block(text, first, points, extra, odd):  # type: ignore[no-untyped-def]
+    """Read the rows of points (coordinates, perhaps one or two indices) into ``points``.
+
+    Parameters
+    ----------
+    text : (b,) uint8
+        Whole lines; those that are no rows are skipped.
+    first : int
+        Number of the first row among all points.
+    points : (m, d) uint64
+        Receives the bits of the coordinates.
+    extra : (2,) int64
+        Updated by the rows that are not left: ``[0]`` becomes the largest count of numbers on a
+        row, ``[1]`` the smallest number of a row that has only d numbers, the last of which is
+        that number: perhaps its index, and a coordinate is missing.
+    odd : (m, 2) int64
+        Receives for each row left: its number and the first byte of its line.
+
+    Returns
+    -------
+    rows, left : int
+        Number of rows (-1 if more than m; if it is not m, the file was changed), and of rows left.
+    """
+    at, row, n, dim = 0, 0, 0, points.shape[1]
+    bits = np.zeros(1, np.uint64)
+    value = bits.view(np.float64)
+    while at < len(text):
+        line, begin = at, _first_word(text, at)
+        if is_numeric(text[begin]):
+            if row == len(points):
+                return -1, n
+            at, words = (begin if _next_word(text, line) == begin else -1), 0
+            while at >= 0 and text[at] != 10 and text[at] != 37:
+                at = decimal(text, at, bits, 0) if words < dim + 2 else -1
+                if words < dim:
+                    points[row, words] = bits[0]
+                words += 1
+                at = _next_word(text, at) if at >= 0 else -1
+            if at < 0 or words < dim:
+                odd[n, 0], odd[n, 1] = row, line
+                n += 1
+            else:
+                extra[0] = max(extra[0], words)
+                if words == dim and value[0] == first + row:
+                    extra[1] = min(extra[1], first + row)
+            row += 1
+        at = _next_line(text, max(at, begin))
+    return row, n

@@ -1,0 +1,285 @@
+"""Elements and points from the rows of an SU2 file; errors name the line of a mistake.
+
+`su2.loops` reads plain rows; those that it leaves are read here, or are the mistakes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.errors import MeshError
+from slideviz.formats.su2.lines import Lines, Piece, Rows, number_of, show
+from slideviz.formats.su2.scan import Progress
+from slideviz.mesh.check import first_fault, no_node
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import Cells, FloatArray, IntArray
+from slideviz.system.in_order import in_order
+
+_SUPPORTED = ", ".join(str(vtk) for vtk, row in ELEMENTS.items() if row.dim > 0)
+"""The element types, for messages."""
+# VTK's quadratic and higher-order elements, and SU2's own identifiers: 100 more per degree.
+_HIGH_ORDER = (*range(21, 38), *range(60, 82))
+_LONE_SIGN = re.compile(rb"[+-](?![0-9])")
+_DIGITS = 18
+"""Most digits of a whole number that surely fits into 64 bits."""
+_EXTRA_POINT_WORDS = 2
+"""Most numbers after the coordinates: the index, and in partitioned files the global index."""
+
+
+def parse_cells(lines: Lines, rows: Rows, dim: int, n_points: int, progress: Progress) -> Cells:
+    """Return the elements on rows, each with type, nodes, and perhaps an index that is ignored.
+
+    Parameters
+    ----------
+    rows : tuple of Piece
+        The rows, with one element each.
+    dim : int
+        The dimension that the elements must have.
+    n_points : int
+        Node indices must be below this.
+    progress : callable
+        Called with the fraction done after each block; may raise to stop.
+
+    Raises
+    ------
+    MeshError
+        An element has a wrong type, dimension or nodes; the message has its line.
+    """
+    types = np.empty(number_of(rows), np.uint8)
+    nodes = np.empty(rows[-1].node + rows[-1].nodes if rows else 0, np.int64)
+
+    def parsed(piece: Piece) -> None:
+        mine = types[piece.row : piece.row + piece.rows]
+        flat = nodes[piece.node : piece.node + piece.nodes]
+        fill_cells(lines, piece, mine, flat, dim=dim, n_points=n_points)
+
+    _each(parsed, rows, progress)
+    nodes.flags.writeable = False
+    return Cells.from_types(types, nodes)
+
+
+def fill_cells(
+    lines: Lines,
+    piece: Piece,
+    types: NDArray[np.uint8],
+    nodes: IntArray,
+    *,
+    dim: int,
+    n_points: int,
+) -> None:
+    """Write the m elements of a piece into ``types`` (m,) and ``nodes`` (k,).
+
+    Raises
+    ------
+    MeshError
+        An element has a wrong type, dimension or nodes; the message has its line.
+    """
+    from slideviz.formats.su2.loops import cell_block
+
+    text = lines.text(piece)
+    odd = np.empty((piece.rows, 3), np.int64)
+    found, n_odd = cell_block(np.frombuffer(text, np.uint8), dim, n_points, types, nodes, odd)
+    if found != piece.rows:
+        raise lines.raw.changed()
+    for row, begin, node in odd[:n_odd].tolist():
+        vtk, its = _element(*_line_at(lines, piece, text, begin), dim, n_points)
+        types[row] = vtk
+        nodes[node : node + len(its)] = its
+
+
+def _each(work: Callable[[Piece], None], rows: Rows, progress: Progress) -> None:
+    """Call ``work`` with each piece, on all cores."""
+    for piece, _ in zip(rows, in_order(work, rows), strict=True):
+        progress((piece.row + piece.rows) / number_of(rows))
+
+
+def _line_at(lines: Lines, piece: Piece, text: bytes, begin: int) -> tuple[Lines, int, bytes]:
+    """Return ``lines``, and number and text without comment of the line from byte ``begin`` on.
+
+    ``text`` is the text of the piece, and ``begin`` counted in it.
+    """
+    stop = text.index(b"\n", begin)
+    return lines, piece.line + text.count(b"\n", 0, begin), text[begin:stop].partition(b"%")[0]
+
+
+def _element(lines: Lines, index: int, row: bytes, dim: int, n_points: int) -> tuple[int, IntArray]:
+    """Return type and nodes of the element on a row; ``index`` is the number of its line.
+
+    Raises
+    ------
+    MeshError
+        It has a wrong type, dimension or nodes, or a word that is no whole number.
+    """
+    numbers = _numbers(lines, index, row, np.int64)
+    words, vtk, n_numbers = row.split(), int(numbers[0]), len(numbers) - 1
+    if vtk not in ELEMENTS or ELEMENTS[vtk].dim != dim:
+        raise _wrong_type(lines, index, vtk, dim, show(words[0]))
+    kind = ELEMENTS[vtk]
+    if n_numbers not in (kind.n_nodes, kind.n_nodes + 1):
+        raise lines.error(
+            index,
+            f"a {kind.name} (type {vtk}) has {kind.n_nodes} nodes and perhaps an index, but "
+            f"{n_numbers} numbers follow the type; correct the type or the nodes",
+        )
+    nodes = numbers[1 : 1 + kind.n_nodes]
+    fault = first_fault(Cells.from_types([vtk], nodes), n_points)
+    if fault:
+        # A word with more digits may have been read as another number: the message has the word.
+        large = (word for word in words[1 : 1 + kind.n_nodes] if len(word.lstrip(b"+-0")) > _DIGITS)
+        word = next(large, None)
+        raise lines.error(index, fault[1] if word is None else no_node(show(word), n_points))
+    return vtk, nodes
+
+
+def _wrong_type(lines: Lines, index: int, vtk: int, dim: int, word: str) -> MeshError:
+    """Return the error for an element of unknown type (in the file ``word``) or wrong dimension."""
+    if vtk in ELEMENTS:
+        allowed = ", ".join(f"{t} ({e.name})" for t, e in ELEMENTS.items() if e.dim == dim)
+        return lines.error(
+            index,
+            f"element type {vtk} ({ELEMENTS[vtk].name}) has dimension {ELEMENTS[vtk].dim}, but "
+            f"dimension {dim} is needed here: {allowed}; correct the element or NDIME",
+        )
+    message = f"element type {word} is not supported (supported: {_SUPPORTED})"
+    if vtk in _HIGH_ORDER or vtk > 100:
+        message += "; it is a high-order element and slideviz needs linear elements, so export the"
+        message += " mesh with linear elements"
+    else:
+        message += "; export the mesh with these"
+    return lines.error(index, message)
+
+
+def _numbers(lines: Lines, index: int, row: bytes, kind: type) -> NDArray:
+    """Return the numbers of a row, (w,) of dtype ``kind``: ``np.int64`` or ``np.float64``.
+
+    Raises
+    ------
+    MeshError
+        A word is not one such number.
+    """
+    words = row.split()
+    numbers = []
+    for word in words:
+        found = _parse(word, kind)
+        if found is None or len(found) != 1:
+            what = "a whole number" if kind is np.int64 else "a number"
+            raise lines.error(index, f"'{show(word)}' stands where {what} should be; correct it")
+        numbers.append(found)
+    return np.concatenate(numbers)
+
+
+def _parse(text: bytes, kind: type) -> NDArray | None:
+    """Return the numbers of a text, (w,), or None if a word is no number.
+
+    Floats are rounded correctly, as by Python.
+    """
+    # NumPy takes a lone sign for 0, or joins it to the next word.
+    if kind is np.int64 and (b"-" in text or b"+" in text) and _LONE_SIGN.search(text):
+        return None
+    try:
+        return np.fromstring(text, kind, sep=" ")
+    except ValueError:
+        return None
+
+
+def parse_points(lines: Lines, rows: Rows, dim: int, progress: Progress) -> FloatArray:
+    """Return the coordinates (n, dim) of the points on rows, read-only.
+
+    Raises
+    ------
+    MeshError
+        A row has too few or many numbers, or one that is not finite; the message has its line.
+    """
+    points = np.empty((number_of(rows), dim))
+    found = np.empty((len(rows), 2), np.int64)
+    place = {piece.row: k for k, piece in enumerate(rows)}
+
+    def parsed(piece: Piece) -> None:
+        mine = points[piece.row : piece.row + piece.rows]
+        found[place[piece.row]] = fill_points(lines, piece, mine)
+
+    _each(parsed, rows, progress)
+    require_all_coordinates(lines, rows, dim, found)
+    points.flags.writeable = False
+    return points
+
+
+def fill_points(lines: Lines, piece: Piece, points: FloatArray) -> IntArray:
+    """Write the coordinates of the m points of a piece into ``points`` (m, d).
+
+    Returns
+    -------
+    (2,) int64
+        Largest count of numbers on a row, and number of the first row that may lack a coordinate
+        (``extra`` of `loops.point_block`), the largest int64 if there is none.
+
+    Raises
+    ------
+    MeshError
+        A row has too few or many numbers, or one that is not finite; the message has its line.
+    """
+    from slideviz.formats.su2.loops import point_block
+
+    text, dim = lines.text(piece), points.shape[1]
+    odd = np.empty((piece.rows, 2), np.int64)
+    extra = np.array([0, np.iinfo(np.int64).max])
+    n_rows, n_odd = point_block(
+        np.frombuffer(text, np.uint8), piece.row, points.view(np.uint64), extra, odd
+    )
+    if n_rows != piece.rows:
+        raise lines.raw.changed()
+    for row, begin in odd[:n_odd].tolist():
+        numbers = _point(*_line_at(lines, piece, text, begin), dim)
+        points[row] = numbers[:dim]
+        extra[0] = max(extra[0], len(numbers))
+        if len(numbers) == dim and numbers[-1] == piece.row + row:
+            extra[1] = min(extra[1], piece.row + row)
+    return extra
+
+
+def require_all_coordinates(lines: Lines, rows: Rows, dim: int, found: IntArray) -> None:
+    """Raise if a point lacks a coordinate, by the results (p, 2) of `fill_points` for p pieces.
+
+    If any row has an index after its coordinates, then a row with only ``dim`` numbers, the last
+    of which is its index, lacks a coordinate.
+
+    Raises
+    ------
+    MeshError
+        A point lacks a coordinate; the message has its line.
+    """
+    lost = int(found[:, 1].min())
+    if found[:, 0].max() > dim and lost < number_of(rows):
+        raise _wrong_count(lines, lines.row(rows, lost), dim, dim)
+
+
+def _point(lines: Lines, index: int, row: bytes, dim: int) -> FloatArray:
+    """Return the numbers of a row with a point, coordinates first; ``index`` is that of its line.
+
+    Raises
+    ------
+    MeshError
+        It has too few or many numbers, or a coordinate that is not finite.
+    """
+    numbers = _numbers(lines, index, row, np.float64)
+    if not dim <= len(numbers) <= dim + _EXTRA_POINT_WORDS:
+        raise _wrong_count(lines, index, len(numbers), dim)
+    for word, number in zip(row.split()[:dim], numbers, strict=False):
+        if not np.isfinite(number):
+            raise lines.error(
+                index, f"the coordinate {show(word)} is not finite; correct it or mesh again"
+            )
+    return numbers
+
+
+def _wrong_count(lines: Lines, index: int, count: int, dim: int) -> MeshError:
+    """Return the error for a point on line ``index`` with ``count`` numbers."""
+    return lines.error(
+        index,
+        f"a point has {dim} coordinates (NDIME= {dim}) and perhaps an index, but "
+        f"{count} numbers stand here; correct the line or NDIME",
+    )

@@ -1,0 +1,131 @@
+"""Reading SU2 text meshes; with the mesh is kept what is needed to write the file again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from slideviz.errors import printable
+from slideviz.formats.source import Source
+from slideviz.formats.su2.keyword_blocks import boxes_elsewhere, find_blocks, find_bounds
+from slideviz.formats.su2.lines import Rows, number_of
+from slideviz.formats.su2.numbers import parse_cells, parse_points
+from slideviz.formats.su2.scan import Progress, scan
+from slideviz.formats.su2.send_receive import find_halo
+from slideviz.formats.su2.text import boundaries_elsewhere
+from slideviz.formats.su2.zone import find_zone
+from slideviz.mesh.interfaces import find_interfaces
+from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh, Origin
+
+_SCANNED = 0.2
+"""Part of the time of reading a file, as told to the progress, that finding its lines takes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Document(Origin):
+    """An SU2 file as it was read, with the places of its parts, so that it can be written again.
+
+    Attributes
+    ----------
+    raw : Source
+        The whole file.
+    rows : tuple of Piece
+        The rows of the points in it.
+    points : (n, d) float64
+        The points as read.
+    cells : Cells
+        The cells as read.
+    markers : tuple of Marker
+        The boundaries as read.
+    zone : (int, int)
+        First byte and end of the zone, without its ``IZONE`` line.
+    sends, unknown : tuple of (int, int)
+        First byte and end of each ``SEND_RECEIVE`` marker, and of each unknown section.
+    """
+
+    ending = ".su2"
+    raw: Source
+    rows: Rows
+    points: FloatArray
+    cells: Cells
+    markers: tuple[Marker, ...]
+    zone: tuple[int, int]
+    sends: tuple[tuple[int, int], ...]
+    unknown: tuple[tuple[int, int], ...]
+
+
+def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
+    """Return one zone of an SU2 file.
+
+    Parameters
+    ----------
+    raw : Source
+        The file.
+    zone : int or None
+        The zone, from 1; None for the first.
+    progress : callable
+        Called with the fraction done; may raise to stop.
+
+    Raises
+    ------
+    MeshError
+        The file has a mistake; the message has the line.
+    """
+    lines = scan(raw, lambda done: progress(_SCANNED * done))
+    sections = find_blocks(lines)
+    found = find_zone(lines, sections, find_bounds(lines, sections, zone))
+    n_points = number_of(found.points)
+    sizes = [
+        rows[-1].end - rows[0].begin if rows else 0
+        for rows in (found.elements, found.points, *(m.rows for m in found.markers))
+    ]
+    first, second, *rest = _shares(sizes, progress)
+    cells = parse_cells(lines, found.elements, found.dim, n_points, first)
+    points = parse_points(lines, found.points, found.dim, second)
+    markers = tuple(
+        Marker(part.name, parse_cells(lines, part.rows, found.dim - 1, n_points, share))
+        for part, share in zip(found.markers, rest, strict=True)
+    )
+    raw.require_same()
+    progress(1.0)
+    document = Document(
+        raw=raw,
+        rows=found.points,
+        points=points,
+        cells=cells,
+        markers=markers,
+        zone=lines.bytes_of((found.bounds.begin, found.bounds.end))[0],
+        sends=lines.bytes_of(*((part.begin, part.end) for part in found.sends)),
+        unknown=lines.bytes_of(*((part.line, part.stop) for part in found.unknown)),
+        ffd_at=found.ffd_at,
+        ffd_elsewhere=boxes_elsewhere(sections, found.bounds),
+    )
+    mesh = Mesh(
+        points=points,
+        cells=cells,
+        markers=markers,
+        origin=document,
+        name=printable(raw.path.name),
+        zone=found.bounds.number,
+        zones=found.bounds.zones,
+        source=raw.path.resolve(),
+    )
+    halo, remarks = find_halo(lines, found, mesh)
+    others = boundaries_elsewhere(lines, sections, found, progress)
+    return replace(
+        mesh,
+        halo=halo,
+        remarks=(*found.remarks, *remarks),
+        interfaces=find_interfaces(mesh, others),
+    )
+
+
+def _shares(sizes: list[int], progress: Progress) -> list[Progress]:
+    """Return a function for each part that turns its progress (0 to 1) into that of all parts."""
+    total = max(sum(sizes), 1)
+    edges = [_SCANNED + (1.0 - _SCANNED) * sum(sizes[:k]) / total for k in range(len(sizes) + 1)]
+
+    def share(begin: float, end: float) -> Progress:
+        return lambda done: progress(begin + done * (end - begin))
+
+    return [share(begin, end) for begin, end in pairwise(edges)]

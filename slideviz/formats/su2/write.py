@@ -1,0 +1,303 @@
+"""Writing SU2 text meshes: the file that was read with other coordinates, or a new one.
+
+Numbers are written with as few digits as identify the float64, so that nothing is lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.errors import MeshError
+from slideviz.formats.source import Source
+from slideviz.formats.su2.keyword_blocks import is_ffd
+from slideviz.formats.su2.lines import Piece, Rows
+from slideviz.formats.su2.read import Document
+from slideviz.formats.su2.scan import BLOCK_BYTES
+from slideviz.formats.su2.zone import SEND_RECEIVE
+from slideviz.mesh.check import check_mesh, check_points
+from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
+from slideviz.system.in_order import in_order
+
+_BLOCK_ROWS = 20_000
+"""Most elements or points in a block of text."""
+_NUMBER_BYTES = 20
+"""Most bytes of an index, with the blank after it."""
+Edit = tuple[int, int, bytes]
+"""A change of a file: first byte and end of the text to replace, and the new text."""
+
+
+def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
+    """Yield the SU2 file of a mesh, block by block.
+
+    For a mesh that was read from an SU2 file and has the same cells and markers it is that file, in
+    which only the coordinates that changed are replaced. Any other mesh is written anew; sections
+    of its file that slideviz does not know follow at the end of its zone.
+
+    Raises
+    ------
+    MeshError
+        The mesh cannot be used, or a marker's name cannot stand in an SU2 file.
+    """
+    document, boxes = mesh.origin, mesh.origin.ffd
+    if isinstance(document, Document) and _only_points_differ(mesh, document):
+        check_points(mesh)
+        yield from _patched(document, mesh.points)
+        return
+    check_mesh(mesh)
+    require_text_names(mesh.name, mesh.marker_names)
+    if not isinstance(document, Document):
+        yield from _whole_zone(mesh)
+        yield from _markers(mesh.markers, 0)
+        yield boxes or b""
+        return
+    raw, (begin, end) = document.raw, document.zone
+    raw.require_same()
+    yield from (raw[a:b] for a, b in _ranges(0, begin))
+    yield from _whole_zone(mesh)
+    yield from _markers(mesh.markers, len(document.sends))
+    kept = (_whole(raw[a:b]) for a, b in (*document.sends, *document.unknown))
+    yield from (text for text in kept if boxes is None or not is_ffd(text))
+    yield boxes or b""
+    yield from (raw[a:b] for a, b in _ranges(end, raw.size))
+    raw.require_same()
+
+
+def _only_points_differ(mesh: Mesh, document: Document) -> bool:
+    """Return whether a mesh has the cells and markers, and as many points, as its file."""
+    if mesh.points.shape != document.points.shape:
+        return False
+    if mesh.cells is not document.cells and not mesh.cells.same_as(document.cells):
+        return False
+    return mesh.marker_names == tuple(m.name for m in document.markers) and all(
+        a is b or a.cells.same_as(b.cells)
+        for a, b in zip(mesh.markers, document.markers, strict=True)
+    )
+
+
+def _patched(document: Document, points: FloatArray) -> Iterator[bytes]:
+    """Yield the file with all coordinates replaced that differ in any bit, and with new boxes."""
+
+    def text(piece: Piece) -> bytes:
+        mine = slice(piece.row, piece.row + piece.rows)
+        return moved_rows(raw, piece, document.points[mine], points[mine])
+
+    raw, ffd = document.raw, document.ffd
+    edits = [] if ffd is None else box_edits(raw, document.unknown, document.zone[1], ffd)
+    yield from patched_blocks(raw, document.rows, text, edits)
+
+
+def patched_blocks(
+    raw: Source, rows: Rows, rows_text: Callable[[Piece], bytes], edits: Sequence[Edit]
+) -> Iterator[bytes]:
+    """Yield a file, block by block, with new texts for the pieces of points, and with ``edits``.
+
+    ``rows_text`` returns the new text of a piece of ``rows``.
+
+    Raises
+    ------
+    MeshError
+        The file was changed since it was read.
+    """
+    raw.require_same()
+    done = 0
+    tasks: list[tuple[int, int] | Piece | bytes] = []
+    for piece in rows:
+        tasks += [*_around(edits, done, piece.begin), piece]
+        done = piece.end
+
+    def text(task: tuple[int, int] | Piece | bytes) -> bytes:
+        if isinstance(task, bytes):
+            return task
+        return raw[slice(*task)] if isinstance(task, tuple) else rows_text(task)
+
+    yield from in_order(text, [*tasks, *_around(edits, done, raw.size + 1)])
+    raw.require_same()
+
+
+def box_edits(raw: Source, unknown: Sequence[tuple[int, int]], end: int, ffd: bytes) -> list[Edit]:
+    """Return the edits that replace the boxes for free-form deformation of a zone by ``ffd``.
+
+    If the zone has none, ``ffd`` is put at its end.
+
+    Parameters
+    ----------
+    unknown : sequence of (int, int)
+        First byte and end of each unknown section.
+    end : int
+        The byte where the zone ends.
+    """
+    old = [(a, b) for a, b in unknown if is_ffd(raw[a:b])]
+    if old:
+        return [(a, b, b"" if at else ffd) for at, (a, b) in enumerate(old)]
+    return [(end, end, ffd if raw[end - 1 : end] == b"\n" else b"\n" + ffd)]
+
+
+def _around(edits: Sequence[Edit], begin: int, end: int) -> Iterator[tuple[int, int] | bytes]:
+    """Yield the parts of a range of bytes in order: blocks (first byte, end) and texts of edits."""
+    for first, after, text in edits:
+        if begin <= first < end:
+            yield from _ranges(begin, first)
+            yield text
+            begin = after
+    yield from _ranges(begin, end)
+
+
+def _ranges(begin: int, end: int) -> list[tuple[int, int]]:
+    """Return first byte and end of the blocks that a range of bytes is divided into."""
+    return [(i, min(i + BLOCK_BYTES, end)) for i in range(begin, end, BLOCK_BYTES)]
+
+
+def moved_rows(raw: Source, piece: Piece, before: FloatArray, now: FloatArray) -> bytes:
+    """Return the text of a piece of points with the coordinates that changed replaced.
+
+    Parameters
+    ----------
+    before, now : (m, d) float64
+        The points of these rows, as read and as they are to be written.
+
+    Raises
+    ------
+    MeshError
+        The file was changed.
+    """
+    from slideviz.formats.su2.digits import print_changed
+
+    text = raw[piece.begin : piece.end]
+    changed = now.view(np.int64) != before.view(np.int64)
+    if not changed.any():
+        return text
+    broken = text if text.endswith(b"\n") else text + b"\n"
+    numbers = _digits(now)
+    out = np.empty(len(broken) + len(numbers), np.uint8)
+    rows, size = print_changed(np.frombuffer(broken, np.uint8), numbers, changed, out)
+    if rows != piece.rows:
+        raise raw.changed()
+    return out[: size - len(broken) + len(text)].tobytes()
+
+
+def _digits(points: FloatArray) -> NDArray[np.uint8]:
+    """Return the bytes of ``[[x,y],[x,y]]``, with as few digits as identify each float64."""
+    import orjson
+
+    return np.frombuffer(orjson.dumps(points, option=orjson.OPT_SERIALIZE_NUMPY), np.uint8)
+
+
+def require_text_names(mesh: str, names: Iterable[str]) -> None:
+    """Raise if the name of a marker cannot be written to an SU2 text file and read again.
+
+    ``mesh`` is the name of the mesh, for the message.
+
+    Raises
+    ------
+    MeshError
+        A name is empty, has a percent sign, blanks around it or control characters, or is
+        ``SEND_RECEIVE``.
+    """
+    for name in names:
+        if not name or name != name.strip() or not name.isprintable() or "%" in name:
+            raise MeshError(
+                f"{mesh}: the marker name {name!r} cannot stand in an SU2 file; rename it without "
+                "percent sign, line break or blanks around it"
+            )
+        if name.upper() == SEND_RECEIVE:
+            raise MeshError(
+                f"{mesh}: a boundary cannot be named {name}, which SU2 uses for halos; rename it"
+            )
+
+
+CellsOf = Callable[[int, int], Cells]
+"""A function that returns the cells ``i`` to ``j - 1``."""
+PointsOf = Callable[[int, int], FloatArray]
+"""A function that returns the points ``i`` to ``j - 1``, (j - i, d)."""
+
+
+def text_of_parts(
+    dim: int,
+    cells: tuple[int, CellsOf],
+    points: tuple[int, PointsOf],
+    markers: Sequence[Marker],
+) -> Iterator[bytes]:
+    """Yield the SU2 file of a mesh whose parts are made by functions, called from several threads.
+
+    Parameters
+    ----------
+    dim : int
+        2 or 3.
+    cells, points : (int, callable)
+        Their number, and the function that returns some of them.
+    markers : sequence of Marker
+        The boundaries.
+    """
+    yield from _zone(dim, cells, points)
+    yield from _markers(markers, 0)
+
+
+def _zone(dim: int, cells: tuple[int, CellsOf], points: tuple[int, PointsOf]) -> Iterator[bytes]:
+    """Yield dimension, elements and points, as `text_of_parts` gets them."""
+    yield f"NDIME= {dim}\nNELEM= {cells[0]}\n".encode()
+    yield from _elements(*cells, numbered=True)
+    yield f"NPOIN= {points[0]}\n".encode()
+    yield from in_order(partial(_point_rows, points[1]), _blocks(points[0]))
+
+
+def _whole_zone(mesh: Mesh) -> Iterator[bytes]:
+    """Yield dimension, elements and points of a mesh in memory."""
+    yield from _zone(
+        mesh.dim,
+        (len(mesh.cells), partial(_some, mesh.cells)),
+        (len(mesh.points), lambda i, j: mesh.points[i:j]),
+    )
+
+
+def _some(cells: Cells, i: int, j: int) -> Cells:
+    """Return the cells ``i`` to ``j - 1``, with offsets that begin as in ``cells``, not with 0."""
+    offsets = cells.offsets[i : j + 1]
+    return Cells(cells.types[i:j], offsets, cells.connectivity[offsets[0] : offsets[-1]])
+
+
+def _blocks(count: int) -> list[tuple[int, int]]:
+    """Return the first row of each block, and the one after the last."""
+    return [(i, min(i + _BLOCK_ROWS, count)) for i in range(0, count, _BLOCK_ROWS)]
+
+
+def _point_rows(points: PointsOf, block: tuple[int, int]) -> bytes:
+    """Return a line for each point of a block: coordinates and index."""
+    from slideviz.formats.su2.digits import print_points
+
+    mine = points(*block)
+    numbers = _digits(mine)
+    out = np.empty(len(numbers) + _NUMBER_BYTES * len(mine), np.uint8)
+    return out[: print_points(numbers, mine.shape[1], block[0], out)].tobytes()
+
+
+def _markers(markers: Sequence[Marker], sends: int) -> Iterator[bytes]:
+    """Yield NMARK, which includes ``sends`` markers of a halo that follow, and the boundaries."""
+    yield f"NMARK= {len(markers) + sends}\n".encode()
+    for marker in markers:
+        yield f"MARKER_TAG= {marker.name}\nMARKER_ELEMS= {len(marker.cells)}\n".encode()
+        yield from _elements(len(marker.cells), partial(_some, marker.cells), numbered=False)
+
+
+def _elements(count: int, cells: CellsOf, *, numbered: bool) -> Iterator[bytes]:
+    """Yield a line for each element: type, nodes, and its index where asked for."""
+    yield from in_order(partial(_cell_rows, cells, numbered), _blocks(count))
+
+
+def _cell_rows(cells: CellsOf, numbered: bool, block: tuple[int, int]) -> bytes:
+    """Return a line for each element of a block."""
+    from slideviz.formats.su2.digits import print_cells
+
+    some = cells(*block)
+    out = np.empty(_NUMBER_BYTES * (len(some.connectivity) + 2 * len(some)), np.uint8)
+    index = block[0] if numbered else -1
+    size = print_cells(some.types, some.offsets, some.connectivity, index, out)
+    return out[:size].tobytes()
+
+
+def _whole(text: bytes) -> bytes:
+    """Return the text of a section with a line break at its end."""
+    return text if text.endswith(b"\n") else text + b"\n"

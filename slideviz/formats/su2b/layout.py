@@ -1,0 +1,321 @@
+"""The layout of an SU2 binary mesh (``.su2b``): at which byte of the file each part begins.
+
+The file begins with two integers of 4 bytes: the width of all further counts and indices (4 or 8
+bytes, in either byte order) and the number of zones. Then it has for each zone number, dimension,
+elements, points and markers. Elements are an array of offsets, and a list with type, nodes and
+(not for markers) index of each. Each count is compared with the size of the file before an array is
+made by it, so that a file that is cut off or was changed costs no memory.
+"""
+
+from __future__ import annotations
+
+import os
+from copy import copy
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+from typing import BinaryIO, Literal
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from slideviz.errors import MeshError, printable
+
+NAME_BYTES = 33
+"""Bytes of the name of a marker, padded with zeros."""
+SEND_RECEIVE = "SEND_RECEIVE"
+"""Name of the markers of a halo (in `su2.zone`, too), which this format cannot have."""
+_INT = 4
+"""Bytes of the integers that are no counts: numbers of zones and markers, dimension."""
+MAGIC = {
+    np.array(width, f"{order}i4").tobytes(): (width, order) for width in (4, 8) for order in "<>"
+}
+"""Width of counts and byte order ("<" or ">"), by the first four bytes of a file."""
+
+
+@dataclass(frozen=True)
+class ElementTable:
+    """Where the elements of a zone or marker are in the file.
+
+    Attributes
+    ----------
+    count : int
+        Number of elements.
+    offsets, entries : int
+        First byte of the offsets, and of the list.
+    length : int
+        How many numbers the list has.
+    numbered : bool
+        Whether each element ends with its index.
+    """
+
+    count: int
+    offsets: int
+    entries: int
+    length: int
+    numbered: bool
+
+
+@dataclass(frozen=True)
+class MarkerPlace:
+    """A marker: its name, the ``NAME_BYTES`` bytes of the name in the file, its elements."""
+
+    name: str
+    raw: bytes
+    elements: ElementTable
+
+
+@dataclass(frozen=True)
+class ZonePlace:
+    """Where a zone is in the file.
+
+    Attributes
+    ----------
+    number : int
+        Number of the zone, from 1.
+    begin, end : int
+        Its first byte, and the one after its last.
+    dim : int
+        2 or 3.
+    cells : ElementTable
+        Its cells.
+    n_points, points : int
+        Number of points, and the first byte of the first.
+    markers : tuple of MarkerPlace
+        Its markers.
+    """
+
+    number: int
+    begin: int
+    end: int
+    dim: int
+    cells: ElementTable
+    n_points: int
+    points: int
+    markers: tuple[MarkerPlace, ...]
+
+
+class BinaryFile:
+    """An open ``.su2b`` file: reads arrays, from any thread, and makes errors that name the byte.
+
+    Attributes
+    ----------
+    name : str
+        The file, for messages.
+    size : int
+        Number of bytes.
+    width : int
+        Bytes of a count or an index, 4 or 8.
+    order : "<" or ">"
+        The byte order.
+    zones : int
+        Number of zones by its head.
+
+    Raises
+    ------
+    MeshError
+        The file does not begin as an SU2 binary mesh.
+    """
+
+    def __init__(self, path: Path, file: BinaryIO) -> None:
+        self.name, self._file, self._lock = printable(path), file, Lock()
+        self.size = os.fstat(file.fileno()).st_size
+        head = file.read(2 * _INT)
+        if head[:_INT] not in MAGIC:
+            raise self.error(
+                0,
+                f"this is no SU2 binary mesh, which begins with 4 or 8 in four bytes, not with "
+                f"{head[:_INT].hex(' ') or 'nothing'}; give the file the ending of its format",
+            )
+        self.width, sign = MAGIC[head[:_INT]]
+        self.order: Literal["<", ">"] = "<" if sign == "<" else ">"
+        self.zones = self.whole(_INT, "the number of zones")
+        if self.zones < 1:
+            raise self.error(_INT, f"the number of zones is {self.zones}, but at least 1 is needed")
+
+    def of(self, file: BinaryIO) -> BinaryFile:
+        """Return this object for another open file of the same layout, whose head is not read."""
+        other = copy(self)
+        other._file, other._lock = file, Lock()
+        return other
+
+    @property
+    def conn(self) -> np.dtype:
+        """Return the data type of counts and indices."""
+        return np.dtype(f"{self.order}u{self.width}")
+
+    def point(self, dim: int) -> np.dtype:
+        """Return the data type of a point: coordinates ``x`` (dim,) and its index ``i``."""
+        return np.dtype([("x", f"{self.order}f8", (dim,)), ("i", self.conn)])
+
+    def error(self, at: int, message: str) -> MeshError:
+        """Return the error ``file: byte n: message``."""
+        return MeshError(f"{self.name}: byte {at}: {message}")
+
+    def require(self, at: int, count: int, width: int, what: str) -> int:
+        """Return the byte after ``count`` items of ``width`` bytes that begin at byte ``at``.
+
+        ``what`` names the items in the message.
+
+        Raises
+        ------
+        MeshError
+            The file ends before that byte.
+        """
+        end = at + count * width
+        if end > self.size:
+            raise self.error(
+                at,
+                f"{what} ({count} times {width} bytes) should be here, but the file ends at byte "
+                f"{self.size}; it is cut off or the count is wrong, so write it again",
+            )
+        return end
+
+    def array(self, at: int, count: int, dtype: DTypeLike, what: str) -> NDArray:
+        """Return the ``count`` items of type ``dtype`` that begin at byte ``at``.
+
+        ``what`` names the items in the message.
+
+        Raises
+        ------
+        MeshError
+            The file ends before the last item, or cannot be read.
+        """
+        kind = np.dtype(dtype)
+        self.require(at, count, kind.itemsize, what)
+        try:
+            with self._lock:
+                self._file.seek(at)
+                found = np.fromfile(self._file, kind, count)
+        except OSError as problem:
+            raise self.error(at, f"cannot be read: {problem}; check the disk") from problem
+        if len(found) != count:
+            raise self.error(at, f"{what}: the file became shorter while it was read; read again")
+        return found
+
+    def bytes(self, begin: int, end: int) -> bytes:
+        """Return the bytes ``begin`` to ``end - 1``."""
+        return self.array(begin, end - begin, np.uint8, "the zones").tobytes()
+
+    def whole(self, at: int, what: str) -> int:
+        """Return the integer of four bytes at byte ``at``."""
+        return int(self.array(at, 1, f"{self.order}i4", what)[0])
+
+    def count(self, at: int, what: str) -> int:
+        """Return the count or index, of ``width`` bytes, at byte ``at``."""
+        return int(self.array(at, 1, self.conn, what)[0])
+
+
+def find_zones(source: BinaryFile) -> tuple[ZonePlace, ...]:
+    """Return where the zones of a file are.
+
+    Raises
+    ------
+    MeshError
+        A part goes beyond the end of the file, a number is wrong, or bytes follow the last zone.
+    """
+    zones: list[ZonePlace] = []
+    at = 2 * _INT
+    while len(zones) < source.zones:
+        zones.append(_zone(source, at, len(zones) + 1))
+        at = zones[-1].end
+    if at != source.size:
+        raise source.error(
+            at,
+            f"{source.size - at} bytes follow the last of the {source.zones} zones, where the file "
+            "should end; correct the number of zones (byte 4) or write the mesh again",
+        )
+    return tuple(zones)
+
+
+def find_zone(source: BinaryFile, number: int | None) -> ZonePlace:
+    """Return where the zone of that number (from 1) is; None: the first.
+
+    Raises
+    ------
+    MeshError
+        There is no such zone, or as `find_zones`.
+    """
+    zones, chosen = find_zones(source), 1 if number is None else number
+    if not 1 <= chosen <= len(zones):
+        has = "one zone" if len(zones) == 1 else f"the zones 1 to {len(zones)}"
+        raise MeshError(
+            f"{source.name}: there is no zone {chosen}, for the file has {has}; choose one of these"
+        )
+    return zones[chosen - 1]
+
+
+def _zone(source: BinaryFile, begin: int, number: int) -> ZonePlace:
+    """Return where zone ``number`` is, which begins at byte ``begin``; raise as `find_zones`."""
+    given = source.whole(begin, f"the number of zone {number}")
+    if given != number:
+        raise source.error(
+            begin, f"zone {number} has the number {given}; zones are numbered from 1, so correct it"
+        )
+    dim = source.whole(begin + _INT, "the dimension")
+    if dim not in (2, 3):
+        raise source.error(begin + _INT, f"the dimension is {dim}, but must be 2 or 3; correct it")
+    cells = _elements(source, begin + 2 * _INT, "elements", dim + 3, numbered=True)
+    at = cells.entries + cells.length * source.width
+    n_points = source.count(at, "the number of points")
+    points = at + source.width
+    at = source.require(points, n_points, source.point(dim).itemsize, "the points")
+    count = source.whole(at, "the number of markers")
+    if count < 0:
+        raise source.error(at, f"the number of markers is {count}, but must not be negative")
+    at += _INT
+    source.require(at, count, NAME_BYTES + 2 * source.width, "the markers")
+    markers: dict[str, MarkerPlace] = {}
+    for _ in range(count):
+        marker = _marker(source, at, dim)
+        if marker.name in markers:
+            raise source.error(at, f"marker {marker.name} stands a second time; rename one of them")
+        markers[marker.name] = marker
+        at = marker.elements.entries + marker.elements.length * source.width
+    return ZonePlace(number, begin, at, dim, cells, n_points, points, tuple(markers.values()))
+
+
+def _marker(source: BinaryFile, at: int, dim: int) -> MarkerPlace:
+    """Return the marker that begins at byte ``at``; raise MeshError for a wrong name or count."""
+    raw = source.array(at, NAME_BYTES, np.uint8, "the name of a marker").tobytes()
+    text, end, _ = raw.partition(b"\0")
+    try:
+        name = text.decode()
+    except UnicodeDecodeError:
+        name = ""
+    if not name or not end or not name.isprintable():
+        what = "is not ended by a zero" if not end else "is empty or no printable UTF-8 text"
+        raise source.error(
+            at,
+            f"the marker name {text.decode('utf-8', 'backslashreplace')!r} {what}; {NAME_BYTES} "
+            "bytes are for it, padded with zeros, so correct it or write the mesh again",
+        )
+    if name.upper() == SEND_RECEIVE:
+        raise source.error(
+            at, f"SU2 binary meshes cannot have {name} markers (halos); write the mesh without them"
+        )
+    what = f"elements of marker {name}"
+    elements = _elements(source, at + NAME_BYTES, what, dim + 1, numbered=False)
+    return MarkerPlace(name, raw, elements)
+
+
+def _elements(
+    source: BinaryFile, at: int, what: str, fewest: int, *, numbered: bool
+) -> ElementTable:
+    """Return the table of elements that begins at byte ``at``, or raise MeshError.
+
+    ``what`` names the elements in messages, ``fewest`` is the least count of numbers of an element.
+    """
+    count = source.count(at, f"the number of {what}")
+    offsets = at + source.width
+    entries = source.require(offsets, count + 1, source.width, f"the offsets of the {what}")
+    last = entries - source.width
+    length = source.count(last, f"the last offset of the {what}")
+    source.require(entries, length, source.width, f"the list of the {what}")
+    if length < count * fewest:
+        raise source.error(
+            last,
+            f"{count} {what} have a list of {length} numbers, but each needs at least {fewest}; "
+            "the file is damaged, so write the mesh again",
+        )
+    return ElementTable(count, offsets, entries, length, numbered)

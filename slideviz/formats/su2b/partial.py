@@ -1,0 +1,245 @@
+"""Partial files: large files that are written part by part, and resumed after the program stopped.
+
+A partial file has a hidden name in the folder of the *target*, the file that it is to replace or
+that it is needed for. A *note*, a small JSON file beside it, says which parts are done. A mesh is
+first a copy of another one, whose parts are changed one by one. Its first bytes are zeros
+meanwhile, so that no program reads it; at the end they are written, and it is renamed to the
+target.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from slideviz.errors import MeshError
+from slideviz.formats.su2b.copying import Piece, copying
+from slideviz.system.atomic import mode_of, reason_of
+from slideviz.system.cleanup import keep, open_temporary, removed_at_stop
+from slideviz.system.file_checks import read_json, require_no_input
+from slideviz.system.ranks import ALONE, Alone
+from slideviz.system.threads import Tick
+
+BINARY = ".binary"
+"""End of the name of the partial file that is a binary copy of a text."""
+HEAD = 8
+"""Bytes that are zeros until the end."""
+
+
+@dataclass(eq=False)
+class Partial:
+    """A partial file.
+
+    Attributes
+    ----------
+    file : BinaryIO
+        Open for reading and writing.
+    path : Path
+        Its hidden name.
+    sums : list of int
+        Checksum of each part that is done; what a part is, the caller decides.
+    mode : int or None
+        Permissions of the target, None if it does not exist.
+    ready : callable
+        Waits until the file is a complete copy; call it before the first writing.
+    """
+
+    file: BinaryIO
+    path: Path
+    sums: list[int]
+    mode: int | None
+    _note: Path
+    _about: str
+    ready: Callable[[Tick], None] = lambda _: None
+
+    @property
+    def done(self) -> int:
+        """Return how many parts are done."""
+        return len(self.sums)
+
+    def remove(self) -> None:
+        """Remove the file and its note."""
+        _removed(self.path, self._note)
+
+    def note(self, sums: Iterable[int]) -> None:
+        """Sync the file to the disk, then note that parts with these checksums are done."""
+        os.fsync(self.file.fileno())
+        self.sums = list(sums)
+        fresh = self._note.with_suffix(".new")
+        fresh.unlink(missing_ok=True)  # it might be a link to another file
+        with fresh.open("x") as file:
+            json.dump({"about": self._about, "sums": self.sums}, file)
+        fresh.replace(self._note)
+        if self.sums:
+            keep(self.path, _kept_words(self.path))
+
+
+def names_of(path: Path, more: str = "") -> tuple[Path, Path]:
+    """Return the paths of the partial file of a target, and of its note."""
+    real = Path(os.path.realpath(path))
+    name = f".{real.name}.partial{more}"
+    return real.with_name(name), real.with_name(f"{name}.json")
+
+
+def keep_earlier(path: Path) -> None:
+    """Let it be said at an early end that partial files of an earlier run are there, if any are."""
+    for ours, note in (names_of(path), names_of(path, BINARY)):
+        if ours.exists() and note.exists():
+            keep(ours, f"what an earlier run has done is kept in {ours}; go on with --resume")
+
+
+@contextmanager
+def partial_file(
+    path: Path, size: int, about: str, *, resume: bool, more: str = ""
+) -> Iterator[Partial]:
+    """Context with a partial file of ``size`` bytes, zeros or as a stopped process left it.
+
+    An error in the block removes the file. If the program is stopped, the file stays once a part is
+    noted as done, so that ``resume`` can continue. Otherwise the caller removes or renames it.
+
+    Parameters
+    ----------
+    path : Path
+        The target.
+    size : int
+        Number of bytes.
+    about : str
+        A text that identifies the work: if that in the note differs, the file is made anew.
+    resume : bool
+        Whether to continue with the file of a stopped process, if there is one.
+    more : str
+        End of its name, where a target has several partial files.
+
+    Raises
+    ------
+    MeshError
+        It cannot be written, or another process is writing it.
+    """
+    ours, note = names_of(path, more)
+    try:
+        mode = mode_of(Path(os.path.realpath(path)))
+        sums = _noted(note, about) if resume else []
+        with open_temporary(ours, new=True) as file:
+            _lock(file, path)
+            with removed_at_stop(ours):
+                try:
+                    if sums and os.fstat(file.fileno()).st_size == size:
+                        keep(ours, _kept_words(ours))
+                    else:
+                        sums = []
+                        note.unlink(missing_ok=True)
+                        os.ftruncate(file.fileno(), 0)
+                        os.ftruncate(file.fileno(), size)
+                    yield Partial(file, ours, sums, mode, note, about)
+                except Exception:
+                    _removed(ours, note)
+                    raise
+    except OSError as problem:
+        if problem.filename is not None and Path(str(problem.filename)) not in (ours, note, path):
+            raise
+        raise MeshError(f"{path}: cannot be written: {reason_of(problem)}") from problem
+
+
+@contextmanager
+def partial_copy(
+    path: Path,
+    source: Path,
+    about: str,
+    changed: Piece,
+    *,
+    resume: bool,
+    replaces: Path | None,
+    ranks: Alone = ALONE,
+) -> Iterator[Partial]:
+    """Context with a partial file that is a copy of ``source``, which replaces ``path`` at the end.
+
+    Of a copy that a stopped process has left, all that is not ``changed`` is made equal again.
+
+    Parameters
+    ----------
+    path : Path
+        The target.
+    source : Path
+        The mesh to copy.
+    about, resume
+        As of `partial_file`.
+    changed : tuple of int
+        The first of the bytes that the caller changes, and the one after the last.
+    ranks : Alone or Ranks
+        The processes that copy.
+
+    Raises
+    ------
+    MeshError
+        It cannot be written, or another process is writing it.
+    """
+    require_no_input(path, MeshError, replaces)
+    size = source.stat().st_size
+    with partial_file(path, size, about, resume=resume) as partial:
+        with source.open("rb") as given:
+            head = given.read(HEAD)
+        is_left = partial.done > 0
+        copied = [(HEAD, changed[0]), (changed[1], size)] if is_left else [(HEAD, size)]
+        with copying(source, partial.path, copied, ranks, is_left=is_left) as partial.ready:
+            yield partial
+        finish_head(partial.file, head)
+        mode = 0o644 & ~_umask() if partial.mode is None else partial.mode
+        os.fchmod(partial.file.fileno(), mode)
+        partial.path.replace(os.path.realpath(path))
+        _removed(partial._note)  # not its name, which may be another's by now
+
+
+def finish_head(file: BinaryIO, head: bytes) -> None:
+    """Write the first bytes of a mesh, after all others, and sync the file to the disk."""
+    file.seek(0)
+    file.write(head)
+    file.flush()
+    os.fsync(file.fileno())
+
+
+def _kept_words(ours: Path) -> str:
+    """Return the words for the user on a partial file that stays."""
+    return f"what is done is kept in {ours}; go on with --resume"
+
+
+def _noted(note: Path, about: str) -> list[int]:
+    """Return the checksums in a note on the same work ``about``; empty if there is no such note."""
+    try:
+        kept = read_json(note)
+        return [int(one) for one in kept["sums"]] if kept["about"] == about else []
+    except (OSError, ValueError, KeyError, TypeError, OverflowError):
+        return []
+
+
+def _lock(file: BinaryIO, path: Path) -> None:
+    """Lock a file, or raise MeshError, which names the target, if another process has."""
+    import fcntl  # POSIX only
+
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as problem:
+        if problem.errno not in (errno.EAGAIN, errno.EACCES):
+            raise
+        raise MeshError(
+            f"{path}: another process is writing it; wait for it, or choose another name"
+        ) from problem
+
+
+def _removed(*paths: Path) -> None:
+    """Remove files, those that exist and can be removed."""
+    for path in paths:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    """Return the permission bits that new files do not get."""
+    now = os.umask(0)
+    os.umask(now)
+    return now

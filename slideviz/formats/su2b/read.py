@@ -1,0 +1,257 @@
+"""Reading SU2 binary meshes (``.su2b``), block by block.
+
+With the mesh is kept what is needed to write the file again. `su2b.elements` reads elements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from slideviz.errors import MeshError, printable
+from slideviz.formats.su2.scan import Progress
+from slideviz.formats.su2b.elements import BLOCK, element_blocks
+from slideviz.formats.su2b.layout import MAGIC, BinaryFile, ElementTable, ZonePlace, find_zone
+from slideviz.mesh.check import first_fault
+from slideviz.mesh.interfaces import find_interfaces
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class BinaryForm(Origin):
+    """The form of the ``.su2b`` file that a mesh was read from, to write it the same way.
+
+    Attributes
+    ----------
+    width : int
+        Bytes of an index, 4 or 8.
+    byte_order : "<" or ">"
+        Little or big endian.
+    before, after : bytes
+        The file before and after the zone: its head and the other zones.
+    order : (m,) int64 or None
+        Index of the cell at each place of the file; None where each is at its place.
+    names : tuple of bytes
+        Names of the markers with the bytes that pad them.
+    cells : Cells
+        The cells as read.
+    """
+
+    ending = ".su2b"
+    width: int
+    byte_order: Literal["<", ">"]
+    before: bytes
+    after: bytes
+    order: IntArray | None
+    names: tuple[bytes, ...]
+    cells: Cells
+
+
+def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
+    """Return one zone of an SU2 binary mesh.
+
+    Parameters
+    ----------
+    zone : int or None
+        The zone, from 1; None for the first.
+    progress : callable
+        Called with the fraction done; may raise to stop.
+
+    Raises
+    ------
+    MeshError
+        The file has a mistake; the message has its byte.
+    OSError
+        It cannot be read.
+    """
+    with path.open("rb") as file:
+        source = BinaryFile(path, file)
+        place = find_zone(source, zone)
+        whole = place.cells.count + place.n_points + sum(m.elements.count for m in place.markers)
+        done = 0
+
+        def tick(count: int) -> None:
+            nonlocal done
+            done += count
+            progress(min(1.0, done / max(whole, 1)))
+
+        cells, order = read_elements(source, place, place.cells, place.dim, tick)
+        points = np.empty((place.n_points, place.dim))
+        for first, block in point_blocks(source, place):
+            points[first : first + len(block)] = block
+            tick(len(block))
+        markers = tuple(
+            Marker(m.name, read_elements(source, place, m.elements, place.dim - 1, tick)[0])
+            for m in place.markers
+        )
+        form = BinaryForm(
+            source.width,
+            source.order,
+            source.bytes(0, place.begin),
+            source.bytes(place.end, source.size),
+            order,
+            tuple(marker.raw for marker in place.markers),
+            cells,
+        )
+        others = list(boundaries_elsewhere(source, place))
+    points.flags.writeable = False
+    mesh = Mesh(
+        points=points,
+        cells=cells,
+        markers=markers,
+        name=printable(path.name),
+        zone=place.number,
+        zones=source.zones,
+        source=path.resolve(),
+        origin=form,
+    )
+    return replace(mesh, interfaces=find_interfaces(mesh, others))
+
+
+def boundaries_elsewhere(
+    source: BinaryFile, place: ZonePlace
+) -> Iterator[tuple[int, str, FloatArray]]:
+    """Yield zone, name and nodes (k, d) of each boundary of other zones, as far as readable."""
+    for number in range(1, source.zones + 1):
+        if number == place.number:
+            continue
+        try:
+            zone = find_zone(source, number)
+            nodes = [
+                (m.name, read_elements(source, zone, m.elements, zone.dim - 1, _untold)[0].nodes)
+                for m in zone.markers
+                if zone.dim == place.dim and m.elements.count
+            ]
+            places = [np.empty((len(some), zone.dim)) for _, some in nodes]
+            for first, block in point_blocks(source, zone) if nodes else ():
+                for (_, some), points in zip(nodes, places, strict=True):
+                    here = slice(*np.searchsorted(some, [first, first + len(block)]))
+                    points[here] = block[some[here] - first]
+        except MeshError:  # the zone that is asked for can be right all the same
+            continue
+        for (name, _), points in zip(nodes, places, strict=True):
+            yield number, name, points
+
+
+def _untold(_: int) -> None:
+    """Take the number of elements of a block."""
+
+
+def point_blocks(
+    source: BinaryFile, place: ZonePlace, size: int = BLOCK
+) -> Iterator[tuple[int, FloatArray]]:
+    """Yield the points of a zone in blocks: number of the first point, and coordinates (k, d).
+
+    Raises
+    ------
+    MeshError
+        A coordinate is not finite, or a point has another index than its place.
+    """
+    for first in range(0, place.n_points, size):
+        yield first, point_block(source, place, first, size)
+
+
+def point_block(source: BinaryFile, place: ZonePlace, first: int, size: int) -> FloatArray:
+    """Return the coordinates (k, d) of the points from number ``first`` on, at most ``size``.
+
+    Raises
+    ------
+    MeshError
+        A coordinate is not finite, or a point has another index than its place.
+    """
+    kind = source.point(place.dim)
+    count = min(size, place.n_points - first)
+    at = place.points + first * kind.itemsize
+    block = source.array(at, count, kind, "the points")
+    wrong = block["i"] != np.arange(first, first + count, dtype=np.uint64)
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise source.error(
+            at + k * kind.itemsize + 8 * place.dim,
+            f"point {first + k} has the index {block['i'][k]}; points are numbered from 0 in "
+            "the order of the file, so write the mesh again",
+        )
+    points = block["x"].astype(np.float64)
+    bad = ~np.isfinite(points)
+    if bad.any():
+        k, axis = np.argwhere(bad)[0].tolist()
+        raise source.error(
+            at + k * kind.itemsize + 8 * axis,
+            f"point {first + k} has the coordinate {points[k, axis]}, which is not finite; "
+            "correct it or mesh again",
+        )
+    return points
+
+
+def read_elements(
+    source: BinaryFile, place: ZonePlace, table: ElementTable, dim: int, tick: Callable[[int], None]
+) -> tuple[Cells, IntArray | None]:
+    """Return the elements of a table in the order of their indices, and the order of the file.
+
+    That is the index (m,) of the element at each place, or None where each is at its place. Raises
+    MeshError as `element_block`, or if indices are not each number below m once. ``tick`` is called
+    with the number of elements of each block.
+    """
+    # Filled block by block, so that they are in memory only once.
+    types = np.empty(table.count, np.uint8)
+    flat = np.empty(table.length - (1 + table.numbered) * table.count, np.int64)
+    order = np.empty(table.count if table.numbered else 0, np.int64)
+    filled = 0
+    for block in element_blocks(source, place, table, dim):
+        part = slice(block.first, block.first + len(block.types))
+        types[part] = block.types
+        flat[filled : filled + len(block.nodes)] = block.nodes
+        order[part] = block.ids
+        filled += len(block.nodes)
+        tick(len(block.types))
+    types.flags.writeable = flat.flags.writeable = False
+    cells = Cells.from_types(types, flat)
+    fault = first_fault(cells, place.n_points)
+    if fault:
+        at = table.entries + (int(cells.offsets[fault[0]]) + fault[0] * (1 + table.numbered)) * (
+            source.width
+        )
+        raise source.error(at, f"element {fault[0]}: {fault[1]}")
+    if not table.numbered or np.array_equal(order, np.arange(table.count)):
+        return cells, None
+    _check_order(source, table, cells, order)
+    return sorted_back(cells, order), frozen_array(order, np.int64)
+
+
+def _check_order(source: BinaryFile, table: ElementTable, cells: Cells, order: IntArray) -> None:
+    """Raise MeshError if an index of elements, ``order`` (m,), is not below m or repeats."""
+    inside = order.view(np.uint64) < len(order)
+    first = np.full(len(order), len(order))
+    np.minimum.at(first, order[inside], np.flatnonzero(inside))
+    wrong = ~inside
+    wrong[inside] = first[order[inside]] != np.flatnonzero(inside)
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise source.error(
+            table.entries + (int(cells.offsets[k + 1]) + 2 * k + 1) * source.width,
+            f"element {k} has the index {int(order[k]) % 2**64}, which is not below the number of "
+            f"elements, {len(order)}, or stands twice; write the mesh again",
+        )
+
+
+def sorted_back(cells: Cells, order: IntArray) -> Cells:
+    """Return cells in the order of their indices, ``order`` (m,) being the index of each."""
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    return cells.take(place)
+
+
+def is_su2b(path: Path) -> bool:
+    """Return whether a file begins as an SU2 binary mesh does.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    """
+    with path.open("rb") as file:
+        return file.read(4) in MAGIC

@@ -1,0 +1,318 @@
+"""Writing SU2 binary meshes (``.su2b``), of arrays or of functions that return parts of them.
+
+A mesh that was read from such a file is written as it was: with the same width, byte order and
+order of its elements. Others are written as by SU2: counts of 8 bytes, little endian, elements
+sorted by type. Each element has its index, so that a mesh is read back with its cells in the order
+that it had.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.errors import MeshError
+from slideviz.formats.su2.keyword_blocks import is_ffd
+from slideviz.formats.su2.read import Document
+from slideviz.formats.su2b.elements import BLOCK
+from slideviz.formats.su2b.layout import NAME_BYTES, SEND_RECEIVE
+from slideviz.formats.su2b.read import BinaryForm
+from slideviz.mesh.check import check_mesh
+from slideviz.mesh.elements import SIZES
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
+
+SORTED = (3, 5, 9, 10, 12, 13, 14)
+"""SU2's order of the types of elements."""
+LARGEST_4 = 2**32 - 1
+OTHER_ZONES = "its other zones"
+"""What a file of one zone loses."""
+
+
+@dataclass(frozen=True, eq=False)
+class ZoneContent:
+    """The content of a zone to write, with functions that return parts of its large arrays.
+
+    The functions get numbers i, j and return the k = j - i items from i on.
+
+    Attributes
+    ----------
+    dim : int
+        2 or 3.
+    n_cells, n_points : int
+        Numbers of cells and points.
+    cells : callable
+        Returns cells in the order of the file: types (k,), nodes one after the other, and the
+        index of each (k,).
+    types : callable
+        Returns the types (k,) of these cells.
+    points : callable
+        Returns coordinates (k, d).
+    markers : tuple of Marker
+        The boundaries.
+    """
+
+    dim: int
+    n_cells: int
+    n_points: int
+    cells: Callable[[int, int], tuple[NDArray[np.uint8], IntArray, IntArray]]
+    types: Callable[[int, int], NDArray[np.uint8]]
+    points: Callable[[int, int], FloatArray]
+    markers: tuple[Marker, ...]
+
+
+def su2b_blocks(*meshes: Mesh) -> Iterator[bytes]:
+    """Yield the SU2 binary file of a mesh, or of several as its zones, block by block.
+
+    For a single mesh that is one zone of a ``.su2b`` file, the other zones are written, too.
+
+    Raises
+    ------
+    MeshError
+        A mesh cannot be used, has a halo, or has a name that cannot stand in such a file.
+    """
+    for mesh in meshes:
+        check_mesh(mesh)
+        require_binary(mesh)
+    form = meshes[0].origin
+    if len(meshes) > 1 or not isinstance(form, BinaryForm):
+        yield from file_head(len(meshes))
+        for number, mesh in enumerate(meshes, 1):
+            yield from zone_blocks(_zone(mesh, _by_type(mesh.cells)), number)
+        return
+    mesh = meshes[0]
+    same = mesh.cells is form.cells or mesh.cells.same_as(form.cells)
+    yield form.before
+    yield from zone_blocks(
+        _zone(mesh, form.order if same else _by_type(mesh.cells)), mesh.zone, form
+    )
+    yield form.after
+
+
+def require_binary(mesh: Mesh) -> None:
+    """Raise if an SU2 binary file cannot hold a mesh.
+
+    Raises
+    ------
+    MeshError
+        It has a halo, or a boundary has a name that cannot stand in such a file.
+    """
+    if mesh.halo is not None or (isinstance(mesh.origin, Document) and mesh.origin.sends):
+        raise halo_error(mesh.name)
+    require_binary_names(mesh.name, mesh.marker_names)
+
+
+def halo_error(name: str) -> MeshError:
+    """Return the error for a mesh, called ``name``, with a halo."""
+    return MeshError(
+        f"{name}: has a halo ({SEND_RECEIVE} markers), which an SU2 binary mesh cannot hold; write "
+        "a .su2 file, or make the mesh without its halo"
+    )
+
+
+def require_binary_names(mesh: str, names: Iterable[str]) -> None:
+    """Raise if a name of a boundary of the mesh called ``mesh`` cannot be in an SU2 binary file.
+
+    Raises
+    ------
+    MeshError
+        A name is empty, not printable, too long, or ``SEND_RECEIVE``.
+    """
+    for name in names:
+        size = len(name.encode("utf-8", "replace"))
+        if not name or not name.isprintable() or size >= NAME_BYTES or name.upper() == SEND_RECEIVE:
+            raise MeshError(
+                f"{mesh}: the marker name {name!r} cannot stand in an SU2 binary file, which "
+                f"has room for {NAME_BYTES - 1} bytes ({size} given) and has no {SEND_RECEIVE}; "
+                "rename the marker"
+            )
+
+
+def lost_in_binary(mesh: Mesh) -> tuple[str, ...]:
+    """Return what of a mesh's file is lost if it is written as SU2 binary, in words."""
+    is_binary = isinstance(mesh.origin, BinaryForm)
+    return lost_of_mesh(replace(mesh, zones=1) if is_binary else mesh)
+
+
+def lost_of_mesh(mesh: Mesh) -> tuple[str, ...]:
+    """Return what the file of a mesh has besides points, cells and boundaries, in words."""
+    document = mesh.origin
+    keys = ["FFD_NBOX"] if document.ffd else []
+    has_halo = mesh.halo is not None
+    if isinstance(document, Document):
+        keys += [document.raw[a:b].partition(b"=")[0].strip().decode() for a, b in document.unknown]
+        has_halo = has_halo or bool(document.sends)
+    halo = (f"its halo ({SEND_RECEIVE}; its cells are as any others now)",) if has_halo else ()
+    return (*halo, *lost_of_text(keys, mesh.zones))
+
+
+def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:
+    """Return what of an SU2 text is lost as binary, in words; empty if nothing is.
+
+    ``keys`` are those of sections that slideviz does not know, ``zones`` the number of zones.
+    """
+    unique = dict.fromkeys(key.upper() for key in keys)
+    others = ", ".join(key for key in unique if not is_ffd(key.encode()))
+    lost = {
+        "its FFD boxes": any(is_ffd(key.encode()) for key in unique),
+        f"its other sections ({others})": bool(others),
+        OTHER_ZONES: zones > 1,
+    }
+    return tuple(words for words, is_lost in lost.items() if is_lost)
+
+
+def listed(lost: Sequence[str]) -> str:
+    """Return words (at least one) as a list in a sentence: ``a, b and c``."""
+    *first, last = lost
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def sentence_of_lost(
+    output: Path, name: str, lost: Sequence[str], ending: str = ".su2", *, alone: bool = False
+) -> str:
+    """Return in words what a file will not have of a mesh; nothing where it has all.
+
+    Parameters
+    ----------
+    ending : str
+        Of a file that would have it.
+    alone : bool
+        Whether one of several zones is converted, as ``--zone`` asks for.
+    """
+    if not lost:
+        return ""
+    remedy = f"write a {ending} file"
+    if alone:
+        has_zones = output.suffix.lower() in (".su2", ".su2b")
+        is_enough = has_zones and list(lost) == [OTHER_ZONES]
+        remedy = "leave out --zone" if is_enough else f"leave out --zone and {remedy}"
+    return f"{output} will not have {listed(lost)} of {name}; {remedy} to keep them"
+
+
+def file_head(zones: int, form: BinaryForm | None = None) -> Iterator[bytes]:
+    """Yield the head of a file, in width and byte order of ``form``, else 8 and little endian."""
+    width, sign = (8, "<") if form is None else (form.width, form.byte_order)
+    yield np.array([width, zones], f"{sign}i4").tobytes()
+
+
+def zone_blocks(zone: ZoneContent, number: int, form: BinaryForm | None = None) -> Iterator[bytes]:
+    """Yield one zone of a file, in the width and byte order of ``form``, else 8 and little endian.
+
+    Raises MeshError if its numbers do not fit into counts of 4 bytes.
+    """
+    width, sign = (8, "<") if form is None else (form.width, form.byte_order)
+    conn = np.dtype(f"{sign}u{width}")
+
+    def short(*values: int) -> bytes:
+        return np.array(values, f"{sign}i4").tobytes()
+
+    yield short(number, zone.dim) + np.array([zone.n_cells], conn).tobytes()
+    start = 0
+    for i, j in _parts(zone.n_cells):
+        ends = start + np.cumsum(SIZES[zone.types(i, j)] + 2)
+        yield np.concatenate([[start], ends[:-1]]).astype(conn).tobytes()
+        start = int(ends[-1])
+    if width == 4 and max(start, zone.n_points) > LARGEST_4:
+        raise MeshError("the mesh has more cells than a file with counts of 4 bytes can hold")
+    yield np.array([start], conn).tobytes()
+    for i, j in _parts(zone.n_cells):
+        yield rows_of(*zone.cells(i, j)).astype(conn, copy=False).tobytes()
+    yield np.array([zone.n_points], conn).tobytes()
+    kind = np.dtype([("x", f"{sign}f8", (zone.dim,)), ("i", conn)])
+    for i, j in _parts(zone.n_points):
+        block = np.empty(j - i, kind)
+        block["x"], block["i"] = zone.points(i, j), np.arange(i, j)
+        yield block.tobytes()
+    yield short(len(zone.markers))
+    raw = {} if form is None else {name.partition(b"\0")[0]: name for name in form.names}
+    for marker in zone.markers:
+        name = marker.name.encode()
+        yield raw.get(name, padded(name)) + marker_table(marker.cells, conn)
+
+
+def padded(name: bytes) -> bytes:
+    """Return the name of a marker padded with zeros to ``NAME_BYTES``."""
+    return name.ljust(NAME_BYTES, b"\0")
+
+
+def marker_table(cells: Cells, conn: np.dtype) -> bytes:
+    """Return the bytes of a marker's elements (count, offsets, list), which follow its name.
+
+    ``conn`` is the data type of counts and indices.
+    """
+    head = np.concatenate([[len(cells), 0], np.cumsum(SIZES[cells.types] + 1)])
+    return np.concatenate([head, rows_of(cells.types, cells.connectivity)]).astype(conn).tobytes()
+
+
+def _parts(count: int) -> Iterator[tuple[int, int]]:
+    """Yield begin and end of parts of at most ``BLOCK`` of ``count`` items."""
+    for first in range(0, count, BLOCK):
+        yield first, min(first + BLOCK, count)
+
+
+def rows_of(types: NDArray[np.uint8], nodes: IntArray, ids: IntArray | None = None) -> IntArray:
+    """Return the list (n,) of elements in the file: type, nodes and, if given, index of each.
+
+    ``types`` and ``ids`` are (k,), ``nodes`` those of all elements one after the other.
+    """
+    sizes = SIZES[types]
+    more = 1 if ids is None else 2
+    if len(types) and (types == types[0]).all():
+        table = np.empty((len(types), int(sizes[0]) + more), np.int64)
+        table[:, 0] = types[0]
+        table[:, 1 : 1 + int(sizes[0])] = nodes.reshape(len(types), -1)
+        if ids is not None:
+            table[:, -1] = ids
+        return table.ravel()
+    ends = np.cumsum(sizes + more)
+    out = np.empty(len(nodes) + more * len(types), np.int64)
+    keep = np.ones(len(out), bool)
+    keep[ends - sizes - more] = False
+    out[ends - sizes - more] = types
+    if ids is not None:
+        keep[ends - 1] = False
+        out[ends - 1] = ids
+    out[keep] = nodes
+    return out
+
+
+def _by_type(cells: Cells) -> IntArray | None:
+    """Return indices (m,) that sort cells by type as SU2 does, or None if they are sorted so."""
+    rank = np.zeros(256, np.int64)
+    rank[list(SORTED)] = np.arange(len(SORTED))
+    ranks = rank[cells.types]
+    return None if (np.diff(ranks) >= 0).all() else np.argsort(ranks, kind="stable")
+
+
+def _zone(mesh: Mesh, order: IntArray | None) -> ZoneContent:
+    """Return the content of a zone for a mesh; ``order`` has the cell at each place of the file."""
+    cells = mesh.cells
+
+    def part(i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
+        if order is not None:
+            some = cells.take(order[i:j])
+            return some.types, some.connectivity, order[i:j]
+        begin, end = cells.offsets[[i, j]]
+        return cells.types[i:j], cells.connectivity[begin:end], np.arange(i, j)
+
+    def types(i: int, j: int) -> NDArray[np.uint8]:
+        return cells.types[i:j] if order is None else cells.types[order[i:j]]
+
+    return ZoneContent(
+        dim=mesh.dim,
+        n_cells=len(cells),
+        n_points=len(mesh.points),
+        cells=part,
+        types=types,
+        points=partial(_slice, mesh.points),
+        markers=mesh.markers,
+    )
+
+
+def _slice(array: FloatArray, i: int, j: int) -> FloatArray:
+    """Return the rows ``i`` to ``j - 1``."""
+    return array[i:j]

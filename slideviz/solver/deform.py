@@ -1,0 +1,240 @@
+"""The solver: ``deform(case, mesh)`` yields one deformed mesh for each step.
+
+Whoever pulls the generator owns progress and cancel; the command line, a test and the window's
+worker run the same code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from slideviz.argument_types import check_types
+from slideviz.case.model import Case
+from slideviz.errors import DeformError, UnsoundError
+from slideviz.mesh.model import IntArray, Mesh
+from slideviz.mesh.quality import INVERTED, quality
+from slideviz.rbf.constraint_rows import ConstraintRows, blocks
+from slideviz.rbf.problem import Watch
+from slideviz.solver.setup import Setup, make_setup
+from slideviz.solver.stepping import Stepping, problem_at, renumbered
+from slideviz.solver.steps import Progress, Step, Trial
+
+__all__ = ["Progress", "Step", "Trial", "deform", "folded_at"]
+
+COUNTS = (1, 2, 3, 5, 8, 13, 21, 34)
+"""Numbers of steps that STEPS= auto tries, in this order."""
+
+ELASTIC_BYTES = {2: 2_000, 3: 8_000}
+"""Bytes of memory that linear elasticity takes for each node, by dimension: measured on
+quadrilaterals and hexahedra, whose matrix has the most entries."""
+
+
+@check_types
+def deform(
+    case: Case,
+    mesh: Mesh,
+    progress: Callable[[Progress], None] | None = None,
+    setup: Setup | None = None,
+) -> Iterator[Step]:
+    """Yield the deformed mesh of each step, with numbers on how it was made.
+
+    Parameters
+    ----------
+    case
+        Roles, motions and settings. Its ``mesh_file`` is not read.
+    mesh
+        The undeformed mesh.
+    progress
+        Called often with a ``Progress``; an exception it raises ends the run at once.
+    setup
+        What ``make_setup`` returned for this mesh and a case that differs in the number of steps
+        alone; it is made when there is none.
+
+    Raises
+    ------
+    CaseError, MeshError
+        The case does not fit the mesh.
+    DeformError
+        The system cannot be solved, or needs more memory than there is.
+
+    Notes
+    -----
+    Thesis chapters 2 and 3: the displacement is divided by the number of steps, in the working
+    frame, and every step solves at the positions the one before it left. With ``steps`` 0
+    (STEPS= auto) no step is yielded before their number is found.
+
+    Examples
+    --------
+    Two squares side by side; the left side stays, the right side moves by 0.5:
+
+    >>> import slideviz as sv
+    >>> mesh = sv.Mesh(
+    ...     [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]],
+    ...     sv.Cells.from_blocks([(9, [[0, 1, 4, 3], [1, 2, 5, 4]])]),
+    ...     (
+    ...         sv.Marker("left", sv.Cells.from_blocks([(3, [[0, 3]])])),
+    ...         sv.Marker("right", sv.Cells.from_blocks([(3, [[2, 5]])])),
+    ...     ),
+    ... )
+    >>> case = sv.Case(roles={"right": "moving"}, motions=(sv.Translate("right", (0.5, 0.0)),))
+    >>> for step in sv.deform(case, mesh):
+    ...     print(step.index, step.mesh.points[:3, 0].round(2))
+    1 [0.   1.28 2.5 ]
+    """
+    tell = progress or (lambda _: None)
+    watch = Watch(lambda phase, fraction: tell(Progress(1, max(1, case.steps), phase, fraction)))
+    if setup is None:
+        with watch.phase("classify"):
+            setup = make_setup(case, mesh)
+    require_memory(setup, case)
+    stepping = Stepping(case, mesh, setup, tell, watch.seconds)
+    yield from all_steps(stepping)
+
+
+def all_steps(stepping: Stepping) -> Iterator[Step]:
+    """Yield the steps of a case: as many as it asks for, or as STEPS= auto finds best."""
+    count = stepping.case.steps
+    yield from stepping.steps(count) if count else _automatic(stepping)
+
+
+def _automatic(stepping: Stepping) -> Iterator[Step]:
+    """Yield the steps of the best number of steps (STEPS= auto).
+
+    Numbers are tried in the order of ``COUNTS``, without those up to the number that the trial
+    before came to by halving steps that fold cells. Better means fewer inverted cells, then a
+    higher minimum quality. The search ends
+
+    * when the best trial has no inverted cell and no halved step, and the next one has none either,
+      and raises the minimum quality by at most the part ``steps_gain`` of it;
+    * after two trials in a row that are no better or have no sound result. Two, because halved
+      steps are small just where it matters: equal steps catch up only with a larger number, and
+      because cells that fold with some number of steps need not fold with the next.
+
+    Raises
+    ------
+    DeformError
+        A step cannot be solved, or no trial before the end of the search has a sound result.
+    """
+    tried: list[Trial] = []
+    best: tuple[Trial, list[Step]] | None = None
+    worse, failure = 0, None
+    for count in COUNTS:
+        if tried and count <= tried[-1].steps:
+            continue  # halving made so many already
+        try:
+            steps = list(stepping.steps(count, halve=True))
+        except UnsoundError as problem:
+            worse, failure = worse + 1, problem
+            if worse == 2:
+                break
+            continue
+        found = stepping.quality_of(steps)
+        trial = Trial(count, len(steps), found.min, found.mean, found.inverted)
+        tried.append(trial)
+        if best is not None and best[0].inverted == 0 and best[0].steps == best[0].planned:
+            gain = stepping.case.steps_gain * best[0].min
+            if not trial.inverted and trial.min - best[0].min <= gain:
+                break
+        if best is None or (-trial.inverted, trial.min) > (-best[0].inverted, best[0].min):
+            best, worse = (trial, steps), 0
+        else:
+            worse += 1
+        if worse == 2:
+            break  # more steps do not help: two numbers in a row were no better
+    if best is None:
+        assert failure is not None
+        raise failure
+    yield from renumbered(best[1], tuple(tried))
+
+
+def folded_at(steps: Sequence[Step], mesh: Mesh, cells: IntArray) -> IntArray:
+    """Return the number of the step after which each cell is first inverted, (k,); 0 where never.
+
+    Parameters
+    ----------
+    steps
+        All steps of a run, with their meshes.
+    mesh
+        The undeformed mesh.
+    cells : (k,)
+        Cells to follow, such as those inverted in the end.
+    """
+    first = np.zeros(len(cells), np.int64)
+    if not len(cells):
+        return first
+    part = Mesh(mesh.points, mesh.cells.take(cells))
+    for step in steps:
+        status = quality(part.with_points(step.mesh.points), part).status
+        first[(first == 0) & (status == INVERTED)] = step.index
+    return first
+
+
+def require_memory(setup: Setup, case: Case, *, lasting: bool = False) -> None:
+    """Raise DeformError when the system of a step would not fit into free memory.
+
+    ``lasting``: as of a ``Problem``.
+    """
+    if case.method == "elastic":
+        _require_free(
+            ELASTIC_BYTES[setup.coords.shape[1]] * len(setup.coords),
+            f"linear elasticity of {len(setup.coords)} nodes needs",
+            "use METHOD= rbf with DATA_REDUCTION= YES, METHOD= idw, or a coarser mesh",
+        )
+    if case.method != "rbf" or setup.reduction is not None:
+        return  # nothing is dense; the selection keeps no matrix of all candidates
+    sizes = _systems(setup, case, lasting=lasting)
+    _require_free(
+        8.0 * (sum(n**2 for n in sizes) + 1.6 * max(sizes) ** 2),
+        f"{sum(sizes)} unknowns need",
+        "give large boundaries far from the motion the role internal, use SLIDING_MODE= ps, "
+        "DATA_REDUCTION= YES, or a coarser mesh",
+    )
+
+
+def _systems(setup: Setup, case: Case, *, lasting: bool) -> list[int]:
+    """Return the number of unknowns of each dense system whose factors are in memory together.
+
+    At most: parts of the boundary that supports do not connect have systems of their own.
+
+    Direct sliding has one system for each axis where normals lie along axes. Where boundaries are
+    curved, it solves a further one, for all boundary nodes.
+    """
+    goal = setup.coords[setup.known] + setup.target
+    problem = problem_at(setup, setup.coords, goal)
+    label, moves = problem.reach
+    moves = moves | lasting
+    known, nodes = (
+        int(moves[label[setup.same_as[each]]].sum())
+        for each in (problem.known, np.concatenate([problem.known, problem.edge, problem.surface]))
+    )
+    normals = problem.normals[moves[label[setup.same_as[problem.normal_nodes]]]]
+    if case.sliding != "ds" or not len(normals):
+        return [nodes]
+    dim = setup.coords.shape[1]
+    along = np.concatenate([np.eye(dim), normals])
+    block = blocks(ConstraintRows(np.arange(len(along)), along, np.zeros((len(along), 1))))
+    each = np.bincount(block, np.r_[np.full(dim, known), np.ones(len(normals))])
+    return [int(n) for n in each if n] + [nodes] * setup.tracks.curved
+
+
+def _require_free(needed: float, what: str, remedy: str) -> None:
+    """Raise DeformError when fewer than ``needed`` bytes of memory are free."""
+    free = free_memory()
+    if needed > free:
+        raise DeformError(
+            f"{what} {needed / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free; {remedy}"
+        )
+
+
+def free_memory() -> float:
+    """Return the bytes a process may still take; infinite where the system does not say."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as lines:  # noqa: PTH123
+            for line in lines:
+                if line.startswith("MemAvailable:"):
+                    return float(line.split()[1]) * 1024
+    except OSError:
+        pass
+    return float("inf")

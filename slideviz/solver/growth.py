@@ -1,0 +1,254 @@
+"""Results that cannot be right: nodes that overshoot the motion, and systems that were not solved.
+
+A smooth function that has to change from one displacement to another within a thin layer
+overshoots behind it: for example at a wall that moves along itself, beside a wall that is fixed,
+with cells of a height of 1e-6 between the two.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.rbf.problem import Solution
+from slideviz.solver.setup import Setup
+from slideviz.system.threads import PART, in_parts
+
+GROWTH = 5.0
+"""A displacement overshoots where it is longer than this times the reach of the motion (`_reach`).
+Sliding nodes get to 2 on the thesis's cases, and to 4 around a thin sharp profile that slides."""
+
+TAKEN = 1.5
+"""Boundaries that went farther than this times the largest displacement asked for have overshot
+themselves, so that they do not count for the reach of the motion."""
+
+STEEP = 100.0
+"""Neighbouring boundary nodes explain an overshoot where the difference of their displacements over
+their distance is this times the largest displacement over the mesh's extent."""
+
+STRAY = 10.0
+"""A node strays where it goes more than this times as far as the farthest boundary node."""
+
+HOPELESS = 0.1
+"""A system was not solved where its solution misses the displacement of a control node by more than
+this part of the largest displacement."""
+
+
+def unsoundness(
+    setup: Setup,
+    mesh: Mesh,
+    solution: Solution,
+    moved: FloatArray,
+    part: float,
+    least: float = 0.0,
+) -> str | None:
+    """Return why the result of a step cannot be right, and what helps; None where it may be.
+
+    Parameters
+    ----------
+    moved : (n, d)
+        Coordinates in the frame after the step. In a cylindrical one angles are times the largest
+        radius: so a body that turns about the axis carries no node farther than itself.
+    part : float
+        The part of the whole displacement that is reached after the step, 0 to 1.
+    least : float
+        A length: the whole displacement counts as at least so long, where it is smaller.
+    """
+    largest = part * setup.largest
+    if solution.lost > HOPELESS * largest:
+        return (
+            f"the interpolation misses its own control nodes by {solution.lost:.3g}, where the "
+            f"largest displacement is {largest:.3g} (condition number {solution.condition:.0e}): "
+            f"{_cause(setup, mesh, moved)}"
+        )
+    asked, largest = largest, max(largest, part * least)
+    longest = np.zeros(-(-len(moved) // PART))
+
+    def measure(part: slice) -> None:
+        length = np.linalg.norm(moved[part] - setup.coords[part], axis=1)
+        longest[part.start // PART] = length.max()
+
+    in_parts(measure, len(moved))
+    if longest.max() <= GROWTH * largest:
+        return None  # as nearly always: the motion reaches that far at least
+    shift = moved - setup.coords
+    length = np.linalg.norm(shift, axis=1)
+    # Sliding nodes are compared with moving boundaries only: they are data for all other nodes.
+    reach = np.full(len(length), _reach(setup, shift, largest, ("moving", "fixed", "sliding")))
+    slid = setup.classes.sliding
+    reach[slid] = _reach(setup, shift, largest, ("moving",))
+    beyond = length > GROWTH * reach
+    if not beyond.any():
+        return None
+    on = slid[beyond[slid]]
+    node = int(on[np.argmax(length[on])]) if len(on) else int(np.argmax(length * beyond))
+    where = ", ".join(f"{value:.6g}" for value in mesh.points[node])
+    return (
+        f"node {mesh.number(node)} at ({where}) would go {length[node]:.3g} far, more than "
+        f"{GROWTH:g} times the {reach[node]:.3g} that the motion reaches, whose largest "
+        f"displacement so far is {asked:.3g}: {_cause(setup, mesh, moved)}"
+    )
+
+
+def overshoot_of_rest(
+    setup: Setup, mesh: Mesh, after: FloatArray, part: float, length: float
+) -> str | None:
+    """Return that a node outside of the skin overshoots, as the end of a sentence; None if not.
+
+    Parameters
+    ----------
+    mesh, after
+        The skin of a mesh, and its points (n, d) after the step.
+    part : float
+        The part of the whole displacement that is reached after the step, 0 to 1.
+    length : float
+        How far the node has gone, in the frame.
+    """
+    largest = part * setup.largest
+    if length <= GROWTH * largest:
+        return None
+    moved = setup.frame.coords(after)
+    shift = moved - setup.coords
+    if length <= GROWTH * _reach(setup, shift, largest, ("moving", "fixed", "sliding")):
+        return None
+    return (
+        f"would go {length:.3g} far, {length / largest:.3g} times the largest displacement that is "
+        f"asked for ({largest:.3g}): {_cause(setup, mesh, moved)}"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Farthest:
+    """The node of a mesh that went farthest.
+
+    Attributes
+    ----------
+    length : float
+        How far, in the mesh's length unit.
+    node : int
+        Its number; of several, the lowest.
+    point : (d,) float64
+        Its undeformed place.
+    """
+
+    length: float
+    node: int
+    point: FloatArray
+
+    def further(self, other: Farthest) -> Farthest:
+        """Return the one of two that went farther."""
+        return max(self, other, key=lambda each: (each.length, -each.node))
+
+
+def farthest_node(
+    before: FloatArray, after: FloatArray, numbers: IntArray | None = None
+) -> Farthest:
+    """Return the node that went farthest, of points (n, d) with ``numbers`` (n,), or 0, 1, ..."""
+    parts: list[Farthest] = []
+
+    def measure(part: slice) -> None:
+        length = np.linalg.norm(after[part] - before[part], axis=1)
+        k = int(np.argmax(length))
+        node = part.start + k
+        number = node if numbers is None else int(numbers[node])
+        parts.append(Farthest(float(length[k]), number, before[node]))
+
+    in_parts(measure, len(before))
+    return reduce(Farthest.further, parts)
+
+
+def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) -> list[str]:
+    """Return the warning that a node strays from the motion, or [].
+
+    Parameters
+    ----------
+    mesh, after
+        The mesh, or its skin, and its points (n, d) after the step.
+    found : Farthest
+        Of the whole mesh.
+    """
+    nodes = np.concatenate([setup.known, setup.classes.sliding])
+    most = float(np.linalg.norm(after[nodes] - mesh.points[nodes], axis=1).max(initial=0.0))
+    if not found.length > STRAY * most > 0.0:
+        return []
+    where = ", ".join(f"{value:.6g}" for value in found.point)
+    ratio, radius = found.length / most, setup.basis.radius
+    smaller = f"{0.8 * STRAY / ratio * radius / mesh.extent:.2g}"
+    remedy = f"RBF_KERNEL= wendland-c0, which does not, or INFLUENCE_FACTOR= {smaller}"
+    if setup.fitted_radius < radius:
+        remedy = "INFLUENCE_FACTOR= AUTO, or RBF_KERNEL= wendland-c0"
+    sentence = (
+        f"node {found.node} at ({where}) goes {found.length:.3g} far, {ratio:.3g} "
+        f"times as far as the farthest boundary node ({most:.3g}): the interpolation, whose "
+        f"support radius is {radius:.3g}, continues the turning or stretching of the boundary "
+        f"beyond it; use {remedy}"
+    )
+    return [sentence]
+
+
+def _reach(setup: Setup, shift: FloatArray, largest: float, kinds: tuple[str, ...]) -> float:
+    """Return the reach of the motion: how far its boundaries may carry nodes.
+
+    That is the largest displacement, or the largest strain of a boundary times the mesh's extent:
+    a smooth function continues the turning or stretching of a body around it, so that a small
+    profile turned in a large far field carries nodes the farther, the farther they are from it.
+
+    Parameters
+    ----------
+    shift : (n, d)
+        Displacement of all nodes in the frame.
+    largest : float
+        The largest displacement asked for.
+    kinds
+        Classes of boundary nodes that count: "moving", "fixed", "sliding".
+    """
+    chosen = np.zeros(len(shift), bool)
+    for kind in kinds:
+        chosen[getattr(setup.classes, kind)] = True
+    strains = [0.0]
+    for index in range(len(setup.boundary.names)):
+        nodes = np.unique(setup.boundary.facets[setup.boundary.marker == index])
+        nodes = nodes[chosen[nodes]]
+        farthest = np.linalg.norm(shift[nodes], axis=1).max(initial=0.0)
+        if len(nodes) > 1 and farthest <= TAKEN * largest:
+            at, moved = setup.coords[nodes], shift[nodes]
+            size = np.linalg.norm(at - at.mean(axis=0), axis=1).max()
+            strains.append(np.linalg.norm(moved - moved.mean(axis=0), axis=1).max() / size)
+    return max(largest, float(max(strains)) * float(np.ptp(setup.coords, axis=0).max()))
+
+
+def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
+    """Return why the interpolation fails, and what helps, as the end of a sentence."""
+    nodes = np.concatenate([setup.known, setup.classes.sliding])
+    at, shift = setup.coords[nodes], (moved - setup.coords)[nodes]
+    from scipy.spatial import cKDTree  # takes long to load
+
+    near = cKDTree(at).query(at, k=min(2, len(nodes)))
+    gaps, others = (np.asarray(found).reshape(len(nodes), -1)[:, -1] for found in near)
+    apart = np.linalg.norm(shift - shift[others], axis=1)
+    steep = np.divide(apart, gaps, out=np.zeros_like(apart), where=gaps > 0)
+    k = int(np.argmax(steep))
+    usual = setup.largest / mesh.extent
+    if steep[k] < STEEP * usual:
+        return (
+            f"{setup.basis.kernel} is too smooth for nodes so close to each other; use a less "
+            "smooth RBF_KERNEL such as wendland-c0, a smaller INFLUENCE_FACTOR, or "
+            "DATA_REDUCTION= YES"
+        )
+    pair = sorted((int(nodes[k]), int(nodes[others[k]])))
+    named = " and ".join(f"{mesh.number(node)} ({_boundaries(setup, node)})" for node in pair)
+    return (
+        f"boundary nodes {named}, {gaps[k]:.2g} apart, move by {apart[k]:.3g} differently, which a "
+        "smooth function cannot follow; let the boundary that stays go along (role moving, "
+        "internal or periodic), use RBF_KERNEL= wendland-c0, which does not overshoot, or "
+        "DATA_REDUCTION= YES"
+    )
+
+
+def _boundaries(setup: Setup, node: int) -> str:
+    """Return the names of the boundaries that a node is on."""
+    mine = (setup.boundary.facets == node).any(axis=1)
+    return ", ".join(setup.boundary.names[k] for k in np.unique(setup.boundary.marker[mine]))

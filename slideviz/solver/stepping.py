@@ -1,0 +1,380 @@
+"""Stepping: a deformation in a number of steps, each from the positions that the last one left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from slideviz.case.boxes import moved_boxes
+from slideviz.case.model import Case
+from slideviz.case.words import wrong_by
+from slideviz.errors import DeformError, Note, UnsoundError
+from slideviz.mesh.check import within
+from slideviz.mesh.halo import Halo
+from slideviz.mesh.interfaces import torn_interfaces
+from slideviz.mesh.model import FloatArray, Mesh, sealed
+from slideviz.mesh.quality import Quality, quality
+from slideviz.rbf.constraint_rows import AGREE
+from slideviz.rbf.frames import Frame
+from slideviz.rbf.images import largest_misfit, misfits
+from slideviz.rbf.kernels import KERNELS
+from slideviz.rbf.problem import Problem, Solution, Watch
+from slideviz.rbf.refine import NOTED, TRUSTED
+from slideviz.solver.growth import farthest_node, stray_warning, unsoundness
+from slideviz.solver.setup import Setup
+from slideviz.solver.steps import Progress, Step, Trial
+from slideviz.system.threads import in_parts
+
+HALVINGS = 3
+"""How often at most a step that folds a cell is halved: into eighths."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stepping:
+    """A deformation that can be made in any number of steps.
+
+    Attributes
+    ----------
+    case, mesh, setup
+        What is asked, the undeformed mesh, and the arrays made of both.
+    tell : callable
+        Called with each ``Progress``; an exception it raises ends the run.
+    seconds : dict of str to float
+        Spent before the first step, by phase; added to those of the first step.
+    rate : callable or None
+        Returns the quality of all cells after the last of the steps it is given, where ``mesh`` is
+        only the skin of a streamed mesh; the steps then have a ``field``. None: the quality of
+        the last step's mesh.
+    """
+
+    case: Case
+    mesh: Mesh
+    setup: Setup
+    tell: Callable[[Progress], None]
+    seconds: dict[str, float]
+    rate: Callable[[Sequence[Step]], Quality] | None = None
+
+    def steps(self, count: int, halve: bool = False) -> Iterator[Step]:
+        """Yield the steps that divide the displacement into ``count`` equal parts.
+
+        Parameters
+        ----------
+        halve : bool
+            Whether a step that folds more cells or is unsound is replaced by two of half the
+            length, and these again, up to ``HALVINGS`` times.
+
+        Raises
+        ------
+        DeformError
+            A step cannot be solved, or its result cannot be right.
+        """
+        setup, mesh = self.setup, self.mesh
+        ahead = [(k / count, 0) for k in range(1, count + 1)]
+        coords, done, index, folded = setup.coords, 0.0, 0, 0
+        warnings = [*self.case.warnings, *setup.warnings]
+        remarks: list[str] = []
+        worst, least = 0.0, (0.0, 0.0, 0, 0.0)
+        seconds = dict(self.seconds)
+        before: Solution | None = None
+        made: list[Step] = []
+        while ahead:
+            part, halvings = ahead[0]
+            total = index + len(ahead)
+            watch = Watch(self._report(index + 1, total), seconds)
+            goal = setup.coords[setup.known] + setup.target * part
+            solution = one_step(setup, coords, goal, watch, before)
+            moved = moved_by(setup, coords, solution.displacement, goal)
+            points = cartesian(setup.frame, mesh.points, setup.coords, moved)
+            if mesh.halo is not None:
+                points, moved = followed(setup, mesh, mesh.halo, points, moved)
+            if not within(points, np.finfo(float).max):
+                raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
+            step = self._made(index + 1, total, points, solution, watch, part)
+            unsound = unsoundness(setup, mesh, solution, moved, part)
+            failure = UnsoundError(f"step {index + 1}: {unsound}") if unsound else None
+            if halve:
+                try:
+                    now = self.quality_of([*made, step]).inverted
+                except UnsoundError as problem:
+                    now, failure = folded, failure or problem
+                if (now > folded or failure) and halvings < HALVINGS:
+                    ahead[0] = part, halvings + 1
+                    ahead.insert(0, ((done + part) / 2, halvings + 1))
+                    continue
+                folded = now
+                made.append(step)
+            if failure:
+                raise failure
+            coords, done, index = moved, part, index + 1
+            before = solution
+            ahead.pop(0)
+            if solution.short and solution.max_error > worst:
+                remarks, worst = [_short_warning(setup, solution, index)], solution.max_error
+            elif not remarks:
+                remarks = _dropped_warning(setup, solution, index, total, mesh)
+            warnings += [f"step {index}: {text}" for text in solution.warnings]
+            stray = []
+            if self.rate is None and self.case.method == "rbf":
+                farthest = farthest_node(mesh.points, points)
+                stray = stray_warning(setup, mesh, points, farthest)
+            least = max(least, (solution.doubt, solution.refined, index, solution.condition))
+            misfit, apart = self._misfit(step)
+            yield replace(
+                step,
+                warnings=(
+                    *warnings,
+                    *remarks,
+                    *_doubt_warning(*least),
+                    *apart,
+                    *torn_interfaces(mesh, points),
+                    *stray,
+                ),
+                periodic_misfit=misfit,
+            )
+            seconds = {}
+
+    def quality_of(self, steps: Sequence[Step]) -> Quality:
+        """Return the quality after the last of some steps.
+
+        Raises
+        ------
+        UnsoundError
+            A node outside of the skin of a streamed mesh would go far beyond the motion.
+        """
+        if self.rate is not None:
+            return self.rate(steps)
+        return quality(steps[-1].mesh, self.mesh, self.case.quality_metric)
+
+    def _misfit(self, step: Step) -> tuple[float | None, list[str]]:
+        """Return the misfit of periodic images, and a warning where cells are inverted as well.
+
+        Inverted cells are what a run then fails by. Raises DeformError where no cell is inverted.
+        """
+        setup = self.setup
+        state = setup.frame, setup.coords, step.mesh.points, setup.images
+        try:
+            return largest_misfit(*state), []
+        except DeformError as problem:
+            if self.rate is not None or not self.quality_of([step]).inverted:
+                raise
+            return float(misfits(*state).max()), [f"step {step.index}: {problem}"]
+
+    def _report(self, index: int, total: int) -> Callable[[str, float], None]:
+        return lambda phase, fraction: self.tell(Progress(index, total, phase, fraction))
+
+    def _made(
+        self,
+        index: int,
+        total: int,
+        points: FloatArray,
+        solution: Solution,
+        watch: Watch,
+        part: float,
+    ) -> Step:
+        return Step(
+            index=index,
+            total=total,
+            mesh=moved_boxes(self.case, self.mesh, part).with_points(sealed(points)),
+            control_nodes=solution.control_nodes,
+            max_error=solution.max_error,
+            condition=solution.condition,
+            node_counts=self.setup.classes.counts(),
+            seconds=watch.seconds,
+            warnings=(),
+            history=solution.history,
+            control=solution.control,
+            candidates=self.setup.candidates,
+            tolerance=self.setup.reduction.tolerance if self.setup.reduction else None,
+            layers=self.setup.layers,
+            part=part,
+            support_radius=self.setup.basis.radius if self.case.method == "rbf" else None,
+            field=solution.field if self.rate is not None else None,
+        )
+
+
+def renumbered(steps: list[Step], tried: tuple[Trial, ...]) -> Iterator[Step]:
+    """Yield the steps with their final ``total``, the last one with the trials as ``tried``."""
+    for step in steps:
+        last = step is steps[-1]
+        yield replace(step, total=len(steps), tried=tried if last else ())
+
+
+def one_step(
+    setup: Setup,
+    coords: FloatArray,
+    goal: FloatArray,
+    watch: Watch,
+    before: Solution | None,
+) -> Solution:
+    """Return the solution of one step from ``coords`` (n, d), with the displacement of all nodes.
+
+    Of periodic images only the representative is in the problem; its displacement is copied to the
+    others.
+
+    Parameters
+    ----------
+    goal : (a, d)
+        Coordinates of the known nodes after the step.
+    before : Solution or None
+        The solution of the step before.
+    """
+    found = setup.solve(problem_at(setup, coords, goal, before), watch)
+    first, second = setup.images.T
+    found.displacement[second] = found.displacement[first]
+    return found
+
+
+def problem_at(
+    setup: Setup, coords: FloatArray, goal: FloatArray, before: Solution | None = None
+) -> Problem:
+    """Return the problem of the step from ``coords`` (n, d) with known nodes at ``goal`` (a, d)."""
+    once = setup.once(setup.known)
+    known, classes = setup.known[once], setup.classes
+    normal_nodes, normals = setup.constraints(coords)
+    return Problem(
+        basis=setup.basis,
+        features=setup.frame.features(coords),
+        known=known,
+        values=goal[once] - coords[known],
+        edge=classes.edge[setup.once(classes.edge)],
+        surface=classes.surface[setup.once(classes.surface)],
+        normal_nodes=normal_nodes,
+        normals=normals,
+        same_as=setup.same_as,
+        project=lambda nodes, free: setup.project(coords, nodes, free),
+        curved=setup.tracks.curved,
+        cartesian=setup.frame.points,
+        coords=coords,
+        shift=setup.frame.shift(),
+        reduction=setup.reduction,
+        before=before,
+    )
+
+
+def moved_by(
+    setup: Setup, coords: FloatArray, displacement: FloatArray, goal: FloatArray
+) -> FloatArray:
+    """Return the coordinates (n, d) after a displacement, which they overwrite.
+
+    Known nodes are exactly at their ``goal`` (a, d).
+    """
+    moved = shifted(coords, displacement, setup.axis)
+    moved[setup.known] = np.where(
+        goal == setup.coords[setup.known], setup.coords[setup.known], goal
+    )
+    return moved
+
+
+def shifted(coords: FloatArray, displacement: FloatArray, axis: np.ndarray) -> FloatArray:
+    """Return the coordinates (n, d) after a displacement, which they overwrite.
+
+    Nodes on the ``axis``, a mask (n,), stay on it.
+    """
+    displacement[axis, :2] = 0.0
+
+    def add(part: slice) -> None:
+        # Adding zero would turn -0.0 into 0.0: nodes at rest keep every bit.
+        by, before = displacement[part], coords[part]
+        displacement[part] = np.where(by == 0, before, before + by)
+
+    in_parts(add, len(coords))
+    return displacement
+
+
+def cartesian(
+    frame: Frame, points: FloatArray, start: FloatArray, coords: FloatArray
+) -> FloatArray:
+    """Return the Cartesian points (n, d) of coordinates ``coords`` (n, d) in the frame.
+
+    Nodes whose coordinates still are their undeformed ones, ``start`` (n, d), get their undeformed
+    ``points`` (n, d), to the bit.
+    """
+    if not frame.cylindrical:
+        return coords
+    out = np.empty_like(points)
+
+    def fill(part: slice) -> None:
+        rest = np.all(coords[part] == start[part], axis=1, keepdims=True)
+        out[part] = np.where(rest, points[part], frame.points(coords[part]))
+
+    in_parts(fill, len(points))
+    return out
+
+
+def followed(
+    setup: Setup, mesh: Mesh, halo: Halo, points: FloatArray, moved: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return Cartesian ``points`` and coordinates ``moved`` (n, d), with halo copies moved, too."""
+    rows = setup.copies
+    points, out = halo.follow(mesh.points, points, rows), moved.copy()
+    out[halo.receivers[rows]] = setup.frame.coords(points[halo.receivers[rows]])
+    return points, out
+
+
+def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
+    """Return the warning that the selection of control nodes ended above its tolerance."""
+    assert setup.reduction is not None
+    return (
+        f"step {index}: the data reduction ended with {solution.control_nodes} control nodes at "
+        f"an error of {solution.max_error:.3g}, above its tolerance of "
+        f"{setup.reduction.tolerance:.3g}: {solution.short}. Boundary nodes still get exactly "
+        "their displacement, but what is near them follows by the correction alone"
+    )
+
+
+def _doubt_warning(doubt: float, refined: float, index: int, condition: float) -> list[str]:
+    """Return the warning that a solution cannot be trusted, the note that it was refined, or []."""
+    nearly = f"the system is nearly singular (condition number {condition:.0e})"
+    if doubt > TRUSTED:
+        sentence = (
+            f"step {index}: {nearly}, so that between the boundary nodes the displacement may be "
+            f"wrong by {wrong_by(doubt, bounded=refined > 0.0)}; use DATA_REDUCTION= YES, a less "
+            "smooth RBF_KERNEL such as wendland-c0, or a smaller INFLUENCE_FACTOR"
+        )
+        return [sentence if doubt > NOTED else Note(sentence)]
+    if refined:
+        return [
+            Note(
+                f"step {index}: {nearly}; between the boundary nodes its solution would be wrong "
+                f"by {100 * refined:.2g} % of the largest displacement, so it was refined with "
+                f"twice the digits, to {100 * doubt:.2g} %"
+            )
+        ]
+    return []
+
+
+def _dropped_warning(
+    setup: Setup, solution: Solution, index: int, total: int, mesh: Mesh
+) -> list[str]:
+    """Return the warning that the system is singular, or the pivot guard left out nodes; or [].
+
+    Only a note where the misfit at these nodes is negligible.
+    """
+    if not len(solution.dropped):
+        return []
+    since = f"from step {index} on, " if total > 1 else ""
+    if KERNELS[setup.basis.kernel].polynomial:
+        sentence = (
+            f"{since}the system is singular for RBF_KERNEL= {setup.basis.kernel}, "
+            f"and its {solution.control_nodes} control nodes are met by least squares, to "
+            f"{solution.dropped_error:.2g}; they still get exactly their displacement, and the "
+            "cells beside them take that up; use RBF_KERNEL= wendland-c2"
+        )
+        return [sentence]
+    node = int(solution.dropped[0])
+    where = ", ".join(f"{v:.6g}" for v in mesh.points[node])
+    which = f"node {mesh.number(node)} at {where}"
+    if len(solution.dropped) == 1:
+        said = f"boundary {which} nearly coincides with another and is no control node; it still "
+        said += "gets exactly its displacement"
+    else:
+        said = f"{len(solution.dropped)} boundary nodes that nearly coincide with others (first: "
+        said += f"{which}) are no control nodes; they still get exactly their displacement"
+    sentence = (
+        f"{since}{said}, from which the interpolation is off by "
+        f"{solution.dropped_error:.2g} at most, and the cells beside them take that up"
+    )
+    harmless = solution.dropped_error <= AGREE * mesh.extent
+    return [Note(sentence) if harmless else sentence]

@@ -1,0 +1,1 @@
+"""Meshes larger than memory, deformed and measured from file to file, block by block."""

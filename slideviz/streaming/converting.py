@@ -1,0 +1,143 @@
+"""SU2 meshes larger than memory, converted from text to binary and back, piece by piece."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from slideviz.errors import printable
+from slideviz.formats.binary_copy import Plan, fill, planned
+from slideviz.formats.files import format_of
+from slideviz.formats.su2.text import Text, find_text
+from slideviz.formats.su2.write import require_text_names
+from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone, find_zones
+from slideviz.formats.su2b.write import (
+    OTHER_ZONES,
+    file_head,
+    halo_error,
+    lost_of_text,
+    require_binary_names,
+    sentence_of_lost,
+)
+from slideviz.streaming.disk_space import require_room, text_size
+from slideviz.streaming.skin import read_skin
+from slideviz.streaming.stream_input import part_of
+from slideviz.streaming.text_of_binary import text_of_binary
+from slideviz.system.atomic import atomic_write
+from slideviz.system.threads import Tick
+from slideviz.terms import FileFormat
+
+Warn = Callable[[str], object]
+"""Called with a sentence on what of the mesh the new file will lack; with "" if nothing."""
+PLACE = 8
+"""Bytes of disk for each cell: its place in the binary file, should cells not be in order there."""
+
+
+def streamed_kind(source: Path, target: Path) -> FileFormat | None:
+    """Return the format of ``source`` where it can be converted to ``target`` piece by piece.
+
+    That is from SU2 text to SU2 binary or back; None for all others.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read.
+    """
+    kind = format_of(source, None)
+    other = target.suffix.lower().removeprefix(".")
+    return kind if kind != other and {kind, other} == {"su2", "su2b"} else None
+
+
+def convert_streamed(
+    source: Path, target: Path, zone: int | None, *, warn: Warn, tick: Tick = lambda _: None
+) -> None:
+    """Convert an SU2 mesh from text to binary or back, with the bytes of `slideviz.convert`.
+
+    Parameters
+    ----------
+    source, target : Path
+        One is SU2 text, the other SU2 binary (`streamed_kind`); a file at ``target`` is replaced.
+    zone : int or None
+        The zone, from 1; all of them when None.
+
+    Raises
+    ------
+    MeshError
+        The file has a mistake, the format cannot hold the mesh, or the disk has no room.
+    """
+    if format_of(source, None) == "su2":
+        _to_binary(source, target, zone, warn, tick)
+    else:
+        _to_text(source, target, zone, warn, tick)
+
+
+def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tick) -> None:
+    texts = [find_text(source, zone, part_of(tick, 0.0, 0.1))]
+    zones = texts[0].zone.bounds.zones
+    if zone is None:
+        texts += [find_text(source, number) for number in range(2, zones + 1)]
+    plans: list[Plan] = []
+    for number, text in enumerate(texts, 1):
+        name = printable(source.name) + (f", zone {number}" if number > 1 else "")
+        _require_binary(text, name)
+        keys = (part.key for part in text.zone.unknown)
+        lost = lost_of_text(keys, 1 if zone is None else zones)
+        warn(sentence_of_lost(target, name, lost, alone=zone is not None and zones > 1))
+        begin = plans[-1].size if plans else 8
+        plans.append(planned(text, is_result=True, begin=begin, number=number))
+    require_room(target, target, plans[-1].size)
+    with atomic_write(target) as file:
+        os.truncate(file.fileno(), plans[-1].size)
+        for k, plan in enumerate(plans):
+            share = part_of(tick, 0.1 + 0.9 * k / len(plans), 0.1 + 0.9 * (k + 1) / len(plans))
+            fill(plan, Path(file.name), share)
+        for block in file_head(len(plans)):
+            file.write(block)
+    tick(1.0)
+
+
+def _require_binary(text: Text, name: str) -> None:
+    """Raise where an SU2 binary file cannot hold a zone: with a halo, or long or odd marker names.
+
+    Raises
+    ------
+    MeshError
+        As by `slideviz.formats.su2b.write.require_binary`, for a mesh in memory.
+    """
+    if text.zone.sends:
+        raise halo_error(name)
+    require_binary_names(name, (marker.name for marker in text.zone.markers))
+
+
+def _to_text(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tick) -> None:
+    with source.open("rb") as file:
+        binary = BinaryFile(source, file)
+        places = find_zones(binary) if zone is None else (find_zone(binary, zone),)
+        for place in places:
+            require_text_names(binary.name, (marker.name for marker in place.markers))
+        if len(places) < binary.zones:
+            name = printable(source.name)
+            warn(sentence_of_lost(target, name, [OTHER_ZONES], alone=True))
+        sizes = [text_size(place) for place in places]
+        more = PLACE * max(place.cells.count for place in places)
+        require_room(target, target, sum(sizes) + more)
+        for place in places:  # finds every mistake in the file, as reading it whole would
+            read_skin(source, place.number, part_of(tick, 0.0, 0.3))
+        written = 0
+        with atomic_write(target) as out:
+            for block in _text_blocks(binary, places, Path(os.path.realpath(target)).parent):
+                out.write(block)
+                written += len(block)
+                tick(min(1.0, 0.3 + 0.7 * written / sum(sizes)))
+    tick(1.0)
+
+
+def _text_blocks(binary: BinaryFile, places: Sequence[ZonePlace], folder: Path) -> Iterator[bytes]:
+    if len(places) == 1:
+        yield from text_of_binary(binary, places[0], binary, folder)
+        return
+    yield f"NZONE= {len(places)}\n".encode()
+    for number, place in enumerate(places, 1):
+        yield f"IZONE= {number}\n".encode()
+        yield from text_of_binary(binary, place, binary, folder)

@@ -1,0 +1,74 @@
+"""Whether the disk has room for the files of a streamed run, found out before it begins."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+from slideviz.errors import MeshError
+from slideviz.formats.binary_copy import Plan
+from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone
+from slideviz.formats.su2b.partial import names_of
+from slideviz.system.atomic import reason_of
+
+RATED = 18
+"""Bytes of disk for each cell during a run: quality and status, before and after, twice 8 + 1."""
+
+
+def require_room(place: Path, path: Path, size: int) -> None:
+    """Raise where the disk of the file ``place`` has no room for ``size`` more bytes.
+
+    Raises
+    ------
+    MeshError
+        It has not, or the folder of ``place`` does not exist; the message names ``path``.
+    """
+    folder = Path(os.path.realpath(place)).parent
+    try:
+        free = shutil.disk_usage(folder).free
+    except OSError as problem:
+        raise MeshError(f"{path}: cannot be written: {reason_of(problem)}") from problem
+    if size > free:
+        raise MeshError(
+            f"{path}: {size / 1e6:,.0f} MB of disk are needed in {folder} while this lasts, but "
+            f"{free / 1e6:,.0f} MB are free; free some space or choose another disk"
+        )
+
+
+def text_size(place: ZonePlace) -> int:
+    """Return about how many bytes a zone of a binary mesh has as a text."""
+    return 8 * (place.cells.length + (2 * place.dim + 1) * place.n_points)
+
+
+def bytes_of_text(plan: Plan, is_text: bool, later: int) -> int:
+    """Return the most bytes on the disk at a time in the run of a text mesh.
+
+    Parameters
+    ----------
+    is_text : bool
+        Whether the output is a text.
+    later : int
+        Bytes for each cell that the caller writes afterwards.
+    """
+    result = plan.text.lines.raw.size if is_text else plan.size
+    points = plan.markers - plan.points if is_text else 0
+    cells = plan.text.n_cells
+    return result + RATED * cells + max(plan.size + points, later * cells)
+
+
+def bytes_of_binary(path: Path, zone: int | None, *, is_text: bool, later: int) -> int:
+    """Return the most bytes on the disk at a time in the run of a binary mesh (`bytes_of_text`)."""
+    with path.open("rb") as file:
+        source = BinaryFile(path, file)
+        place = find_zone(source, zone)
+    result = text_size(place) if is_text else source.size
+    points = place.n_points * source.point(place.dim).itemsize if is_text else 0
+    cells = place.cells.count
+    return result + RATED * cells + max(points, later * cells)
+
+
+def bytes_left(output: Path) -> int:
+    """Return how many bytes on the disk a stopped run has left, which this run will replace."""
+    files = (names_of(output, more)[0] for more in ("", ".binary"))
+    return sum(file.stat().st_blocks * 512 for file in files if file.exists())

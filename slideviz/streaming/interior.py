@@ -1,0 +1,143 @@
+"""The rest of a streamed mesh: the nodes outside of its skin, displaced by the fields of all steps.
+
+The skin is the boundary and the cells at it: the only part of the mesh that is in memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from slideviz.errors import DeformError, MeshError, UnsoundError
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.rbf.axis import on_axis
+from slideviz.solver.growth import overshoot_of_rest
+from slideviz.solver.setup import Setup
+from slideviz.solver.stepping import cartesian, shifted
+from slideviz.solver.steps import Step
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """Displaces any nodes of a mesh, by the steps of its skin.
+
+    Attributes
+    ----------
+    skin : Mesh
+        The undeformed skin.
+    setup : Setup
+        The setup of the skin.
+    steps : sequence of Step
+        The steps of the skin, with their ``field``.
+    """
+
+    skin: Mesh
+    setup: Setup
+    steps: Sequence[Step]
+
+    def bare(self) -> Rest:
+        """Return the same without the skin's cells and markers, which no displacement needs."""
+        none = Cells.from_blocks([])
+        skin = replace(self.skin, cells=none, markers=())
+        steps = [replace(step, mesh=skin.with_points(step.mesh.points)) for step in self.steps]
+        return replace(self, skin=skin, steps=steps)
+
+    def after_steps(self, nodes: IntArray, points: FloatArray) -> Iterator[FloatArray]:
+        """Yield the points (m, d) of some nodes after each step.
+
+        Parameters
+        ----------
+        nodes : (m,)
+            Their numbers in the whole mesh, ascending.
+        points : (m, d)
+            Their undeformed points.
+
+        Raises
+        ------
+        DeformError
+            Coordinates became infinite, or a node would go far beyond the motion.
+        MeshError
+            A node is outside of the sector that the skin spans in a cylindrical frame.
+        """
+        frame = self.setup.frame
+        start = frame.coords(points)
+        at, where = self._in_skin(nodes)
+        inner = np.ones(len(points), bool)
+        inner[at] = False
+        self._require_enclosed(nodes, points, start, inner)
+        axis, coords = on_axis(frame, start), start
+        for step in self.steps:
+            assert step.field is not None
+            displacement = step.field.at(frame.features(coords), frame.points(coords))
+            coords = shifted(coords, displacement, axis)
+            now = cartesian(frame, points, start, coords)
+            if not np.all(np.isfinite(now)):
+                raise DeformError(f"step {step.index}: coordinates became infinite; use more steps")
+            self._require_sound(step, nodes, points, coords - start, at)
+            # A Cartesian frame has the points as coordinates, which are those of the next step.
+            out = now.copy()
+            out[at] = step.mesh.points[where]
+            yield out
+
+    def _in_skin(self, nodes: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the places (b,) in ``nodes`` of those that are in the skin, and in the skin (b,).
+
+        ``nodes`` (m,) are ascending numbers in the whole mesh.
+        """
+        assert self.skin.part is not None
+        low, high = np.searchsorted(self.skin.part.points, [nodes[0], nodes[-1] + 1])
+        numbers = self.skin.part.points[low:high]
+        at = np.searchsorted(nodes, numbers)
+        same = np.flatnonzero(nodes[at] == numbers)
+        return at[same], low + same
+
+    @cached_property
+    def _sector(self) -> tuple[float, float]:
+        """Return the range of the skin's second coordinate: in a cylindrical frame its angles."""
+        angles = self.setup.coords[:, 1]
+        return float(angles.min()), float(angles.max())
+
+    def _require_enclosed(
+        self, nodes: IntArray, points: FloatArray, start: FloatArray, inner: np.ndarray
+    ) -> None:
+        """Raise where a node is farther from the axis than the skin, or outside of its sector.
+
+        The largest radius and the sector of the whole mesh would give another frame then.
+
+        Parameters
+        ----------
+        start : (m, d)
+            Coordinates of the nodes in the frame.
+        inner : (m,) bool
+            Nodes that are not in the skin.
+        """
+        frame = self.setup.frame
+        if not frame.cylindrical:
+            return
+        low, high = self._sector
+        out = (start[:, 0] > frame.radius) | (start[:, 1] < low) | (start[:, 1] > high)
+        out &= inner
+        if out.any():
+            k = int(np.argmax(out))
+            where = ", ".join(f"{value:.6g}" for value in points[k])
+            raise MeshError(
+                f"{self.skin.name}: node {nodes[k]} at ({where}) is outside the sector that the "
+                "boundaries enclose, so the mesh cannot be streamed; give all its sides markers, "
+                "or run it without --stream"
+            )
+
+    def _require_sound(
+        self, step: Step, nodes: IntArray, points: FloatArray, shift: FloatArray, at: IntArray
+    ) -> None:
+        """Raise where a node overshoots, but for those ``at`` (b,), which are in the skin."""
+        squared = np.einsum("nd,nd->n", shift, shift)
+        squared[at] = 0.0
+        k = int(np.argmax(squared))
+        far, after = float(np.linalg.norm(shift[k])) if squared[k] else 0.0, step.mesh.points
+        message = overshoot_of_rest(self.setup, self.skin, after, step.part, far)
+        if message:
+            where = ", ".join(f"{value:.6g}" for value in points[k])
+            raise UnsoundError(f"step {step.index}: node {nodes[k]} at ({where}) {message}")

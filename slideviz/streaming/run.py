@@ -1,0 +1,286 @@
+"""Streaming: a mesh larger than memory is deformed from file to file.
+
+The skin (the boundary and the cells at it) is deformed as any mesh in memory. The fields of its
+steps then displace all other nodes, block by block, in a copy of the file: by the functions that
+displace a mesh in memory, so that no number depends on the blocks. Last, the quality of the cells
+is measured block by block.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from slideviz import __version__
+from slideviz.case.model import Case
+from slideviz.errors import CaseError, NodeError
+from slideviz.formats.su2b.partial import keep_earlier
+from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
+from slideviz.mesh.quality import Quality
+from slideviz.rbf.problem import Watch
+from slideviz.rbf.projection import Tracks
+from slideviz.solver.deform import (
+    Progress,
+    Step,
+    all_steps,
+    require_memory,
+)
+from slideviz.solver.growth import Farthest, stray_warning
+from slideviz.solver.setup import make_setup
+from slideviz.solver.stepping import Stepping
+from slideviz.streaming.interior import Rest
+from slideviz.streaming.measuring import folded_steps
+from slideviz.streaming.output import Output
+from slideviz.streaming.remaining_time import Course
+from slideviz.streaming.stream_input import given_for, require_su2
+from slideviz.system.ranks import ALONE, Alone
+from slideviz.system.threads import give_back
+from slideviz.terms import FileFormat
+
+Tell = Callable[[Progress], None]
+
+
+@dataclass(frozen=True, eq=False)
+class StreamedRun:
+    """The outcome of a streamed run.
+
+    Attributes
+    ----------
+    skin : Mesh
+        The undeformed points of the skin; it has no cells, and its markers have no elements.
+    steps : tuple of Step
+        Their meshes are the deformed skin, their ``node_counts`` those of the whole mesh.
+    quality, undeformed : Quality
+        Quality of all cells after and before the run; without ``size`` and ``skew``.
+    folded : dict of int to (int, int)
+        VTK type of inverted cells, and the step after which they are first inverted, by cell
+        number; at most ``listed``, those with the lowest numbers.
+    seconds : dict of str to float
+        Spent by phase, besides those of the steps.
+    """
+
+    skin: Mesh
+    steps: tuple[Step, ...]
+    quality: Quality
+    undeformed: Quality
+    folded: dict[int, tuple[int, int]]
+    seconds: dict[str, float]
+
+
+def stream(
+    case: Case,
+    output: Path,
+    *,
+    file_format: FileFormat | None = None,
+    tell: Tell = lambda _: None,
+    note: Callable[[str], object] = lambda _: None,
+    warn: Callable[[str], object] = lambda _: None,
+    resume: bool = False,
+    replaces: Path | None = None,
+    listed: int = 100,
+    later: int = 0,
+    ranks: Alone = ALONE,
+) -> StreamedRun:
+    """Deform the mesh of a case from file to file, with only its skin in memory; return numbers.
+
+    Parameters
+    ----------
+    output : Path
+        The file of the deformed mesh, written whole or not at all.
+    file_format : {"su2", "su2b"}, optional
+        The format of ``output``; None: by its ending.
+    tell : callable
+        Called often with a ``Progress``; an exception it raises ends the run at once.
+    note : callable
+        Called with a sentence on what ``resume`` found.
+    warn : callable
+        Called with a sentence on what of the mesh the output will lack; with "" if nothing.
+    resume : bool
+        Whether to go on where a run was stopped.
+    replaces : Path, optional
+        An input file that the output may overwrite.
+    listed : int
+        Most inverted cells whose first inverted step is found.
+    later : int
+        Bytes for each cell that the caller writes beside the output afterwards: the disk must
+        have room for them, too.
+    ranks : Alone or Ranks
+        The processes that share the work; this one is rank 0.
+
+    Raises
+    ------
+    CaseError, MeshError
+        The case does not fit the mesh, or the mesh is of no format that can be streamed.
+    DeformError
+        The system cannot be solved, or the method needs the whole mesh.
+    """
+    assert case.mesh_file is not None
+    path = case.mesh_file
+    require_stream(case)
+    keep_earlier(output)
+    total = max(1, case.steps)
+    is_text = (file_format or output.suffix.lower().removeprefix(".")) == "su2"
+    first = "text" if require_su2(path, case.mesh_format) == "su2" else "read"
+    course = Course(tell, first, "solve", "evaluate", "quality", *("write",) * is_text)
+    watch = Watch(lambda phase, part: course(Progress(total, total, phase, part)))
+    with ExitStack() as stack:
+        with watch.phase("read") as tick:
+            given = stack.enter_context(
+                given_for(
+                    output,
+                    path,
+                    case.zone,
+                    file_format=case.mesh_format,
+                    is_text=is_text,
+                    version=__version__,
+                    resume=resume,
+                    warn=warn,
+                    tick=tick,
+                    ranks=ranks,
+                    later=later,
+                )
+            )
+        out = Output(
+            stack,
+            given,
+            case.quality_metric,
+            output,
+            watch,
+            ranks,
+            about_run(case),
+            is_text=is_text,
+            resume=resume,
+            replaces=replaces,
+        )
+        if resume:
+            note(out.found())
+
+        def read() -> Mesh:
+            with watch.phase("read") as tick:
+                skin = given.skin(tick, ranks)
+            course.next()
+            return skin
+
+        rest = _solved(case, read, out, course)
+        give_back()
+        course.next()
+        out.displace(rest, final=True)
+        course.next()
+        rating = out.rating(listed)
+        folded = folded_steps(rest, out.files, rating.inverted)
+        moved = rest.steps[-1].mesh.origin.ffd
+        if is_text:
+            course.next()
+        out.finish(None if moved is rest.skin.origin.ffd else moved)
+    return StreamedRun(
+        rest.skin,
+        _of_whole(rest, rating.farthest),
+        rating.quality(),
+        rating.undeformed(),
+        folded,
+        watch.seconds,
+    )
+
+
+def _solved(case: Case, read: Callable[[], Mesh], out: Output, tell: Tell) -> Rest:
+    """Read and deform the skin; return what displaces the rest of the mesh.
+
+    With STEPS= auto, trials write the points of the whole mesh to ``out`` to rate it.
+    """
+    watch = Watch(lambda phase, part: tell(Progress(1, max(1, case.steps), phase, part)))
+    skin = read()
+    assert skin.part is not None
+    give_back()
+    with _numbered(skin.part.points):
+        with watch.phase("classify"):
+            setup = make_setup(case, skin)
+        require_memory(setup, case)
+        # Let go of what is not needed any more: cells and joints, and after the steps the tracks.
+        none = Cells.from_blocks([])
+        markers = tuple(Marker(marker.name, none) for marker in skin.markers)
+        skin = replace(skin, cells=none, markers=markers)
+        pairs = np.empty((0, 2), np.int64)
+        boundary = replace(setup.boundary, owner=pairs[:, 0], joints=pairs, joint_nodes=pairs)
+        setup = replace(setup, boundary=boundary)
+        lean = replace(setup, tracks=Tracks((), setup.tracks.of_node[:0], setup.tracks.curved))
+        give_back()
+
+        def rate(steps: Sequence[Step]) -> Quality:
+            out.displace(Rest(skin, lean, steps), final=False)
+            return out.rating(0).quality()
+
+        steps = tuple(all_steps(Stepping(case, skin, setup, tell, watch.seconds, rate)))
+    return Rest(skin, lean, steps)
+
+
+@contextmanager
+def _numbered(numbers: IntArray) -> Iterator[None]:
+    """Context whose NodeErrors name nodes by ``numbers`` (n,): of the skin's nodes in the file."""
+    try:
+        yield
+    except NodeError as problem:
+        raise NodeError(problem.sentence, *numbers[list(problem.nodes)].tolist()) from problem
+
+
+def require_stream(case: Case) -> None:
+    """Raise where a case cannot be streamed.
+
+    Raises
+    ------
+    CaseError
+        Its method, linear elasticity, needs the whole mesh at once.
+    MeshError
+        Its mesh is of no format that can be streamed.
+    """
+    path = case.mesh_file
+    assert path is not None
+    if case.method == "elastic":
+        raise CaseError(
+            "METHOD= elastic needs the whole mesh at once and cannot be streamed; use METHOD= rbf "
+            "or idw, or run it without --stream"
+        )
+    require_su2(path, case.mesh_format)
+
+
+def about_run(case: Case) -> str:
+    """Return a hash of all that the deformed points depend on: case, input files and version.
+
+    The mesh file counts by its size and its time of change, other files by their bytes.
+    """
+    path = case.mesh_file
+    assert path is not None
+    text = repr(
+        (
+            __version__,
+            replace(case, mesh_out=None, view={}, warnings=()),
+        )
+    )
+    for file in sorted(case.inputs()):
+        if file not in (path, case.source):
+            text += hashlib.sha256(file.read_bytes()).hexdigest()
+    state = path.stat()
+    return hashlib.sha256(f"{text}{state.st_size} {state.st_mtime_ns}".encode()).hexdigest()
+
+
+def _of_whole(rest: Rest, farthest: Farthest) -> tuple[Step, ...]:
+    """Return the steps of the skin, with the ``node_counts`` of the whole mesh.
+
+    The last one warns of the node of the whole mesh that went farthest, if it strays.
+    """
+    skin, last = rest.skin, rest.steps[-1]
+    assert skin.part is not None
+    more = skin.part.n_points - len(skin.points)
+    stray = stray_warning(rest.setup, skin, last.mesh.points, farthest)
+    steps = (*rest.steps[:-1], replace(last, warnings=(*last.warnings, *stray)))
+    return tuple(
+        replace(
+            step,
+            node_counts={**step.node_counts, "internal": step.node_counts["internal"] + more},
+        )
+        for step in steps
+    )

@@ -1,0 +1,297 @@
+"""The skin of a mesh: its boundary and the cells at it, read without keeping the rest in memory.
+
+Roles, periodic pairs, classification, the choice of control nodes and their weights depend on
+the boundary alone. So they are found by the skin: an ordinary mesh with fewer nodes and cells, in
+the order of the whole one. It also has the nodes of lowest and highest coordinates, so that its
+extent is that of the whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.errors import MeshError, printable
+from slideviz.formats.su2b.elements import BLOCK, ElementBlock, element_block, require_used
+from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone
+from slideviz.formats.su2b.read import boundaries_elsewhere, point_block, read_elements
+from slideviz.mesh.check import LARGEST, first_fault
+from slideviz.mesh.interfaces import find_interfaces
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Part, frozen_array
+from slideviz.system.ranks import ALONE, Alone
+from slideviz.system.threads import Tick
+
+Index = slice | IntArray
+"""Numbers of cells, as an index of an array."""
+
+
+def read_skin(
+    path: Path, zone: int | None, progress: Tick = lambda _: None, ranks: Alone = ALONE
+) -> Mesh:
+    """Return the skin of a zone of an SU2 binary mesh; the whole zone is read and checked.
+
+    ``zone`` is counted from 1; None: the first.
+
+    Raises
+    ------
+    MeshError
+        The file has a mistake; the message has its byte.
+    OSError
+        It cannot be read.
+    """
+    with path.open("rb") as file:
+        source = BinaryFile(path, file)
+        place = find_zone(source, zone)
+        markers = [
+            Marker(
+                m.name, read_elements(source, place, m.elements, place.dim - 1, lambda _: None)[0]
+            )
+            for m in place.markers
+        ]
+        used = np.zeros(place.n_points, bool)
+        for marker in markers:
+            used[marker.nodes] = True
+        with ranks.sharing(_cells_near, path, zone, np.flatnonzero(used)) as do:
+            tasks = range(0, place.cells.count, BLOCK)
+            cells, ids = _cells_at(
+                source, place, map(_ticking(progress, 0.0, 0.6, len(tasks)), do(tasks))
+            )
+        used[cells.connectivity] = True
+        numbers = np.flatnonzero(used)
+        with ranks.sharing(_points_near, path, zone) as do:
+            starts = range(0, place.n_points, BLOCK)
+            ends = np.searchsorted(numbers, [*starts, place.n_points])
+            parts = [
+                (first, numbers[a:b])
+                for first, a, b in zip(starts, ends[:-1], ends[1:], strict=True)
+            ]
+            numbers, points = _points_of(
+                source, place, numbers, map(_ticking(progress, 0.6, 1.0, len(parts)), do(parts))
+            )
+        others = list(boundaries_elsewhere(source, place))
+    skin = Mesh(
+        points,
+        _renumbered(cells, numbers),
+        tuple(Marker(m.name, _renumbered(m.cells, numbers)) for m in markers),
+        name=printable(path.name),
+        zone=place.number,
+        zones=source.zones,
+        source=path.resolve(),
+        part=Part(
+            frozen_array(numbers, np.int64),
+            frozen_array(ids, np.int64),
+            place.n_points,
+            place.cells.count,
+        ),
+    )
+    return replace(skin, interfaces=find_interfaces(skin, others))
+
+
+def _ticking(tick: Tick, begin: float, end: float, count: int) -> Callable[[Any], Any]:
+    """Return a function that returns its argument, and with each of ``count`` calls ticks.
+
+    The fraction told to ``tick`` rises from ``begin`` to ``end``.
+    """
+    done = 0
+
+    def passed(thing: Any) -> Any:
+        nonlocal done
+        done += 1
+        tick(begin + (end - begin) * done / count)
+        return thing
+
+    return passed
+
+
+@dataclass(frozen=True, eq=False)
+class _Near:
+    """Cells of a block of the file that may have a side on the boundary.
+
+    Attributes
+    ----------
+    first : int
+        Place in the file of the block's first cell.
+    types, nodes, ids : (k,), flat, (k,)
+        Of the cells that may have a side on the boundary: VTK identifiers, nodes, numbers.
+    every : slice or (b,)
+        The numbers of all cells of the block.
+    """
+
+    first: int
+    types: NDArray[np.uint8]
+    nodes: IntArray
+    ids: IntArray
+    every: Index
+
+
+@contextmanager
+def _cells_near(
+    path: Path, zone: int | None, boundary: IntArray
+) -> Iterator[Callable[[int], _Near]]:
+    """Context with a function that reads one block of cells and returns those near the boundary.
+
+    ``boundary`` (k,) are the boundary's nodes; the function's argument is the place of the block's
+    first cell.
+    """
+    with path.open("rb") as file:
+        source = BinaryFile(path, file)
+        place = find_zone(source, zone)
+        on = np.zeros(place.n_points, bool)
+        on[boundary] = True
+
+        def read(first: int) -> _Near:
+            block = element_block(source, place, place.cells, place.dim, first, BLOCK)
+            cells = Cells.from_types(block.types, block.nodes)
+            _check_block(source, place, block, cells)
+            near = np.add.reduceat(on[block.nodes], cells.offsets[:-1], dtype=np.int64)
+            chosen = np.flatnonzero(near >= place.dim)
+            kept = cells.take(chosen)
+            return _Near(
+                first, kept.types, kept.connectivity, block.ids[chosen], index_of(block.ids)
+            )
+
+        yield read
+
+
+def index_of(ids: IntArray) -> Index:
+    """Return ids (k,) as a slice if they are consecutive, which indexes faster; else as given."""
+    first = int(ids[0])
+    if np.array_equal(ids, np.arange(first, first + len(ids))):
+        return slice(first, first + len(ids))
+    return ids
+
+
+def _cells_at(
+    source: BinaryFile, place: ZonePlace, found: Iterator[_Near]
+) -> tuple[Cells, IntArray]:
+    """Return the cells that may have a side on the boundary, ordered by their numbers, and these.
+
+    Raises MeshError if two blocks have a cell of the same number.
+    """
+    kept: list[_Near] = []
+    seen = np.zeros(place.cells.count, bool)
+    for near in found:
+        if seen[near.every].any():
+            k = int(np.argmax(seen[near.every]))
+            every = near.every
+            index = every.start + k if isinstance(every, slice) else int(every[k])
+            raise _twice(source, place, near.first + k, index)
+        seen[near.every] = True
+        kept.append(near)
+    if not kept:
+        require_used(source, place.cells, 0)
+        return Cells.from_blocks([]), np.empty(0, np.int64)
+    types = np.concatenate([near.types for near in kept])
+    nodes = np.concatenate([near.nodes for near in kept])
+    ids = np.concatenate([near.ids for near in kept])
+    order = np.argsort(ids, kind="stable")
+    return Cells.from_types(types, nodes).take(order), ids[order]
+
+
+def _check_block(source: BinaryFile, place: ZonePlace, block: ElementBlock, cells: Cells) -> None:
+    """Raise MeshError if a cell of a block has wrong nodes, or an index out of range or used twice.
+
+    ``cells`` are those of ``block``.
+    """
+    if not np.array_equal(block.ids, np.arange(block.first, block.first + len(block.ids))):
+        wrong = block.ids.view(np.uint64) >= place.cells.count
+        _, first, count = np.unique(block.ids, return_index=True, return_counts=True)
+        if wrong.any() or (count > 1).any():
+            k = int(np.argmax(wrong)) if wrong.any() else int(first[np.argmax(count)])
+            raise _twice(source, place, block.first + k, int(block.ids[k]))
+    fault = first_fault(cells, place.n_points)
+    if fault is not None:
+        raise _cell_error(source, place, block.first + fault[0], fault[1])
+
+
+def _twice(source: BinaryFile, place: ZonePlace, element: int, index: int) -> MeshError:
+    """Return the error for an element whose index is out of range or used twice."""
+    return _cell_error(
+        source,
+        place,
+        element,
+        f"its index {index % 2**64} is not below the number of elements, {place.cells.count}, or "
+        "stands twice; write the mesh again",
+    )
+
+
+def _cell_error(source: BinaryFile, place: ZonePlace, element: int, message: str) -> MeshError:
+    """Return the error for an element, with the byte in the file where it begins."""
+    at = source.count(place.cells.offsets + element * source.width, "an offset")
+    return source.error(place.cells.entries + at * source.width, f"element {element}: {message}")
+
+
+Outer = dict[tuple[int, str], tuple[int, FloatArray]]
+"""Number and coordinates (d,) of outermost points, by axis (0 to 2) and side ("low", "high")."""
+
+
+@contextmanager
+def _points_near(
+    path: Path, zone: int | None
+) -> Iterator[Callable[[tuple[int, IntArray]], tuple[FloatArray, Outer]]]:
+    """Context with a function that reads one block of points.
+
+    Its argument is the number of the block's first point, and ascending nodes (k,) in the block. It
+    returns their points (k, d) and the outermost points of the block.
+    """
+    with path.open("rb") as file:
+        source = BinaryFile(path, file)
+        place = find_zone(source, zone)
+
+        def read(task: tuple[int, IntArray]) -> tuple[FloatArray, Outer]:
+            first, nodes = task
+            block = point_block(source, place, first, BLOCK)
+            outer: Outer = {}
+            for axis in range(place.dim):
+                low, high = int(block[:, axis].argmin()), int(block[:, axis].argmax())
+                outer[axis, "low"] = first + low, block[low].copy()
+                outer[axis, "high"] = first + high, block[high].copy()
+            return block[nodes - first], outer
+
+        yield read
+
+
+def _points_of(
+    source: BinaryFile,
+    place: ZonePlace,
+    numbers: IntArray,
+    found: Iterator[tuple[FloatArray, Outer]],
+) -> tuple[IntArray, FloatArray]:
+    """Return ``numbers`` with those of the outermost points of all, sorted, and the points (k, d).
+
+    ``found`` are the results of `_points_near` for the blocks in order.
+    """
+    blocks: list[FloatArray] = [np.empty((0, place.dim))]
+    outer: Outer = {}
+    for block, ends in found:
+        blocks.append(block)
+        for (axis, side), (node, point) in ends.items():
+            old = outer.get((axis, side))
+            sign = -1.0 if side == "low" else 1.0
+            if old is None or sign * point[axis] > sign * old[1][axis]:
+                outer[axis, side] = node, point
+    for (axis, _), (node, point) in outer.items():
+        if abs(point[axis]) > LARGEST:
+            raise source.error(
+                place.points + node * source.point(place.dim).itemsize + 8 * axis,
+                f"point {node} is at {tuple(point.tolist())}; nothing can be computed with "
+                f"coordinates larger than {LARGEST:g}, so correct it or scale the mesh",
+            )
+    more = dict(outer.values())
+    few = np.unique(np.array(list(more), np.int64))
+    extra = few[np.searchsorted(numbers, few) == np.searchsorted(numbers, few, "right")]
+    every = np.concatenate([numbers, extra])
+    blocks.append(np.array([more[n] for n in extra]).reshape(-1, place.dim))
+    order = np.argsort(every, kind="stable")  # nearly in order already
+    return every[order], np.concatenate(blocks)[order]
+
+
+def _renumbered(cells: Cells, numbers: IntArray) -> Cells:
+    """Return cells whose nodes are replaced by their indices in ``numbers`` (k,), ascending."""
+    return Cells.from_types(cells.types, np.searchsorted(numbers, cells.connectivity))

@@ -1,0 +1,284 @@
+"""The mesh file that a streamed run reads: the SU2 binary file itself, or a binary copy of a text.
+
+The copy is made first, and removed after the run.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from slideviz.errors import MeshError, printable
+from slideviz.formats.binary_copy import fill, planned
+from slideviz.formats.files import format_of
+from slideviz.formats.su2.lines import Piece
+from slideviz.formats.su2.text import Text, find_text
+from slideviz.formats.su2.write import box_edits, moved_rows, patched_blocks, require_text_names
+from slideviz.formats.su2b.copying import checksums
+from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone
+from slideviz.formats.su2b.partial import BINARY, finish_head, partial_file
+from slideviz.formats.su2b.write import (
+    OTHER_ZONES,
+    lost_of_text,
+    require_binary_names,
+    sentence_of_lost,
+)
+from slideviz.mesh.model import Mesh
+from slideviz.streaming.disk_space import (
+    bytes_left,
+    bytes_of_binary,
+    bytes_of_text,
+    require_room,
+    text_size,
+)
+from slideviz.streaming.skin import read_skin
+from slideviz.streaming.text_skin import naming_text, skin_of_text
+from slideviz.system.atomic import reason_of
+from slideviz.system.cleanup import draft, open_temporary
+from slideviz.system.ranks import ALONE, Alone
+from slideviz.system.threads import Tick
+from slideviz.terms import FileFormat
+
+SCANNED, FILLED, COPIED = 0.15, 0.75, 0.8
+"""Parts of the time for reading a text after which its lines are found, its copy is made, and the
+checksums of the copy are computed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """A mesh to be streamed, in an SU2 binary file.
+
+    Attributes
+    ----------
+    path : Path
+        The binary file: the user's, or a copy of a text.
+    zone : int or None
+        The zone in it, from 1; the first where it is None.
+    text : Text or None
+        The text that ``path`` is a copy of.
+    is_left : bool
+        Whether the copy was made by an earlier run that was stopped.
+    """
+
+    path: Path
+    zone: int | None
+    text: Text | None = None
+    is_left: bool = False
+
+    def text_size(self, place: ZonePlace) -> int:
+        """Return about how many bytes the zone at ``place`` has as a text."""
+        if self.text is not None:
+            return self.text.lines.raw.size
+        return text_size(place)
+
+    def skin(self, tick: Tick, ranks: Alone = ALONE) -> Mesh:
+        """Return the boundary and the cells at it; the whole mesh is read and checked.
+
+        Raises
+        ------
+        MeshError
+            The file has a mistake.
+        """
+        if self.text is None:
+            return read_skin(self.path, self.zone, tick, ranks)
+        return skin_of_text(self.text, self.path, part_of(tick, COPIED), ranks)
+
+
+def part_of(tick: Tick, begin: float, end: float = 1.0) -> Tick:
+    """Return a tick for a part of the work: its 0 to 1 becomes ``begin`` to ``end`` of ``tick``."""
+    return lambda done: tick(begin + (end - begin) * done)
+
+
+def require_su2(path: Path, file_format: FileFormat | None = None) -> FileFormat:
+    """Return the format of a mesh file, SU2 text or binary: only these can be streamed.
+
+    Raises
+    ------
+    MeshError
+        It is of another format.
+    """
+    kind = format_of(path, file_format)
+    if kind is None:
+        raise MeshError(
+            f"{path}: only SU2 meshes, text or binary, can be streamed; make one with `slideviz "
+            f"convert {path.name} {path.stem}.su2b`"
+        )
+    return kind
+
+
+def _streamable(path: Path, zone: int | None, tick: Tick) -> Text:
+    """Return the places of points, cells and markers in an SU2 text.
+
+    Raises
+    ------
+    MeshError
+        It has a mistake, or a halo: nodes that follow others are not all on the boundary.
+    """
+    text = find_text(path, zone, part_of(tick, 0.0, SCANNED))
+    if text.zone.sends:
+        raise text.lines.error(
+            text.zone.sends[0].begin,
+            "a mesh with SEND_RECEIVE markers (a halo) cannot be streamed; make it without its "
+            "halo, or run it without --stream",
+        )
+    return text
+
+
+@contextmanager
+def given_mesh(
+    path: Path,
+    zone: int | None,
+    tick: Tick,
+    folder: Path,
+    file_format: FileFormat | None = None,
+) -> Iterator[Given]:
+    """Context with a mesh that is only looked at; the binary copy of a text is in ``folder``.
+
+    The copy is removed at the end.
+
+    Raises
+    ------
+    MeshError
+        It is of no format that can be streamed, or has a mistake.
+    """
+    if require_su2(path, file_format) == "su2b":
+        yield Given(path, zone)
+        return
+    plan = planned(_streamable(path, zone, tick), is_result=False)
+    with draft(folder) as ours:
+        try:
+            open_temporary(ours, new=True).close()
+            require_room(ours, path, plan.size)
+            os.truncate(ours, plan.size)
+            head = fill(plan, ours, part_of(tick, SCANNED, COPIED))
+            with open_temporary(ours) as file:
+                file.write(head)
+        except OSError as problem:
+            raise MeshError(
+                f"{path}: its binary copy cannot be written in {folder}: {reason_of(problem)} "
+                "(TMPDIR names another folder)"
+            ) from problem
+        with naming_text(plan.text, ours):
+            yield Given(ours, None, plan.text)
+
+
+@contextmanager
+def given_for(
+    output: Path,
+    path: Path,
+    zone: int | None,
+    *,
+    file_format: FileFormat | None,
+    is_text: bool,
+    version: str,
+    resume: bool,
+    warn: Callable[[str], object],
+    tick: Tick,
+    ranks: Alone,
+    later: int = 0,
+) -> Iterator[Given]:
+    """Context with a mesh to be deformed; the binary copy of a text is beside the output.
+
+    The copy is removed at the end, but kept where the run is stopped, to go on with.
+
+    Parameters
+    ----------
+    is_text : bool
+        Whether the output is a text.
+    version : str
+        The program's version: a copy made by another version is not used again.
+    resume : bool
+        Whether to use the copy that a stopped run has left.
+    warn : callable
+        Called with a sentence on what of the mesh the output will lack; with "" if nothing.
+    later : int
+        Bytes for each cell that the caller writes beside the output afterwards.
+
+    Raises
+    ------
+    MeshError
+        It is of no format that can be streamed, or has a mistake; the disk has no room.
+    """
+    if require_su2(path, file_format) == "su2b":
+        if is_text:
+            warn(_lost_in_text(output, path, zone))
+        size = bytes_of_binary(path, zone, is_text=is_text, later=later)
+        require_room(output, output, size - bytes_left(output))
+        yield Given(path, zone)
+        return
+    text = _streamable(path, zone, tick)
+    if not is_text:
+        require_binary_names(printable(path.name), (m.name for m in text.zone.markers))
+        lost = lost_of_text((part.key for part in text.zone.unknown), text.zone.bounds.zones)
+        warn(sentence_of_lost(output, printable(path.name), lost))
+    plan, left = planned(text, is_result=not is_text), bytes_left(output)
+    state = path.stat()
+    about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {plan.size}"
+    with partial_file(output, plan.size, about, resume=resume, more=BINARY) as copy:
+        is_left = (
+            copy.done > 0
+            and checksums(copy.path, part_of(tick, SCANNED, COPIED), ranks) == copy.sums
+        )
+        require_room(output, output, bytes_of_text(plan, is_text, later) - left)
+        if not is_left:
+            head = fill(plan, copy.path, part_of(tick, SCANNED, FILLED), ranks)
+            finish_head(copy.file, head)
+            copy.note(checksums(copy.path, part_of(tick, FILLED, COPIED), ranks))
+        with naming_text(text, copy.path):
+            yield Given(copy.path, None, text, is_left)
+        copy.remove()
+
+
+def _lost_in_text(output: Path, path: Path, zone: int | None) -> str:
+    """Return a sentence on the other zones of a binary mesh, which a text lacks; "" if none.
+
+    Raises
+    ------
+    MeshError
+        The name of a boundary cannot be written in a text.
+    """
+    with path.open("rb") as file:
+        source = BinaryFile(path, file)
+        place = find_zone(source, zone)
+    name = printable(path.name)
+    require_text_names(name, (marker.name for marker in place.markers))
+    return sentence_of_lost(output, name, [OTHER_ZONES] * (source.zones > 1), ".su2b")
+
+
+def text_blocks(
+    given: Given, source: BinaryFile, place: ZonePlace, after: Path, ffd: bytes | None
+) -> Iterator[bytes]:
+    """Yield the text of ``given`` block by block, with the coordinates in the file ``after``.
+
+    Parameters
+    ----------
+    source, place
+        The binary copy of the text, and its zone.
+    after : Path
+        A file with the new points where the binary copy has the old ones.
+    ffd : bytes or None
+        Boxes for free-form deformation, in place of those in the text; None keeps these.
+    """
+    text = given.text
+    assert text is not None
+    raw, kind = text.lines.raw, source.point(place.dim)
+    edits: Sequence[tuple[int, int, bytes]] = ()
+    if ffd is not None:
+        bounds = text.zone.bounds
+        edits = box_edits(raw, text.unknown, text.lines.byte(bounds.end), ffd)
+    with given.path.open("rb") as old, after.open("rb") as new:
+
+        def rows(piece: Piece) -> bytes:
+            at, size = place.points + piece.row * kind.itemsize, piece.rows * kind.itemsize
+            before, now = (
+                np.frombuffer(os.pread(file.fileno(), size, at), kind)["x"].astype(np.float64)
+                for file in (old, new)
+            )
+            return moved_rows(raw, piece, before, now)
+
+        yield from patched_blocks(raw, text.zone.points, rows, edits)

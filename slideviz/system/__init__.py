@@ -1,0 +1,1 @@
+"""What the program asks of the system: whole files, clean-up, threads, ranks, compiled loops."""

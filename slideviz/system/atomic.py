@@ -1,0 +1,132 @@
+"""Atomic writing: files are written whole or not at all.
+
+The bytes go to a temporary file in the same folder, which then takes the place of the target in
+one step of the file system. So a full disk, a cancel or a crash never leaves half a mesh, and an
+old file stays as it was until the new one is complete.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from slideviz.errors import MeshError, SlidevizError
+from slideviz.system.cleanup import draft
+from slideviz.system.file_checks import require_no_input
+
+_REMEDIES = {  # reason and remedy by errno
+    errno.ENOENT: "the folder does not exist; create it first",
+    errno.ENOTDIR: "a part of the path is a file, not a folder; choose another folder",
+    errno.EACCES: "no permission to write there; choose another folder or change its permissions",
+    errno.EPERM: "no permission to write there; choose another folder or change its permissions",
+    errno.EROFS: "the file system is read-only; choose another folder",
+    errno.ENOSPC: "the disk is full; free some space or choose another disk",
+    errno.EDQUOT: "the disk quota is used up; free some space or choose another disk",
+    errno.EFBIG: "the file is larger than the file system or the limit of the user allows",
+    errno.ENAMETOOLONG: "the file name is too long; choose a shorter one",
+    errno.EISDIR: "it is a folder; give the name of a file",
+}
+
+
+@contextmanager
+def atomic_write(
+    path: str | Path, error: type[SlidevizError] = MeshError, replaces: Path | None = None
+) -> Iterator[BinaryIO]:
+    """Context with a binary file to write, which replaces ``path`` at the end.
+
+    When the block raises, whatever was at ``path`` stays as it was and the temporary file is
+    removed. A symbolic link stays a link, and an existing file keeps its permissions.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file to write.
+    error : type of SlidevizError
+        The class of error to raise: ``MeshError`` unless another is given.
+    replaces : Path, optional
+        The input that may be written over; see `slideviz.system.file_checks`.
+
+    Raises
+    ------
+    SlidevizError
+        It cannot be written: missing folder, no permission, full disk; or it is an input. The
+        message has the path, the reason and the remedy.
+    """
+    target = Path(path)
+    require_no_input(target, error, replaces)
+    temporary: Path | None = None
+    try:
+        real = Path(os.path.realpath(target))
+        mode = mode_of(real)
+        with draft(real.parent) as temporary:
+            with temporary.open("xb") as file:
+                yield file
+                file.flush()
+                # Some file systems report a full disk only now; and without it a power cut
+                # after the renaming could leave an empty file.
+                os.fsync(file.fileno())
+                if mode is not None:
+                    os.fchmod(file.fileno(), mode)
+            temporary.replace(real)
+    except OSError as problem:
+        # The block may have failed to read some other file, which is not ours to explain.
+        if problem.filename is not None and not _is_ours(problem.filename, target, temporary):
+            raise
+        raise error(f"{target}: cannot be written: {reason_of(problem)}") from problem
+
+
+def require_writable(
+    path: str | Path, error: type[SlidevizError] = MeshError, replaces: Path | None = None
+) -> None:
+    """Raise if a file cannot be written now; called before the work whose result it is to hold.
+
+    A temporary file is made beside it and removed. Parameters are those of `atomic_write`.
+
+    Raises
+    ------
+    SlidevizError
+        The file cannot be written, as for `atomic_write`.
+    """
+    require_no_input(Path(path), error, replaces)
+    real = Path(os.path.realpath(path))
+    try:
+        mode_of(real)
+        with draft(real.parent) as temporary:
+            temporary.touch(exist_ok=False)
+    except OSError as problem:
+        raise error(f"{path}: cannot be written: {reason_of(problem)}") from problem
+
+
+def mode_of(path: Path) -> int | None:
+    """Return the permission bits of an existing file, or None if there is none.
+
+    Raises
+    ------
+    OSError
+        It may not be replaced: it is a folder, a device, a pipe or write-protected.
+    """
+    if not path.exists():
+        return None
+    if path.is_dir():
+        raise OSError(errno.EISDIR, "is a folder")
+    if not path.is_file():
+        raise OSError(errno.EINVAL, "it is a device or pipe; give the name of an ordinary file")
+    # Renaming would get round the write protection of the file, so ask for it.
+    if not os.access(path, os.W_OK):
+        raise OSError(errno.EACCES, "write-protected")
+    return path.stat().st_mode & 0o777
+
+
+def _is_ours(name: object, target: Path, temporary: Path | None) -> bool:
+    """Return whether the file name of an error is that of the target or its temporary file."""
+    return str(name) in {str(target), str(temporary), os.path.realpath(target)}
+
+
+def reason_of(problem: OSError) -> str:
+    """Return in words why a file cannot be written, with the remedy for the usual reasons."""
+    text = problem.strerror or str(problem)
+    return _REMEDIES.get(problem.errno or 0, text)

@@ -1,0 +1,115 @@
+"""A damaged cache of compiled code is compiled again, and harms nobody."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numba.core import event
+
+from slideviz.system.jit_cache import njit
+
+
+def double(x):
+    return x * 2.0
+
+
+def half(x):
+    return x / 2.0
+
+
+class Compiled(event.Listener):
+    """Counts what is compiled."""
+
+    def __init__(self):
+        self.count = 0
+
+    def on_start(self, _):
+        self.count += 1
+
+    def on_end(self, _):
+        pass
+
+
+def compilations(function=double) -> int:
+    """Return how many functions were compiled for a call."""
+    listener = Compiled()
+    with event.install_listener("numba:compile", listener):
+        assert njit(cache=True)(function)(3.0) == function(3.0)
+    return listener.count
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch) -> Path:
+    """The folder of a cache with one function in it."""
+    monkeypatch.setattr("numba.core.config.CACHE_DIR", str(tmp_path))
+    assert compilations() == 1
+    assert compilations() == 0
+    (index,) = tmp_path.rglob("*.nbi")
+    return index.parent
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def garbage(path: Path) -> None:
+    path.write_bytes(np.random.default_rng(1).bytes(2000))
+
+
+def one_bit(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) * 2 // 3] ^= 1
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("damage", [cut, one_bit])
+@pytest.mark.parametrize("kind", ["*.nbi", "*.nbc"])
+def test_what_is_damaged_is_compiled_again_once(cache, kind, damage):
+    (path,) = cache.glob(kind)
+    damage(path)
+    assert compilations() == 1
+    assert compilations() == 0
+
+
+def test_what_is_missing_is_compiled_again(cache):
+    (path,) = cache.glob("*.nbc")
+    path.unlink()
+    assert compilations() == 1
+    assert compilations() == 0
+
+
+def test_a_cache_that_cannot_be_written_only_costs_time(cache, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("slideviz.system.jit_cache._SealedFile._open_for_write", full)
+    assert compilations(half) == 1
+    assert compilations(half) == 1
+
+
+def test_all_loops_have_this_cache():
+    """None is compiled by Numba's own decorator."""
+    root = Path(sys.modules["slideviz"].__file__).parent
+    users = [path.name for path in root.rglob("*.py") if "njit" in path.read_text()]
+    own = [
+        path.name for path in root.rglob("*.py") if "mesh.caching import njit" in path.read_text()
+    ]
+    assert sorted(users) == sorted([*own, "caching.py"])
+
+
+@pytest.mark.slow
+def test_a_run_survives_a_damaged_cache(tmp_path):
+    places = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+
+    def slideviz(*words: str) -> None:
+        call = [sys.executable, "-m", "slideviz", *words]
+        subprocess.run(call, cwd=tmp_path, env=places, check=True)
+
+    slideviz("sample", "square", "-o", ".")
+    slideviz("run", "square.cfg", "--set", "STEPS=1")
+    for path in (tmp_path / "cache").rglob("*.nb*"):
+        garbage(path)
+    slideviz("run", "square.cfg", "--set", "STEPS=1")
