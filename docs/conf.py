@@ -56,7 +56,6 @@ html_static_path = ["static"]
 html_css_files = ["slideviz.css"]
 html_theme_options = {
     "logo": {"text": "slideviz"},
-    "github_url": "https://github.com/slideviz/slideviz",
     "navigation_with_keys": False,
     "show_prev_next": False,
     "secondary_sidebar_items": ["page-toc"],

@@ -18,9 +18,15 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 def test_the_citation_names_this_version_and_the_thesis():
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert citation["version"] == slideviz.__version__
-    assert citation["repository-code"] == PROJECT["project"]["urls"]["Repository"]
     (thesis,) = citation["references"]
     assert "Radial Basis Function Interpolation" in thesis["title"]
+
+
+def test_no_address_is_invented():
+    assert "urls" not in PROJECT["project"]  # CONTRIBUTING.md says where the first address goes
+    texts = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("slideviz/**/*.py")]
+    texts += [ROOT / "docs" / "conf.py", ROOT / "CITATION.cff"]
+    assert [path for path in texts if "github.com/slideviz" in path.read_text("utf-8")] == []
 
 
 def test_the_desktop_file_starts_what_is_installed():

@@ -22,16 +22,16 @@ printf '\n== inflow and outflow slide, periodic sides move along ==\n'
     --json demo/passage_sliding.json
 "$slideviz" quality demo/passage_sliding.su2 --reference demo/passage/mesh.su2
 
-tell() { printf '  %-31s %s\n' "demo/$1" "$2"; }
+describe() { printf '  %-31s %s\n' "demo/$1" "$2"; }
 printf '\nwritten:\n'
-tell passage/mesh.su2 'the undeformed mesh'
-tell passage/passage.cfg 'the case: what moves, slides and repeats, by which method'
-for way in fixed sliding; do
-    tell "passage_$way.su2" "the deformed mesh, outer boundaries $way"
-    tell "passage_$way.png" 'its picture: cells colored by quality'
-    tell "passage_${way}_qual.txt" 'its quality, a number for each cell (GENERATE_QUALITY= YES)'
+describe passage/mesh.su2 'the undeformed mesh'
+describe passage/passage.cfg 'the case: what moves, slides and repeats, by which method'
+for method in fixed sliding; do
+    describe "passage_$method.su2" "the deformed mesh, outer boundaries $method"
+    describe "passage_$method.png" 'its picture: cells colored by quality'
+    describe "passage_${method}_qual.txt" 'its quality, a number for each cell (GENERATE_QUALITY= YES)'
 done
-tell passage_sliding.json 'the report of the run, for other programs'
+describe passage_sliding.json 'the report of the run, for other programs'
 if [ "${WINDOW:-yes}" = no ]; then
     printf '\nthe window: %s %s\n' "$slideviz" "$case"
 elif [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
