@@ -22,7 +22,7 @@ from slideviz.terms import QUANTITIES
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.export.reel import Reel
+    from slideviz.export.reel import FilmOptions
     from slideviz.mesh.model import Mesh
     from slideviz.session.state import Run, StepFrame
 
@@ -89,28 +89,28 @@ def film(arguments: argparse.Namespace) -> int:
     from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.places import OutputPath, require_places
     from slideviz.cli.progress import Bar
-    from slideviz.export.encode import kind_of
+    from slideviz.export.encode import film_kind
     from slideviz.export.film import film as draw
     from slideviz.export.film import require_pair
-    from slideviz.export.reel import Reel, check_film
+    from slideviz.export.reel import FilmOptions, check_film
     from slideviz.session.opening import of_runs
 
     file = arguments.output
-    reel = Reel(arguments.size, arguments.fps, arguments.hold, arguments.between)
-    check_film(file, reel, overwrite=arguments.force)  # before the work, not after it
+    film_options = FilmOptions(arguments.size, arguments.fps, arguments.hold, arguments.between)
+    check_film(file, film_options, overwrite=arguments.force)  # before the work, not after it
     if arguments.beside:
-        require_pair(reel.pixels(file))
+        require_pair(film_options.pixels(file))
     case = read_case(arguments)
-    if kind_of(file) != ".png":  # of pictures it is not known yet how many there will be
+    if film_kind(file) != ".png":  # of pictures it is not known yet how many there will be
         require_places(arguments, OutputPath(file, "-o"))
     first, runs = _runs(arguments, case)
     session = of_runs(first, runs, arguments.color)
-    drawing = draw(session, file, reel, zoom=arguments.zoom, overwrite=arguments.force)
+    drawing = draw(session, file, film_options, zoom=arguments.zoom, overwrite=arguments.force)
     with Bar(not arguments.quiet) as bar, closing(drawing):
         for drawn in drawing:
             bar.count(drawn.done, drawn.total, "image")
     if not arguments.quiet:
-        _print_film(arguments, reel, runs)
+        _print_film(arguments, film_options, runs)
     for run in runs:
         _print_inverted(arguments, run)
     return INVERTED if any(run.frames[-1].quality.inverted for run in runs) else DONE
@@ -176,7 +176,7 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Step
     return tuple(frames)
 
 
-def _print_film(arguments: argparse.Namespace, reel: Reel, runs: list[Run]) -> None:
+def _print_film(arguments: argparse.Namespace, film_options: FilmOptions, runs: list[Run]) -> None:
     from slideviz.case.words import counted
 
     for run in runs:
@@ -185,7 +185,8 @@ def _print_film(arguments: argparse.Namespace, reel: Reel, runs: list[Run]) -> N
         steps = counted(len(run.frames), "step")
         print(f"{name}{steps}, min {last.min:.6g}, mean {last.mean:.6g}, {last.inverted} inverted")
     most = 1 + max(len(run.frames) for run in runs)
-    print(f"film: {arguments.output} ({reel.count(most)} images, {reel.pace(most):.3g} a second)")
+    images, pace = film_options.count(most), film_options.pace(most)
+    print(f"film: {arguments.output} ({images} images, {pace:.3g} a second)")
     if most - 1 < SMOOTH and not arguments.between:
         print("few steps; --between 20 puts 20 images between two of them")
 

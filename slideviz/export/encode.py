@@ -33,7 +33,7 @@ Add = Callable[[Pixels, float], None]
 """A function that writes an image (height, width, 3) to be shown for a number of seconds."""
 
 SUFFIXES = (".mp4", ".gif", ".png")
-"""The kinds of films (see `kind_of`)."""
+"""The kinds of films (see `film_kind`)."""
 
 SLOWEST = 10
 """Least frame rate of an MP4, as players fail with lower ones; images shown longer are repeated."""
@@ -44,7 +44,7 @@ _NUMBER = re.compile(r"(%(?:0\d)?d)")
 
 
 @dataclass(frozen=True)
-class Take:
+class EncoderSettings:
     """The settings that a writer has to know before the first image.
 
     Attributes
@@ -65,7 +65,7 @@ class Take:
     samples: Callable[[], Sequence[Pixels]]
 
 
-def kind_of(file: Path) -> str:
+def film_kind(file: Path) -> str:
     """Return the kind of a film by its name: ".mp4", ".gif", or ".png" for numbered pictures.
 
     ".png" is that of a folder, or of a name with one number such as ``step_%03d.png``.
@@ -94,7 +94,7 @@ def kind_of(file: Path) -> str:
 
 def targets(file: Path, count: int) -> list[Path]:
     """Return the files of a film of ``count`` images: one file, or one per image."""
-    if kind_of(file) != ".png":
+    if film_kind(file) != ".png":
         return [file]
     if file.is_dir() or not file.suffix:
         file = file / f"step_%0{max(len(str(count - 1)), 2)}d.png"
@@ -102,18 +102,18 @@ def targets(file: Path, count: int) -> list[Path]:
     return [file.with_name(f"{before}{number % i}{after}") for i in range(count)]
 
 
-def writer(file: Path, take: Take) -> AbstractContextManager[Add]:
-    """Return the writer for the kind of a file (see `kind_of`)."""
-    return _WRITERS[kind_of(file)](file, take)
+def writer(file: Path, settings: EncoderSettings) -> AbstractContextManager[Add]:
+    """Return the writer for the kind of a file (see `film_kind`)."""
+    return _WRITERS[film_kind(file)](file, settings)
 
 
 @contextmanager
-def _mp4(file: Path, take: Take) -> Iterator[Add]:
+def _mp4(file: Path, settings: EncoderSettings) -> Iterator[Add]:
     """Write an MP4 with H.264 as every browser plays it, encoded by ffmpeg."""
-    fps = Fraction(take.fps).limit_denominator(1000)
+    fps = Fraction(settings.fps).limit_denominator(1000)
     rate = fps * max(1, -(-SLOWEST // fps))
     with atomic_write(file, SlidevizError) as out, tempfile.TemporaryFile() as log:
-        process = _start_ffmpeg(out.name, take.size, rate, log)
+        process = _start_ffmpeg(out.name, settings.size, rate, log)
         pipe = process.stdin
         assert pipe is not None
         shown = Fraction(0)
@@ -185,11 +185,11 @@ def _raise_ffmpeg(file: Path, process: subprocess.Popen[bytes], log: IO[bytes]) 
 
 
 @contextmanager
-def _gif(file: Path, take: Take) -> Iterator[Add]:
+def _gif(file: Path, settings: EncoderSettings) -> Iterator[Add]:
     """Write a GIF, of each image only the rectangle that differs from the one before."""
     from PIL import GifImagePlugin, Image
 
-    palette = _palette(take.samples())
+    palette = _palette(settings.samples())
     before: NDArray | None = None
     shown, ticks = 0.0, 0
     with atomic_write(file, SlidevizError) as out:
@@ -243,13 +243,13 @@ def _palette(samples: Sequence[Pixels]) -> Image:
 
 
 @contextmanager
-def _pngs(file: Path, take: Take) -> Iterator[Add]:
+def _pngs(file: Path, settings: EncoderSettings) -> Iterator[Add]:
     """Write numbered PNG files; existing ones are replaced only after the last image is drawn."""
-    paths = targets(file, take.count)
+    paths = targets(file, settings.count)
     folder = paths[0].parent
     is_new = not folder.exists()
     try:
-        with _told(file):
+        with _os_errors_as_slideviz(file):
             folder.mkdir(exist_ok=True)
         require_writable(paths[0], SlidevizError)
         for path in paths:
@@ -259,11 +259,11 @@ def _pngs(file: Path, take: Take) -> Iterator[Add]:
 
             def add(image: Pixels, _: float) -> None:
                 drawn.append(drawer / str(len(drawn)))
-                with _told(file):
+                with _os_errors_as_slideviz(file):
                     drawn[-1].write_bytes(png_bytes(image))
 
             yield add
-            with _told(file):
+            with _os_errors_as_slideviz(file):
                 for done, path in zip(drawn, paths, strict=True):
                     done.replace(path)
     except BaseException:
@@ -273,14 +273,14 @@ def _pngs(file: Path, take: Take) -> Iterator[Add]:
 
 
 @contextmanager
-def _told(file: Path) -> Iterator[None]:
+def _os_errors_as_slideviz(file: Path) -> Iterator[None]:
     try:
         yield
     except OSError as problem:
         raise SlidevizError(f"{file}: cannot be written: {problem.strerror}") from problem
 
 
-_WRITERS: dict[str, Callable[[Path, Take], AbstractContextManager[Add]]] = {
+_WRITERS: dict[str, Callable[[Path, EncoderSettings], AbstractContextManager[Add]]] = {
     ".mp4": _mp4,
     ".gif": _gif,
     ".png": _pngs,

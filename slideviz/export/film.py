@@ -17,7 +17,14 @@ from slideviz.export.encode import Pixels
 from slideviz.export.offscreen import LETTERS
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions, letters_across, panes
-from slideviz.export.reel import USUAL, FilmProgress, Reel, check_film, exposing, images_drawn
+from slideviz.export.reel import (
+    DEFAULT_FILM,
+    FilmOptions,
+    FilmProgress,
+    check_film,
+    images_drawn,
+    render_frames,
+)
 from slideviz.export.titles import (
     DETAIL,
     LETTER_WIDTH,
@@ -37,7 +44,7 @@ _NARROWEST = 160
 
 
 @dataclass(frozen=True)
-class Shot:
+class FilmFrame:
     """A frame of a film, with the texts of its place in the run.
 
     ``words`` always names the step; ``place`` is empty for the only step of a run.
@@ -48,14 +55,14 @@ class Shot:
     place: str
 
 
-Titles = Callable[[Sequence[Shot]], tuple[Sequence[str], float]]
+Titles = Callable[[Sequence[FilmFrame]], tuple[Sequence[str], float]]
 """A function that returns the titles of the runs shown, and their letters' size (1: usual)."""
 
 
 def film(
     session: Session,
     file: str | Path,
-    reel: Reel = USUAL,
+    film_options: FilmOptions = DEFAULT_FILM,
     *,
     zoom: Zoom = "auto",
     overwrite: bool = False,
@@ -71,7 +78,7 @@ def film(
         Made of the runs (`slideviz.session.opening.of_runs`).
     file : str or Path
         A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
-    reel : Reel
+    film_options : Reel
         Size, speed, and images in between.
     zoom : Detail, "auto" or "all"
         What part of the mesh is seen; "auto" is the whole, unless what moved is tiny in it.
@@ -84,18 +91,18 @@ def film(
         There are no steps, the film cannot be made like that, or the file cannot be written.
     """
     path = Path(file)
-    options = film_options(reel.pixels(path), both=session.view.beside is not None)
+    options = image_options(film_options.pixels(path), both=session.view.beside is not None)
     if options.both:
         require_pair(options.size)
     with OffscreenRenderer.of_runs(session, zoom) as renderer:
         runs = renderer.shown(session, options)
-        titles = _titles_of_runs(runs, options, renderer.shows_detail, reel.between > 0)
+        titles = _titles_of_runs(runs, options, renderer.shows_detail, film_options.between > 0)
         yield from images_drawn(
-            filming(renderer, options, path, reel, titles=titles, overwrite=overwrite)
+            filming(renderer, options, path, film_options, titles=titles, overwrite=overwrite)
         )
 
 
-def film_options(size: tuple[int, int], both: bool = False) -> PictureOptions:
+def image_options(size: tuple[int, int], both: bool = False) -> PictureOptions:
     """Return the usual options of a film's images; ``both``: of two runs side by side."""
     return PictureOptions(size, title=True, both=both, letters=LETTERS, film=True, lines=1 + both)
 
@@ -104,7 +111,7 @@ def filming(
     renderer: OffscreenRenderer,
     options: PictureOptions,
     file: Path,
-    reel: Reel,
+    film_options: FilmOptions,
     *,
     titles: Titles | None = None,
     overwrite: bool = False,
@@ -119,7 +126,7 @@ def filming(
         The options of each image.
     file : Path
         A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
-    reel : Reel
+    film_options : Reel
         Speed, and images in between.
     titles : callable, optional
         Returns the titles of the images; by default run, step and quality.
@@ -133,28 +140,33 @@ def filming(
     """
     runs = renderer.shown(renderer.session, options)
     for one in runs:
-        require_steps(one.frames, file, reel, overwrite)
+        require_steps(one.frames, file, film_options, overwrite)
     write = titles or _titles(runs[0], options)
     count = max(len(one.frames) for one in runs)
-    yield from posing(renderer, options)
+    yield from aim_at_largest(renderer, options)
 
     def draw(position: float) -> Generator[object, Any, Pixels]:
-        shots = []
+        film_frames = []
         for one in runs:
             at = position
             if len(one.frames) < count:  # as far deformed
                 part = (len(one.frames) - 1) / (count - 1)
-                at = round(position * part, 9 if reel.between else 0)
-            shots.append((yield Beside(partial(shot_at, one.frames, at))))
-        shown = [_showing(one, shot.frame) for one, shot in zip(runs, shots, strict=True)]
-        return (yield from renderer.drawing(shown, options, write(shots)))
+                at = round(position * part, 9 if film_options.between else 0)
+            film_frames.append((yield Beside(partial(film_frame_at, one.frames, at))))
+        shown = [
+            _showing(one, film_frame.frame)
+            for one, film_frame in zip(runs, film_frames, strict=True)
+        ]
+        return (yield from renderer.drawing(shown, options, write(film_frames)))
 
-    yield from exposing(count, file, reel, draw)
+    yield from render_frames(count, file, film_options, draw)
 
 
-def posing(renderer: OffscreenRenderer, options: PictureOptions) -> Generator[object, Any, None]:
+def aim_at_largest(
+    renderer: OffscreenRenderer, options: PictureOptions
+) -> Generator[object, Any, None]:
     """Aim a renderer's camera so that the largest step is seen whole, yielding between pieces."""
-    yield from renderer.arranging()
+    yield from renderer.prepare_steps()
     frames = renderer.session.frames
     widest = yield Beside(lambda _: max(range(len(frames)), key=lambda k: frames[k].mesh.extent))
     renderer.pose(options, widest)
@@ -163,7 +175,7 @@ def posing(renderer: OffscreenRenderer, options: PictureOptions) -> Generator[ob
 
 def require_pair(size: tuple[int, int]) -> None:
     """Raise SlidevizError if a film's size is too narrow for two runs side by side."""
-    options = film_options(size, both=True)
+    options = image_options(size, both=True)
     room = panes(options, options.gap)[0].size[0]
     if room < _NARROWEST:
         least = size[0] + 2 * (_NARROWEST - room)
@@ -173,24 +185,28 @@ def require_pair(size: tuple[int, int]) -> None:
         )
 
 
-def require_steps(frames: Sequence[StepFrame], file: Path, reel: Reel, overwrite: bool) -> None:
+def require_steps(
+    frames: Sequence[StepFrame], file: Path, film_options: FilmOptions, overwrite: bool
+) -> None:
     """Raise SlidevizError if there are no steps, or `check_film` refuses the film."""
     if len(frames) < 2:
         raise SlidevizError("there are no steps to make a film of; run the case first")
-    check_film(file, reel, frames=len(frames), overwrite=overwrite)
+    check_film(file, film_options, frames=len(frames), overwrite=overwrite)
 
 
-def shot_at(frames: Sequence[StepFrame], position: float, going_on: GoingOn = never) -> Shot:
-    """Return the shot at a position in a run: a step, or a mesh interpolated between two steps.
+def film_frame_at(
+    frames: Sequence[StepFrame], position: float, going_on: GoingOn = never
+) -> FilmFrame:
+    """Return the frame at a position in a run: a step, or a mesh between two steps.
 
     ``position`` is the number of the step, 0 the undeformed mesh; ``frames`` are all of these.
     """
     step, steps = int(position), len(frames) - 1
     place = place_words(position, steps)
     if position == step:
-        return Shot(frames[step], place or f"step {step} of {steps}", place)
+        return FilmFrame(frames[step], place or f"step {step} of {steps}", place)
     frame = _blend(frames[step], frames[step + 1], position - step, frames[0], going_on)
-    return Shot(frame, place, place)
+    return FilmFrame(frame, place, place)
 
 
 def _blend(
@@ -221,9 +237,9 @@ def _titles(session: Session, options: PictureOptions) -> Titles:
     letters = options.size[0] / (LETTER_WIDTH * options.scale)
     longest = LONGEST.format(len(session.frames) - 1)
 
-    def write(shots: Sequence[Shot]) -> tuple[Sequence[str], float]:
-        (shot,) = shots
-        return [title_words(session, shot.frame, shot.place, letters, longest)], 1.0
+    def write(film_frames: Sequence[FilmFrame]) -> tuple[Sequence[str], float]:
+        (film_frame,) = film_frames
+        return [title_words(session, film_frame.frame, film_frame.place, letters, longest)], 1.0
 
     return write
 
@@ -254,10 +270,10 @@ def _titles_of_runs(
     longest = max((line for text in every for line in text.splitlines()), key=len)
     letters = letters_across(panes(options, options.gap)[0] if pair else options)
 
-    def write(shots: Sequence[Shot]) -> tuple[Sequence[str], float]:
+    def write(film_frames: Sequence[FilmFrame]) -> tuple[Sequence[str], float]:
         texts = [
-            words(one, shot.words, shot.frame.quality)
-            for one, shot in zip(runs, shots, strict=True)
+            words(one, film_frame.words, film_frame.frame.quality)
+            for one, film_frame in zip(runs, film_frames, strict=True)
         ]
         found, part = fitting([*texts, longest], letters)
         return found[:-1], part

@@ -85,7 +85,7 @@ class OffscreenRenderer:
         overview = Overview.of(farthest, base, zoom)
         return cls(session, find_surfaces(base) if base.dim == 2 else (), overview=overview)
 
-    def arranging(self) -> Iterator[None]:
+    def prepare_steps(self) -> Iterator[None]:
         """Prepare the plotter and the scene, yielding between pieces of this work.
 
         What remains of it is done with the first picture.
@@ -148,9 +148,9 @@ class OffscreenRenderer:
         SlidevizError
             The size cannot be drawn.
         """
-        return whole(self.picturing(options))
+        return whole(self.render_steps(options))
 
-    def picturing(
+    def render_steps(
         self, options: PictureOptions, aim: bool = True, frame: int | None = None
     ) -> Generator[None, None, Pixels]:
         """Draw and return a picture as `image` does, yielding between pieces of the work.
@@ -167,7 +167,7 @@ class OffscreenRenderer:
         """
         shown = self.session if frame is None else show_frame(self.session, frame)
         check_size(options.size)
-        yield from self.arranging()
+        yield from self.prepare_steps()
         sessions = self.shown(shown, options)
         if aim:
             self._aim(sessions[0], options)
@@ -200,7 +200,7 @@ class OffscreenRenderer:
     def pose(self, options: PictureOptions, frame: int | None = None) -> Scene:
         """Aim the camera as for a picture of a step, by default the shown one; return the scene."""
         shown = self.session if frame is None else show_frame(self.session, frame)
-        for _ in self.arranging():
+        for _ in self.prepare_steps():
             pass
         self._aim(shown, options)
         scene: Scene = self._scene

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from slideviz.errors import SlidevizError
-from slideviz.export.encode import FASTEST, Pixels, Take, kind_of, targets, writer
+from slideviz.export.encode import FASTEST, EncoderSettings, Pixels, film_kind, targets, writer
 from slideviz.export.offscreen import check_size
 from slideviz.session.pieces import Beside, here
 
@@ -22,7 +22,7 @@ FPS, SECONDS = 10.0, 3.0
 
 
 @dataclass(frozen=True)
-class Reel:
+class FilmOptions:
     """The size, speed and images in between of a film.
 
     Attributes
@@ -45,7 +45,7 @@ class Reel:
 
     def pixels(self, file: Path) -> tuple[int, int]:
         """Return width and height in pixels of the film in a file."""
-        return self.size or SIZES[kind_of(file)]
+        return self.size or SIZES[film_kind(file)]
 
     def count(self, frames: int) -> int:
         """Return the number of images of a film of ``frames`` frames, with the undeformed mesh."""
@@ -56,12 +56,12 @@ class Reel:
         return self.fps or min(FPS, max(1.0, self.count(frames) / SECONDS))
 
 
-USUAL = Reel()
+DEFAULT_FILM = FilmOptions()
 """The default settings of a film."""
 
 
 def check_film(
-    file: Path, reel: Reel, *, frames: int | None = None, overwrite: bool = False
+    file: Path, film_options: FilmOptions, *, frames: int | None = None, overwrite: bool = False
 ) -> None:
     """Raise SlidevizError if a film cannot be made with these settings or in this file.
 
@@ -69,29 +69,34 @@ def check_film(
     ----------
     file : Path
         A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
-    reel : Reel
+    film_options : Reel
         The settings.
     frames : int, optional
         The number of frames, if it is known already.
     overwrite : bool
         Allow files that exist.
     """
-    kind, size = kind_of(file), reel.pixels(file)
+    kind, size = film_kind(file), film_options.pixels(file)
     check_size(size)
     if kind == ".mp4" and (size[0] % 2 or size[1] % 2):
         raise SlidevizError(
             f"an MP4 of {size[0]}x{size[1]} pixels cannot be made: width and height must be even; "
             f"take {size[0] + size[0] % 2}x{size[1] + size[1] % 2}"
         )
-    if reel.fps is not None and not 0.1 <= reel.fps <= FASTEST[kind]:
+    if film_options.fps is not None and not 0.1 <= film_options.fps <= FASTEST[kind]:
         raise SlidevizError(
-            f"{reel.fps:g} images a second cannot be shown; 0.1 to {FASTEST[kind]:g} can ({kind})"
+            f"{film_options.fps:g} images a second cannot be shown; "
+            f"0.1 to {FASTEST[kind]:g} can ({kind})"
         )
-    if not 0.0 <= reel.hold <= 600.0:
-        raise SlidevizError(f"the last image cannot stay for {reel.hold:g} s; 0 to 600 s can")
-    if not 0 <= reel.between <= 1000:
-        raise SlidevizError(f"{reel.between} images between two steps; 0 to 1000 are possible")
-    paths = targets(file, reel.count(frames) if frames else 2)
+    if not 0.0 <= film_options.hold <= 600.0:
+        raise SlidevizError(
+            f"the last image cannot stay for {film_options.hold:g} s; 0 to 600 s can"
+        )
+    if not 0 <= film_options.between <= 1000:
+        raise SlidevizError(
+            f"{film_options.between} images between two steps; 0 to 1000 are possible"
+        )
+    paths = targets(file, film_options.count(frames) if frames else 2)
     existing = [path for path in paths if path.exists()]
     if existing and not overwrite:
         raise SlidevizError(
@@ -126,10 +131,10 @@ def images_drawn(pieces: Generator[object, Any, None]) -> Generator[FilmProgress
         run.close()
 
 
-def exposing(
+def render_frames(
     frames: int,
     file: Path,
-    reel: Reel,
+    film_options: FilmOptions,
     draw: Callable[[float], Generator[object, Any, Pixels]],
 ) -> Generator[object, Any, None]:
     """Draw and encode all images; yield `FilmProgress` after each one, and between its pieces.
@@ -141,23 +146,23 @@ def exposing(
     frames : int
         Number of the undeformed mesh and all steps.
     file : Path
-    reel : Reel
+    film_options : Reel
     draw : callable
         Given a position (the number of a step, or a number between two), returns a generator that
         draws the image in pieces and returns it.
     """
-    total, pace = reel.count(frames), reel.pace(frames)
+    total, pace = film_options.count(frames), film_options.pace(frames)
     samples = []
-    if kind_of(file) == ".gif":  # only there colors have to be chosen
+    if film_kind(file) == ".gif":  # only there colors have to be chosen
         for at in sorted({0, frames // 2, frames - 1}):
             image = yield from draw(float(at))
             samples.append(image)
-    take = Take(reel.pixels(file), total, pace, lambda: samples)
+    settings = EncoderSettings(film_options.pixels(file), total, pace, lambda: samples)
     with ExitStack() as stack:
-        add = yield Beside(lambda _: stack.enter_context(writer(file, take)))
-        for done, position in enumerate(_positions(frames - 1, reel.between), start=1):
+        add = yield Beside(lambda _: stack.enter_context(writer(file, settings)))
+        for done, position in enumerate(_positions(frames - 1, film_options.between), start=1):
             image = yield from draw(position)
-            seconds = 1.0 / pace if done < total else max(reel.hold, 1.0 / pace)
+            seconds = 1.0 / pace if done < total else max(film_options.hold, 1.0 / pace)
             yield Beside(partial(_add, add, image, seconds))
             yield FilmProgress(done, total)
         yield Beside(lambda _: stack.close())

@@ -33,7 +33,7 @@ _SHOWN = "shown: "
 
 
 @dataclass(frozen=True)
-class Paper:
+class PageFormat:
     """The format of a section's picture.
 
     Attributes
@@ -52,7 +52,7 @@ class Paper:
     axes: bool = True
 
     @classmethod
-    def of_cm(cls, width: float, height: float, dpi: float = 300.0) -> Paper:
+    def of_cm(cls, width: float, height: float, dpi: float = 300.0) -> PageFormat:
         """Return the format of a picture of a width and maximum height in centimetres."""
         return cls((round(width / 2.54 * dpi), round(height / 2.54 * dpi)), dpi)
 
@@ -61,7 +61,7 @@ def save_section(
     path: Path,
     session: Session,
     section: Section,
-    paper: Paper,
+    paper: PageFormat,
     report: Report,
     stopped: Stopped,
 ) -> Path:

@@ -17,7 +17,7 @@ from slideviz.export.titles import draw_mark
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.plots.bar import color_bar
 from slideviz.plots.cells import color_scale, draw_cells
-from slideviz.plots.written import empty_figure, write_figure
+from slideviz.plots.figure_io import empty_figure, write_figure
 from slideviz.scene.color_legend import OPACITY, STRIP
 from slideviz.scene.mesh import FADED, is_faded
 from slideviz.scene.sections import BAND, NAME, RIM, WIDTHS, shown_sections

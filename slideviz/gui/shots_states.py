@@ -196,7 +196,7 @@ STATES = (
 def film_of_passage(path: Path) -> Path:
     """Write a film of the 2D passage, as in the dark picture, and return its path."""
     from slideviz.export.film import film
-    from slideviz.export.reel import Reel
+    from slideviz.export.reel import FilmOptions
     from slideviz.mesh.quality import quality as quality_of
     from slideviz.session.opening import of_runs
     from slideviz.session.state import Run, StepFrame
@@ -207,6 +207,6 @@ def film_of_passage(path: Path) -> Path:
     steps = deform(case, made.mesh)
     frames = tuple(StepFrame(step.mesh, quality_of(step.mesh, made.mesh), step) for step in steps)
     session = of_runs(StepFrame(made.mesh, quality_of(made.mesh)), [Run(1, case, frames, "done")])
-    for _ in film(session, path, Reel((480, 300), 5.0, 1.5, 1), overwrite=True):
+    for _ in film(session, path, FilmOptions((480, 300), 5.0, 1.5, 1), overwrite=True):
         pass
     return path

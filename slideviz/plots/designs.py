@@ -13,7 +13,7 @@ from slideviz.case.words import is_number
 from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.design.sweeps.row import DesignRow
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.plots.style import PRINT, Style, add_legend, dress
+from slideviz.plots.style import PRINT, Style, add_legend, style_axes
 from slideviz.session.design_table import DesignTable
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def against_designs(
     cells are crosses, those that ``failed`` (see `failed_designs`) bold ones on the axis. The
     design ``shown`` has a ring.
     """
-    dress(axes, style, column, RESULTS[what])
+    style_axes(axes, style, column, RESULTS[what])
     several = len(curves) <= _MOST_LINES
     for index, curve in enumerate(curves):
         _draw_curve(axes, curve, style, index if several else None, mean=what == "quality")

@@ -14,7 +14,7 @@ import numpy as np
 
 from slideviz.plots.histogram import histogram
 from slideviz.plots.series import GreedyRun, Outcome, QualityRun, StepRun
-from slideviz.plots.style import ON_DARK, ON_LIGHT, PRINT, Style, add_legend, dress, place
+from slideviz.plots.style import ON_DARK, ON_LIGHT, PRINT, Style, add_legend, place, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,7 +51,7 @@ _CROWDED = 300
 
 def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -> None:
     """Draw minimum (filled markers) and mean quality (hollow ones) against the step."""
-    dress(axes, style, "step [-]", "quality [-]")
+    style_axes(axes, style, "step [-]", "quality [-]")
     for index, run in enumerate(runs):
         look = _line(style, place(run.series, index))
         # Some markers are enough for many steps; those of each run are at other steps.
@@ -81,7 +81,7 @@ def convergence(
 
     Each tolerance is a thin line; markers show where levels begin (about ten if there are many).
     """
-    dress(axes, style, "control nodes [-]", f"largest error [{unit}]")
+    style_axes(axes, style, "control nodes [-]", f"largest error [{unit}]")
     axes.set_yscale("log")
     tolerances: set[float] = set()
     for index, run in enumerate(runs):
@@ -132,7 +132,7 @@ def against_steps(
     what : {"minimum", "mean", "seconds", "control_nodes", "max_error"}
     style : Style
     """
-    dress(axes, style, "deformation steps [-]", LABELS[what])
+    style_axes(axes, style, "deformation steps [-]", LABELS[what])
     labels = list(dict.fromkeys(row.label for row in rows))
     for index, label in enumerate(labels):
         mine = sorted((row for row in rows if row.label == label), key=lambda row: row.steps)

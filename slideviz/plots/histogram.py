@@ -13,7 +13,7 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray
 from slideviz.plots.series import Bars, Distribution, Outline, QualityRun
-from slideviz.plots.style import PRINT, Style, add_legend, dress, place
+from slideviz.plots.style import PRINT, Style, add_legend, place, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,7 +83,7 @@ def draw_distribution(
         Whether the counts' axis is logarithmic, which shows a few bad cells among many.
     style : Style
     """
-    dress(axes, style, metric, "cells [-]")
+    style_axes(axes, style, metric, "cells [-]")
     foot = 0.5 if log else 0.0
     # The dotted line of the undeformed mesh alone is visible on bars of any color.
     paler = any(outline.series is not None for outline in outlines)

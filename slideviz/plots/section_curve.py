@@ -10,7 +10,7 @@ import numpy as np
 
 from slideviz.color_scheme import COLOR_MAP
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.plots.style import PRINT, Style, add_legend, dress, place
+from slideviz.plots.style import PRINT, Style, add_legend, place, style_axes
 from slideviz.plots.ticks import rounded_out
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
@@ -115,7 +115,7 @@ def draw_curves(
     colors : Colors, optional
         Colors of the areas; without them no areas are drawn.
     """
-    dress(axes, style, *labels)
+    style_axes(axes, style, *labels)
     good = np.concatenate([row.curve.values for row in rows])
     low, high = rounded_out(float(good.min()), float(good.max()))
     room = 0.06 * (high - low)

@@ -14,6 +14,7 @@ from slideviz.mesh.model import IntArray
 from slideviz.plots.around import draw_around, window
 from slideviz.plots.bar import BELOW, GAP, below, beside, color_bar
 from slideviz.plots.cells import THICKEST, color_scale, draw_cells
+from slideviz.plots.figure_io import empty_figure, fitted, lay_out, trim, write_figure
 from slideviz.plots.section_curve import Colors, CurveRow, curve_of, draw_curves, position_label
 from slideviz.plots.section_layout import (
     BAR,
@@ -30,7 +31,6 @@ from slideviz.plots.section_layout import (
 )
 from slideviz.plots.section_paint import Paint
 from slideviz.plots.style import PRINT
-from slideviz.plots.written import empty_figure, fitted, lay_out, trim, write_figure
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons, joined
 from slideviz.sections.shape import Label

@@ -15,7 +15,7 @@ import numpy as np
 from slideviz.errors import SlidevizError
 from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
-from slideviz.plots.style import PRINT, Style, add_legend, dress, place
+from slideviz.plots.style import PRINT, Style, add_legend, place, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -194,7 +194,7 @@ def spanwise(
     """
     coordinate = profiles[0].coordinate if profiles else "r"
     label = "span fraction [-]" if fraction else f"{coordinate} [{unit}]"
-    dress(axes, style, f"{what} quality [-]", label)
+    style_axes(axes, style, f"{what} quality [-]", label)
     ends = []
     for index, profile in enumerate(profiles):
         look = style.series(place(profile.series, index))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from slideviz.color_scheme import DARK, INVERTED_COLOR, LIGHT, PAPER, ColorScheme
-from slideviz.plots.written import SMALLEST
+from slideviz.plots.figure_io import SMALLEST
 from slideviz.terms import PALETTE
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ ON_LIGHT = Style(LIGHT)
 ON_DARK = Style(DARK)
 
 
-def dress(axes: Axes, style: Style, x_label: str, y_label: str) -> None:
+def style_axes(axes: Axes, style: Style, x_label: str, y_label: str) -> None:
     """Set labels, colors, letters and a faint grid of axes."""
     text, size = style.scheme.text, max(style.size, SMALLEST)
     axes.set_facecolor(style.scheme.background)

@@ -13,8 +13,8 @@ from slideviz.export.picture import WHITE, pictures_alike
 from slideviz.mesh.model import Mesh
 from slideviz.plots.bar import color_bar
 from slideviz.plots.cells import color_scale
+from slideviz.plots.figure_io import SMALLEST, empty_figure, fitted, trim
 from slideviz.plots.style import PRINT
-from slideviz.plots.written import SMALLEST, empty_figure, fitted, trim
 from slideviz.session.state import StepFrame
 from slideviz.study.combinations import COMPARED_METHODS, MODES, CombinationRow, Result
 from slideviz.study.plots import WIDTH

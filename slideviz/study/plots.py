@@ -11,10 +11,10 @@ import numpy as np
 
 from slideviz.mesh.quality import INVERTED
 from slideviz.plots import draw as plots
+from slideviz.plots.figure_io import empty_figure, write_figure
 from slideviz.plots.spanwise import spanwise
 from slideviz.plots.style import PRINT
 from slideviz.plots.ticks import rounded_out
-from slideviz.plots.written import empty_figure, write_figure
 from slideviz.study.combinations import CombinationRow
 from slideviz.study.facets import Facet, FacetLine, Profiler, facets, result_of
 

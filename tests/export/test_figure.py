@@ -20,7 +20,7 @@ from slideviz.export.picture_options import (
     title_of,
     words_of_size,
 )
-from slideviz.export.reel import Reel, images_drawn
+from slideviz.export.reel import FilmOptions, images_drawn
 from slideviz.export.titles import fitting, mark_words, pair_titles
 from slideviz.export.vector import draw_vector, require_vector, write_vector
 from slideviz.mesh.elements import ELEMENTS
@@ -256,7 +256,7 @@ def test_a_film_has_the_titles_of_its_preview(session, renderer, tmp_path, monke
 
     monkeypatch.setattr(renderer_module, "write_title", keep)
     figure = PictureOptions((640, 400), title=True, both=False, film=True)
-    for _ in images_drawn(filming(renderer, figure, tmp_path / "a%d.png", Reel())):
+    for _ in images_drawn(filming(renderer, figure, tmp_path / "a%d.png", FilmOptions())):
         pass
     for frame in range(3):
         renderer.session = changes.show_frame(session, frame)

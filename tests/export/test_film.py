@@ -15,10 +15,10 @@ from slideviz.case.model import Case
 from slideviz.color_scheme import PAPER
 from slideviz.errors import SlidevizError
 from slideviz.export import offscreen_renderer as renderer_module
-from slideviz.export.film import film, film_options, filming
+from slideviz.export.film import film, filming, image_options
 from slideviz.export.offscreen import font_scale, offscreen
 from slideviz.export.offscreen_renderer import OffscreenRenderer
-from slideviz.export.reel import Reel, check_film, images_drawn
+from slideviz.export.reel import FilmOptions, check_film, images_drawn
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.scene.scene import Scene
@@ -40,8 +40,8 @@ def leaning(mesh, steps=3, by=0.9):
     return tuple(frames)
 
 
-def shoot(frames, file, reel, **options):
-    return [(d.done, d.total) for d in film(shown(frames), file, reel, **options)]
+def shoot(frames, file, film_options, **options):
+    return [(d.done, d.total) for d in film(shown(frames), file, film_options, **options)]
 
 
 def shown(frames):
@@ -49,11 +49,11 @@ def shown(frames):
     return of_runs(frames[0], [Run(1, Case(), tuple(frames[1:]), "done")])
 
 
-def film_of(session, file, reel, like=None):
+def film_of(session, file, film_options, like=None):
     """Film what a view shows."""
-    figure = replace(film_options(reel.size), fill=like is None)
+    figure = replace(image_options(film_options.size), fill=like is None)
     with OffscreenRenderer(session, find_surfaces(session.mesh), like) as renderer:
-        yield from images_drawn(filming(renderer, figure, file, reel))
+        yield from images_drawn(filming(renderer, figure, file, film_options))
 
 
 def mp4_images(file):
@@ -90,7 +90,7 @@ def ran(session, frames):
 
 def test_an_mp4_has_the_size_the_time_and_the_steps(tmp_path, frames):
     file = tmp_path / "a.mp4"
-    drawn = shoot(frames, file, Reel(SMALL, fps=5, hold=1.0))
+    drawn = shoot(frames, file, FilmOptions(SMALL, fps=5, hold=1.0))
     assert drawn == [(1, 4), (2, 4), (3, 4), (4, 4)]
     meta, images = mp4_images(file)
     assert meta["size"] == SMALL
@@ -106,8 +106,8 @@ def test_an_mp4_has_the_size_the_time_and_the_steps(tmp_path, frames):
 
 
 def test_the_colors_of_an_mp4_are_those_of_the_picture(tmp_path, frames):
-    shoot(frames, tmp_path / "a.mp4", Reel(SMALL))
-    shoot(frames, tmp_path / "a%d.png", Reel(SMALL))
+    shoot(frames, tmp_path / "a.mp4", FilmOptions(SMALL))
+    shoot(frames, tmp_path / "a%d.png", FilmOptions(SMALL))
     image = mp4_images(tmp_path / "a.mp4")[1][-1]
     with Image.open(tmp_path / "a3.png") as picture:
         asked = np.asarray(picture)
@@ -118,13 +118,13 @@ def test_the_colors_of_an_mp4_are_those_of_the_picture(tmp_path, frames):
 
 def test_a_gif_repeats_for_ever_with_the_times_asked_for(tmp_path, frames):
     file = tmp_path / "a.gif"
-    shoot(frames, file, Reel(SMALL, fps=30, hold=0.5))
+    shoot(frames, file, FilmOptions(SMALL, fps=30, hold=0.5))
     loop, found = gif_images(file)
     assert loop == 0
     assert [time for time, _ in found] == [30, 40, 30, 500], "hundredths, right in sum"
     assert {image.shape for _, image in found} == {(200, 320, 3)}
     assert differ(found[0][1], found[-1][1]) > 1000
-    shoot(frames, tmp_path / "a%d.png", Reel(SMALL))
+    shoot(frames, tmp_path / "a%d.png", FilmOptions(SMALL))
     for k, (_, image) in enumerate(found):
         with Image.open(tmp_path / f"a{k}.png") as picture:
             away = np.abs(np.asarray(picture).astype(int) - image.astype(int)).max(axis=2)
@@ -148,7 +148,7 @@ def test_a_gif_keeps_the_shades_of_the_color_map_and_rare_colors():
 def test_the_camera_sees_every_step_whole(tmp_path, square):
     frames = leaning(square, steps=2, by=3.0)
     for name, order in (("out", frames), ("back", frames[::-1])):
-        shoot(order, tmp_path / f"{name}%d.png", Reel(SMALL))
+        shoot(order, tmp_path / f"{name}%d.png", FilmOptions(SMALL))
         for k in range(3):
             with Image.open(tmp_path / f"{name}{k}.png") as picture:
                 drawn = np.asarray(picture)[20:, :240].min(axis=2) < 200
@@ -159,16 +159,16 @@ def test_the_camera_sees_every_step_whole(tmp_path, square):
 
 
 def test_steps_that_do_not_change_are_images_of_a_gif_too(tmp_path, frames):
-    shoot((frames[0], frames[0], frames[0]), tmp_path / "a.gif", Reel(SMALL, fps=10))
+    shoot((frames[0], frames[0], frames[0]), tmp_path / "a.gif", FilmOptions(SMALL, fps=10))
     assert len(gif_images(tmp_path / "a.gif")[1]) == 3
 
 
 def test_few_images_are_shown_longer_and_many_ten_a_second():
-    assert Reel().pace(2) == 1.0
-    assert Reel().pace(7) == pytest.approx(7 / 3)
-    assert Reel().pace(100) == 10.0
-    assert Reel(between=9).pace(11) == 10.0
-    assert Reel(fps=25).pace(2) == 25
+    assert FilmOptions().pace(2) == 1.0
+    assert FilmOptions().pace(7) == pytest.approx(7 / 3)
+    assert FilmOptions().pace(100) == 10.0
+    assert FilmOptions(between=9).pace(11) == 10.0
+    assert FilmOptions(fps=25).pace(2) == 25
 
 
 def test_images_in_between_have_their_own_mesh_and_quality(tmp_path, frames, monkeypatch):
@@ -184,7 +184,7 @@ def test_images_in_between_have_their_own_mesh_and_quality(tmp_path, frames, mon
         "write_title",
         lambda p, text, *rest: (words.append(text), write(p, text, *rest)),
     )
-    drawn = shoot(frames[:2], tmp_path / "s%d.png", Reel(SMALL, between=1))
+    drawn = shoot(frames[:2], tmp_path / "s%d.png", FilmOptions(SMALL, between=1))
     assert drawn[-1] == (3, 3)
     half = seen[1]
     middle = (frames[0].mesh.points + frames[1].mesh.points) / 2
@@ -197,18 +197,18 @@ def test_images_in_between_have_their_own_mesh_and_quality(tmp_path, frames, mon
 
 
 def test_pictures_go_into_a_folder_that_is_made(tmp_path, frames):
-    shoot(frames, tmp_path / "steps", Reel(SMALL))
+    shoot(frames, tmp_path / "steps", FilmOptions(SMALL))
     names = sorted(path.name for path in (tmp_path / "steps").iterdir())
     assert names == ["step_00.png", "step_01.png", "step_02.png", "step_03.png"]
     with Image.open(tmp_path / "steps" / "step_03.png") as image:
         assert image.size == SMALL
-    shoot(frames, tmp_path / "x_%03d.png", Reel(SMALL))
+    shoot(frames, tmp_path / "x_%03d.png", FilmOptions(SMALL))
     assert (tmp_path / "x_003.png").exists()
 
 
 @pytest.mark.parametrize("name", ["a.mp4", "a.gif", "a_%02d.png", "steps"])
 def test_closing_it_early_leaves_nothing(tmp_path, frames, name):
-    drawing = film(shown(frames), tmp_path / name, Reel(SMALL))
+    drawing = film(shown(frames), tmp_path / name, FilmOptions(SMALL))
     assert next(drawing).done == 1
     assert next(drawing).done == 2
     drawing.close()
@@ -219,14 +219,14 @@ def test_closing_it_early_leaves_nothing(tmp_path, frames, name):
 def test_a_film_of_before_stays_until_the_new_one_is_done(tmp_path, frames, name):
     asked = tmp_path / name.replace("00", "%02d")
     (tmp_path / name).write_bytes(b"before")
-    drawing = film(shown(frames), asked, Reel(SMALL))
+    drawing = film(shown(frames), asked, FilmOptions(SMALL))
     with pytest.raises(SlidevizError, match=rf"{re.escape(name)} exists already; choose another"):
         next(drawing)
-    drawing = film(shown(frames), asked, Reel(SMALL), overwrite=True)
+    drawing = film(shown(frames), asked, FilmOptions(SMALL), overwrite=True)
     next(drawing)
     drawing.close()
     assert (tmp_path / name).read_bytes() == b"before"
-    shoot(frames, asked, Reel(SMALL), overwrite=True)
+    shoot(frames, asked, FilmOptions(SMALL), overwrite=True)
     assert (tmp_path / name).stat().st_size > 1000
 
 
@@ -234,42 +234,50 @@ def test_what_fails_while_drawing_leaves_nothing(tmp_path, frames, square):
     broken = StepFrame(square.with_points(square.points), quality(square))
     object.__setattr__(broken, "quality", None)
     with pytest.raises(AttributeError):
-        shoot((*frames[:2], broken, frames[2]), tmp_path / "a.mp4", Reel(SMALL))
+        shoot((*frames[:2], broken, frames[2]), tmp_path / "a.mp4", FilmOptions(SMALL))
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
-    ("name", "reel", "message"),
+    ("name", "film_options", "message"),
     [
-        ("a.avi", Reel(), r"no film can be written as \.avi; end the name with \.mp4 or \.gif"),
-        ("a.png", Reel(), r"need one number in their name, such as step_%03d\.png"),
-        ("a_%d_%d.png", Reel(), r"need one number in their name"),
-        ("a.mp4", Reel((321, 200)), r"321x200 pixels .* must be even; take 322x200"),
-        ("a.gif", Reel((10, 200)), r"10x200 pixels cannot be drawn; .* are 64 to 8192"),
-        ("a.gif", Reel(fps=60), r"60 images a second cannot be shown; 0\.1 to 50 can \(\.gif\)"),
-        ("a.mp4", Reel(fps=-1), r"-1 images a second cannot be shown"),
-        ("a.mp4", Reel(fps=float("nan")), r"nan images a second cannot be shown"),
-        ("a.mp4", Reel(hold=-1), r"cannot stay for -1 s; 0 to 600 s can"),
-        ("a.mp4", Reel(between=-1), r"-1 images between two steps; 0 to 1000 are possible"),
-        ("no/a.mp4", Reel(), r"the folder .*no does not exist; create it first"),
-        ("no/steps", Reel(), r"the folder .*no does not exist; create it first"),
+        (
+            "a.avi",
+            FilmOptions(),
+            r"no film can be written as \.avi; end the name with \.mp4 or \.gif",
+        ),
+        ("a.png", FilmOptions(), r"need one number in their name, such as step_%03d\.png"),
+        ("a_%d_%d.png", FilmOptions(), r"need one number in their name"),
+        ("a.mp4", FilmOptions((321, 200)), r"321x200 pixels .* must be even; take 322x200"),
+        ("a.gif", FilmOptions((10, 200)), r"10x200 pixels cannot be drawn; .* are 64 to 8192"),
+        (
+            "a.gif",
+            FilmOptions(fps=60),
+            r"60 images a second cannot be shown; 0\.1 to 50 can \(\.gif\)",
+        ),
+        ("a.mp4", FilmOptions(fps=-1), r"-1 images a second cannot be shown"),
+        ("a.mp4", FilmOptions(fps=float("nan")), r"nan images a second cannot be shown"),
+        ("a.mp4", FilmOptions(hold=-1), r"cannot stay for -1 s; 0 to 600 s can"),
+        ("a.mp4", FilmOptions(between=-1), r"-1 images between two steps; 0 to 1000 are possible"),
+        ("no/a.mp4", FilmOptions(), r"the folder .*no does not exist; create it first"),
+        ("no/steps", FilmOptions(), r"the folder .*no does not exist; create it first"),
     ],
 )
-def test_what_cannot_be_made_is_told_before_the_work(tmp_path, name, reel, message):
+def test_what_cannot_be_made_is_told_before_the_work(tmp_path, name, film_options, message):
     with pytest.raises(SlidevizError, match=message):
-        check_film(tmp_path / name, reel)
+        check_film(tmp_path / name, film_options)
 
 
 def test_a_file_in_the_place_of_a_folder_is_told(tmp_path):
     (tmp_path / "steps").write_text("")
     with pytest.raises(SlidevizError, match=r"steps is not a folder; end the name of a film with"):
-        check_film(tmp_path / "steps", Reel())
+        check_film(tmp_path / "steps", FilmOptions())
 
 
 def test_a_folder_without_permission_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "access", lambda path, mode: False)
     with pytest.raises(SlidevizError, match="no permission to write there; choose another folder"):
-        check_film(tmp_path / "a.mp4", Reel())
+        check_film(tmp_path / "a.mp4", FilmOptions())
 
 
 def test_without_steps_there_is_no_film(tmp_path, frames):
@@ -283,13 +291,13 @@ def test_an_encoder_that_fails_or_is_not_there_is_told(tmp_path, frames, monkeyp
     program.chmod(stat.S_IRWXU)
     monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(program))
     with pytest.raises(SlidevizError, match=r"a\.mp4: cannot be written: ffmpeg stopped: No space"):
-        shoot(frames, tmp_path / "a.mp4", Reel(SMALL))
+        shoot(frames, tmp_path / "a.mp4", FilmOptions(SMALL))
     program.write_text("#!/bin/sh\ncat >/dev/null\nexit 1\n")
     with pytest.raises(SlidevizError, match=r"ffmpeg stopped: it gave no reason"):
-        shoot(frames, tmp_path / "a.mp4", Reel(SMALL))
+        shoot(frames, tmp_path / "a.mp4", FilmOptions(SMALL))
     monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(tmp_path / "none"))
     with pytest.raises(SlidevizError, match=r"ffmpeg, which makes MP4 films, cannot be started"):
-        shoot(frames, tmp_path / "a.mp4", Reel(SMALL))
+        shoot(frames, tmp_path / "a.mp4", FilmOptions(SMALL))
     assert [path.name for path in tmp_path.iterdir()] == ["ffmpeg"]
 
 
@@ -301,7 +309,7 @@ def test_pictures_that_cannot_be_written_are_told(tmp_path, frames, monkeypatch)
 
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(SlidevizError, match="steps: cannot be written: No space left on device"):
-        shoot(frames, tmp_path / "steps", Reel(SMALL))
+        shoot(frames, tmp_path / "steps", FilmOptions(SMALL))
     assert not list(tmp_path.iterdir())
 
 
@@ -312,9 +320,9 @@ def test_the_view_is_filmed_with_its_camera_and_one_color_range(tmp_path, ran):
         like = Scene(plotter, PAPER, font_scale(SMALL))
         like.open(ran, surfaces)
         plotter.camera.parallel_scale *= 3.0
-        drawing = film_of(ran, tmp_path / "v%d.png", Reel(SMALL), like=like)
+        drawing = film_of(ran, tmp_path / "v%d.png", FilmOptions(SMALL), like=like)
         assert [drawn.done for drawn in drawing] == [1, 2, 3, 4]
-    whole = [d.done for d in film_of(ran, tmp_path / "w%d.png", Reel(SMALL))]
+    whole = [d.done for d in film_of(ran, tmp_path / "w%d.png", FilmOptions(SMALL))]
     assert whole == [1, 2, 3, 4]
 
     def covered(name):
@@ -336,14 +344,14 @@ def test_displacement_of_the_view_keeps_the_range_of_the_last_step(tmp_path, ran
         return draw(self, shown, *rest)
 
     monkeypatch.setattr(OffscreenRenderer, "drawing", watch)
-    for _ in film_of(ran, tmp_path / "v%d.png", Reel(SMALL)):
+    for _ in film_of(ran, tmp_path / "v%d.png", FilmOptions(SMALL)):
         pass
     assert {span for span, _ in seen} == {ran.color_range}
     assert [frame for _, frame in seen] == list(ran.frames)
 
 
 def test_cancelling_the_film_of_a_view_leaves_nothing(tmp_path, ran):
-    drawing = film_of(ran, tmp_path / "v.mp4", Reel(SMALL))
+    drawing = film_of(ran, tmp_path / "v.mp4", FilmOptions(SMALL))
     next(drawing)
     with suppress(KeyboardInterrupt):
         drawing.throw(KeyboardInterrupt())
@@ -367,7 +375,7 @@ def test_a_film_draws_its_mesh_once_and_leaves_nothing(tmp_path, square, monkeyp
     monkeypatch.setattr(OffscreenRenderer, "drawing", watch)
     frames = leaning(square)
     runs = [Run(k, Case(), frames[1:], "done", name=str(k)) for k in range(1, count + 1)]
-    for _ in film(of_runs(frames[0], runs), tmp_path / "a%d.png", Reel((640, 300))):
+    for _ in film(of_runs(frames[0], runs), tmp_path / "a%d.png", FilmOptions((640, 300))):
         pass
     assert len(scenes) == 4
     assert {len(added), *added_before} == {len(added)}, "no actor is made again"

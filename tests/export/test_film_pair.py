@@ -8,10 +8,10 @@ from PIL import Image
 
 from slideviz.errors import SlidevizError
 from slideviz.export import offscreen_renderer as module
-from slideviz.export.film import film, film_options, require_pair
+from slideviz.export.film import film, image_options, require_pair
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import panes
-from slideviz.export.reel import Reel
+from slideviz.export.reel import FilmOptions
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
 from slideviz.scene.color_legend import STRIP
@@ -20,7 +20,7 @@ from slideviz.session.state import Run, StepFrame, round_above
 from slideviz.solver.deform import deform
 
 SIZE = (800, 400)
-USUAL = Reel(SIZE)
+USUAL = FilmOptions(SIZE)
 
 
 @pytest.fixture(scope="module")
@@ -44,9 +44,9 @@ def runs(made):
 
 @pytest.fixture(scope="module")
 def shoot(made):
-    def film_of(runs, file, reel=USUAL, color_by="size-skew", **options):
+    def film_of(runs, file, film_options=USUAL, color_by="size-skew", **options):
         session = of_runs(StepFrame(made.mesh, quality(made.mesh)), runs, color_by)
-        return list(film(session, file, reel, **options))[-1].done
+        return list(film(session, file, film_options, **options))[-1].done
 
     return film_of
 
@@ -85,7 +85,7 @@ def test_both_halves_are_one_picture_when_the_runs_are_the_same(runs, tmp_path, 
     shoot(twice, tmp_path / "p_%d.png", color_by="displacement")
     with Image.open(tmp_path / "p_4.png") as image:
         whole = np.asarray(image).astype(int)
-    figure = film_options(SIZE, both=True)
+    figure = image_options(SIZE, both=True)
     first, second = panes(figure, figure.gap)
     left, right = whole[:, : first.size[0]], whole[:, -second.size[0] :][:, : first.size[0]]
     # The same but for a part of a pixel by which one of them may be wider.
@@ -123,7 +123,7 @@ def test_the_range_of_displacements_holds_both_runs(made, runs, tmp_path, monkey
 
 
 def test_images_in_between_are_there_for_both(runs, tmp_path, told, shoot):
-    assert shoot(runs, tmp_path / "p_%02d.png", Reel(SIZE, between=1)) == 9
+    assert shoot(runs, tmp_path / "p_%02d.png", FilmOptions(SIZE, between=1)) == 9
     second = [text.split("\n")[1] for text, _ in told[1::2]]
     assert second[1].startswith("step 0.25 of 2, interpolated")
     assert second[4].startswith("step 1 of 2: min")
@@ -142,6 +142,6 @@ def test_what_cannot_be_is_told(runs, tmp_path, shoot):
     with pytest.raises(SlidevizError, match="no steps to make a film of"):
         shoot((runs[0], replace(runs[1], frames=())), tmp_path / "a.gif")
     with pytest.raises(SlidevizError, match=r"300x300 pixels are too narrow.*take 408 or more"):
-        shoot(runs, tmp_path / "a.gif", Reel((300, 300)))
+        shoot(runs, tmp_path / "a.gif", FilmOptions((300, 300)))
     require_pair((408, 300))
     assert not list(tmp_path.iterdir())

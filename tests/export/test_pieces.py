@@ -120,11 +120,11 @@ def test_a_picture_in_pieces_is_the_one_that_is_drawn_at_once(session, square, m
         at_once = renderer.image(PLAIN)
     monkeypatch.setattr(pieces.portions, "__defaults__", (3,))
     with OffscreenRenderer(session, surfaces) as renderer:
-        assert sum(1 for _ in renderer.arranging()) > 10
-        assert not list(renderer.arranging()), "once"
-        assert np.array_equal(whole(renderer.picturing(PLAIN)), at_once)
+        assert sum(1 for _ in renderer.prepare_steps()) > 10
+        assert not list(renderer.prepare_steps()), "once"
+        assert np.array_equal(whole(renderer.render_steps(PLAIN)), at_once)
     with OffscreenRenderer(session, surfaces) as renderer:
-        stopped = renderer.picturing(PLAIN)
+        stopped = renderer.render_steps(PLAIN)
         for _ in range(5):
             next(stopped)
         stopped.close()
@@ -143,7 +143,7 @@ def test_a_picture_is_drawn_once(session, square):
 def test_another_step_is_pictured_and_the_session_stays(session, square):
     with OffscreenRenderer(session, find_surfaces(square)) as renderer:
         last = renderer.image(PLAIN)
-        first = whole(renderer.picturing(PLAIN, frame=0))
+        first = whole(renderer.render_steps(PLAIN, frame=0))
         assert renderer.session is session
         assert not np.array_equal(first, last)
         assert np.array_equal(renderer.image(PLAIN), last)

@@ -8,7 +8,7 @@ from matplotlib.collections import PolyCollection
 from PIL import Image
 
 from slideviz.errors import CaseError
-from slideviz.export.section_job import Paper, save_section
+from slideviz.export.section_job import PageFormat, save_section
 from slideviz.mesh.quality import quality
 from slideviz.plots import section_picture
 from slideviz.plots.section_layout import arranged
@@ -18,7 +18,7 @@ from slideviz.session.state import StepFrame
 from tests.builders import cube, passage, square
 from tests.slow import one_of_each_fast
 
-PAPERS = [Paper.of_cm(8.5, 6.4), Paper.of_cm(17.0, 10.6), Paper((1600, 1000))]
+PAPERS = [PageFormat.of_cm(8.5, 6.4), PageFormat.of_cm(17.0, 10.6), PageFormat((1600, 1000))]
 LEVEL = Section("plane", (0.5, 0.5, 0.4))
 
 

@@ -20,7 +20,7 @@ from slideviz.export import film as film_module
 from slideviz.export import reel
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
-from slideviz.export.reel import Reel
+from slideviz.export.reel import FilmOptions
 from slideviz.gui.dialogs import exports as export
 from slideviz.gui.dialogs.film import FilmDialog
 from slideviz.gui.dialogs.film_form import FilmForm, length_words
@@ -340,7 +340,7 @@ def test_a_film_that_fails_is_told_and_with_an_error_nobody_expected_not_finishe
     film.form.kind.show_value(".gif")
     made = []
     film.made.connect(made.append)
-    monkeypatch.setattr(film_module, "shot_at", None)
+    monkeypatch.setattr(film_module, "film_frame_at", None)
     with qtbot.waitSignal(film.failed, timeout=10_000):
         film.make.click()
     qtbot.wait(50)
@@ -366,9 +366,9 @@ def test_what_cannot_be_filmed_is_said_and_first_and_last_image_are_previewed(fi
 
 
 def test_the_length_of_a_film_in_words():
-    assert length_words(Reel(fps=10.0, hold=1.5), 3, ".gif").endswith("lasts 1.7 s.")
-    assert "4 images between two" in length_words(Reel(fps=10.0, between=4), 3, ".mp4")
-    assert length_words(Reel(), 2, "").endswith("a file of its own.")
+    assert length_words(FilmOptions(fps=10.0, hold=1.5), 3, ".gif").endswith("lasts 1.7 s.")
+    assert "4 images between two" in length_words(FilmOptions(fps=10.0, between=4), 3, ".mp4")
+    assert length_words(FilmOptions(), 2, "").endswith("a file of its own.")
 
 
 def test_images_in_between_are_measured_and_written_beside_the_window(

@@ -12,7 +12,7 @@ from slideviz.errors import MeshError
 from slideviz.formats.files import write
 from slideviz.mesh.periodic import find_pairs, pair_up
 from slideviz.mesh.quality import quality
-from slideviz.plots.written import figure_bytes
+from slideviz.plots.figure_io import figure_bytes
 from slideviz.session import changes
 from slideviz.session.motions import found_text
 from slideviz.session.opening import guess_by_name, open_mesh

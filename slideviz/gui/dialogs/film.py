@@ -9,7 +9,7 @@ from typing import Any
 from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QDialog, QDialogButtonBox, QHBoxLayout, QLabel, QWidget
 
-from slideviz.export.film import filming, posing
+from slideviz.export.film import aim_at_largest, filming
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.reel import FilmProgress
 from slideviz.gui.dialogs.film_form import FilmForm
@@ -111,9 +111,9 @@ class FilmDialog(QDialog):
     def _drawing(self) -> Generator[object, Any, None]:
         """Yield pieces of the work that draws both previews, with one camera."""
         options = self.form.picture_options.within(drawn_for(self.renderer, PREVIEW))
-        yield from posing(self.renderer, options)
+        yield from aim_at_largest(self.renderer, options)
         for label, frame in zip(self.previews, (0, self.form.frames - 1), strict=True):
-            pixels = yield from self.renderer.picturing(options, aim=False, frame=frame)
+            pixels = yield from self.renderer.render_steps(options, aim=False, frame=frame)
             label.setPixmap(framed(fitted(to_image(pixels), PREVIEW)))
 
     # Filming ---------------------------------------------------------------------------
@@ -129,8 +129,8 @@ class FilmDialog(QDialog):
             return
         self._previewing.stop()
         self._file = file
-        options, reel = self.form.picture_options, self.form.reel
-        self._runner.start(filming(self.renderer, options, file, reel, overwrite=True))
+        options, film_options = self.form.picture_options, self.form.film_options
+        self._runner.start(filming(self.renderer, options, file, film_options, overwrite=True))
         self._show_filming(True)
 
     def _came(self, drawn: FilmProgress) -> None:

@@ -11,7 +11,7 @@ from slideviz.errors import SlidevizError
 from slideviz.export.offscreen import LARGEST, SMALLEST
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
-from slideviz.export.reel import FPS, SIZES, Reel, check_film
+from slideviz.export.reel import FPS, SIZES, FilmOptions, check_film
 from slideviz.gui.widgets.build import check_box, decimal_box, in_row, number_box
 from slideviz.gui.widgets.choice import Choice
 
@@ -87,7 +87,7 @@ class FilmForm(QWidget):
         self.hold = decimal_box(
             0.0,
             60.0,
-            Reel().hold,
+            FilmOptions().hold,
             self._changed,
             unit=" s",
             tip="How long the last image stays before the film ends or begins again.",
@@ -104,10 +104,10 @@ class FilmForm(QWidget):
     # What was chosen -------------------------------------------------------------------
 
     @property
-    def reel(self) -> Reel:
+    def film_options(self) -> FilmOptions:
         """Return size, frame rate, duration of the last image, and images between steps."""
         size = self.width_px.value(), self.height_px.value()
-        return Reel(size, self.fps.value(), self.hold.value(), self.between.value())
+        return FilmOptions(size, self.fps.value(), self.hold.value(), self.between.value())
 
     @property
     def picture_options(self) -> PictureOptions:
@@ -152,7 +152,7 @@ class FilmForm(QWidget):
         kind = self.kind.currentData()
         try:
             # A placeholder: the real file name is asked for later.
-            check_film(Path(f"film{kind}").absolute(), self.reel, overwrite=True)
+            check_film(Path(f"film{kind}").absolute(), self.film_options, overwrite=True)
         except SlidevizError as error:
             return str(error)
         return ""
@@ -160,23 +160,25 @@ class FilmForm(QWidget):
     @property
     def words(self) -> str:
         """Return a sentence with the film's number of images and its duration."""
-        return length_words(self.reel, self.frames, self.kind.currentData())
+        return length_words(self.film_options, self.frames, self.kind.currentData())
 
     def _changed(self, _: object = None) -> None:
         self.changed.emit()
 
 
-def length_words(reel: Reel, frames: int, kind: str) -> str:
+def length_words(film_options: FilmOptions, frames: int, kind: str) -> str:
     """Return a sentence with a film's number of images and its duration.
 
     ``frames`` is the number of steps with the undeformed mesh; ``kind`` a key of `KINDS`.
     """
-    count = reel.count(frames)
+    count = film_options.count(frames)
     steps = f"{frames - 1} step{'s' if frames > 2 else ''}"
-    between = f", {reel.between} image{'s' if reel.between > 1 else ''} between two"
-    text = f"{count} images: the undeformed mesh and {steps}{between if reel.between else ''}"
+    between = f", {film_options.between} image{'s' if film_options.between > 1 else ''} between two"
+    text = (
+        f"{count} images: the undeformed mesh and {steps}{between if film_options.between else ''}"
+    )
     if not kind:
         return f"{text}; each in a file of its own."
-    pace = reel.pace(frames)
-    seconds = (count - 1) / pace + max(reel.hold, 1.0 / pace)
+    pace = film_options.pace(frames)
+    seconds = (count - 1) / pace + max(film_options.hold, 1.0 / pace)
     return f"{text}. The film lasts {seconds:.1f} s."

@@ -270,7 +270,7 @@ class PictureDialog(QDialog):
     def _drawing(self) -> Generator[object, Any, None]:
         """Yield pieces of the work that draws the preview: of a large mesh it takes a second."""
         options = self.picture_options.within(drawn_for(self.renderer, PREVIEW))
-        pixels = yield from self.renderer.picturing(options)
+        pixels = yield from self.renderer.render_steps(options)
         self.preview.setPixmap(framed(fitted(to_image(pixels), PREVIEW)))
 
     def _copy(self) -> None:

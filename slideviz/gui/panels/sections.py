@@ -11,7 +11,7 @@ from qtpy.QtGui import QKeySequence, QShortcut
 from qtpy.QtWidgets import QListWidget, QListWidgetItem, QMenu, QSizePolicy, QWidget
 
 from slideviz.case.section_shapes import SECTION_SHAPES, names
-from slideviz.export.section_job import Paper, save_section
+from slideviz.export.section_job import PageFormat, save_section
 from slideviz.gui.panels.section_editor import SectionEditor
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import (
@@ -52,10 +52,10 @@ UNSEEN = "Tick the section in the list to show it."
 """Tip of the tools of a section that is not shown."""
 
 SIZES = {
-    "8.5 cm wide, a column…": Paper.of_cm(8.5, 6.4),
-    "17 cm wide, a page…": Paper.of_cm(17.0, 10.6),
-    "25 cm wide, a slide…": Paper.of_cm(25.0, 14.0),
-    "1600 pixels wide, for the screen…": Paper((1600, 1000)),
+    "8.5 cm wide, a column…": PageFormat.of_cm(8.5, 6.4),
+    "17 cm wide, a page…": PageFormat.of_cm(17.0, 10.6),
+    "25 cm wide, a slide…": PageFormat.of_cm(25.0, 14.0),
+    "1600 pixels wide, for the screen…": PageFormat((1600, 1000)),
 }
 """Sizes of pictures by their words in the menu; the heights are limits."""
 
@@ -222,7 +222,7 @@ class SectionsPanel(Panel):
     def _want_handle(self, shown: bool) -> None:
         self.store.change(changes.show_handle, shown)
 
-    def _want_picture(self, paper: Paper) -> None:
+    def _want_picture(self, paper: PageFormat) -> None:
         title, axes = self.titled.isChecked(), self.with_axes.isChecked()
         self.picture_wanted.emit(replace(paper, title=title, axes=axes))
 
@@ -230,7 +230,7 @@ class SectionsPanel(Panel):
         size = questions.ask_paper(self, *self._size)
         if size is not None:
             self._size = size
-            self._want_picture(Paper.of_cm(*size))
+            self._want_picture(PageFormat.of_cm(*size))
 
     def _remove(self) -> None:
         view = self.store.session.view
@@ -268,7 +268,7 @@ def sections_panel(window: Services) -> SectionsPanel:
     return panel
 
 
-def save_picture(window: Services, paper: Paper) -> None:
+def save_picture(window: Services, paper: PageFormat) -> None:
     """Ask for a file name and start the job that writes a picture of the selected section."""
     session, section = window.store.session, window.store.session.view.section
     if section is None or session.frame is None or window.runner.busy:

@@ -24,7 +24,7 @@ from slideviz.gui.widgets.build import hint_label
 from slideviz.gui.widgets.plot_image import Draw, Picture, PlotFormat, draw_in_thread
 from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.plots.draw import PRINT, Style
-from slideviz.plots.written import figure_bytes
+from slideviz.plots.figure_io import figure_bytes
 from slideviz.system.atomic import atomic_write
 
 FIGURE_INCHES = (4.2, 3.1)
