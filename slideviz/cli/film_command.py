@@ -22,7 +22,7 @@ from slideviz.terms import QUANTITIES
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.export.reel import FilmOptions
+    from slideviz.export.film import FilmOptions
     from slideviz.mesh.model import Mesh
     from slideviz.session.state import Run, StepFrame
 
@@ -90,9 +90,8 @@ def film(arguments: argparse.Namespace) -> int:
     from slideviz.cli.places import OutputPath, require_places
     from slideviz.cli.progress import Bar
     from slideviz.export.encode import film_kind
+    from slideviz.export.film import FilmOptions, check_film, require_pair
     from slideviz.export.film import film as draw
-    from slideviz.export.film import require_pair
-    from slideviz.export.reel import FilmOptions, check_film
     from slideviz.session.opening import of_runs
 
     file = arguments.output

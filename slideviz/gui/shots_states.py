@@ -195,8 +195,7 @@ STATES = (
 
 def film_of_passage(path: Path) -> Path:
     """Write a film of the 2D passage, as in the dark picture, and return its path."""
-    from slideviz.export.film import film
-    from slideviz.export.reel import FilmOptions
+    from slideviz.export.film import FilmOptions, film
     from slideviz.mesh.quality import quality as quality_of
     from slideviz.session.opening import of_runs
     from slideviz.session.state import Run, StepFrame

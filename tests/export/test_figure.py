@@ -11,7 +11,7 @@ from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.errors import SlidevizError
 from slideviz.export import offscreen_renderer as renderer_module
 from slideviz.export import vector
-from slideviz.export.film import filming
+from slideviz.export.film import FilmOptions, filming, images_drawn
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import (
     TITLE_ROOM,
@@ -20,7 +20,6 @@ from slideviz.export.picture_options import (
     title_of,
     words_of_size,
 )
-from slideviz.export.reel import FilmOptions, images_drawn
 from slideviz.export.titles import fitting, mark_words, pair_titles
 from slideviz.export.vector import draw_vector, require_vector, write_vector
 from slideviz.mesh.elements import ELEMENTS

@@ -15,10 +15,9 @@ from slideviz.case.model import Case
 from slideviz.color_scheme import PAPER
 from slideviz.errors import SlidevizError
 from slideviz.export import offscreen_renderer as renderer_module
-from slideviz.export.film import film, filming, image_options
+from slideviz.export.film import FilmOptions, check_film, film, filming, image_options, images_drawn
 from slideviz.export.offscreen import font_scale, offscreen
 from slideviz.export.offscreen_renderer import OffscreenRenderer
-from slideviz.export.reel import FilmOptions, check_film, images_drawn
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.scene.scene import Scene

@@ -8,10 +8,9 @@ from PIL import Image
 
 from slideviz.errors import SlidevizError
 from slideviz.export import offscreen_renderer as module
-from slideviz.export.film import film, image_options, require_pair
+from slideviz.export.film import FilmOptions, film, image_options, require_pair
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import panes
-from slideviz.export.reel import FilmOptions
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
 from slideviz.scene.color_legend import STRIP

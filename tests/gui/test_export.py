@@ -17,10 +17,9 @@ from qtpy.QtWidgets import QApplication, QDialog
 from slideviz import read
 from slideviz.errors import SlidevizError
 from slideviz.export import film as film_module
-from slideviz.export import reel
+from slideviz.export.film import FilmOptions
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
-from slideviz.export.reel import FilmOptions
 from slideviz.gui.dialogs import exports as export
 from slideviz.gui.dialogs.film import FilmDialog
 from slideviz.gui.dialogs.film_form import FilmForm, length_words
@@ -375,7 +374,7 @@ def test_images_in_between_are_measured_and_written_beside_the_window(
     ran, film, answers, tmp_path, monkeypatch, qtbot
 ):
     threads = {"measured": set(), "written": set()}
-    measure, write = film_module.quality, reel.writer
+    measure, write = film_module.quality, film_module.writer
 
     def spy_quality(*values, **named):
         threads["measured"].add(threading.current_thread())
@@ -392,7 +391,7 @@ def test_images_in_between_are_measured_and_written_beside_the_window(
             yield spy_add
 
     monkeypatch.setattr(film_module, "quality", spy_quality)
-    monkeypatch.setattr(reel, "writer", spy_writer)
+    monkeypatch.setattr(film_module, "writer", spy_writer)
     answers("ask_save", tmp_path / "out.gif")
     film.form.kind.show_value(".gif")
     film.form.between.setValue(1)

@@ -9,9 +9,8 @@ from typing import Any
 from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QDialog, QDialogButtonBox, QHBoxLayout, QLabel, QWidget
 
-from slideviz.export.film import aim_at_largest, filming
+from slideviz.export.film import FilmProgress, aim_at_largest, filming
 from slideviz.export.offscreen_renderer import OffscreenRenderer
-from slideviz.export.reel import FilmProgress
 from slideviz.gui.dialogs.film_form import FilmForm
 from slideviz.gui.responsiveness.piece_runner import PieceRunner, raise_again
 from slideviz.gui.responsiveness.settings import PREVIEW_MS

@@ -8,10 +8,10 @@ from qtpy.QtCore import QSignalBlocker, Signal
 from qtpy.QtWidgets import QFormLayout, QWidget
 
 from slideviz.errors import SlidevizError
+from slideviz.export.film import FPS, SIZES, FilmOptions, check_film
 from slideviz.export.offscreen import LARGEST, SMALLEST
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
-from slideviz.export.reel import FPS, SIZES, FilmOptions, check_film
 from slideviz.gui.widgets.build import check_box, decimal_box, in_row, number_box
 from slideviz.gui.widgets.choice import Choice
 
