@@ -16,7 +16,7 @@ from slideviz.export.titles import (
     title_words,
 )
 from slideviz.scene.color_legend import STRIP
-from slideviz.session.colors import as_drawn
+from slideviz.session.colors import with_drawable_colors
 from slideviz.session.state import Session, StepFrame
 from slideviz.terms import Shown
 
@@ -120,7 +120,7 @@ class PictureOptions:
 
         Nothing is selected, and the motions' ghosts are left out if values are shown.
         """
-        session = as_drawn(session)
+        session = with_drawable_colors(session)
         view = session.view
         drawn: dict[Shown, bool] = {"legend": self.legend, "edges": self.edges, "triad": self.triad}
         if view.color_by != "role":

@@ -21,7 +21,7 @@ from slideviz.scene.passages import Period, matrices
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.threshold import CellsInRange
-from slideviz.session.jobs import Doing, Report, Stopped, require_going
+from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
 from slideviz.session.panes import shown_views
 from slideviz.session.passages import show_passages
 from slideviz.session.runs_words import run_words
@@ -82,7 +82,7 @@ def save_section(
             f"{session.frame.mesh.name} stays in its file; `slideviz section` draws its sections"
         )
     require_picture_name(path)
-    report(Doing(f"Cutting for {path.name}"))
+    report(JobProgress(f"Cutting for {path.name}"))
     views = shown_views(session)
     shown = [_shown(*one, section) for one in zip(views, pair_names(views), strict=True)]
     if not any(one.drawn for one in shown) and shown[0].note:
@@ -91,8 +91,8 @@ def save_section(
             f"{section.describe()}: it cuts no cell that is shown ({words}), so there is "
             "nothing to draw; show all cells, or a wider range of them"
         )
-    require_going(stopped)
-    report(Doing(f"Drawing {path.name}"))
+    raise_if_cancelled(stopped)
+    report(JobProgress(f"Drawing {path.name}"))
     name = session.path.name if session.path is not None else ""
     style = SectionStyle(paper.size, True, "edges" in session.view.drawn, name=name, dpi=paper.dpi)
     style = replace(style, title=paper.title, axes=paper.axes)

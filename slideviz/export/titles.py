@@ -14,7 +14,12 @@ from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.mesh.surfaces import padded
 from slideviz.scene.color_legend import set_letters
 from slideviz.session.inspect import nodes_of
-from slideviz.session.runs_words import apart, differing, method_words, run_words
+from slideviz.session.runs_words import (
+    differences_from,
+    differences_from_all,
+    method_words,
+    run_words,
+)
 from slideviz.session.state import Run, Session, StepFrame
 from slideviz.terms import ColorBy
 
@@ -61,7 +66,7 @@ def names_of(session: Session) -> list[str]:
     if run is None:
         return ["Deformed"]
     number, words = f"Run {run.number}", run_words(run)
-    others = apart(run, session.runs)
+    others = differences_from_all(run, session.runs)
     found = [f"{number}, {words}, {others}"] if others else []
     return [*found, f"{number}, {words}", number]
 
@@ -119,7 +124,9 @@ def pair_names(pair: Sequence[Session]) -> list[str]:
             continue
         words = [f"Run {run.number}", run_words(run)]
         words += [method_words(run.case)] if run.name and _methods_differ(both) else []
-        names.append(", ".join(filter(None, [*words, "" if alone else differing(run, both)])))
+        names.append(
+            ", ".join(filter(None, [*words, "" if alone else differences_from(run, both)]))
+        )
     return names
 
 

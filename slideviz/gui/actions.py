@@ -13,9 +13,9 @@ from qtpy.QtWidgets import QLabel, QMenu, QMenuBar, QSizePolicy, QToolBar, QWidg
 from slideviz.gui.commands import COMMANDS, MENUS
 from slideviz.gui.widgets.build import tool_button
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.command import Menu, Now, valued
+from slideviz.gui.widgets.command import CommandState, Menu, colored_by_value
 from slideviz.session import changes
-from slideviz.session.colors import NO_DISPLACEMENT, unmoved
+from slideviz.session.colors import NO_DISPLACEMENT, lacks_displacement
 from slideviz.session.motions import support_case, support_key, support_words
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -69,7 +69,7 @@ class Actions:
                     group.addAction(act)
 
     def _explain_colors(self, old: Session, new: Session) -> None:
-        if unmoved(new) and not unmoved(old):
+        if lacks_displacement(new) and not lacks_displacement(old):
             self.window.say(NO_DISPLACEMENT)
 
     def _explain_support(self, old: Session, new: Session) -> None:
@@ -81,7 +81,7 @@ class Actions:
         if changed or "support" not in old.view.drawn:
             self.window.say(support_words(new))
 
-    def sync(self, now: Now) -> None:
+    def sync(self, now: CommandState) -> None:
         """Update the actions, menus and tool bar: titles, checked, enabled."""
         for name, command in COMMANDS.items():
             command.show(self.by_name[name], now)
@@ -145,12 +145,12 @@ class ToolBar(QToolBar):
         self.zone_label = self.addWidget(QLabel(" Zone "))
         self.zone_shown = self.addWidget(self.zone)
 
-    def sync(self, now: Now) -> None:
+    def sync(self, now: CommandState) -> None:
         """Show the session's quantity and zone, and enable what can be used."""
         session: Session = now.session
         mesh = session.mesh
         self.color.setEnabled(mesh is not None)
-        self.range.setEnabled(valued(now))
+        self.range.setEnabled(colored_by_value(now))
         self.color.show_value(session.view.color_by)
         zones = mesh.zones if mesh is not None else 1
         if self.zone.count() != zones:

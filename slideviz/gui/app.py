@@ -15,7 +15,7 @@ from qtpy.QtWidgets import QApplication
 from slideviz.gui.responsiveness.settings import READ_MS, WARM_UP_MS
 from slideviz.gui.responsiveness.threads import be_quick, ready_numerics
 from slideviz.gui.responsiveness.warmup_thread import prepare_drawing
-from slideviz.gui.widgets.faults import caught, crash_log
+from slideviz.gui.widgets.error_reporter import caught, crash_log
 from slideviz.gui.widgets.icons import logo
 from slideviz.gui.window import MainWindow
 from slideviz.system.private import private_file, private_folder
@@ -48,7 +48,7 @@ def launch(path: Path | None = None, run: bool = False) -> int:
     _keep_private(kept, cache)
     with crash_log(crashes):
         window = MainWindow(kept=kept / "sessions")
-        with caught(window.faults):
+        with caught(window.error_reporter):
             be_quick()
             window.show()
             window.recovery.look(crashes)

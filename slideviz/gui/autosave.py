@@ -28,7 +28,7 @@ from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.session.design_files import read_results, write_results
 from slideviz.session.design_table import DesignTable
-from slideviz.session.keep import Camera, keep_view
+from slideviz.session.keep import Camera, view_to_case
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.system.private import private_file, private_folder
@@ -90,7 +90,7 @@ class Autosave(QObject):
             self._timer.start()
         elif session.mesh is not None and self._key(session) != self._written:
             self._asked = self._key(session)
-            case = keep_view(session, self._camera())
+            case = view_to_case(session, self._camera())
             table, of = self._designs()
             up_to_date = bool(table.left(of, session.case).results)
             self._runner.start(self._write, case, table, up_to_date)

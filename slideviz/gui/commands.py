@@ -17,19 +17,19 @@ from qtpy.QtWidgets import QMenu
 from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms
 from slideviz.gui.widgets.command import (
     Command,
+    CommandState,
     Menu,
-    Now,
-    boundaries_meant,
-    bounded,
-    boxed,
-    flat,
-    idle,
-    opened,
-    solid,
-    stepped,
-    stepped_and_idle,
-    valued,
-    whole,
+    colored_by_value,
+    has_boundary_target,
+    has_boxes,
+    has_mesh,
+    has_steps,
+    has_steps_and_is_idle,
+    in_memory,
+    is_2d,
+    is_3d,
+    is_idle,
+    target_boundaries,
     why_not,
 )
 from slideviz.gui.widgets.icons import STROKES
@@ -58,8 +58,8 @@ def _switch(name: Shown, window: MainWindow) -> None:
 
 
 def _add_section(kind: str, window: MainWindow) -> None:
-    window.docks_.bring_to_front("sections")
-    panel: Any = window.docks_.panels["sections"]  # this module cannot import the panels
+    window.dock_manager.bring_to_front("sections")
+    panel: Any = window.dock_manager.panels["sections"]  # this module cannot import the panels
     panel.add[kind].click()
 
 
@@ -96,23 +96,23 @@ def _fill_panels(window: MainWindow, menu: QMenu) -> None:
 _NO_STEPS = "There are no steps yet: run the case first."
 _EXPORT = Menu("export", "&Export", "Take away pictures, films, tables and meshes.", (
     Command("save_picture", "&Picture…", "Make a picture of the view for a paper or a slide.",
-            lambda window: window.exports.picture(), ("Ctrl+P",), "picture", opened),
+            lambda window: window.exports.picture(), ("Ctrl+P",), "picture", has_mesh),
     Command("copy_picture", "&Copy picture",
             "Copy a picture of the view, with a white background, to the clipboard.",
-            lambda window: window.exports.copy_picture(), ("Ctrl+Shift+C",), enabled=opened),
+            lambda window: window.exports.copy_picture(), ("Ctrl+Shift+C",), enabled=has_mesh),
     Command("export_film", "&Film of the steps…", "Make a film of the steps.",
             lambda window: window.exports.make_film(),
-            enabled=whole(stepped), tip_now=why_not(whole(stepped), _NO_STEPS)),
+            enabled=in_memory(has_steps), tip_now=why_not(in_memory(has_steps), _NO_STEPS)),
     Command("export_quality", "&Quality as CSV…",
             "Save the quality of every cell of the step that is shown as a CSV table.",
             lambda window: window.exports.quality(),
-            enabled=whole(idle),
-            tip_now=why_not(whole(idle), "There is no mesh yet: open one first.")),
+            enabled=in_memory(is_idle),
+            tip_now=why_not(in_memory(is_idle), "There is no mesh yet: open one first.")),
     Command("export_steps", "&Meshes of all steps…",
             "Save the mesh of every step: each in a file of its own, or all in one .vtkhdf file.",
             lambda window: window.exports.steps(),
-            enabled=whole(stepped_and_idle),
-            tip_now=why_not(whole(stepped_and_idle), _NO_STEPS)),
+            enabled=in_memory(has_steps_and_is_idle),
+            tip_now=why_not(in_memory(has_steps_and_is_idle), _NO_STEPS)),
 ), tooltips=True)
 
 _FILE = Menu("file", "&File", entries=(
@@ -125,11 +125,11 @@ _FILE = Menu("file", "&File", entries=(
     ), fill=_fill_samples),
     None,
     Command("save_mesh", "&Save mesh as…", "Save the mesh of the step that is shown.",
-            lambda window: window.files.save_mesh(), (KEY.Save,), "save", whole(idle),
-            tip_now=why_not(whole(idle), "There is no mesh yet: open one first.")),
+            lambda window: window.files.save_mesh(), (KEY.Save,), "save", in_memory(is_idle),
+            tip_now=why_not(in_memory(is_idle), "There is no mesh yet: open one first.")),
     Command("save_case", "Save &case as…",
             "Save roles, motions, method and view as a case that gives the same result again.",
-            lambda window: window.files.save_case(), ("Ctrl+Shift+S",), "case", opened),
+            lambda window: window.files.save_case(), ("Ctrl+Shift+S",), "case", has_mesh),
     _EXPORT,
     None,
     Command("quit", "&Quit", "Close the window; unsaved changes are asked about.",
@@ -162,8 +162,8 @@ _RUN = Menu("run", "&Run", entries=(
     Command("designs", "&Designs…",
             "Run a table of designs, each with other numbers of the motions or other settings, "
             "and see their quality; or hide the panel for it.",
-            lambda window: window.docks_.toggle("designs"), ("F6",), enabled=opened,
-            tip_now=why_not(opened, "There is no mesh yet: open one first.")),
+            lambda window: window.dock_manager.toggle("designs"), ("F6",), enabled=has_mesh,
+            tip_now=why_not(has_mesh, "There is no mesh yet: open one first.")),
 ))
 
 _COLORS = Menu("colors", "&Colors", "From which value to which the colors range.", (
@@ -171,17 +171,17 @@ _COLORS = Menu("colors", "&Colors", "From which value to which the colors range.
             "Let the colors range over the values of the step that is shown, and of the other "
             "one in a comparison.",
             lambda window: window.store.change(changes.fit_colors, every=False),
-            ("R",), enabled=valued,
+            ("R",), enabled=colored_by_value,
             button_tip="From the lowest to the highest value of what is shown now (R); of all "
             "steps: Shift+R."),
     Command("fit_all_colors", "Fit to all steps",
             "Let the colors range over the values of all steps, so that they say the same in a "
             "film.",
             lambda window: window.store.change(changes.fit_colors, every=True),
-            ("Shift+R",), enabled=valued),
+            ("Shift+R",), enabled=colored_by_value),
     Command("usual_colors", "As ever", "Let the colors range as they do at first.",
             lambda window: window.store.change(changes.set_view, color_range=None),
-            enabled=lambda now: valued(now) and now.session.view.color_range is not None,
+            enabled=lambda now: colored_by_value(now) and now.session.view.color_range is not None,
             title_now=lambda now: usual_range(now.session)),
 ))
 
@@ -190,7 +190,7 @@ def _side(side: str, keys: str, short: str = "") -> Command:
     place = "a corner" if side == "iso" else side
     return Command(f"side{side}", "isometric" if side == "iso" else side,
                    f"Look at the mesh from {place}.", lambda window: window.viewing.look_from(side),
-                   (keys,), enabled=solid, short=short)
+                   (keys,), enabled=is_3d, short=short)
 
 
 _SIDES = Menu("look_from", "Look &from", "Look at the mesh from a side.", (
@@ -203,19 +203,19 @@ _SIDES = Menu("look_from", "Look &from", "Look at the mesh from a side.", (
 # Without steps the commands are disabled, and Space presses the focused button.
 STEPS = Menu("steps", "&Steps", "Show another step of the deformation.", (
     Command("step_first", "Undeformed mesh", "Show the mesh before it is deformed.",
-            lambda window: window.player.go(0), ("Home",), enabled=stepped,
+            lambda window: window.player.go(0), ("Home",), enabled=has_steps,
             button_tip="Undeformed mesh (Home)"),
     Command("step_previous", "Step back", "Show the step before this one.",
-            lambda window: window.player.step(-1), ("Alt+Left",), enabled=stepped,
+            lambda window: window.player.step(-1), ("Alt+Left",), enabled=has_steps,
             button_tip="One step back (Alt+Left)"),
     Command("step_play", "Play or pause", "Show the steps one after the other, or stop that.",
-            lambda window: window.player.toggle(), ("Space",), enabled=stepped,
+            lambda window: window.player.toggle(), ("Space",), enabled=has_steps,
             button_tip="Play the steps (Space)"),
     Command("step_next", "Step on", "Show the step after this one.",
-            lambda window: window.player.step(1), ("Alt+Right",), enabled=stepped,
+            lambda window: window.player.step(1), ("Alt+Right",), enabled=has_steps,
             button_tip="One step on (Alt+Right)"),
     Command("step_last", "Last step", "Show the deformed mesh.",
-            lambda window: window.player.go(10**9), ("End",), enabled=stepped,
+            lambda window: window.player.go(10**9), ("End",), enabled=has_steps,
             button_tip="Last step (End)"),
 ))
 
@@ -233,20 +233,20 @@ _THEMES = Menu("theme", "&Theme", "Light or dark colors.", (
 
 
 def _toggle(name: Shown, term: ShownTerm) -> Command:
-    able = {"": opened, "boxes": boxed, "3d": solid}[term.needs]
+    able = {"": has_mesh, "boxes": has_boxes, "3d": is_3d}[term.needs]
     image = name if name in STROKES else ""
     return Command(name, term.name, term.tip, partial(_switch, name), (term.shortcut,),
                    image, able, checked=lambda now: name in now.session.view.drawn,
-                   tip_now=lambda now: term.why_not if opened(now) and not able(now) else "")
+                   tip_now=lambda now: term.why_not if has_mesh(now) and not able(now) else "")
 
 
 def _section(kind: str, row: ShapeTerms) -> Command:
-    def title(now: Now) -> str:
-        words = row.words.get(2 if flat(now) else 3)
+    def title(now: CommandState) -> str:
+        words = row.words.get(2 if is_2d(now) else 3)
         return "" if words is None else words.action
 
     return Command(f"add_{kind}", row.words[3].action, row.tip_to_add, partial(_add_section, kind),
-                   (row.key,) if row.key else (), enabled=opened, title_now=title)
+                   (row.key,) if row.key else (), enabled=has_mesh, title_now=title)
 
 
 COMPARE = Menu("compare", "Co&mpare with",
@@ -259,17 +259,17 @@ _VIEW = Menu("view", "&View", entries=(
     None,
     _COLORS,
     Command("fit", "&Fit all", "Make the whole mesh fill the view.",
-            lambda window: window.viewing.fit(), ("F",), "fit", opened),
+            lambda window: window.viewing.fit(), ("F",), "fit", has_mesh),
     Command("fit_boundary", "Fit to &boundary",
             "Make the selected boundaries fill the view, or else those that move.",
-            lambda w: w.viewing.fit(boundaries_meant(w.store.session)),
-            ("Shift+F",), enabled=bounded,
-            tip_now=why_not(bounded, "No boundary is selected, and none moves.")),
+            lambda w: w.viewing.fit(target_boundaries(w.store.session)),
+            ("Shift+F",), enabled=has_boundary_target,
+            tip_now=why_not(has_boundary_target, "No boundary is selected, and none moves.")),
     _SIDES,
     COMPARE,
     Command("show_all", "Show &all boundaries", "Show the boundaries that were hidden.",
             lambda w: w.store.change(changes.show, w.store.session.mesh.marker_names),
-            ("Shift+A",), enabled=opened),
+            ("Shift+A",), enabled=has_mesh),
     *(_section(kind, row) for kind, row in SECTION_SHAPES.items()),
     None,
     STEPS,
@@ -280,16 +280,16 @@ _VIEW = Menu("view", "&View", entries=(
     Menu("panels", "&Panels", "Show and hide the panels around the view.", (
         Command("next_panel", "&Next panel",
                 "Bring the next panel to the front, behind a tab or not, and go there.",
-                lambda window: window.docks_.bring_next(), ("Ctrl+PgDown",)),
+                lambda window: window.dock_manager.bring_next(), ("Ctrl+PgDown",)),
         Command("previous_panel", "&Previous panel",
                 "Bring the panel before to the front, behind a tab or not, and go there.",
-                lambda window: window.docks_.bring_next(-1), ("Ctrl+PgUp",)),
+                lambda window: window.dock_manager.bring_next(-1), ("Ctrl+PgUp",)),
         Command("hide_panels", "&Hide or show all",
                 "Hide every panel, so that the view has all the room, or show them again.",
-                lambda window: window.docks_.toggle_all(), ("F9",)),
+                lambda window: window.dock_manager.toggle_all(), ("F9",)),
         Command("restore_layout", "&Restore layout",
                 "Put every panel back to where it was at first.",
-                lambda window: window.docks_.restore_layout()),
+                lambda window: window.dock_manager.restore_layout()),
     ), fill=_fill_panels),
 ))
 

@@ -20,7 +20,7 @@ from slideviz.gui.widgets import questions
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.session import changes, jobs
 from slideviz.session.formats import left_out
-from slideviz.session.keep import files_beside, keep_view
+from slideviz.session.keep import files_beside, view_to_case
 from slideviz.session.unsaved import Unsaved
 from slideviz.system.atomic import atomic_write
 
@@ -91,7 +91,7 @@ class Files(QObject):
         try:
             jobs.require_openable(Path(path))
         except SlidevizError as error:
-            self.window.banner.tell_error(error)
+            self.window.banner.show_error(error)
             log.error("%s", error)
             return
         if self.ask_about_unsaved(lambda: self.open_path(path, zone)):
@@ -160,7 +160,7 @@ class Files(QObject):
         before : str
             What the user wants to do that would lose the changes, in words.
         """
-        window, designs = self.window, self.window.docks_.panel(DesignsPanel)
+        window, designs = self.window, self.window.dock_manager.panel(DesignsPanel)
         unsaved = self._unsaved()
         if self._answered or not unsaved.lost:
             return True
@@ -180,7 +180,7 @@ class Files(QObject):
 
     def _unsaved(self) -> Unsaved:
         window = self.window
-        designs = window.docks_.panel(DesignsPanel).unsaved
+        designs = window.dock_manager.panel(DesignsPanel).unsaved
         return Unsaved.of(window.store.session, window.runner.busy, designs)
 
     def _go_on(self, again: Callable[[], object]) -> None:
@@ -241,7 +241,7 @@ class Files(QObject):
         )
         if path is None or not is_source(path, session.mesh):
             return path
-        self.window.banner.tell_error(
+        self.window.banner.show_error(
             SlidevizError(f"{path} is the mesh itself, which is read meanwhile; give another name")
         )
         return None
@@ -255,7 +255,7 @@ class Files(QObject):
         said = [left_out(path, mesh)] if mesh is not None else []
         said += [f"{each[0].upper()}{each[1:]}." for each in torn]
         if any(said):
-            self.window.banner.tell(" ".join(["Saved.", *filter(None, said)]))
+            self.window.banner.show_message(" ".join(["Saved.", *filter(None, said)]))
         if self.after_save is not None:
             QTimer.singleShot(0, self.after_save)
 
@@ -278,15 +278,15 @@ class Files(QObject):
         if self._saved_to is not None and self._saved_to.suffix in (".su2", ".su2b", ".cgns"):
             case = case.change(mesh_out=self._saved_to)
         try:
-            keep_view(replace(session, case=case), self.window.scene.camera.view).write(path)
+            view_to_case(replace(session, case=case), self.window.scene.camera.view).write(path)
         except (OSError, SlidevizError) as error:
-            self.window.banner.tell_error(error)
+            self.window.banner.show_error(error)
             return False
         self.window.store.change(changes.saved_case, replace(case, source=path))
         self.remember(path)
         self.window.say(f"Saved {path}")
         if case.mesh_file is not None and not case.mesh_file.is_file():
-            self.window.banner.tell(
+            self.window.banner.show_message(
                 f"Saved. But its mesh {case.mesh_file} is not there any more: the case cannot be "
                 "opened without it. Put it back, or save the mesh under that name (step 0)."
             )
@@ -306,7 +306,7 @@ class Files(QObject):
                 with atomic_write(target) as out:
                     out.write(file.read_bytes())
         except (OSError, SlidevizError) as error:
-            self.window.banner.tell_error(error)
+            self.window.banner.show_error(error)
             return False
         if moved:
             self.window.store.change(changes.moved_files, moved)

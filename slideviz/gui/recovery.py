@@ -15,7 +15,7 @@ from slideviz.errors import CaseError
 from slideviz.gui.autosave import Autosave, LeftSession, find_sessions
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets.banner import Banner
-from slideviz.gui.widgets.faults import old_crashes
+from slideviz.gui.widgets.error_reporter import old_crashes
 from slideviz.session import jobs
 from slideviz.session.keep import restored
 
@@ -57,7 +57,7 @@ class SessionRecovery(QObject):
         for problem in problems:
             log.warning("%s", problem)
         if problems:
-            self.window.banner.tell("\n".join(problems), calm=False)
+            self.window.banner.show_message("\n".join(problems), calm=False)
         self._offer()
 
     def _offer(self) -> None:
@@ -104,11 +104,11 @@ class SessionRecovery(QObject):
 
         Its results count as those of the session's case only if the file says so.
         """
-        panel, session = self.window.docks_.panel(DesignsPanel), self.window.store.session
+        panel, session = self.window.dock_manager.panel(DesignsPanel), self.window.store.session
         try:
             table, current = found.designs()
         except CaseError as error:
-            self.window.banner.tell_error(error)
+            self.window.banner.show_error(error)
             return
         panel.case, panel.mesh = session.case if current else None, session.mesh
         panel.put(table)

@@ -15,7 +15,7 @@ from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.widgets.banner import NO_ANSWERS, Banner
 from slideviz.session import changes, jobs
-from slideviz.session.jobs import Doing
+from slideviz.session.jobs import JobProgress
 from slideviz.session.jobs_large import compute_in_file
 from slideviz.session.run_messages import (
     help_for,
@@ -73,7 +73,7 @@ class Running(QObject):
         self.runner.cancelled.connect(self._cancelled)
         self.runner.failed.connect(self._failed)
 
-    def _tell(self, doing: Doing) -> None:
+    def _tell(self, doing: JobProgress) -> None:
         self.said.emit(doing.text)
 
     def start_job(
@@ -189,7 +189,7 @@ class Running(QObject):
         if self._deforms and isinstance(error, SlidevizError):
             # The message names keys of a case file: say it in the words of the window.
             error = type(error)(in_window_words(str(error)))
-        self.banner.tell_error(error)
+        self.banner.show_error(error)
         log.error("%s", error)
         self.said.emit("")
         self._end("failed")
@@ -219,7 +219,7 @@ class Running(QObject):
             log.info("the deformed mesh is in %s", file)
         if warnings:
             show = {"Show the worst": self.worst_wanted.emit} if bad else NO_ANSWERS
-            self.banner.tell("\n".join(warnings), calm=not bad, answers=show)
+            self.banner.show_message("\n".join(warnings), calm=not bad, answers=show)
             self._about = run.number
         self.said.emit(f"Done: {text}")
 

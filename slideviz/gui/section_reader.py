@@ -11,7 +11,7 @@ from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.mesh.model import Mesh
 from slideviz.sections.model import Section
-from slideviz.session.jobs import Doing, Report, Stopped, require_going
+from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
 from slideviz.session.panes import shown_views
 from slideviz.session.section_cuts import is_awaited
 from slideviz.session.slabs import keep_slab, plain, read_slab
@@ -107,6 +107,6 @@ class SectionReader(QObject):
 
 def _reading(frame: StepFrame, section: Section, report: Report, stopped: Stopped) -> StepFrame:
     def tell(part: float) -> None:
-        report(Doing(f"{READING}: {part:.0%}"))
+        report(JobProgress(f"{READING}: {part:.0%}"))
 
-    return read_slab(frame, section, tell, partial(require_going, stopped))
+    return read_slab(frame, section, tell, partial(raise_if_cancelled, stopped))

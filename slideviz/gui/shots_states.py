@@ -147,8 +147,8 @@ def section(window: MainWindow, place: Path) -> None:
     """Show a cylindrical section at mid-span, unrolled below the 3D view."""
     _open(window, _stator(place))
     _run(window, **SLIDING)
-    window.docks_.bring_to_front("sections")
-    window.docks_.panel(SectionsPanel).add["cylinder"].click()
+    window.dock_manager.bring_to_front("sections")
+    window.dock_manager.panel(SectionsPanel).add["cylinder"].click()
     window.store.change(changes.set_view, passages=1)
     window.section_views.want_flat(True)
     window.store.change(changes.show, OUTER, False)
@@ -181,7 +181,7 @@ def dark(window: MainWindow, place: Path) -> None:
     _open(window, place / "passage" / "passage.cfg")
     _run(window)
     window.store.change(changes.set_view, passages=1)
-    window.docks_.bring_to_front("curves")
+    window.dock_manager.bring_to_front("curves")
 
 
 STATES = (

@@ -41,8 +41,8 @@ from slideviz.gui.viewport.viewing import Viewing
 from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.banner import Banner
 from slideviz.gui.widgets.build import in_column, reveal
-from slideviz.gui.widgets.command import Now
-from slideviz.gui.widgets.faults import Faults
+from slideviz.gui.widgets.command import CommandState
+from slideviz.gui.widgets.error_reporter import ErrorReporter
 from slideviz.gui.widgets.icons import redraw_icons
 from slideviz.gui.widgets.labels import plain_labels, wrapped
 from slideviz.gui.widgets.panel import Panel
@@ -90,8 +90,8 @@ class MainWindow(Services):
         self.store = Store()
         self.banner = Banner()
         self.offer = Banner()
-        self.faults = Faults(self.banner, self)
-        self.store.failed = self.faults.tell
+        self.error_reporter = ErrorReporter(self.banner, self)
+        self.store.failed = self.error_reporter.show
         self.running = Running(self.store, self.banner, self)
         self.runner = self.running.runner
         self.files = Files(self, self.settings)
@@ -102,12 +102,12 @@ class MainWindow(Services):
         self._kept = ExitStack()
         self._kept.enter_context(protected(self._inputs))
         self._make_centre(multi_samples)
-        self.docks_ = Docks(self)
+        self.dock_manager = Docks(self)
         self._make_status()
-        self.actions_ = Actions(self)
+        self.actions_table = Actions(self)
         self._connect()
         self._take_scheme(scheme)
-        self.docks_.restore(self.settings)
+        self.dock_manager.restore(self.settings)
         self.store.listen(self.viewing.sync)
         self.store.listen(lambda *_: self.sync_actions())
         self.intersection_check = IntersectionCheck(self.store, self)
@@ -157,27 +157,27 @@ class MainWindow(Services):
     @property
     def docks(self) -> dict[str, QDockWidget]:
         """Return the docks, by name."""
-        return self.docks_.by_name
+        return self.dock_manager.by_name
 
     @property
     def boundaries(self) -> BoundariesPanel:
         """Return the panel of the boundaries."""
-        return self.docks_.panel(BoundariesPanel)
+        return self.dock_manager.panel(BoundariesPanel)
 
     @property
     def motions(self) -> MotionPanel:
         """Return the panel of the motions."""
-        return self.docks_.panel(MotionPanel)
+        return self.dock_manager.panel(MotionPanel)
 
     @property
     def method(self) -> MethodPanel:
         """Return the panel of the method."""
-        return self.docks_.panel(MethodPanel)
+        return self.dock_manager.panel(MethodPanel)
 
     @property
     def run_panel(self) -> RunPanel:
         """Return the panel that starts a run."""
-        return self.docks_.panel(RunPanel)
+        return self.dock_manager.panel(RunPanel)
 
     def _make_status(self) -> None:
         self.mesh_text = QLabel()
@@ -203,7 +203,7 @@ class MainWindow(Services):
         running.said.connect(self.say)
         running.worst_wanted.connect(self._show_worst)
         panel.place_wanted.connect(self.lead_to)
-        self.docks_.panel(DesignsPanel).changed.connect(self.sync_actions)
+        self.dock_manager.panel(DesignsPanel).changed.connect(self.sync_actions)
         self.start.file_wanted.connect(self.files.open_path)
         self.start.sample_wanted.connect(self.files.open_sample)
         self.start.try_wanted.connect(self.files.try_sample)
@@ -216,7 +216,7 @@ class MainWindow(Services):
         self.autosave: Autosave | None = None
         self.recovery: SessionRecovery | None = None
         if folder is not None:
-            designs = self.docks_.panel(DesignsPanel)
+            designs = self.dock_manager.panel(DesignsPanel)
             self.autosave = Autosave(
                 self.store,
                 folder,
@@ -232,8 +232,8 @@ class MainWindow(Services):
     def sync_actions(self) -> None:
         """Update menus, tool bar, window title, and the facts of the mesh in the status bar."""
         session = self.store.session
-        self.actions_.sync(
-            Now(
+        self.actions_table.sync(
+            CommandState(
                 session,
                 busy=self.runner.busy,
                 ready=self.run_panel.run.isEnabled(),
@@ -264,7 +264,7 @@ class MainWindow(Services):
         for remark in remarks:
             log.warning("%s", remark)
         if session.in_file:
-            self.banner.tell("\n".join(remarks))
+            self.banner.show_message("\n".join(remarks))
         notes = [] if session.in_file else [*remarks]
         notes.append(boxes_hint(session))
         name = (session.case.source or session.path).name
@@ -301,14 +301,14 @@ class MainWindow(Services):
         if missing.place == "open":
             self.files.ask_and_open()
             return
-        self.docks_.bring_to_front(missing.place)
-        panel = self.docks_.panels[missing.place]
+        self.dock_manager.bring_to_front(missing.place)
+        panel = self.dock_manager.panels[missing.place]
         if isinstance(panel, Panel):
             panel.lead_to(missing)
 
     def _show_worst(self) -> None:
-        self.docks_.bring_to_front("worst")
-        self.docks_.panel(WorstPanel).show_worst()
+        self.dock_manager.bring_to_front("worst")
+        self.dock_manager.panel(WorstPanel).show_worst()
 
     def set_theme(self, name: str) -> None:
         """Change to a theme: ``light``, ``dark``, or ``system`` for that of the desktop."""
@@ -335,7 +335,7 @@ class MainWindow(Services):
         moved = super().focusNextPrevChild(forwards)
         first = self.focusWidget()
         # For Qt a field behind a tab is visible: what is typed would change it unseen.
-        while moved and self.docks_.is_behind(self.focusWidget()):
+        while moved and self.dock_manager.is_behind(self.focusWidget()):
             moved = super().focusNextPrevChild(forwards) and self.focusWidget() is not first
         reveal(self.focusWidget())
         return moved
@@ -363,19 +363,19 @@ class MainWindow(Services):
                 event.ignore()
                 return
             self._closed = True
-            self.docks_.save(self.settings)
+            self.dock_manager.save(self.settings)
             self.hide()
             # The jobs before the views: a job may still add a step, which is drawn.
             self.player.stop()
             self.exports.end()
-            self.docks_.panel(DesignsPanel).runner.close()
+            self.dock_manager.panel(DesignsPanel).runner.close()
             self.warmup.close()
             self.intersection_check.close()
             self.section_reader.close()
             self.left_behind = not self.running.close()
             if self.autosave is not None:
                 self.autosave.close()
-            self.docks_.panel(LogPanel).detach()
+            self.dock_manager.panel(LogPanel).detach()
             self.section_views.close_views()
             self.viewing.close_views()
             self._kept.close()

@@ -21,7 +21,7 @@ from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
 from slideviz.sections.shape import Label
 from slideviz.sections.threshold import CellsInRange
-from slideviz.session.colors import as_drawn
+from slideviz.session.colors import with_drawable_colors
 from slideviz.session.passages import keeps, moved
 from slideviz.session.section_cuts import Cuts, cut_frame, is_awaited
 from slideviz.session.state import Session
@@ -87,7 +87,7 @@ class FlatScene:
 
     def update(self, session: Session, section: Section) -> None:
         """Draw another state of the session, or another section."""
-        session = as_drawn(session)
+        session = with_drawable_colors(session)
         assert session.frame is not None
         self.session, self.section = session, section
         self.stage.set_colors(session)

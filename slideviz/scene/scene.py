@@ -32,10 +32,10 @@ from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
 from slideviz.scene.support import SupportLayer
 from slideviz.scene.threshold import ThresholdLayer
-from slideviz.session.colors import as_drawn
+from slideviz.session.colors import with_drawable_colors
 from slideviz.session.inspect import cell_at, surroundings
 from slideviz.session.state import Session
-from slideviz.session.store import tell_all
+from slideviz.session.store import notify
 
 NEAR = 8.0
 """Height of the view after flying to a cell, in sizes of the cell."""
@@ -118,7 +118,7 @@ class Scene:
         """
         self.clear()
         self._cells.part = part
-        session = as_drawn(session)
+        session = with_drawable_colors(session)
         if session.mesh is None:
             return
         self.session = session
@@ -138,12 +138,12 @@ class Scene:
 
     def update(self, session: Session) -> None:
         """Draw another state of the same mesh; layers change only what differs."""
-        session = as_drawn(session)
+        session = with_drawable_colors(session)
         old, self.session = self.session, session
         if session.mesh is None or old.mesh is None:
             return
         self.stage.set_colors(session)
-        tell_all((layer.update for layer in self.layers), old, session)
+        notify((layer.update for layer in self.layers), old, session)
         if "perspective" in old.view.drawn ^ session.view.drawn:
             self.plotter.camera.parallel_projection = self._parallel()
 
@@ -165,7 +165,7 @@ class Scene:
 
     def _again(self) -> None:
         if self.session.mesh is not None:
-            tell_all((layer.update for layer in self.layers), self.session, self.session)
+            notify((layer.update for layer in self.layers), self.session, self.session)
 
     # While the camera moves --------------------------------------------------------------
 

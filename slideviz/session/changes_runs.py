@@ -127,7 +127,7 @@ def take_settings(session: Session, number: int) -> Session:
     return replace(session, case=run.case, guesses={})
 
 
-def seen_beside(session: Session) -> Session:
+def second_view(session: Session) -> Session:
     """Return the session that the second view shows: the other run, at the matching step.
 
     Unchanged where there is no second view.

@@ -52,7 +52,7 @@ def set_view(session: Session, **values: Any) -> Session:
         if "displacement" in (what, old.color_by) and old.threshold != ONLY_INVERTED:
             values.setdefault("threshold", None)
     if "sections" in values:
-        index = followed(old.section_index, old.sections, values["sections"])
+        index = selection_after(old.section_index, old.sections, values["sections"])
         values.setdefault("section_index", index)
     if session.in_file:
         values.pop("threshold", None)  # needs the values of all cells
@@ -127,7 +127,9 @@ def flat_one(sections: Sequence[Section]) -> int | None:
     return next((index for index, one in enumerate(sections) if one.flat and one.shown), None)
 
 
-def followed(index: int | None, old: Sequence[Section], new: Sequence[Section]) -> int | None:
+def selection_after(
+    index: int | None, old: Sequence[Section], new: Sequence[Section]
+) -> int | None:
     """Return the place of the selected section after one was added, removed or changed.
 
     ``index`` is its place among ``old``. A section that was added is selected; where the selected

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.quality import INVERTED
-from slideviz.session.changes_runs import seen_beside
+from slideviz.session.changes_runs import second_view
 from slideviz.session.changes_view import set_view
 from slideviz.session.results import StepFrame
 from slideviz.session.state import Session
@@ -30,14 +30,14 @@ def fit_colors(session: Session, every: bool = True) -> Session:
 NO_DISPLACEMENT = "There is no displacement yet: run the case. Until then the roles are shown."
 
 
-def unmoved(session: Session) -> bool:
+def lacks_displacement(session: Session) -> bool:
     """Return whether the view is colored by the displacement, and no run has a step yet."""
     return session.view.color_by == "displacement" and not any(run.frames for run in session.runs)
 
 
-def as_drawn(session: Session) -> Session:
+def with_drawable_colors(session: Session) -> Session:
     """Return the session to draw: colored by roles where there is no displacement yet."""
-    return set_view(session, color_by="role") if unmoved(session) else session
+    return set_view(session, color_by="role") if lacks_displacement(session) else session
 
 
 def usual_range(session: Session) -> str:
@@ -65,7 +65,7 @@ def _limits(session: Session, every: bool) -> tuple[float, float] | None:
 def _frames(session: Session, every: bool) -> set[StepFrame]:
     """Return the frames that are shown in all views, with ``every`` those of all their steps."""
     shown: set[StepFrame] = set()
-    for one in (session, seen_beside(session)):
+    for one in (session, second_view(session)):
         if one.frame is not None:
             shown.add(one.frame)
         if every:

@@ -15,7 +15,7 @@ from slideviz.formats.su2.write import su2_blocks
 from slideviz.samples.table import sample
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
-from slideviz.session.jobs import Stopped, require_going
+from slideviz.session.jobs import Stopped, raise_if_cancelled
 from slideviz.session.results import cell_displacement
 from slideviz.system.jit_cache import compilation_watched
 
@@ -48,7 +48,7 @@ def warm_up(compiling: Callable[[], None], stopped: Stopped) -> None:
         _write_and_read()
         _look()
         for name, settings in _RUNS:
-            require_going(stopped)
+            raise_if_cancelled(stopped)
             _deform(name, settings, stopped)
 
 
@@ -78,5 +78,5 @@ def _deform(name: str, settings: Mapping[str, Any], stopped: Stopped) -> None:
     case: Case = made.case.change(
         motions=(motion,), steps=1, periodic="moving", reduction=None, **settings
     )
-    for _ in deform(case, mesh, progress=lambda _: require_going(stopped)):
+    for _ in deform(case, mesh, progress=lambda _: raise_if_cancelled(stopped)):
         pass

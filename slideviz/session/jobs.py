@@ -23,7 +23,7 @@ from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.session.changes import open_mesh
 from slideviz.session.formats import holds_quality
-from slideviz.session.keep import Camera, kept_camera
+from slideviz.session.keep import Camera, camera_from_case
 from slideviz.session.large import first_frame, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.passages import find_period
@@ -46,7 +46,7 @@ PHASES = {
 
 
 @dataclass(frozen=True)
-class Doing:
+class JobProgress:
     """Progress of a job: words, and the fraction done, 0 to 1, or None where it is unknown."""
 
     text: str
@@ -90,16 +90,16 @@ def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) ->
 
     case, mesh_path = None, path
     if path.suffix.lower() in CASE_SUFFIXES:
-        report(Doing(f"Reading {path.name}"))
+        report(JobProgress(f"Reading {path.name}"))
         case = Case.read(path)
         if case.mesh_file is None:
             raise CaseError(f"{path}: the case names no mesh; add a line MESH_FILENAME= FILE")
         mesh_path, zone = case.mesh_file, case.zone if zone is None else zone
-    report(Doing(f"Reading {mesh_path.name}"))
+    report(JobProgress(f"Reading {mesh_path.name}"))
 
     def reading(fraction: float) -> None:
-        require_going(stopped)
-        report(Doing(f"Reading {mesh_path.name}", fraction))
+        raise_if_cancelled(stopped)
+        report(JobProgress(f"Reading {mesh_path.name}", fraction))
 
     kind = case.mesh_format if case is not None else None
     if kind != "su2" and is_large(mesh_path, zone):
@@ -112,29 +112,29 @@ def prepare(
     mesh: Mesh, path: Path | None, case: Case | None, report: Report, stopped: Stopped
 ) -> Opened:
     """Return a mesh just read, ready to be shown: its boundaries, periodic pairs and quality."""
-    require_going(stopped)
-    report(Doing("Finding the boundaries"))
+    raise_if_cancelled(stopped)
+    report(JobProgress("Finding the boundaries"))
     surfaces = find_surfaces(mesh)
-    require_going(stopped)
-    report(Doing("Looking for periodic boundaries"))
+    raise_if_cancelled(stopped)
+    report(JobProgress("Looking for periodic boundaries"))
 
     def going_on() -> None:
-        require_going(stopped)
+        raise_if_cancelled(stopped)
 
     pairs = find_pairs(mesh, going_on=going_on) if mesh.markers else ()
-    report(Doing("Measuring the cells"))
+    report(JobProgress("Measuring the cells"))
     metric = case.quality_metric if case is not None else "knupp"
 
     def measuring(fraction: float) -> None:
         going_on()
-        report(Doing("Measuring the cells", fraction))
+        report(JobProgress("Measuring the cells", fraction))
 
     if mesh.part is None:
         first = StepFrame(mesh, quality(mesh, metric=metric, going_on=going_on))
     else:
         first = first_frame(mesh, metric, measuring)
     going_on()
-    _look_ahead(first)
+    _precompute(first)
     session = open_mesh(first, path, pairs, case)
     enclosing_of(mesh, surfaces)
     with suppress(SlidevizError):  # said beside the Run button
@@ -144,10 +144,10 @@ def prepare(
     coarse = coarse_surfaces(surfaces, mesh.points)
     if case is None:
         return Opened(session, surfaces, ghosts, coarse=coarse)
-    return Opened(session, surfaces, ghosts, bool(case.view), kept_camera(case), coarse)
+    return Opened(session, surfaces, ghosts, bool(case.view), camera_from_case(case), coarse)
 
 
-def _look_ahead(frame: StepFrame) -> None:
+def _precompute(frame: StepFrame) -> None:
     """Compute cached properties of a frame that drawing needs: in this thread, as it takes time."""
     mesh, measured = frame.mesh, frame.quality
     _ = mesh.bounds, mesh.extent, mesh.cells.nodes, mesh.cells.by_type
@@ -155,39 +155,39 @@ def _look_ahead(frame: StepFrame) -> None:
 
 
 def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
-    """Deform the mesh; report every step as a `StepFrame`, and the progress as `Doing`."""
+    """Deform the mesh; report every step as a `StepFrame`, and the progress as `JobProgress`."""
     from slideviz.solver.deform import Progress, deform
 
     furthest = 0.0
 
     def progress(now: Progress) -> None:
         nonlocal furthest
-        require_going(stopped)
+        raise_if_cancelled(stopped)
         # Sliding has its phases more than once in a step; a bar must not run back.
         furthest = max(furthest, overall(now))
         phase = PHASES.get(now.phase, now.phase)
         if case.steps:
-            report(Doing(f"Step {now.step} of {now.total}: {phase}", furthest))
+            report(JobProgress(f"Step {now.step} of {now.total}: {phase}", furthest))
         elif now.phase == "classify":
-            report(Doing(f"Automatic steps: {phase}"))
+            report(JobProgress(f"Automatic steps: {phase}"))
         else:
             # It is unknown how many numbers of steps will be tried, and so is the fraction.
             tried = f"{now.total} step{'s' if now.total > 1 else ''}"
-            report(Doing(f"Trying {tried}: step {now.step}, {phase}"))
+            report(JobProgress(f"Trying {tried}: step {now.step}, {phase}"))
 
     unfinished = True
 
     def going_on() -> None:
         # The last step is not dropped, even if the job is asked to stop.
         if unfinished:
-            require_going(stopped)
+            raise_if_cancelled(stopped)
 
     for step in deform(case, mesh, progress=progress):
         unfinished = step.index < step.total
-        report(Doing(f"Step {step.index} of {step.total}: quality", step.index / step.total))
+        report(JobProgress(f"Step {step.index} of {step.total}: quality", step.index / step.total))
         measured = quality(step.mesh, mesh, case.quality_metric, going_on)
         frame = StepFrame(step.mesh, measured, step)
-        _look_ahead(frame)
+        _precompute(frame)
         report(frame)
         going_on()
 
@@ -224,9 +224,9 @@ def save_mesh(
     """
     from slideviz.formats.files import write
 
-    report(Doing(f"Writing {path.name}"))
+    report(JobProgress(f"Writing {path.name}"))
     data = cell_values(frame) if holds_quality(path) else None
-    write(path, frame.mesh, overwrite, data, base, lambda: require_going(stopped))
+    write(path, frame.mesh, overwrite, data, base, lambda: raise_if_cancelled(stopped))
     return path
 
 
@@ -236,7 +236,7 @@ def cell_values(frame: StepFrame) -> dict[str, FloatArray]:
     return {"size_skew": measured.values, "size": measured.size, "skew": measured.skew}
 
 
-def require_going(stopped: Stopped) -> None:
+def raise_if_cancelled(stopped: Stopped) -> None:
     """Raise Cancelled if ``stopped()`` returns True: the job was asked to stop."""
     if stopped():
         raise Cancelled("stopped, as you asked")
@@ -260,11 +260,11 @@ def open_sample(
     """
     from slideviz.samples.table import write_sample
 
-    report(Doing(f"Making the sample {name}"))
+    report(JobProgress(f"Making the sample {name}"))
     with suppress(OSError):  # writing says why
         private_folder(folder)
     own = folder / (name if size is None else f"{name}-{size}")
     written = write_sample(name, own, size or SIZES.get(name), overwrite=True)
-    require_going(stopped)
+    raise_if_cancelled(stopped)
     case = next(path for path in written if path.suffix == ".cfg")
     return open_file(case, None, report, stopped)

@@ -11,7 +11,14 @@ from slideviz.errors import SlidevizError
 from slideviz.formats.vtkhdf import VTKHDF, vtkhdf_series
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.session.jobs import Doing, Report, Stopped, cell_values, require_going, save_mesh
+from slideviz.session.jobs import (
+    JobProgress,
+    Report,
+    Stopped,
+    cell_values,
+    raise_if_cancelled,
+    save_mesh,
+)
 from slideviz.session.state import StepFrame
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import CELL_STATES
@@ -35,8 +42,8 @@ def save_quality(path: Path, frame: StepFrame, report: Report, stopped: Stopped)
     with atomic_write(path, SlidevizError) as file:
         file.write(f"cell,type,size,skew,size_skew,status,{axes}\n".encode())
         for start in range(0, len(found), _ROWS):
-            require_going(stopped)
-            report(Doing(f"Writing {path.name}", start / len(found)))
+            raise_if_cancelled(stopped)
+            report(JobProgress(f"Writing {path.name}", start / len(found)))
             part = slice(start, start + _ROWS)
             rows = zip(
                 mesh.cells.types[part].tolist(),
@@ -102,8 +109,8 @@ def save_steps(
         _save_series(path, [*([first] if first else []), *frames], report, stopped)
         return paths
     for k, (target, frame) in enumerate(zip(paths, frames, strict=True)):
-        require_going(stopped)
-        report(Doing(f"Writing {target.name}", k / len(frames)))
+        raise_if_cancelled(stopped)
+        report(JobProgress(f"Writing {target.name}", k / len(frames)))
         save_mesh(target, frame, False, lambda _: None, stopped)
     return paths
 
@@ -113,7 +120,7 @@ def _save_series(path: Path, frames: Sequence[StepFrame], report: Report, stoppe
     start = frames[0].mesh
     with vtkhdf_series(path, start) as series:
         for k, frame in enumerate(frames):
-            require_going(stopped)
-            report(Doing(f"Writing {path.name}", k / len(frames)))
+            raise_if_cancelled(stopped)
+            report(JobProgress(f"Writing {path.name}", k / len(frames)))
             moved = {"displacement": frame.mesh.points - start.points}
             series.add(frame.mesh.points, cell_values(frame), moved)

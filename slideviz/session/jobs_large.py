@@ -6,7 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from slideviz.case.model import Case
-from slideviz.session.jobs import PHASES, Doing, Report, Stopped, overall, require_going
+from slideviz.session.jobs import (
+    PHASES,
+    JobProgress,
+    Report,
+    Stopped,
+    overall,
+    raise_if_cancelled,
+)
 from slideviz.session.large import frame_of
 from slideviz.session.results import StepFrame
 from slideviz.session.whole import tally_of
@@ -29,8 +36,8 @@ def compute_in_file(
     phases = {**PHASES, "read": "reading the boundary", "write": "copying the file"}
 
     def tell(now: Progress) -> None:
-        require_going(stopped)
-        report(Doing(f"From file to file: {phases.get(now.phase, now.phase)}", overall(now)))
+        raise_if_cancelled(stopped)
+        report(JobProgress(f"From file to file: {phases.get(now.phase, now.phase)}", overall(now)))
 
     skin = first.mesh
     assert skin.source is not None

@@ -17,7 +17,7 @@ Camera = tuple[float, ...]
 perhaps also width over height of the view."""
 
 
-def keep_view(session: Session, camera: Camera | None = None) -> Case:
+def view_to_case(session: Session, camera: Camera | None = None) -> Case:
     """Return the case of a session with its view and camera as keys; defaults are left out."""
     view, first = session.view, ViewState()
     before = _plain(first)
@@ -34,7 +34,7 @@ def keep_view(session: Session, camera: Camera | None = None) -> Case:
     return session.case.change(view=kept)
 
 
-def kept_view(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
+def view_from_case(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
     """Return the view that a case has; what it leaves out is taken from ``view``.
 
     Parameters
@@ -67,7 +67,7 @@ def restored(session: Session, source: Path | None) -> Session:
     return replace(session, case=session.case.change(source=source), saved=Case())
 
 
-def kept_camera(case: Case) -> Camera | None:
+def camera_from_case(case: Case) -> Camera | None:
     """Return the camera that a case has, or None."""
     camera: Camera | None = case.view.get("VIEW_CAMERA")
     return camera

@@ -15,7 +15,7 @@ NEAR = 4
 
 
 @dataclass(frozen=True)
-class Around:
+class RotationAxis:
     """The axis of rotational periodicity.
 
     Attributes
@@ -28,16 +28,18 @@ class Around:
     origin: tuple[float, float, float]
 
 
-def axis_of(session: Session) -> Around | None:
+def axis_of(session: Session) -> RotationAxis | None:
     """Return the axis of a session's rotational periodic pair of boundaries, or None."""
     names = session.case.markers_with("periodic")
     for pair in session.pairs:
         if pair.kind == "rotational" and pair.first in names and pair.second in names:
-            return Around(pair.axis, pair.origin)
+            return RotationAxis(pair.axis, pair.origin)
     return None
 
 
-def coordinates(positions: FloatArray, around: Around | None) -> tuple[tuple[str, ...], FloatArray]:
+def coordinates(
+    positions: FloatArray, around: RotationAxis | None
+) -> tuple[tuple[str, ...], FloatArray]:
     """Return names and values of coordinates: cylindrical about an axis, or Cartesian.
 
     Parameters

@@ -14,7 +14,7 @@ from slideviz.case.reduction import Reduction
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.session.changes_view import flat_one
-from slideviz.session.keep import kept_view
+from slideviz.session.keep import view_from_case
 from slideviz.session.state import Guess, Run, Session, StepFrame, ViewState
 from slideviz.terms import ColorBy, Role
 
@@ -48,7 +48,7 @@ def open_mesh(
     listed = {name: chosen.roles.get(name, "fixed") for name in mesh.marker_names}
     others = {name: role for name, role in chosen.roles.items() if name not in listed}
     chosen = chosen.change(roles=listed | others, mesh_file=path or chosen.mesh_file)
-    view = kept_view(chosen, ViewState(), mesh.marker_names)
+    view = view_from_case(chosen, ViewState(), mesh.marker_names)
     if has_ffd(chosen) and "VIEW_SHOW" not in chosen.view:
         view = view.with_drawn({"ffd": True})
     flat = flat_one(view.sections)

@@ -119,15 +119,15 @@ def _settings_words(run: Run, cases: Sequence[Case]) -> Iterator[tuple[str, bool
         # A setting at its default has no words: those of the other runs are enough.
         words = _setting_words(key, case)
         of = reduction_words if key.field == "reduction" else key.get
-        apart = bool(words) and any(of(other) != of(case) for other in cases)
-        if apart or (words and key.field == "kernel"):
-            yield words, apart
+        is_different = bool(words) and any(of(other) != of(case) for other in cases)
+        if is_different or (words and key.field == "kernel"):
+            yield words, is_different
     nodes = control_nodes(run)
     if nodes is not None:
         yield f"{nodes:,} nodes", False
 
 
-def apart(run: Run, among: Sequence[Run]) -> str:
+def differences_from_all(run: Run, among: Sequence[Run]) -> str:
     """Return words that distinguish a run from the runs ``among``, to be put beside its name.
 
     "" where no other has the same name or, without names, the same method.
@@ -135,10 +135,10 @@ def apart(run: Run, among: Sequence[Run]) -> str:
     if not any(other is not run and run_words(other) == run_words(run) for other in among):
         return ""
     words = [method_words(run.case)] if run.name else []
-    return ", ".join(filter(None, [*words, differing(run, among)]))
+    return ", ".join(filter(None, [*words, differences_from(run, among)]))
 
 
-def differing(run: Run, among: Sequence[Run]) -> str:
+def differences_from(run: Run, among: Sequence[Run]) -> str:
     """Return in words the settings of a run that differ among ``among``, which has it, too.
 
     The method is not among them.

@@ -23,7 +23,7 @@ DEEPEST = 200
 """Most changes that can be undone."""
 
 
-def tell_all(
+def notify(
     functions: Iterable[Callable[..., object]], *values: Any, failed: Failed | None = None
 ) -> None:
     """Call every function with the values, even after one has raised an error.
@@ -45,7 +45,7 @@ def tell_all(
 
 
 @dataclass(frozen=True)
-class Memento:
+class UndoState:
     """The state that undo brings back: case, guesses, style of the view, removed runs.
 
     Attributes
@@ -64,7 +64,7 @@ class Memento:
     shown: int | None = field(default=None, compare=False)
 
     @classmethod
-    def of(cls, session: Session) -> Memento:
+    def of(cls, session: Session) -> UndoState:
         """Return the memento of a session."""
         return cls(
             session.case,
@@ -113,7 +113,7 @@ class _OutsideChange:
 
 
 @dataclass(frozen=True)
-class _Done:
+class UndoEntry:
     """A change that can be undone.
 
     Attributes
@@ -129,7 +129,7 @@ class _Done:
         to it; minus infinity where nothing more can.
     """
 
-    before: Memento | _OutsideChange
+    before: UndoState | _OutsideChange
     words: str
     kind: tuple[object, ...]
     at_s: float
@@ -140,7 +140,7 @@ class Store:
 
     Listeners are called with the old and the new session, in the order in which they were added.
     Where a listener changes the session, all listeners are called for the first change before the
-    second. An error in a listener does not keep the others from being called (`tell_all`): it goes
+    second. An error in a listener does not keep the others from being called (`notify`): it goes
     to the attribute ``failed`` or, where that is None, is raised afterwards.
 
     Parameters
@@ -159,8 +159,8 @@ class Store:
         self._listeners: list[Listener] = []
         self._waiting: list[tuple[Session, Session]] = []
         self.failed: Failed | None = None
-        self._undo: list[_Done] = []
-        self._redo: list[_Done] = []
+        self._undo: list[UndoEntry] = []
+        self._redo: list[UndoEntry] = []
         self._dragging = self._taking_back = False
 
     def listen(self, listener: Listener) -> None:
@@ -224,7 +224,7 @@ class Store:
         try:
             while self._waiting:
                 try:
-                    tell_all(self._listeners, *self._waiting[0], failed=self.failed)
+                    notify(self._listeners, *self._waiting[0], failed=self.failed)
                 except Exception as error:
                     first = first or error
                 self._waiting.pop(0)
@@ -253,7 +253,7 @@ class Store:
         """Make the last change that was undone again, if none was made since; return as `undo`."""
         return self._step(self._redo, self._undo)
 
-    def _step(self, source: list[_Done], target: list[_Done]) -> bool:
+    def _step(self, source: list[UndoEntry], target: list[UndoEntry]) -> bool:
         if not source:
             return False
         done = source.pop()
@@ -264,7 +264,7 @@ class Store:
                 return True
             source.append(target.pop())
             return False
-        target.append(replace(done, before=Memento.of(self.session), at_s=float("-inf")))
+        target.append(replace(done, before=UndoState.of(self.session), at_s=float("-inf")))
         self.put(done.before.put_into(self.session))
         return True
 
@@ -278,17 +278,19 @@ class Store:
         For changes of what is not part of the session, such as a table of designs.
         """
         self._redo.clear()
-        self._undo.append(_Done(_OutsideChange(put, before, after), words, (put,), float("-inf")))
+        self._undo.append(
+            UndoEntry(_OutsideChange(put, before, after), words, (put,), float("-inf"))
+        )
         del self._undo[:-DEEPEST]
 
     def _remember(self, old: Session, new: Session, words: str, kind: tuple[object, ...]) -> None:
         if new is old or new.mesh is not old.mesh or new.mesh is None:
             return
-        before = Memento.of(old)
-        if before == Memento.of(new):
+        before = UndoState.of(old)
+        if before == UndoState.of(new):
             return
         self._redo.clear()
-        if self._taking_back and self._drop_alike(Memento.of(new), kind):
+        if self._taking_back and self._drop_alike(UndoState.of(new), kind):
             return
         now = self._clock()
         last = self._undo[-1] if self._undo else None
@@ -296,16 +298,16 @@ class Store:
         at_s = float("inf") if self._dragging else now
         if last is not None and last.kind == kind and now - last.at_s < TOGETHER_S:
             self._undo.pop()
-            if last.before != Memento.of(new):
+            if last.before != UndoState.of(new):
                 self._undo.append(replace(last, at_s=at_s))
             return
-        self._undo.append(_Done(before, words, kind, at_s))
+        self._undo.append(UndoEntry(before, words, kind, at_s))
         # The removal of a run that is no longer in `removed` cannot be undone.
         there = {run.number for run in new.removed}
         self._undo = [d for d in self._undo if d.kind[0] is not remove_run or d.kind[1] in there]
         del self._undo[:-DEEPEST]
 
-    def _drop_alike(self, before: Memento, kind: tuple[object, ...]) -> bool:
+    def _drop_alike(self, before: UndoState, kind: tuple[object, ...]) -> bool:
         """Forget the last changes since a state; return whether all are of one kind."""
         for at in reversed(range(len(self._undo))):
             if self._undo[at].kind != kind:

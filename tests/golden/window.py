@@ -95,9 +95,9 @@ def opened(desk: Desk, window, place: Path) -> None:
         ("motion", "curves", "sections"),
     ):
         for name in (left, right, lower):
-            window.docks_.bring_to_front(name)
+            window.dock_manager.bring_to_front(name)
         if lower == "sections":
-            window.docks_.panels["sections"].add["plane"].click()
+            window.dock_manager.panels["sections"].add["plane"].click()
         photograph(desk, window, f"panels_{right}_{lower}")
     tell_panels(desk, window, "panels")
     tell_contexts(desk, window)
@@ -123,7 +123,7 @@ def tell_menu(desk: Desk, menu: QWidget, depth: int = 0) -> None:
 
 def tell_panels(desk: Desk, window, name: str) -> None:
     """Write down the words and tips of every panel."""
-    for dock in window.docks_.by_name.values():
+    for dock in window.dock_manager.by_name.values():
         tell_words(desk, dock.windowTitle(), dock.widget())
     desk.close(name)
 

@@ -122,7 +122,7 @@ def window(qtbot, settings, monkeypatch):
     qtbot.waitUntil(made.isActiveWindow)
     yield made
     # A listener that raises is told in the banner, and the window goes on: not so a test.
-    assert made.faults.count == 0, made.banner.text.text()
+    assert made.error_reporter.count == 0, made.banner.text.text()
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from slideviz.design.sweeps.row import DesignRow
 from slideviz.gui import autosave
 from slideviz.gui.autosave import SOURCE, Autosave, find_sessions
 from slideviz.gui.panels.designs import DesignsPanel
-from slideviz.gui.widgets import faults, questions
+from slideviz.gui.widgets import error_reporter, questions
 from slideviz.gui.window import MainWindow
 from slideviz.session import changes, jobs
 from slideviz.session.design_table import DesignTable
@@ -94,7 +94,7 @@ def test_nobody_else_may_read_what_is_kept_its_files_are_found_and_a_proper_end_
     assert len(modes) == 2
     assert set(modes.values()) == {0o600}
     crashes = tmp_path / "crashes"
-    with faults.crash_log(crashes):
+    with error_reporter.crash_log(crashes):
         (log,) = crashes.iterdir()
         assert log.stat().st_mode & 0o777 == 0o600
     assert crashes.stat().st_mode & 0o777 == 0o700
@@ -162,7 +162,7 @@ def test_after_a_crash_it_is_offered_and_restored(make, qtbot, crashed, case_fil
 def test_the_designs_and_their_results_come_back(make, qtbot, folder, case_file, changed):
     window = make()
     open_in(window, case_file, qtbot)
-    panel = window.docks_.panel(DesignsPanel)
+    panel = window.dock_manager.panel(DesignsPanel)
     panel.put(DesignTable().crossed("STEPS", ["1", "2", "3"]))
     panel.case = window.store.session.case
     results = [
@@ -183,7 +183,7 @@ def test_the_designs_and_their_results_come_back(make, qtbot, folder, case_file,
     window = make()
     window.recovery.look()
     window.offer.answers["Restore"].click()
-    panel = window.docks_.panel(DesignsPanel)
+    panel = window.dock_manager.panel(DesignsPanel)
     qtbot.waitUntil(lambda: bool(panel.table.rows))
     assert panel.table.designs() == [{"STEPS": "1"}, {"STEPS": "2"}, {"STEPS": "3"}]
     assert panel.table.results[1] == results[0]
@@ -340,7 +340,7 @@ def test_a_folder_that_cannot_be_written_is_logged_and_the_window_goes_on(
     open_in(window, case_file, qtbot)
     window.autosave.save()
     qtbot.waitUntil(lambda: "could not be kept" in caplog.text)
-    assert window.faults.count == 0
+    assert window.error_reporter.count == 0
 
 
 KILLED = """

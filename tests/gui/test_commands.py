@@ -6,7 +6,7 @@ import pytest
 from qtpy.QtGui import QKeySequence
 
 from slideviz.gui.commands import COMMANDS, MENUS
-from slideviz.gui.widgets.command import Now
+from slideviz.gui.widgets.command import CommandState
 from slideviz.gui.widgets.icons import STROKES
 from slideviz.session import changes
 from slideviz.session.state import Session
@@ -35,13 +35,13 @@ def test_each_command_says_what_it_does_and_has_the_icon_it_names(one):
     assert one.tip.endswith(".")
     assert len(one.tip.split()) >= 3
     assert one.image in {"", *STROKES}
-    assert one.called(Now(Session()))
+    assert one.called(CommandState(Session()))
 
 
 @pytest.mark.parametrize("name", SHOWN)
 def test_each_toggle_of_the_view_is_a_command_that_says_whether_it_is_on(session, name):
-    assert COMMANDS[name].checked(Now(session)) == SHOWN[name].at_first
+    assert COMMANDS[name].checked(CommandState(session)) == SHOWN[name].at_first
     switched = changes.set_view(session, **{name: not SHOWN[name].at_first})
-    assert COMMANDS[name].checked(Now(switched)) != SHOWN[name].at_first
-    assert COMMANDS[name].enabled(Now(session)) == (not SHOWN[name].why_not)
-    assert not COMMANDS[name].enabled(Now(Session()))
+    assert COMMANDS[name].checked(CommandState(switched)) != SHOWN[name].at_first
+    assert COMMANDS[name].enabled(CommandState(session)) == (not SHOWN[name].why_not)
+    assert not COMMANDS[name].enabled(CommandState(Session()))

@@ -35,8 +35,8 @@ def passage(window, driver, tmp_path, monkeypatch):
     monkeypatch.setattr(plot_canvas, "REST_MS", 0)
     write_sample("passage", tmp_path, 12)
     driver.open(tmp_path / "passage.cfg")
-    window.actions_.by_name["designs"].trigger()
-    return window.docks_.panel(DesignsPanel)
+    window.actions_table.by_name["designs"].trigger()
+    return window.dock_manager.panel(DesignsPanel)
 
 
 def fill(panel, column, values):
@@ -260,7 +260,7 @@ def test_tables_are_loaded_and_saved_and_all_mistakes_are_told_with_their_rows(
     file.write_text("STEPS\n1\n")
     QTest.mouseClick(passage.load, LEFT)
     assert not window.banner.isVisible()
-    window.banner.tell("Something else.")
+    window.banner.show_message("Something else.")
     QTest.mouseClick(passage.load, LEFT)
     assert window.banner.isVisible()
 
@@ -269,8 +269,8 @@ def test_changes_of_the_table_are_undone_with_its_results(
     window, passage, qtbot, in_a_thread, answers
 ):
     answers("ask_unsaved", "discard")
-    panel, undo = passage, window.actions_.by_name["undo"]
-    redo = window.actions_.by_name["redo"]
+    panel, undo = passage, window.actions_table.by_name["undo"]
+    redo = window.actions_table.by_name["redo"]
     assert not undo.isEnabled()
     fill(panel, "airfoil.rotate.angle_deg", "-2, 0")
     assert undo.text() == "Undo designs"

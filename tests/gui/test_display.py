@@ -27,7 +27,7 @@ def shown(driver, sample_folder):
 
 
 def panel(driver):
-    return driver.window.docks_.panels["display"]
+    return driver.window.dock_manager.panels["display"]
 
 
 def view(driver):
@@ -37,11 +37,11 @@ def view(driver):
 def test_colors_map_and_points_are_chosen_and_undone(shown):
     shown.choose(panel(shown).color_by, "skew")
     assert view(shown).color_by == "skew"
-    assert shown.window.actions_.bar.color.currentData() == "skew"
+    assert shown.window.actions_table.bar.color.currentData() == "skew"
     shown.choose(panel(shown).map, "cividis")
     assert view(shown).color_map == "cividis"
     assert shown.window.scene.stage.table.cmap.name == "cividis"
-    shown.window.actions_.by_name["undo"].trigger()
+    shown.window.actions_table.by_name["undo"].trigger()
     assert view(shown).color_map == "viridis"
     assert panel(shown).map.currentData() == "viridis"
     shown.choose(panel(shown).points, "types")
@@ -144,7 +144,7 @@ def test_neighbours_of_a_row_and_of_a_wheel(shown, stator):
     assert box.passages.text() == "all 41 around"
     assert view(shown).passages == -1
     assert len([n for n in shown.window.view.actors if n.startswith("copy:")]) == 40 * 7
-    shown.window.actions_.by_name["undo"].trigger()
+    shown.window.actions_table.by_name["undo"].trigger()
     assert view(shown).passages == 0
     assert box.passages.value() == 0
 
@@ -178,7 +178,7 @@ def test_what_is_drawn_is_switched_agrees_with_the_menu_and_perspective_is_for_s
         # Beside its word a check box is deaf.
         QTest.mouseClick(box, Qt.MouseButton.LeftButton, pos=QPoint(8, box.height() // 2))
         assert (name in view(shown).drawn) != before, name
-        action = shown.window.actions_.by_name[name]
+        action = shown.window.actions_table.by_name[name]
         assert action.isChecked() != before, name
         action.trigger()
         assert box.isChecked() == before == (name in view(shown).drawn), name
@@ -205,10 +205,10 @@ def test_the_panel_fits_its_dock_and_is_off_without_a_mesh(driver, passage_file)
 
 
 def test_colors_fit_a_step_or_all_or_both_views_of_a_comparison_and_are_as_ever_again(shown):
-    window, acts = shown.window, shown.window.actions_.by_name
+    window, acts = shown.window, shown.window.actions_table.by_name
     one, every, usual = (acts[f"{n}_colors"] for n in ("fit", "fit_all", "usual"))
     assert not one.isEnabled(), "roles have no range"
-    assert not window.actions_.bar.range.isEnabled()
+    assert not window.actions_table.bar.range.isEnabled()
     shown.window.store.change(changes.set_view, color_by="size-skew")
     window.start_run()
     shown.settle()

@@ -36,7 +36,7 @@ def method(driver, sample_folder, qtbot):
     driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
     window = driver.window
     window.resize(*SMALL)
-    window.docks_.bring_to_front("method")
+    window.dock_manager.bring_to_front("method")
     driver.window.store.change(changes.set_case, reduction=Reduction(multilevel=True))
     driver.click(window.method.more.button)
     settled(qtbot, window)
@@ -122,7 +122,7 @@ def test_every_setting_is_reached_with_the_wheel_which_changes_none_and_none_is_
         edge = widget.mapTo(method.area.widget(), QPoint(widget.width(), 0)).x()
         assert edge <= right, widget.objectName()
     # What was typed after a click on the tab Motion went into the tolerance, which nobody saw.
-    docks = driver.window.docks_.by_name
+    docks = driver.window.dock_manager.by_name
     field = method.findChild(NumberField)
     field.setFocus()
     assert docks["method"].isAncestorOf(QApplication.focusWidget())
@@ -195,7 +195,7 @@ def test_the_layout_can_be_put_back(start, qtbot, monkeypatch):
     second = start()
     assert widths(second) != at_first
     assert second.docks["method"].isFloating()
-    second.actions_.by_name["restore_layout"].trigger()
+    second.actions_table.by_name["restore_layout"].trigger()
     settled(qtbot, second)
     assert widths(second) == at_first
     assert not second.docks["method"].isFloating()
@@ -231,7 +231,7 @@ def test_nothing_overlaps_in_a_small_window_where_boundaries_are_a_tab(start, qt
     window.files.open_path(sample_folder / "passage" / "passage.cfg")
     qtbot.waitUntil(lambda: not window.runner.busy)
     for dock in ("motion", "method", "worst", "curves", "sections", "display", "designs"):
-        window.docks_.bring_to_front(dock)
+        window.dock_manager.bring_to_front(dock)
         settled(qtbot, window)
         assert overlaps(window) == set(), dock
         assert run_is_seen(window)
@@ -239,7 +239,7 @@ def test_nothing_overlaps_in_a_small_window_where_boundaries_are_a_tab(start, qt
     assert window.motions.width() <= port.width(), "no field is beyond the edge"
     # The panel in front stays that; where the user has moved a panel, the height changes nothing.
     docks["designs"].hide()
-    window.docks_.bring_to_front("method")
+    window.dock_manager.bring_to_front("method")
     window.resize(1280, 800)
     settled(qtbot, window)
     assert not docks["method"].visibleRegion().isEmpty()
@@ -276,7 +276,7 @@ def test_sides_follow_the_window_until_they_are_moved_also_after_a_restart(
 
 def tab_of(window, title):
     """Return the tab bar that has a panel, and where its tab is."""
-    for bar in window.docks_.tabs.bars():
+    for bar in window.dock_manager.tabs.bars():
         for index in range(bar.count()):
             if bar.tabText(index) == title:
                 return bar, bar.tabRect(index).center()
@@ -302,7 +302,7 @@ def test_a_panel_is_taken_out_of_its_tab_and_put_back(start, qtbot, monkeypatch)
     close(window, monkeypatch)
     again = start()
     assert again.docks["curves"].isFloating()
-    again.actions_.by_name["restore_layout"].trigger()
+    again.actions_table.by_name["restore_layout"].trigger()
     settled(qtbot, again)
     assert not again.docks["curves"].isFloating()
     assert not is_titled(again.docks["curves"])
@@ -321,7 +321,7 @@ def test_a_panel_without_a_tab_has_a_title_and_the_menu_of_a_tab_closes_it(start
     assert not is_titled(window.docks["histogram"])
     assert run_is_seen(window)
     window = start(SMALL)
-    menu = window.docks_.tabs.menu_of(window.docks["runs"])
+    menu = window.dock_manager.tabs.menu_of(window.docks["runs"])
     texts = {action.text(): action for action in menu.actions()}
     texts["Own window"].trigger()
     assert window.docks["runs"].isFloating()
@@ -344,7 +344,7 @@ def tabs(window):
     while time.monotonic() < end:
         app.processEvents()
         time.sleep(0.01)
-    inside = [bar for bar in window.docks_.tabs.bars() if window.rect().intersects(bar.geometry())]
+    inside = [bar for bar in window.dock_manager.tabs.bars() if window.rect().intersects(bar.geometry())]
     return sorted([bar.tabText(index) for index in range(bar.count())] for bar in inside)
 
 for _ in range(2):
@@ -353,7 +353,7 @@ for _ in range(2):
     print(tabs(window))
     window.docks["curves"].setFloating(True)
     tabs(window)
-    window.docks_.restore_layout()
+    window.dock_manager.restore_layout()
     print(tabs(window))
     window.close()
     window.deleteLater()
@@ -373,7 +373,7 @@ def test_no_tab_is_left_over_the_panels(tmp_path):
 
 def test_keys_go_from_panel_to_panel_behind_tabs_too(driver, sample_folder, qtbot):
     driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
-    window, docks = driver.window, driver.window.docks_
+    window, docks = driver.window, driver.window.dock_manager
     driver.activate()
     docks.bring_to_front("motion")
     for key, name in ((Qt.Key.Key_PageDown, "method"), (Qt.Key.Key_PageUp, "motion")):

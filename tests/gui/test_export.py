@@ -77,7 +77,7 @@ def test_the_usual_picture_is_white_without_clutter(opened, answers, tmp_path):
     asked = answers("ask_save", tmp_path / "out.png")
     opened.window.set_theme("dark")
     in_dialog(lambda _: True)
-    opened.window.actions_.by_name["save_picture"].trigger()
+    opened.window.actions_table.by_name["save_picture"].trigger()
     found, _ = pixels(tmp_path / "out.png")
     assert found.shape[:2] == (1000, 1600)
     assert (found[[0, 0, -1, -1], [0, -1, 0, -1]] == 255).all()
@@ -253,7 +253,7 @@ def film(ran):
 
 
 def test_a_film_needs_steps_and_the_menu_says_so(opened):
-    act = opened.window.actions_.by_name["export_film"]
+    act = opened.window.actions_table.by_name["export_film"]
     assert not act.isEnabled()
     assert "run the case first" in act.statusTip()
     opened.window.exports.make_film()
@@ -419,7 +419,7 @@ def test_a_preview_appears_in_pieces(opened, qtbot, monkeypatch):
         return False
 
     in_dialog(look)
-    opened.window.actions_.by_name["save_picture"].trigger()
+    opened.window.actions_table.by_name["save_picture"].trigger()
     assert ticks
 
 
@@ -436,7 +436,7 @@ def test_a_copy_while_the_preview_is_drawn_is_whole_and_so_is_the_preview(opened
         return False
 
     in_dialog(look)
-    opened.window.actions_.by_name["save_picture"].trigger()
+    opened.window.actions_table.by_name["save_picture"].trigger()
     copied, chosen = pictures
     assert (copied.width(), copied.height()) == tuple(chosen)
 
@@ -448,7 +448,7 @@ def test_quality_of_the_step_that_is_shown_as_csv(ran, answers, tmp_path):
     path = tmp_path / "q.csv"
     answers("ask_save", path)
     ran.window.store.change(changes.show_frame, 1)
-    ran.window.actions_.by_name["export_quality"].trigger()
+    ran.window.actions_table.by_name["export_quality"].trigger()
     ran.settle()
     rows = list(csv.DictReader(path.read_text().splitlines()))
     frame = ran.session.frames[1]
@@ -476,7 +476,7 @@ def test_a_cancelled_table_leaves_no_file(computed, tmp_path):
 def test_all_steps_are_saved_with_numbers(ran, answers, tmp_path):
     answers("ask_numbered", tmp_path / "s.su2")
     assert ran.session.unsaved_mesh
-    ran.window.actions_.by_name["export_steps"].trigger()
+    ran.window.actions_table.by_name["export_steps"].trigger()
     ran.settle()
     assert sorted(path.name for path in tmp_path.glob("s_*")) == ["s_1.su2", "s_2.su2"]
     assert np.array_equal(read(tmp_path / "s_2.su2").points, ran.session.frames[2].mesh.points)
@@ -538,7 +538,7 @@ def test_a_saved_mesh_that_no_longer_fits_another_zone_is_told(driver, answers, 
     path = zones(tmp_path)
     driver.open(path)
     assert driver.session.case.roles["BLOCK"] == "fixed"
-    panel = driver.window.docks_.panel(BoundariesPanel)
+    panel = driver.window.dock_manager.panel(BoundariesPanel)
     row = driver.session.mesh.marker_names.index("BLOCK")
     assert "interface with core of zone 2" in panel.table.item(row, 0).toolTip()
     assert "A guess: it is an interface" in panel.table.cellWidget(row, 2).toolTip()
@@ -588,12 +588,12 @@ def test_every_action_says_in_a_sentence_what_it_does_and_can_be_found_with_its_
         for act in every_action(top.menu()):
             if act.isEnabled():
                 assert act.statusTip().endswith("."), act.text()
-    for act in window.actions_.bar.actions():
+    for act in window.actions_table.bar.actions():
         if act.text():
             assert len(act.toolTip().split()) >= 3, act.text()
     window = opened.window
     window.store.change(changes.set_case, steps=3)
-    assert window.actions_.by_name["undo"].text() != "Undo"
+    assert window.actions_table.by_name["undo"].text() != "Undo"
     opened.activate()
     QTest.keyClick(window, Qt.Key.Key_F1)
     dialog = window.help._shown["shortcuts"]
@@ -602,10 +602,12 @@ def test_every_action_says_in_a_sentence_what_it_does_and_can_be_found_with_its_
     said = {(row.text(0), row.text(1)) for row in rows}
     assert {("Run", "F5"), ("Copy picture", "Ctrl+Shift+C"), ("Undo", "Ctrl+Z")} <= said
     keys = {row.text(1) for row in rows}
-    assert {one.shortcut().toString() for one in window.actions_.by_name.values()} - {""} <= keys
+    assert {one.shortcut().toString() for one in window.actions_table.by_name.values()} - {
+        ""
+    } <= keys
     # Those of the panels, which hold for the one that has the focus, are there, too.
     panels = {shortcut.key() for shortcut in window.findChildren(QShortcut)}
-    panels |= {act.shortcut() for act in window.motions.actions_.values()}
+    panels |= {act.shortcut() for act in window.motions.actions_table.values()}
     told = {key for row in rows for key in row.text(1).split(", ")}
     assert {key.toString() for key in panels} - {""} <= told
     dialog.search.setText("whole mesh fill")
@@ -654,7 +656,7 @@ def test_the_manual_is_read_and_searched(opened, monkeypatch):
 
 
 def test_case_keys_can_be_searched_and_there_are_details_for_a_report(opened):
-    opened.window.actions_.by_name["case_keys"].trigger()
+    opened.window.actions_table.by_name["case_keys"].trigger()
     dialog = opened.window.help._shown["keys"]
     dialog.search.setText("periodic_mode")
     assert dialog.text.textCursor().selectedText().lower() == "periodic_mode"
@@ -667,10 +669,10 @@ def test_case_keys_can_be_searched_and_there_are_details_for_a_report(opened):
             break  # only one
     assert dialog.text.textCursor().hasSelection()
     window, clipboard = opened.window, QApplication.clipboard()
-    window.actions_.by_name["about"].trigger()
+    window.actions_table.by_name["about"].trigger()
     window.help._shown["about"].copy.click()
     assert "numpy" in clipboard.text()
-    window.actions_.by_name["copy_details"].trigger()
+    window.actions_table.by_name["copy_details"].trigger()
     text = clipboard.text()
     mesh = opened.session.mesh
     assert f"2D, {len(mesh.cells)} cells" in text

@@ -261,8 +261,8 @@ def test_ctrl_z_and_ctrl_y_act_on_what_is_typed(driver, kind):
     edit.selectAll()
     QTest.keyClicks(box, "7")
     store.redo = store.undo = lambda: pytest.fail("the window was asked")
-    window.actions_.by_name["redo"].setEnabled(True)
-    window.actions_.by_name["undo"].setEnabled(True)
+    window.actions_table.by_name["redo"].setEnabled(True)
+    window.actions_table.by_name["undo"].setEnabled(True)
     QTest.keyClick(box, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     assert edit.text() != "7"
     QTest.keyClick(box, Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier)

@@ -23,9 +23,9 @@ def wheel(tmp_path_factory):
 @pytest.fixture
 def panel(window, driver, wheel):
     driver.open(wheel)
-    window.docks_.bring_to_front("sections")
+    window.dock_manager.bring_to_front("sections")
     QApplication.processEvents()
-    panel = window.docks_.panels["sections"]
+    panel = window.dock_manager.panels["sections"]
     driver.click(panel.add["cylinder"])
     panel.handle.click()
     window.view.snapshot()

@@ -38,7 +38,7 @@ def try_all_ways(driver):
     QTest.keyClick(at, Qt.Key.Key_F5)
     QTest.keyClick(at, Qt.Key.Key_R, Qt.KeyboardModifier.ControlModifier)
     driver.click(window.run_panel.run)
-    window.actions_.by_name["run"].trigger()
+    window.actions_table.by_name["run"].trigger()
     window.start_run()
     return len(driver.session.runs)
 
@@ -53,11 +53,11 @@ def test_no_run_starts_with_what_was_typed_before(blade):
         assert field.property("bad")
         assert told in window.run_panel.text.text()
         assert not window.run_panel.run.isEnabled()
-        assert not window.actions_.by_name["run"].isEnabled()
+        assert not window.actions_table.by_name["run"].isEnabled()
         assert try_all_ways(blade) == 0
         type_into(field, "4")
         assert window.run_panel.run.isEnabled()
-        assert window.actions_.by_name["run"].isEnabled()
+        assert window.actions_table.by_name["run"].isEnabled()
 
 
 def test_an_invalid_field_keeps_runs_from_starting_until_it_is_hidden_or_gone(
@@ -77,7 +77,7 @@ def test_an_invalid_field_keeps_runs_from_starting_until_it_is_hidden_or_gone(
     store.change(changes.add_motion, Rotate("airfoil", 3.0))
     assert (field.text(), blade.session.invalid) == ("3", ()), "another motion has its own number"
     store.undo()
-    window.docks_.bring_to_front("method")
+    window.dock_manager.bring_to_front("method")
     steps, count = window.method.steps, blade.session.case.steps
     type_into(steps.lineEdit(), "2.5")
     QTest.keyClick(steps, Qt.Key.Key_Tab)
@@ -90,7 +90,7 @@ def test_an_invalid_field_keeps_runs_from_starting_until_it_is_hidden_or_gone(
     assert not blade.session.invalid
     assert steps.value() == count
     assert not steps.fault
-    window.docks_.bring_to_front("motion")
+    window.dock_manager.bring_to_front("motion")
     blade.role("airfoil", "moving")
     store.change(changes.add_motion, Rotate("airfoil", 3.0))
     type_into(field, "3.3.3")

@@ -104,7 +104,7 @@ def test_the_tab_key_leaves_every_table_and_comes_around(opened):
         assert wanted <= seen
         assert not [at for at in seen if window.docks["method"].isAncestorOf(at)]
         seen.clear()
-    window.docks_.bring_to_front("method")
+    window.dock_manager.bring_to_front("method")
     window.boundaries.table.setFocus()
     for _ in range(9):
         QTest.keyClick(window.focusWidget(), Qt.Key.Key_Tab)
@@ -124,7 +124,7 @@ def test_focus_is_seen_wherever_the_tab_key_leads(opened, theme):
     window, reason, seen = opened.window, Qt.FocusReason.TabFocusReason, []
     window.set_theme(theme)
     for dock in ("runs", "histogram", "designs", "log"):
-        window.docks_.bring_to_front(dock)
+        window.dock_manager.bring_to_front(dock)
     window.boundaries.table.setFocus(reason)
     while (at := window.focusWidget()) not in seen:
         seen.append(at)
@@ -145,7 +145,7 @@ def test_focus_is_seen_wherever_the_tab_key_leads(opened, theme):
     assert window.motions.editor.vector.fields[0].hasFocus()
     window.store.change(changes.replace_motion, 0, Translate("airfoil", (0.01, 0.0)))
     assert window.run_panel.text.focusPolicy() == Qt.FocusPolicy.NoFocus
-    titles = [action.text() for action in window.actions_.menus["theme"].actions()]
+    titles = [action.text() for action in window.actions_table.menus["theme"].actions()]
     assert all("&" in title for title in titles)
 
 
@@ -295,11 +295,11 @@ def test_motions_are_duplicated_copied_and_pasted(opened):
 
 def test_the_menu_of_the_motions_offers_what_can_be_done_as_to_paste_from_a_case_file(opened):
     panel = opened.window.motions
-    able = {name: act.isEnabled() for name, act in panel.actions_.items()}
+    able = {name: act.isEnabled() for name, act in panel.actions_table.items()}
     assert able == dict.fromkeys(able, False) | {"paste": True}
     opened.window.store.change(changes.set_case, motions=(Translate("airfoil", (0.1, 0.0)),) * 2)
     panel.list.setCurrentRow(0)
-    able = {name for name, act in panel.actions_.items() if act.isEnabled()}
+    able = {name for name, act in panel.actions_table.items() if act.isEnabled()}
     assert able == {"duplicate", "copy", "paste", "later", "remove"}
     assert [act.text() for act in panel.list.actions()][:3] == ["Duplicate", "Copy", "Paste"]
     opened.window.store.change(changes.set_case, motions=())

@@ -59,9 +59,9 @@ def test_only_the_boundary_is_in_memory_and_what_needs_all_cells_says_so(stator,
     for name in ("save_mesh", "export_quality"):
         assert not actions[name].isEnabled()
         assert "stays in its file" in actions[name].toolTip().replace("\n", " ")
-    panel = stator.window.docks_.panels["sections"]
+    panel = stator.window.dock_manager.panels["sections"]
     assert not panel.picture.isEnabled()
-    display = stator.window.docks_.panels["display"]
+    display = stator.window.dock_manager.panels["display"]
     assert not display.only.isEnabled()
     assert "stays in its file" in display.only.toolTip().replace("\n", " ")
     stator.window.store.change(changes.set_view, threshold=(0.0, 0.5))
@@ -76,7 +76,7 @@ def test_only_the_boundary_is_in_memory_and_what_needs_all_cells_says_so(stator,
     assert not stator.window.runner.busy
     assert "is the mesh itself" in stator.window.banner.text.text()
     assert (folder / "mesh.su2b").read_bytes() == before
-    stator.window.actions_.by_name["designs"].trigger()
+    stator.window.actions_table.by_name["designs"].trigger()
     panel = stator.window.docks["designs"].findChild(DesignsPanel)
     assert "sweep it with `slideviz sweep`" in panel.said.label.text()
     assert not any(widget.isEnabled() for widget in (panel.rows.add, panel.load, panel.run))
@@ -131,8 +131,8 @@ def test_a_dragged_section_keeps_its_picture_until_the_next_is_read(stator):
 def test_worst_cells_are_listed_and_marked(stator, folder):
     found = quality(sv.read(folder / "mesh.su2b"))
     window = stator.window
-    window.docks_.bring_to_front("worst")
-    panel = window.docks_.panels["worst"]
+    window.dock_manager.bring_to_front("worst")
+    panel = window.dock_manager.panels["worst"]
     stator.qtbot.waitUntil(lambda: panel.model.worst is not None)
     worst = found.worst(3)
     shown = [int(panel.model.index(row, 0).data()) for row in range(3)]

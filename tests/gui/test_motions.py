@@ -280,8 +280,8 @@ def square_with_boxes():
 
 
 def test_boxes_can_be_drawn_where_there_are_some(driver, passage_file, tmp_path):
-    shown = driver.window.docks_.panels["display"].shown["ffd"]
-    action = driver.window.actions_.by_name["ffd"]
+    shown = driver.window.dock_manager.panels["display"].shown["ffd"]
+    action = driver.window.actions_table.by_name["ffd"]
     driver.open(passage_file)
     assert not shown.isEnabled()
     assert not action.isEnabled()

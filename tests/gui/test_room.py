@@ -101,7 +101,7 @@ def test_a_key_hides_every_panel_and_shows_them_again(driver, passage_file):
 
 def test_hidden_panels_are_there_in_the_next_window(driver, settings, qtbot):
     window = driver.window
-    window.docks_.toggle_all()
+    window.dock_manager.toggle_all()
     QTest.keyClick(window, Qt.Key.Key_F11)
     assert window.isFullScreen()
     window.close()

@@ -27,12 +27,12 @@ def ran(driver, with_runs):
     with_runs({"sliding": "ps", "steps": 2}, {"sliding": "ds", "steps": 3})
     window = driver.window
     window.docks["runs"].raise_()
-    driver.qtbot.waitUntil(lambda: window.docks_.panels["runs"].tree.isVisible())
+    driver.qtbot.waitUntil(lambda: window.dock_manager.panels["runs"].tree.isVisible())
     return driver
 
 
 def panel(driver):
-    return driver.window.docks_.panels["runs"]
+    return driver.window.dock_manager.panels["runs"]
 
 
 def row(driver, number):
@@ -163,7 +163,7 @@ def test_f2_gives_a_run_a_name(ran, qtbot):
     assert [run.name for run in ran.session.runs] == ["stiff blade", "other"]
     assert ran.window.viewing.titles[1].text.startswith("Run 2: other · direct sliding")
     ran.window.docks["histogram"].raise_()
-    canvas = ran.window.docks_.panels["histogram"].canvas
+    canvas = ran.window.dock_manager.panels["histogram"].canvas
     qtbot.waitUntil(lambda: "run 1: stiff blade" in legend_of(canvas))
 
 
@@ -259,7 +259,7 @@ def test_the_button_compares_with_the_undeformed_mesh_or_a_run(ran):
     assert title(ran, 2) not in texts, "a run is not compared with itself"
     open_and_choose(ran, button, "End the comparison")
     assert ran.session.view.beside is None
-    compare = ran.window.actions_.menus["compare"]
+    compare = ran.window.actions_table.menus["compare"]
     assert compare.isEnabled()
     compare.aboutToShow.emit()
     assert [act.text() for act in compare.actions()] == texts
@@ -309,7 +309,7 @@ def test_settings_are_put_back_and_undo_does_that_and_removing_a_run_again(ran):
     ran.click(panel(ran).buttons["settings"])
     assert (ran.session.case.sliding, ran.session.case.steps) == ("ps", 2)
     assert ran.window.method.sliding.currentData() == "ps"
-    ran.window.actions_.by_name["undo"].trigger()
+    ran.window.actions_table.by_name["undo"].trigger()
     assert (ran.session.case.sliding, ran.session.case.steps) == ("ds", 3)
     click(ran, 2)
     frames = ran.session.run(2).frames
@@ -317,8 +317,8 @@ def test_settings_are_put_back_and_undo_does_that_and_removing_a_run_again(ran):
     assert [run.number for run in ran.session.runs] == [1]
     said = ran.window.statusBar().currentMessage()
     assert said == "Run 2 removed (Ctrl+Z brings it back)"
-    assert "removing a run" in ran.window.actions_.by_name["undo"].text()
-    ran.window.actions_.by_name["undo"].trigger()
+    assert "removing a run" in ran.window.actions_table.by_name["undo"].text()
+    ran.window.actions_table.by_name["undo"].trigger()
     assert ran.session.run(2).frames is frames
     assert ran.session.shown == 2
     assert panel(ran).tree.topLevelItemCount() == 3
@@ -449,7 +449,7 @@ def test_moving_one_camera_moves_the_other_and_both_are_drawn(ran, leads):
         QTest.mouseMove(views[leads], QPoint(80 + 8 * step, 80 + 4 * step))
     QTest.mouseRelease(views[leads], left, pos=QPoint(120, 100))
     assert viewing.second_scene.camera.looks_like(viewing.scene.camera)
-    ran.window.actions_.by_name["fit"].trigger()
+    ran.window.actions_table.by_name["fit"].trigger()
     assert viewing.second_scene.camera.looks_like(viewing.scene.camera)
 
 
@@ -495,7 +495,7 @@ def test_look_from_and_rotation_of_a_solid_mesh_are_shared(driver, sample_folder
     viewing = compare(driver, changes.UNDEFORMED)
     assert viewing.titles[1].text == "Undeformed mesh"
     for side in ("+x", "-y", "iso"):
-        driver.window.actions_.by_name[f"side{side}"].trigger()
+        driver.window.actions_table.by_name[f"side{side}"].trigger()
         assert viewing.second_scene.camera.looks_like(viewing.scene.camera)
     driver.window.store.change(changes.set_view, perspective=True)
     assert not viewing.second.camera.parallel_projection
@@ -605,7 +605,7 @@ def test_the_support_radius_is_said_and_follows_the_settings_or_a_compared_run(r
         points = scene.plotter.actors["support:circles"].mapper.dataset.points
         return np.ptp(points, axis=0).max() / 2.0
 
-    window.actions_.by_name["support"].trigger()
+    window.actions_table.by_name["support"].trigger()
     assert "larger than the whole mesh" in bar.currentMessage()
     own = radius()
     extent = window.store.session.mesh.extent

@@ -19,7 +19,7 @@ from slideviz.samples.table import write_sample
 from slideviz.scene.pick import to_display
 from slideviz.sections.model import Section
 from slideviz.session import changes
-from slideviz.session.changes_view import followed
+from slideviz.session.changes_view import selection_after
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
@@ -32,9 +32,9 @@ def sections_may_be_lost(monkeypatch):
 @pytest.fixture
 def panel(window, driver, sample_folder):
     driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
-    window.docks_.bring_to_front("sections")
+    window.dock_manager.bring_to_front("sections")
     QApplication.processEvents()
-    return window.docks_.panels["sections"]
+    return window.dock_manager.panels["sections"]
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +139,7 @@ def test_numbers_are_typed_also_of_a_free_normal(window, driver, panel):
 def test_sections_are_added_by_keys_removed_by_delete_and_looked_at_along_their_normal(
     window, driver, panel
 ):
-    window.docks_.bring_to_front("boundaries")
+    window.dock_manager.bring_to_front("boundaries")
     QTest.keyClick(window, Qt.Key.Key_C)
     QTest.keyClick(window, Qt.Key.Key_C, Qt.KeyboardModifier.ShiftModifier)
     assert [section.kind for section in sections(window)] == ["plane", "cylinder"]
@@ -156,7 +156,7 @@ def test_sections_are_added_by_keys_removed_by_delete_and_looked_at_along_their_
 def test_in_2d_the_menu_offers_a_line_and_a_circle_whose_curve_is_saved(
     window, driver, flat_panel, answers, tmp_path
 ):
-    actions = window.actions_.by_name
+    actions = window.actions_table.by_name
     assert actions["add_plane"].text().replace("&", "") == "Cut by a line"
     assert actions["add_cylinder"].text().replace("&", "") == "Cut by a circle"
     QTest.keyClick(window, Qt.Key.Key_C, Qt.KeyboardModifier.ShiftModifier)
@@ -216,8 +216,8 @@ def test_several_are_listed_hidden_and_chosen(window, driver, panel):
 
 def test_an_unrolled_cylinder_follows_radius_and_step_and_goes(window, driver, wheel):
     driver.open(wheel)
-    window.docks_.bring_to_front("sections")
-    panel = window.docks_.panels["sections"]
+    window.dock_manager.bring_to_front("sections")
+    panel = window.dock_manager.panels["sections"]
     driver.click(panel.add["cylinder"])
     assert panel.flat.text() == "Unrolled"
     panel.flat.click()
@@ -252,7 +252,7 @@ def test_the_flat_view_comes_back_from_the_case_file(window, driver, panel, tmp_
     panel.flat.click()
     assert window.section_views.flat.scene.section.kind == "cylinder"
     answers("ask_save", tmp_path / "again.cfg")
-    window.actions_.by_name["save_case"].trigger()
+    window.actions_table.by_name["save_case"].trigger()
     assert "cut, unrolled)" in (tmp_path / "again.cfg").read_text()
     window.store.undo()
     assert window.section_views.flat is None
@@ -265,9 +265,9 @@ def test_the_flat_view_comes_back_from_the_case_file(window, driver, panel, tmp_
 @pytest.mark.usefixtures("painted")
 def test_a_cone_is_added_slid_typed_unrolled_and_kept(window, driver, wheel, tmp_path, answers):
     driver.open(wheel)
-    window.docks_.bring_to_front("sections")
-    panel = window.docks_.panels["sections"]
-    window.actions_.by_name["add_cone"].trigger()
+    window.dock_manager.bring_to_front("sections")
+    panel = window.dock_manager.panels["sections"]
+    window.actions_table.by_name["add_cone"].trigger()
     (cone,) = sections(window)
     assert panel.list.item(0).toolTip() == cone.describe()
     editor = panel.editor
@@ -297,7 +297,7 @@ def test_a_cone_is_added_slid_typed_unrolled_and_kept(window, driver, wheel, tmp
     assert low[1] == pytest.approx(-high[1], rel=0.1), "level, with a passage on each side"
     assert len(flat.scene._instances.drawn) == 2
     answers("ask_save", tmp_path / "again.cfg")
-    window.actions_.by_name["save_case"].trigger()
+    window.actions_table.by_name["save_case"].trigger()
     text = (tmp_path / "again.cfg").read_text()
     assert "(cone, 9.5, 0.0, 0.0, 1.0, 0.0, 0.0, -1.6, cut, unrolled)" in text
     kept = sections(window)
@@ -322,7 +322,7 @@ def test_a_cone_that_opens_backwards_has_no_axis_of_the_list_and_a_2d_mesh_offer
     assert panel.add["cone"].isVisible()
     driver.open(passage_file)
     assert not panel.add["cone"].isVisible()
-    action = window.actions_.by_name["add_cone"]
+    action = window.actions_table.by_name["add_cone"]
     assert not action.isVisible()
     assert not action.isEnabled()
 
@@ -564,7 +564,7 @@ def test_a_flat_view_of_a_3d_mesh_becomes_a_curve_with_a_2d_one(
     driver.click(panel.add["plane"])
     panel.flat.click()
     answers("ask_save", tmp_path / "again.cfg")
-    window.actions_.by_name["save_case"].trigger()
+    window.actions_table.by_name["save_case"].trigger()
     assert window.section_views.flat.objectName() == "curve_view"
     driver.open(tmp_path / "again.cfg")
     assert window.section_views.flat.objectName() == "curve_view"
@@ -574,9 +574,9 @@ def test_a_flat_view_of_a_3d_mesh_becomes_a_curve_with_a_2d_one(
 @pytest.fixture
 def flat_panel(window, driver, sample_folder):
     driver.open(sample_folder / "passage" / "passage.cfg")
-    window.docks_.bring_to_front("sections")
+    window.dock_manager.bring_to_front("sections")
     QApplication.processEvents()
-    return window.docks_.panels["sections"]
+    return window.dock_manager.panels["sections"]
 
 
 def drag_in_view(view, start, end):
@@ -794,7 +794,7 @@ A, B, C = (Section("plane", (x, 0.0, 0.0), (1.0, 0.0, 0.0)) for x in (0.0, 1.0, 
     ],
 )
 def test_the_chosen_section_stays_chosen(index, old, new, wanted):
-    assert followed(index, old, new) == wanted
+    assert selection_after(index, old, new) == wanted
 
 
 @pytest.mark.parametrize(

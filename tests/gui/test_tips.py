@@ -94,7 +94,7 @@ def test_words_explain_themselves_and_name_the_hovering(driver, passage_file, wi
         assert len(set(tips)) == choice.count()
         assert all(len(tip.split()) > 5 for tip in tips)
     driver.open(passage_file)
-    panels = driver.window.docks_.panels
+    panels = driver.window.dock_manager.panels
     assert panels["display"].reset_range.text() == "Reset"
     labels = {label.text() for label in panels["motion"].findChildren(QLabel)}
     assert "and by (length)" in labels
@@ -118,6 +118,6 @@ def test_the_status_bar_follows_a_run_and_the_log_keeps_its_warnings(
     assert said[-1].startswith("Done: ")
     told = [text for text in said if "tep 2" in text]
     assert told, said
-    log = window.docks_.panels["log"]
+    log = window.dock_manager.panels["log"]
     driver.qtbot.waitUntil(lambda: LONG.strip() in log.toPlainText())
     assert log.lineWrapMode() != log.LineWrapMode.NoWrap

@@ -10,7 +10,7 @@ import numba
 import pytest
 
 from slideviz.session import jit_warmup
-from slideviz.session.jobs import Doing
+from slideviz.session.jobs import JobProgress
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
@@ -67,7 +67,7 @@ def test_a_job_that_waits_for_compilation_says_so(window, qtbot, work):
     assert text.text() == "Reading a.su2"
     work.compile.set()
     qtbot.waitUntil(lambda: text.text() == "Reading a.su2 (compiling, once)")
-    window.run_panel.show_doing(Doing("Measuring the cells", 0.5))
+    window.run_panel.show_doing(JobProgress("Measuring the cells", 0.5))
     assert text.text() == "Measuring the cells (compiling, once)"
     work.end.set()
     qtbot.waitUntil(lambda: text.text() == "Measuring the cells")

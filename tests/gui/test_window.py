@@ -116,7 +116,7 @@ def test_dropping_a_file_opens_it_and_so_does_the_menu(driver, passage_file, ans
     assert not driver.window.view.acceptDrops(), "the view would read the file in its own way"
     other = Path(passage_file).rename(Path(passage_file).with_name("other.su2"))
     answers("ask_open", other)
-    driver.window.actions_.by_name["open"].trigger()
+    driver.window.actions_table.by_name["open"].trigger()
     driver.settle()
     assert driver.session.path == other
 
@@ -156,7 +156,7 @@ def test_zones_can_be_chosen(driver, tmp_path, passage_file):
     two = one.replace("airfoil", "vane")
     both.write_text(f"NZONE= 2\nIZONE= 1\n{one}\nIZONE= 2\n{two}\n")
     driver.open(both)
-    bar = driver.window.actions_.bar
+    bar = driver.window.actions_table.bar
     assert bar.zone_shown.isVisible()
     assert "airfoil" in driver.session.mesh.marker_names
     driver.choose(bar.zone, 2)
@@ -221,7 +221,7 @@ def test_a_click_in_the_view_selects_and_the_right_button_assigns_a_role_and_iso
     assert opened.session.view.selected == ("inflow",)
     trigger("Show only this")
     assert opened.session.view.hidden == set(mesh.marker_names) - {"inflow"}
-    window.actions_.by_name["show_all"].trigger()
+    window.actions_table.by_name["show_all"].trigger()
     assert not opened.session.view.hidden
     trigger("Hide")
     assert opened.session.view.hidden == {"inflow"}
@@ -756,7 +756,7 @@ def test_inverted_cells_are_told_in_red_with_what_would_help(ready):
     assert "38 inverted cells. What may help: " in banner.text.text()
     assert "inverted" in ended(run_)
     # From step 0, and from an order of one's own, too.
-    session, table = ready.session, ready.window.docks_.panels["worst"].table
+    session, table = ready.session, ready.window.dock_manager.panels["worst"].table
     table.sortByColumn(CELL, Qt.SortOrder.DescendingOrder)
     ready.window.store.change(changes.show_frame, 0)
     banner.answers["Show the worst"].click()
@@ -768,7 +768,7 @@ def test_inverted_cells_are_told_in_red_with_what_would_help(ready):
     assert panel.text.text() == "Done."
     assert not panel.text.property("bad")
     assert not banner.isVisible()
-    banner.tell("something else")
+    banner.show_message("something else")
     assert not banner.answers
 
 
@@ -783,7 +783,7 @@ def test_the_banner_is_not_about_a_run_that_is_no_longer_shown(ready):
     assert not window.banner.isVisible()
     # What it says of other things stays.
     window.store.change(changes.show_run, last)
-    window.banner.tell("something else")
+    window.banner.show_message("something else")
     window.store.change(changes.show_run, first)
     assert window.banner.isVisible()
 
@@ -842,14 +842,14 @@ def test_closing_while_running_ends_the_run(ready, answers):
 def test_the_mesh_is_saved_as_it_is_at_the_step_that_is_shown(ran, answers, tmp_path):
     ran.window.player.go(1)
     asked = answers("ask_save", tmp_path / "out.vtu")
-    ran.window.actions_.by_name["save_mesh"].trigger()
+    ran.window.actions_table.by_name["save_mesh"].trigger()
     ran.settle()
     assert asked[0][1].name == "passage_step1.su2"
     assert (tmp_path / "out.vtu").stat().st_size > 1000
     assert ran.session.unsaved_mesh, "the last step is not on disk"
     ran.window.player.go(3)
     asked = answers("ask_save", tmp_path / "out.su2")
-    ran.window.actions_.by_name["save_mesh"].trigger()
+    ran.window.actions_table.by_name["save_mesh"].trigger()
     ran.settle()
     assert asked[0][1].name == "passage_deformed.su2"
     saved = read(tmp_path / "out.su2")
@@ -865,7 +865,7 @@ def test_the_input_is_replaced_only_when_confirmed(opened, answers, passage_file
     answers("ask_save", Path(passage_file))
     for sure in (False, True):
         asked = answers("ask_overwrite_input", sure)
-        opened.window.actions_.by_name["save_mesh"].trigger()
+        opened.window.actions_table.by_name["save_mesh"].trigger()
         opened.settle()
         assert len(asked) == 1
         assert (Path(passage_file).read_bytes() != before) == sure
@@ -877,7 +877,7 @@ def test_a_case_is_saved_and_means_the_same(opened, answers, tmp_path):
     opened.choose(opened.window.method.sliding, "ps")
     assert opened.window.windowTitle().startswith("*")
     answers("ask_save", tmp_path / "a.cfg")
-    opened.window.actions_.by_name["save_case"].trigger()
+    opened.window.actions_table.by_name["save_case"].trigger()
     assert opened.window.windowTitle() == "a.cfg – slideviz"
     case = Case.read(tmp_path / "a.cfg")
     assert case.motions == (Rotate("airfoil", 4.0),)
@@ -896,7 +896,7 @@ def test_a_saved_view_is_shown_again_after_it_was_opened_in_a_narrower_window(
     camera.zoom_at(200, 200, 2.0)
     saved = camera.place
     answers("ask_save", tmp_path / "a.cfg")
-    window.actions_.by_name["save_case"].trigger()
+    window.actions_table.by_name["save_case"].trigger()
     window.resize(900, size.height())
     opened.qtbot.wait(50)
     opened.open(tmp_path / "a.cfg")
@@ -910,7 +910,7 @@ def test_nothing_is_asked_when_nothing_changed_or_a_case_cannot_be_written(
     opened, answers, tmp_path
 ):
     answers("ask_save", tmp_path / "no" / "a.cfg")
-    opened.window.actions_.by_name["save_case"].trigger()
+    opened.window.actions_table.by_name["save_case"].trigger()
     assert "a.cfg" in opened.window.banner.text.text()
     assert opened.window.close()
 
@@ -928,7 +928,7 @@ def test_a_picture_is_saved_at_the_size_asked_for(opened, answers, tmp_path, mon
 
     monkeypatch.setattr(PictureDialog, "exec", accept)
     answers("ask_save", tmp_path / "a.png")
-    opened.window.actions_.by_name["save_picture"].trigger()
+    opened.window.actions_table.by_name["save_picture"].trigger()
     with Image.open(tmp_path / "a.png") as image:
         assert image.size == (1280, 800)
         assert image.mode == "RGBA"
@@ -993,7 +993,7 @@ def test_colors_edges_and_ghosts_are_switched_from_the_tool_bar_and_undo_says_wh
     opened,
 ):
     window, said = opened.window, opened.window.statusBar().currentMessage
-    undo, redo = (window.actions_.by_name[name] for name in ("undo", "redo"))
+    undo, redo = (window.actions_table.by_name[name] for name in ("undo", "redo"))
     window.store.change(changes.set_view, edges=False)
     undo.trigger()
     assert said() == "Undone: mesh edges"
@@ -1001,7 +1001,7 @@ def test_colors_edges_and_ghosts_are_switched_from_the_tool_bar_and_undo_says_wh
     assert said() == "Done again: mesh edges"
     keys = {keys.toString() for keys in redo.shortcuts()}
     assert {"Ctrl+Shift+Z", "Ctrl+Y"} <= keys
-    bar = opened.window.actions_
+    bar = opened.window.actions_table
     opened.choose(bar.bar.color, "skew")
     assert opened.session.view.color_by == "skew"
     for name in ("edges", "undeformed", "motion_ghost", "legend"):
@@ -1023,7 +1023,7 @@ def test_what_moves_fills_the_view_or_what_is_selected_and_the_wheel_zooms_about
     for key in (Qt.Key.Key_W, Qt.Key.Key_S, Qt.Key.Key_R):
         QTest.keyClick(opened.window.view, key)
     assert np.array_equal(opened.window.view.snapshot(), before)
-    window, fit = opened.window, opened.window.actions_.by_name["fit_boundary"]
+    window, fit = opened.window, opened.window.actions_table.by_name["fit_boundary"]
     whole = window.view.camera.parallel_scale
     QTest.keyClick(window, Qt.Key.Key_F, Qt.KeyboardModifier.ShiftModifier)
     moving = window.view.camera.parallel_scale
@@ -1039,7 +1039,7 @@ def test_what_moves_fills_the_view_or_what_is_selected_and_the_wheel_zooms_about
 def test_themes_change_the_view_and_are_remembered(opened, settings):
     opened.window.set_theme("light")
     light = opened.window.view.snapshot()[-5, 5].mean()
-    opened.window.actions_.by_name["theme_dark"].trigger()
+    opened.window.actions_table.by_name["theme_dark"].trigger()
     assert opened.window.view.snapshot()[-5, 5].mean() < light - 100
     assert settings.value("theme") == "dark"
 
@@ -1051,7 +1051,7 @@ def test_all_panels_fit_1280_x_800_and_links_lead_to_them(ready):
     assert (window.width(), window.height()) == (1280, 800)
     for name in ("motion", "method"):
         window.docks[name].raise_()
-        panel = window.docks_.panels[name]
+        panel = window.dock_manager.panels[name]
         ready.qtbot.waitUntil(lambda panel=panel: not panel.visibleRegion().isEmpty())
         assert panel.height() >= panel.minimumSizeHint().height()
         assert panel.width() >= panel.minimumSizeHint().width()

@@ -4,7 +4,7 @@ import pytest
 
 from slideviz.errors import Cancelled, DeformError
 from slideviz.gui.responsiveness.worker import JobRunner
-from slideviz.session.jobs import Doing
+from slideviz.session.jobs import JobProgress
 
 
 @pytest.fixture
@@ -48,7 +48,7 @@ def test_every_kept_item_is_delivered_before_the_end_and_only_the_newest_news(ru
 
     def job(report, stopped):
         for i in range(500):
-            report(Doing(str(i), i / 500))
+            report(JobProgress(str(i), i / 500))
             report(i)
 
     runner.start(job)

@@ -275,8 +275,8 @@ def middle(driver, cell):
 
 def test_a_click_in_the_list_brings_the_cell_into_the_middle_and_back(opened):
     window = opened.window
-    window.docks_.bring_to_front("worst")
-    panel = window.docks_.panels["worst"]
+    window.dock_manager.bring_to_front("worst")
+    panel = window.dock_manager.panels["worst"]
     opened.qtbot.waitUntil(lambda: panel.model.rowCount() > 0 and panel.isVisible())
     before = window.scene.camera.place
     click(panel, 2)
@@ -289,8 +289,8 @@ def test_a_click_in_the_list_brings_the_cell_into_the_middle_and_back(opened):
 
 def test_an_export_that_fails_is_told_in_the_window(opened, tmp_path, answers):
     window = opened.window
-    window.docks_.bring_to_front("worst")
-    panel = window.docks_.panels["worst"]
+    window.dock_manager.bring_to_front("worst")
+    panel = window.dock_manager.panels["worst"]
     answers("ask_save", tmp_path / "none" / "worst.csv")
     opened.click(panel.export)
     assert "the folder does not exist" in window.banner.text.text()
@@ -366,21 +366,21 @@ def test_panels_behind_another_tab_do_nothing_until_they_are_in_front(opened, mo
             return real(*values)
 
         monkeypatch.setattr(module, name, told)
-    panel = window.docks_.panels["worst"]
-    window.docks_.bring_to_front("curves")
+    panel = window.dock_manager.panels["worst"]
+    window.dock_manager.bring_to_front("curves")
     opened.qtbot.wait(50)
     asked.clear()
     for frame in (0, 1):
         window.store.change(changes.show_frame, frame)
     opened.qtbot.wait(50)
     assert asked == []
-    window.docks_.bring_to_front("worst")
+    window.dock_manager.bring_to_front("worst")
     opened.qtbot.waitUntil(lambda: "worst_cells" in asked)
     wanted = worst_cells(opened.session.frames, 1, "size-skew").cells.tolist()
     assert cells(panel) == wanted
-    window.docks_.bring_to_front("histogram")
+    window.dock_manager.bring_to_front("histogram")
     opened.qtbot.waitUntil(lambda: "distribution" in asked)
-    words = window.docks_.panels["histogram"].numbers
+    words = window.dock_manager.panels["histogram"].numbers
     low = f"{opened.session.frame.quality.min:.4g}"
     opened.qtbot.waitUntil(lambda: low in words.text())
 

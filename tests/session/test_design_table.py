@@ -14,7 +14,7 @@ from slideviz.samples.table import sample
 from slideviz.session import design_table
 from slideviz.session.design_files import read_results, read_table, write_results
 from slideviz.session.design_table import DesignTable, column_choices, values_of
-from slideviz.session.jobs import Doing
+from slideviz.session.jobs import JobProgress
 from slideviz.session.jobs_designs import run_designs
 
 
@@ -139,7 +139,7 @@ def test_only_what_has_no_result_is_run(passage, monkeypatch):
     run_designs(passage.case, passage.mesh, table, told.append, lambda: False)
     rows = [one for one in told if isinstance(one, DesignRow)]
     assert sorted((row.design, row.steps) for row in rows) == [(1, 1), (3, 3)]
-    news = [one for one in told if isinstance(one, Doing)]
+    news = [one for one in told if isinstance(one, JobProgress)]
     assert news[-1].fraction == 1.0
     assert news[-1].text == "3 of 3, 0 s left"
 

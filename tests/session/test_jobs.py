@@ -46,7 +46,7 @@ def test_computing_reports_every_step_with_its_quality(kept_passage):
     frames = [item for item in heard if isinstance(item, StepFrame)]
     assert [frame.step.index for frame in frames] == [1, 2, 3]
     assert frames[-1].quality.min < 1.0
-    fractions = [item.fraction for item in heard if isinstance(item, jobs.Doing)]
+    fractions = [item.fraction for item in heard if isinstance(item, jobs.JobProgress)]
     assert all(0.0 <= fraction <= 1.0 for fraction in fractions)
     assert fractions == sorted(fractions)
 
@@ -57,10 +57,10 @@ def test_automatic_steps_tell_what_is_tried_and_claim_no_fraction(kept_passage):
     jobs.compute(case, read(case.mesh_file), heard.append, never)
     frames = [item for item in heard if isinstance(item, StepFrame)]
     assert len(frames) == frames[-1].step.total
-    texts = [item.text for item in heard if isinstance(item, jobs.Doing)]
+    texts = [item.text for item in heard if isinstance(item, jobs.JobProgress)]
     assert any(text.startswith("Trying 1 step: step 1, ") for text in texts)
     assert any(text.startswith("Trying 2 steps: step 2, ") for text in texts)
-    trying = [i for i in heard if isinstance(i, jobs.Doing) and i.text.startswith("Trying")]
+    trying = [i for i in heard if isinstance(i, jobs.JobProgress) and i.text.startswith("Trying")]
     assert {doing.fraction for doing in trying} == {None}
 
 

@@ -13,7 +13,7 @@ from slideviz.case.view_keys import read_sections, write_sections
 from slideviz.errors import CaseError
 from slideviz.sections.model import Section
 from slideviz.session import changes
-from slideviz.session.keep import keep_view, kept_camera, kept_view
+from slideviz.session.keep import camera_from_case, view_from_case, view_to_case
 from slideviz.session.state import ViewState
 from slideviz.terms import COLOR_BY, COLOR_MAPS, POINTS_SHOWN, SHOWN
 
@@ -52,27 +52,27 @@ views = st.builds(
 def test_a_view_comes_back_from_the_file(session, tmp_path_factory, view):
     file = tmp_path_factory.mktemp("keep") / "a.cfg"
     camera = (1.0, 2.0, 3.0, 0.0, 0.0, 0.1, 0.0, 1.0, 0.0, 0.7)
-    kept = keep_view(replace(session, view=view), camera)
+    kept = view_to_case(replace(session, view=view), camera)
     kept.change(source=file).write(file)
     again = Case.read(file)
-    assert kept_view(again, ViewState(), session.mesh.marker_names) == view
-    assert kept_camera(again) == camera
+    assert view_from_case(again, ViewState(), session.mesh.marker_names) == view
+    assert camera_from_case(again) == camera
 
 
 def test_a_fresh_view_needs_no_key(session):
-    assert keep_view(session).view == {}
-    assert kept_camera(keep_view(session)) is None
+    assert view_to_case(session).view == {}
+    assert camera_from_case(view_to_case(session)) is None
 
 
 def test_a_view_is_no_setting_of_the_run(session):
     session = changes.add_frames(changes.start_run(session), [session.first])
-    case = keep_view(changes.set_view(session, color_by="skew"))
+    case = view_to_case(changes.set_view(session, color_by="skew"))
     assert not changes.set_case(session, view=case.view).outdated
 
 
 def test_hidden_boundaries_of_another_mesh_are_passed_by():
     case = Case(view={"VIEW_HIDDEN": ("gone", "left")})
-    assert kept_view(case, ViewState(), ("left", "top")).hidden == {"left"}
+    assert view_from_case(case, ViewState(), ("left", "top")).hidden == {"left"}
 
 
 def test_sections_are_read_as_written():

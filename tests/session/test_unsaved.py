@@ -8,7 +8,7 @@ import pytest
 from slideviz.mesh.quality import quality
 from slideviz.sections.model import Section
 from slideviz.session import changes
-from slideviz.session.keep import keep_view
+from slideviz.session.keep import view_to_case
 from slideviz.session.state import Run, StepFrame
 from slideviz.session.unsaved import Unsaved, title_of
 
@@ -120,7 +120,7 @@ def test_sections_are_part_of_what_a_case_keeps(session):
     assert not Unsaved.of(hidden, busy=False).lost
     assert Unsaved.of(changes.set_view(written, sections=()), busy=False).can_save == ["case"]
     # A case that is opened with sections has them.
-    kept = keep_view(written)
+    kept = view_to_case(written)
     again = changes.open_mesh(session.first, None, (), kept)
     assert len(again.view.sections) == 1
     assert not Unsaved.of(again, busy=False).lost

@@ -12,7 +12,7 @@ from slideviz.mesh.quality import quality
 from slideviz.session import changes
 from slideviz.session.changes_view import UNDO_WORDS
 from slideviz.session.state import Session, StepFrame, ViewState
-from slideviz.session.store import TOGETHER_S, Memento, Store
+from slideviz.session.store import TOGETHER_S, Store, UndoState
 from slideviz.session.undoable import undo_words
 from slideviz.terms import COLOR_BY, ROLES, SHOWN
 
@@ -330,7 +330,7 @@ def test_any_intents_keep_the_session_valid_and_undoing_all_gives_the_first_back
         require_valid(store.session)
     # But for what the view is colored by.
     back = changes.set_view(store.session, color_by=session.view.color_by)
-    assert Memento.of(back) == Memento.of(session)
+    assert UndoState.of(back) == UndoState.of(session)
     while store.can_redo:
         store.redo()
         require_valid(store.session)

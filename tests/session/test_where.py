@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 from slideviz.mesh.model import Cells, Marker, Mesh
-from slideviz.session.locate import Around, coordinates, decimals, nearest_boundary
+from slideviz.session.locate import RotationAxis, coordinates, decimals, nearest_boundary
 
 
 def test_places_are_told_about_an_axis():
     at = np.array([[3.0, 4.0, 7.0], [1.0, -2.0, 0.0]])
-    names, values = coordinates(at, Around((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
+    names, values = coordinates(at, RotationAxis((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
     assert names == ("r", "\u03b8 [°]", "z")
     assert np.allclose(values[0], (20.0**0.5, np.degrees(np.arctan2(4, 2)), 7.0))
     assert np.allclose(values[1], (2.0, -90.0, 0.0))
-    names, values = coordinates(at[:, :2], Around((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)))
+    names, values = coordinates(at[:, :2], RotationAxis((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)))
     assert (names, values.shape) == (("r", "\u03b8 [°]"), (2, 2))
-    assert coordinates(at, Around((0.0, 1.0, 1.0), (0.0, 0.0, 0.0)))[0][2] == "axial"
+    assert coordinates(at, RotationAxis((0.0, 1.0, 1.0), (0.0, 0.0, 0.0)))[0][2] == "axial"
     names, values = coordinates(at, None)
     assert names == ("x", "y", "z")
     assert values is at

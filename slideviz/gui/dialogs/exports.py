@@ -76,7 +76,7 @@ class Exports(QObject):
                 else:
                     renderer.write(options, path)
         except (OSError, SlidevizError) as error:
-            self.window.banner.tell_error(error)
+            self.window.banner.show_error(error)
             return
         self._written(path)
 
@@ -117,7 +117,7 @@ class Exports(QObject):
         dialog = FilmDialog(self.window, self._renderer(), self._ask_film)
         self.film = dialog
         dialog.made.connect(self._written)
-        dialog.failed.connect(self.window.banner.tell_error)
+        dialog.failed.connect(self.window.banner.show_error)
         dialog.stopped.connect(lambda: self.window.say("The film was stopped; no file is left"))
         dialog.finished.connect(self._film_closed)
         dialog.show()

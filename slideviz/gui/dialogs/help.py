@@ -22,8 +22,8 @@ from qtpy.QtWidgets import (
 
 from slideviz.gui.commands import MENUS
 from slideviz.gui.widgets.build import dialog_buttons, hint_label, in_column, in_row
-from slideviz.gui.widgets.command import Now
-from slideviz.gui.widgets.faults import versions
+from slideviz.gui.widgets.command import CommandState
+from slideviz.gui.widgets.error_reporter import versions
 from slideviz.gui.widgets.icons import logo
 from slideviz.gui.widgets.labels import fixed_font
 from slideviz.gui.widgets.services import Services
@@ -89,7 +89,9 @@ class Help(QObject):
 
         folder = manual_folder()
         if folder is None:
-            self.window.banner.tell("The manual was not installed with this copy of slideviz.")
+            self.window.banner.show_message(
+                "The manual was not installed with this copy of slideviz."
+            )
             return
         self._show("manual", lambda: ManualDialog(self.window, folder))
 
@@ -241,8 +243,8 @@ def _search_field(words: str) -> QLineEdit:
 
 def shortcut_rows(window: Services) -> list[tuple[str, list[tuple[str, str, str]]]]:
     """Return per menu its title, and title, first key and tip of each command that has a key."""
-    # A plain `Now`: no title such as “Undo role”.
-    now, native = Now(window.store.session), QKeySequence.SequenceFormat.NativeText
+    # A plain `CommandState`: no title such as “Undo role”.
+    now, native = CommandState(window.store.session), QKeySequence.SequenceFormat.NativeText
     rows = {
         menu.title: [
             (_plain(one.called(now)), QKeySequence(one.keys[0]).toString(native), one.tip)
@@ -273,7 +275,7 @@ def details(window: Services) -> str:
             f"sliding {case.sliding}, periodic {case.periodic}, steps {case.steps or 'automatic'}",
             f"runs: {len(session.runs)}, steps shown: {max(len(session.frames) - 1, 0)}",
         ]
-    log = window.docks_.panels["log"]
+    log = window.dock_manager.panels["log"]
     assert isinstance(log, QPlainTextEdit)
     messages = log.toPlainText().splitlines()[-LOG_LINES:]
     return "\n".join([*lines, "", "last messages:", *(messages or ["(none)"]), ""])

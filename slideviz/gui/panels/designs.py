@@ -191,7 +191,7 @@ class DesignsPanel(Panel):
             self._say(f"{first} (and {len(more)} more)" if more else first, wrong=True)
             if more:
                 self._mistakes = str(error)
-                self.services.banner.tell_error(error)
+                self.services.banner.show_error(error)
             return
         self._say(counted(len(table.rows), "design") if table.rows else "")
         if (table.columns, table.rows) != (self.table.columns, self.table.rows):

@@ -13,7 +13,7 @@ from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.mesh.model import Mesh
 from slideviz.session.design_table import DesignTable
-from slideviz.session.jobs import Doing
+from slideviz.session.jobs import JobProgress
 from slideviz.session.jobs_designs import run_designs
 
 
@@ -53,7 +53,7 @@ class DesignsJob(QObject):
         """Run the designs of a table that have no result."""
         self.runner.start(run_designs, case, mesh, table)
 
-    def _doing(self, doing: Doing) -> None:
+    def _doing(self, doing: JobProgress) -> None:
         self._news, self._fraction = doing.text, doing.fraction or 0.0
         if not self._soon.isActive():
             self._soon.start()

@@ -23,7 +23,7 @@ from slideviz.gui.widgets.build import (
     push_button,
 )
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.command import Now
+from slideviz.gui.widgets.command import CommandState
 from slideviz.gui.widgets.fields import NumberBox, NumberField, number_text
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel
@@ -257,7 +257,7 @@ class DisplayPanel(Panel):
         self._sync_passages(session, self._period.of(session) if opened else None)
         for name, box in self.shown.items():
             box.setChecked(name in view.drawn)
-            able, term = COMMANDS[name].enabled(Now(session)), SHOWN[name]
+            able, term = COMMANDS[name].enabled(CommandState(session)), SHOWN[name]
             box.setEnabled(able)
             box.setToolTip(wrapped(term.why_not if opened and not able else term.tip))
 

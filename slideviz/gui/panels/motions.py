@@ -61,7 +61,7 @@ class MotionPanel(Panel):
         elide_items(self.list)
         self.list.currentRowChanged.connect(lambda _: self._row_changed())
         self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
-        self.list.addActions(list(self.actions_.values()))
+        self.list.addActions(list(self.actions_table.values()))
         self.editor = MotionEditor()
         self.editor.changed.connect(self._edited)
         self.editor.table_wanted.connect(self.edit_table)
@@ -84,7 +84,7 @@ class MotionPanel(Panel):
 
     def _make_actions(self) -> Iterator[QToolButton]:
         """Make the actions of the list's menu, and yield a button for each that has an icon."""
-        self.actions_: dict[str, QAction] = {}
+        self.actions_table: dict[str, QAction] = {}
         for name, text, keys, function, image, tip in (
             ("duplicate", "Duplicate", "Ctrl+D", self._duplicate, "", ""),
             ("copy", "Copy", "Ctrl+C", self._copy, "", ""),
@@ -93,7 +93,7 @@ class MotionPanel(Panel):
             ("later", "Perform it later", "Ctrl+Down", lambda: self._move(1), "down", ""),
             ("remove", "Remove", "Del", self._remove, "remove", "Remove the motion (Del)"),
         ):
-            act = self.actions_[name] = QAction(text, self)
+            act = self.actions_table[name] = QAction(text, self)
             act.setShortcut(QKeySequence(keys))
             # The keys work while the list has the focus.
             act.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
@@ -165,7 +165,7 @@ class MotionPanel(Panel):
             ("later", 0 <= row < count - 1),
             ("remove", row >= 0),
         ):
-            self.actions_[name].setEnabled(able)
+            self.actions_table[name].setEnabled(able)
         self.add.setEnabled(bool(moving))
         if session.mesh is None:
             why = "Open a mesh first."
@@ -225,7 +225,7 @@ class MotionPanel(Panel):
         try:
             QApplication.clipboard().setText(write_motions((motion,)))
         except SlidevizError as error:
-            main_window(self).banner.tell_error(error)
+            main_window(self).banner.show_error(error)
 
     def _paste(self) -> None:
         """Add the motions in the clipboard, as written in a case file, below the selected one."""
@@ -235,7 +235,7 @@ class MotionPanel(Panel):
             motions = read_motions(QApplication.clipboard().text().replace("\\\n", " "))
         except SlidevizError as error:
             said = SlidevizError(f"What was copied is no motion: {error}")
-            main_window(self).banner.tell_error(said)
+            main_window(self).banner.show_error(said)
             return
         for motion in motions:
             fits = set(named(motion.marker)) <= set(moving)
@@ -273,7 +273,7 @@ class MotionPanel(Panel):
             rows = TableRows.on(mesh, case, marker)
             return ask_table(self.window(), rows, path, default)
         except SlidevizError as error:
-            main_window(self).banner.tell_error(error)
+            main_window(self).banner.show_error(error)
             return None
 
     def _edited(self, motion: object) -> None:

@@ -17,7 +17,7 @@ from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window
 from slideviz.session import changes
 from slideviz.session.changes import run_requirements
-from slideviz.session.jobs import Doing
+from slideviz.session.jobs import JobProgress
 from slideviz.session.run_messages import (
     Requirement,
     ended,
@@ -152,7 +152,7 @@ class RunPanel(Panel):
             run = self.store.session.run_shown
             if run is not None:
                 text = "\n".join(f"Note: {note}" for note in notes_of(run))
-                main_window(self).banner.tell(text)
+                main_window(self).banner.show_message(text)
         elif target == SETTINGS:
             self.store.change(changes.take_settings, self.store.session.shown)
         else:
@@ -176,7 +176,7 @@ class RunPanel(Panel):
             self.text.setToolTip("")
         self.sync(self.store.session)
 
-    def show_doing(self, doing: Doing) -> None:
+    def show_doing(self, doing: JobProgress) -> None:
         """Show the progress of the job."""
         if not self._busy:
             return

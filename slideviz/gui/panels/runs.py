@@ -30,10 +30,10 @@ class RunsPanel(Panel):
         self._drawn: tuple[object, ...] = ()
         self.empty = hint_label(EMPTY, Qt.AlignmentFlag.AlignTop)
         self.tree = RunTree()
-        self.actions_ = RunActions(self, self.tree, store)
-        self.buttons = self.actions_.buttons
+        self.actions_table = RunActions(self, self.tree, store)
+        self.buttons = self.actions_table.buttons
         self._connect()
-        parts = (self.empty, self.tree, self.actions_.row)
+        parts = (self.empty, self.tree, self.actions_table.row)
         in_column(*parts, wide=parts[:2], spacing=4, on=self, margins=(6, 6, 6, 4))
         self.follow()
 
@@ -41,7 +41,7 @@ class RunsPanel(Panel):
         self.tree.session = lambda: self.store.session
         self.tree.currentItemChanged.connect(self._chosen)
         self.tree.itemDoubleClicked.connect(lambda *_: self._double_clicked())
-        self.tree.beside_wanted.connect(self.actions_.show_beside)
+        self.tree.beside_wanted.connect(self.actions_table.show_beside)
         self.tree.renamed.connect(
             lambda number, name: self.store.change(changes.rename_run, number, name)
         )
@@ -65,7 +65,7 @@ class RunsPanel(Panel):
             self._select(session)
         self.empty.setVisible(not session.runs)
         self.tree.setVisible(bool(session.runs))
-        self.actions_.sync(session)
+        self.actions_table.sync(session)
 
     def _select(self, session: Session) -> None:
         """Select the row of the shown run, or that of the undeformed mesh at its step 0."""
@@ -128,7 +128,7 @@ class RunsPanel(Panel):
 
     def _chosen(self, item: QTreeWidgetItem | None, _before: object = None) -> None:
         if item is not None:
-            self.actions_.show(item.data(RUN, NUMBER))
+            self.actions_table.show(item.data(RUN, NUMBER))
 
     def _double_clicked(self) -> None:
         """Show the run beside the one shown before the double click, or end that comparison."""
@@ -150,4 +150,4 @@ class RunsPanel(Panel):
 
     def menu(self, number: int) -> QMenu:
         """Return the menu of a run."""
-        return self.actions_.menu(number)
+        return self.actions_table.menu(number)

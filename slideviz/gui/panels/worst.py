@@ -30,7 +30,7 @@ from slideviz.session.inspect import (
     worst_cells,
     write_table,
 )
-from slideviz.session.locate import Around, axis_of, coordinates, nearest_boundary
+from slideviz.session.locate import RotationAxis, axis_of, coordinates, nearest_boundary
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.terms import COLOR_BY
@@ -252,7 +252,7 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
     return "<br>".join(lines)
 
 
-def _place_text(position: FloatArray, around: Around | None) -> str:
+def _place_text(position: FloatArray, around: RotationAxis | None) -> str:
     names, values = coordinates(position[None], around)
     return "&nbsp; ".join(
         f"{name.removesuffix(' [°]')} {value:.7g}{'°' if '°' in name else ''}"

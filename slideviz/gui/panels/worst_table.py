@@ -15,7 +15,7 @@ from slideviz.gui.widgets.labels import ModelIndex
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
 from slideviz.session.inspect import WorstCells
-from slideviz.session.locate import Around, coordinates, decimals
+from slideviz.session.locate import RotationAxis, coordinates, decimals
 
 SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
 """Short names of cell types."""
@@ -106,7 +106,7 @@ class WorstModel(QAbstractTableModel):
         self.order = np.empty(0, np.int64)
         self._by, self._down = QUALITY, False
 
-    def show(self, worst: WorstCells | None, around: Around | None = None) -> None:
+    def show(self, worst: WorstCells | None, around: RotationAxis | None = None) -> None:
         """Show other worst cells, in cylindrical coordinates about an axis if one is given."""
         self.beginResetModel()
         self.worst = worst

@@ -11,7 +11,7 @@ from qtpy.QtCore import QObject, Signal
 from slideviz.gui.responsiveness.settings import TURN_MS
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.worker import JobRunner
-from slideviz.session.jobs import require_going
+from slideviz.session.jobs import raise_if_cancelled
 from slideviz.session.pieces import Beside
 
 
@@ -94,4 +94,4 @@ def raise_again(error: Exception) -> None:
 
 
 def _call(piece: Beside, _report: object, stopped: Callable[[], bool]) -> Any:
-    return piece.call(partial(require_going, stopped))
+    return piece.call(partial(raise_if_cancelled, stopped))

@@ -1,7 +1,7 @@
 """Run long jobs in a thread, one at a time, each ending with exactly one signal.
 
 The object with the signals lives in the GUI thread, so that every slot runs there; the job itself
-runs in its thread and never uses Qt or VTK. Its reports go through a mailbox: of `Doing` only the
+runs in its thread and never uses Qt or VTK. Its reports go through a mailbox: of `JobProgress` only the
 newest is delivered, everything else in full.
 """
 
@@ -20,7 +20,7 @@ from qtpy.QtCore import QObject, Qt, QTimer, Signal
 from slideviz.errors import Cancelled
 from slideviz.gui.responsiveness.settings import CLOSING_S, NEWS_S
 from slideviz.gui.responsiveness.threads import start_thread
-from slideviz.session.jobs import Doing
+from slideviz.session.jobs import JobProgress
 
 log = logging.getLogger("slideviz")
 
@@ -53,7 +53,7 @@ class JobRunner(QObject):
         self._thread: Thread | None = None
         self._lock = Lock()
         self._stop = Event()
-        self._news: Doing | None = None
+        self._news: JobProgress | None = None
         self._delivered_s = float("-inf")
         self._items: list[object] = []
         self._end: tuple[str, Any] | None = None
@@ -102,7 +102,7 @@ class JobRunner(QObject):
 
     def _report(self, item: object) -> None:
         with self._lock:
-            if isinstance(item, Doing):
+            if isinstance(item, JobProgress):
                 self._news = item
             else:
                 self._items.append(item)

@@ -29,7 +29,7 @@ from slideviz.gui.widgets.build import (
     set_style,
     tool_button,
 )
-from slideviz.gui.widgets.faults import details_of
+from slideviz.gui.widgets.error_reporter import details_of
 from slideviz.gui.widgets.labels import rich_label
 
 MOST_LINES = 4
@@ -89,7 +89,7 @@ class Banner(QFrame):
         self._later: Callable[[], object] | None = None
         self.hide()
 
-    def tell(
+    def show_message(
         self, text: str, full: str = "", calm: bool = True, answers: Answers = NO_ANSWERS
     ) -> None:
         """Show a message, with ``full`` behind “Details”, and a button for each of ``answers``.
@@ -109,14 +109,14 @@ class Banner(QFrame):
         self.show()
         self.shown.emit(text)
 
-    def tell_error(self, error: BaseException) -> None:
+    def show_error(self, error: BaseException) -> None:
         """Show the message of an error; of an unexpected one, the trace is behind “Details”."""
         if isinstance(error, SlidevizError):
-            self.tell(str(error), calm=False)
+            self.show_message(str(error), calm=False)
         else:
             kind = type(error).__name__
             text = f"Something unexpected went wrong ({kind}): {error}"
-            self.tell(text, details_of(error), calm=False)
+            self.show_message(text, details_of(error), calm=False)
 
     def withdraw(self, text: str) -> None:
         """Hide the banner if it still shows this message."""
@@ -135,7 +135,7 @@ class Banner(QFrame):
         ``later`` is called if the user closes the question instead.
         """
         self._later = later
-        self.tell(text, full, answers=answers)
+        self.show_message(text, full, answers=answers)
 
     def _offer(self, answers: Answers) -> None:
         """Replace the buttons by one for each answer."""

@@ -42,9 +42,9 @@ class Command:
     image : str
         The name of its icon.
     enabled, checked : callable
-        Return whether it is enabled and, of a toggle, whether it is on, given the window's `Now`.
+        Return whether it is enabled and, of a toggle, whether it is on, given the window's `CommandState`.
     title_now : callable, optional
-        Returns its present title, given the `Now`; an empty one hides it in the menu.
+        Returns its present title, given the `CommandState`; an empty one hides it in the menu.
     tip_now : callable, optional
         Returns a tooltip to be shown instead of ``tip``, or an empty text; for a disabled command,
         why it is disabled.
@@ -61,14 +61,14 @@ class Command:
     keys: tuple[Keys, ...] = ()
     image: str = ""
     enabled: Callable[[Any], bool] = always
-    checked: Callable[[Now], bool] | None = None
-    title_now: Callable[[Now], str] | None = None
-    tip_now: Callable[[Now], str] | None = None
+    checked: Callable[[CommandState], bool] | None = None
+    title_now: Callable[[CommandState], str] | None = None
+    tip_now: Callable[[CommandState], str] | None = None
     button_tip: str = ""
     button_key: str = ""
     short: str = ""
 
-    def called(self, now: Now) -> str:
+    def called(self, now: CommandState) -> str:
         """Return the present title of the command."""
         return (self.title_now(now) if self.title_now else "") or self.title
 
@@ -91,7 +91,7 @@ class Command:
         keys = act.shortcut().toString()
         act.setToolTip(wrapped(f"{tip} ({keys})" if keys else tip))
 
-    def show(self, act: QAction, now: Now) -> None:
+    def show(self, act: QAction, now: CommandState) -> None:
         """Update the command's action: enabled, checked, title and tooltip."""
         able = self.enabled(now)
         if self.title_now is not None:
@@ -126,7 +126,7 @@ class Menu:
     title: str
     tip: str = ""
     entries: tuple[Command | Menu | None, ...] = ()
-    enabled: Callable[[Now], bool] = always
+    enabled: Callable[[CommandState], bool] = always
     fill: Callable[[Any, QMenu], object] | None = None
     one_of: bool = False
     tooltips: bool = False
@@ -141,7 +141,7 @@ class Menu:
 
 
 @dataclass(frozen=True)
-class Now:
+class CommandState:
     """The state of the window on which the commands' conditions depend.
 
     Attributes
@@ -164,73 +164,73 @@ class Now:
     theme: str = ""
 
 
-def opened(now: Now) -> bool:
+def has_mesh(now: CommandState) -> bool:
     """Return whether a mesh is open."""
     return now.session.mesh is not None
 
 
-def flat(now: Now) -> bool:
+def is_2d(now: CommandState) -> bool:
     """Return whether a 2D mesh is open."""
     return now.session.mesh is not None and now.session.mesh.dim == 2
 
 
-def solid(now: Now) -> bool:
+def is_3d(now: CommandState) -> bool:
     """Return whether a 3D mesh is open."""
-    return opened(now) and not flat(now)
+    return has_mesh(now) and not is_2d(now)
 
 
-def bounded(now: Now) -> bool:
+def has_boundary_target(now: CommandState) -> bool:
     """Return whether there are selected or moving boundaries."""
-    return opened(now) and bool(boundaries_meant(now.session))
+    return has_mesh(now) and bool(target_boundaries(now.session))
 
 
-def boundaries_meant(session: Session) -> tuple[str, ...]:
+def target_boundaries(session: Session) -> tuple[str, ...]:
     """Return the boundaries a command acts on: the selected ones, or else those that move."""
     return session.view.selected or session.case.markers_with("moving")
 
 
-def boxed(now: Now) -> bool:
+def has_boxes(now: CommandState) -> bool:
     """Return whether there are boxes for free-form deformation, or their toggle is on."""
-    return opened(now) and ("ffd" in now.session.view.drawn or bool(box_names(now.session)))
+    return has_mesh(now) and ("ffd" in now.session.view.drawn or bool(box_names(now.session)))
 
 
-def valued(now: Now) -> bool:
+def colored_by_value(now: CommandState) -> bool:
     """Return whether cells are colored by a value."""
-    return opened(now) and now.session.view.color_by != "role"
+    return has_mesh(now) and now.session.view.color_by != "role"
 
 
-def stepped(now: Now) -> bool:
+def has_steps(now: CommandState) -> bool:
     """Return whether the shown run has steps."""
     return len(now.session.frames) > 1
 
 
-def idle(now: Now) -> bool:
+def is_idle(now: CommandState) -> bool:
     """Return whether a mesh is open and no job runs."""
-    return opened(now) and not now.busy
+    return has_mesh(now) and not now.busy
 
 
-def stepped_and_idle(now: Now) -> bool:
+def has_steps_and_is_idle(now: CommandState) -> bool:
     """Return whether the shown run has steps and no job runs."""
-    return stepped(now) and idle(now)
+    return has_steps(now) and is_idle(now)
 
 
-def whole(able: Callable[[Now], bool]) -> Callable[[Now], bool]:
+def in_memory(able: Callable[[CommandState], bool]) -> Callable[[CommandState], bool]:
     """Return a condition that holds if ``able`` does and all cells are in memory."""
     return lambda now: able(now) and not now.session.in_file
 
 
-def why_not(able: Callable[[Now], bool], why: str) -> Callable[[Now], str]:
+def why_not(able: Callable[[CommandState], bool], why: str) -> Callable[[CommandState], str]:
     """Return a ``tip_now``: it returns why a command is disabled, empty if ``able`` holds.
 
     The reason is ``why``, unless the mesh stays in its file or a job runs.
     """
     wait = "Wait for the end of what runs, or cancel it."
 
-    def words(now: Now) -> str:
+    def words(now: CommandState) -> str:
         if able(now):
             return ""
         if now.session.in_file:
             return IN_FILE
-        return wait if opened(now) and now.busy else why
+        return wait if has_mesh(now) and now.busy else why
 
     return words

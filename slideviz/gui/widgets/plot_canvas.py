@@ -261,7 +261,7 @@ def ask_and_write(
     except (OSError, SlidevizError) as error:
         if window is None:
             raise
-        window.banner.tell_error(error)
+        window.banner.show_error(error)
         return
     if window is not None:
         window.settings.setValue("folder", str(path.parent))

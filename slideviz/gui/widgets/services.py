@@ -39,7 +39,7 @@ class Services(QMainWindow):
         Opens and saves; knows the folder and the stem of file names that dialogs offer.
     viewing, section_views
         The 3D views; the handles and flat views of the selected section.
-    docks_ : Docks
+    dock_manager : Docks
         The docks with the panels.
     """
 
@@ -51,7 +51,7 @@ class Services(QMainWindow):
     files: Files
     viewing: Viewing
     section_views: SectionViews
-    docks_: Docks
+    dock_manager: Docks
 
     def say(self, text: str) -> None:
         """Show a short message in the status bar; an empty text clears it."""

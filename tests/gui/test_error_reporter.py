@@ -11,9 +11,9 @@ from qtpy.QtCore import QTimer, qWarning
 from qtpy.QtWidgets import QApplication
 
 from slideviz.errors import CaseError
-from slideviz.gui.widgets import faults, questions
+from slideviz.gui.widgets import error_reporter, questions
 from slideviz.session import changes, jobs
-from slideviz.session.store import Store, tell_all
+from slideviz.session.store import Store, notify
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
@@ -21,9 +21,9 @@ pytestmark = pytest.mark.usefixtures("unpainted")
 @pytest.fixture
 def caught(window):
     """A window in an application that catches what nobody does, as `launch` makes it."""
-    with faults.caught(window.faults):
+    with error_reporter.caught(window.error_reporter):
         yield window
-    window.faults.count = 0
+    window.error_reporter.count = 0
 
 
 def boom(*_):
@@ -71,7 +71,7 @@ def test_of_several_errors_the_first_is_raised_when_all_were_called():
         raise CaseError(f"first {value}")
 
     with pytest.raises(CaseError, match="first 3"):
-        tell_all((first, boom, called.append), 3)
+        notify((first, boom, called.append), 3)
     assert called == [3]
 
 
@@ -82,7 +82,7 @@ def test_errors_in_slots_and_threads_are_told_expected_ones_in_their_own_words_o
     caught, qtbot
 ):
     QTimer.singleShot(0, boom)
-    qtbot.waitUntil(lambda: caught.faults.count == 1)
+    qtbot.waitUntil(lambda: caught.error_reporter.count == 1)
     assert caught.banner.isVisible()
     assert "ZeroDivisionError" in text(caught)
     assert "Traceback" not in text(caught)
@@ -90,20 +90,20 @@ def test_errors_in_slots_and_threads_are_told_expected_ones_in_their_own_words_o
     copied = QApplication.clipboard().text()
     for part in ("Traceback", "in boom", "Python 3", "numpy", "vtk", "PySide6"):
         assert part in copied
-    caught.faults.count = 0
+    caught.error_reporter.count = 0
 
     def wrong():
         raise CaseError("case.cfg:3: STEPS= -1 is negative; write a positive number")
 
     QTimer.singleShot(0, wrong)
-    qtbot.waitUntil(lambda: caught.faults.count == 1)
+    qtbot.waitUntil(lambda: caught.error_reporter.count == 1)
     assert text(caught).startswith("case.cfg:3: STEPS= -1 is negative")
     assert not caught.banner.copy.isVisible()
-    caught.faults.count = 0
+    caught.error_reporter.count = 0
     thread = threading.Thread(target=lambda: int("word"))
     thread.start()
     thread.join()
-    qtbot.waitUntil(lambda: caught.faults.count == 1)
+    qtbot.waitUntil(lambda: caught.error_reporter.count == 1)
     assert "ValueError" in text(caught)
 
 
@@ -112,10 +112,10 @@ def test_the_same_error_again_and_again_is_counted_and_logged_once(caught, qtbot
     timer.setInterval(2)
     timer.timeout.connect(boom)
     timer.start()
-    qtbot.waitUntil(lambda: caught.faults.count > 40)
+    qtbot.waitUntil(lambda: caught.error_reporter.count > 40)
     timer.stop()
     qtbot.waitUntil(lambda: "times" in text(caught))
-    qtbot.waitUntil(lambda: f"({caught.faults.count} times)" in text(caught))
+    qtbot.waitUntil(lambda: f"({caught.error_reporter.count} times)" in text(caught))
     assert sum(record.message == "unexpected" for record in caplog.records) == 1
 
 
@@ -123,14 +123,14 @@ def test_two_errors_that_alternate_are_told_once_each_and_a_line_that_repeats_is
     window, monkeypatch, qtbot
 ):
     told, now = [], [0.0]
-    made = faults.Faults(window.banner, clock=lambda: now[0])
+    made = error_reporter.ErrorReporter(window.banner, clock=lambda: now[0])
     monkeypatch.setattr(window.banner, "tell_error", lambda error: told.append(str(error)))
     for _ in range(5):
-        made.tell(CaseError("one"))
-        made.tell(CaseError("two"))
+        made.show(CaseError("one"))
+        made.show(CaseError("two"))
     assert told == ["one", "two"]
-    now[0] = faults.REST_S + 1.0
-    made.tell(CaseError("one"))
+    now[0] = error_reporter.REST_S + 1.0
+    made.show(CaseError("one"))
     assert told == ["one", "two", "one"]
     for _ in range(30):
         logging.getLogger("slideviz.vtk").warning("no texture")
@@ -139,7 +139,7 @@ def test_two_errors_that_alternate_are_told_once_each_and_a_line_that_repeats_is
     assert log_text(window).count("no texture") == 1
     assert "29 times more" in log_text(window)
     before = sys.excepthook, threading.excepthook, sys.unraisablehook
-    with faults.caught(window.faults):
+    with error_reporter.caught(window.error_reporter):
         assert sys.excepthook is not before[0]
     assert (sys.excepthook, threading.excepthook, sys.unraisablehook) == before
 
@@ -153,14 +153,14 @@ def test_errors_in_a_job_and_in_a_file_dialog_are_told_and_the_next_job_runs(
     assert "ZeroDivisionError" in text(caught)
     assert driver.open(passage_file).mesh is not None
     assert not caught.banner.isVisible()
-    caught.faults.count = 0
+    caught.error_reporter.count = 0
 
     def broken(*_):
         raise OSError("the portal does not answer")
 
     monkeypatch.setattr(questions, "ask_open", broken)
-    caught.actions_.by_name["open"].trigger()
-    driver.qtbot.waitUntil(lambda: caught.faults.count == 1)
+    caught.actions_table.by_name["open"].trigger()
+    driver.qtbot.waitUntil(lambda: caught.error_reporter.count == 1)
     assert "the portal does not answer" in text(caught)
     assert driver.open(passage_file).mesh is not None
 
@@ -173,7 +173,7 @@ def test_a_layer_that_cannot_draw_leaves_the_others_and_the_state(
     monkeypatch.setattr(driver.window.scene.layers[0], "update", boom)
     caught.store.change(changes.set_view, legend=False)
     # The banner takes some of the view's room, so that the layer fails once more.
-    assert caught.faults.count >= 1
+    assert caught.error_reporter.count >= 1
     assert "ZeroDivisionError" in text(caught)
     assert "legend" not in caught.store.session.view.drawn
     shown = driver.window.view.renderer.actors
@@ -181,7 +181,7 @@ def test_a_layer_that_cannot_draw_leaves_the_others_and_the_state(
         name.startswith("legend") and (name not in shown or not shown[name].GetVisibility())
         for name in legend
     ), "the layers after it are up to date"
-    assert not caught.actions_.by_name["legend"].isChecked()
+    assert not caught.actions_table.by_name["legend"].isChecked()
 
 
 def test_control_c_ends_the_application(caught, monkeypatch):
@@ -189,14 +189,14 @@ def test_control_c_ends_the_application(caught, monkeypatch):
     monkeypatch.setattr(QApplication, "quit", lambda: quitted.append(1))
     sys.excepthook(KeyboardInterrupt, KeyboardInterrupt(), None)
     assert quitted == [1]
-    assert caught.faults.count == 0
+    assert caught.error_reporter.count == 0
 
 
 # The log ----------------------------------------------------------------------------------
 
 
 def log_text(window):
-    return window.docks_.panels["log"].toPlainText()
+    return window.dock_manager.panels["log"].toPlainText()
 
 
 @pytest.mark.filterwarnings("default:old option")
@@ -218,7 +218,7 @@ def test_what_qt_and_vtk_and_python_complain_of_stands_in_the_log(caught, qtbot)
 CRASH = """
 import faulthandler, sys
 from pathlib import Path
-from slideviz.gui.widgets.faults import crash_log
+from slideviz.gui.widgets.error_reporter import crash_log
 with crash_log(Path(sys.argv[1])):
     {}
 """
@@ -233,10 +233,10 @@ def python(code, folder):
 def test_a_crash_leaves_where_it_was_and_is_told_once(tmp_path):
     folder = tmp_path / "crashes"
     assert python("faulthandler._sigsegv()", folder).returncode < 0
-    (trace,) = faults.old_crashes(folder)
+    (trace,) = error_reporter.old_crashes(folder)
     assert "Segmentation fault" in trace.read_text()
     assert trace.name.startswith("crash-2")
-    assert faults.old_crashes(folder) == []
+    assert error_reporter.old_crashes(folder) == []
     assert trace.exists()
 
 
@@ -246,26 +246,26 @@ def test_a_proper_end_and_a_kill_leave_nothing(tmp_path):
     assert list(folder.iterdir()) == []
     python("import os; os.kill(os.getpid(), 9)", folder)
     assert len(list(folder.iterdir())) == 1
-    assert faults.old_crashes(folder) == []
+    assert error_reporter.old_crashes(folder) == []
     assert list(folder.iterdir()) == []
 
 
 def test_the_log_of_a_program_that_runs_is_left_alone(tmp_path):
     (tmp_path / f"crash-{os.getpid()}.log").write_text("so far")
-    assert faults.old_crashes(tmp_path) == []
+    assert error_reporter.old_crashes(tmp_path) == []
 
 
 def test_a_folder_that_cannot_be_made_is_no_reason_not_to_start(tmp_path, caplog):
     (tmp_path / "file").write_text("")
-    with faults.crash_log(tmp_path / "file" / "crashes"):
+    with error_reporter.crash_log(tmp_path / "file" / "crashes"):
         pass
     assert "would leave no trace" in caplog.text
 
 
 @pytest.mark.parametrize("pid", ["", "word", "-", str(2**22 + 5), "9" * 30])
 def test_what_is_no_process_is_not_alive(pid):
-    assert not faults.is_alive(pid)
+    assert not error_reporter.is_alive(pid)
 
 
 def test_this_process_is_alive():
-    assert faults.is_alive(str(os.getpid()))
+    assert error_reporter.is_alive(str(os.getpid()))

@@ -57,14 +57,14 @@ log = logging.getLogger("slideviz")
 class Notice(Protocol):
     """A widget that shows an error, and how often it occurred."""
 
-    def tell_error(self, error: BaseException) -> None:
+    def show_error(self, error: BaseException) -> None:
         """Show an error."""
 
     def count(self, times: int) -> None:
         """Show how often the error occurred."""
 
 
-class Faults(QObject):
+class ErrorReporter(QObject):
     """Receives the unexpected errors of a window: shows each once in its banner, then counts it.
 
     Attributes
@@ -90,7 +90,7 @@ class Faults(QObject):
         self._timer = later(self, self._count_again, COUNTING_MS)
         self._came.connect(self._take)
 
-    def tell(self, error: BaseException) -> None:
+    def show(self, error: BaseException) -> None:
         """Show an error, from any thread."""
         with contextlib.suppress(RuntimeError):  # the window may be gone
             self._came.emit(error)
@@ -104,7 +104,7 @@ class Faults(QObject):
         if fresh:
             log.error("unexpected", exc_info=error)
             self._shown = key
-            self._banner.tell_error(error)
+            self._banner.show_error(error)
         elif key == self._shown and not self._timer.isActive():
             # Later: an error in a paint event would cause a repaint, and thus itself.
             self._timer.start()
@@ -139,8 +139,8 @@ def versions() -> str:
 
 
 @contextlib.contextmanager
-def caught(faults: Faults) -> Iterator[None]:
-    """Pass uncaught errors of all threads to ``faults`` within the context.
+def caught(reporter: ErrorReporter) -> Iterator[None]:
+    """Pass uncaught errors of all threads to ``reporter`` within the context.
 
     Messages of Qt, VTK and Python's warnings go to the log.
     """
@@ -148,8 +148,8 @@ def caught(faults: Faults) -> Iterator[None]:
         stack.callback(setattr, sys, "excepthook", sys.excepthook)
         stack.callback(setattr, threading, "excepthook", threading.excepthook)
         stack.callback(setattr, sys, "unraisablehook", sys.unraisablehook)
-        sys.excepthook = lambda _, error, __: _uncaught(faults, error)
-        threading.excepthook = partial(_thread_failed, faults)
+        sys.excepthook = lambda _, error, __: _uncaught(reporter, error)
+        threading.excepthook = partial(_thread_failed, reporter)
         sys.unraisablehook = lambda what: log.warning("ignored: %r", what.exc_value)
         qInstallMessageHandler(_qt_says)
         stack.callback(qInstallMessageHandler, None)
@@ -159,16 +159,16 @@ def caught(faults: Faults) -> Iterator[None]:
         yield
 
 
-def _thread_failed(faults: Faults, what: threading.ExceptHookArgs) -> None:
+def _thread_failed(reporter: ErrorReporter, what: threading.ExceptHookArgs) -> None:
     if what.exc_value is not None:
-        faults.tell(what.exc_value)
+        reporter.show(what.exc_value)
 
 
-def _uncaught(faults: Faults, error: BaseException) -> None:
+def _uncaught(reporter: ErrorReporter, error: BaseException) -> None:
     if isinstance(error, KeyboardInterrupt):
         QApplication.quit()
     else:
-        faults.tell(error)
+        reporter.show(error)
 
 
 def _qt_says(kind: QtMsgType, _context: object, text: str) -> None:
