@@ -18,7 +18,7 @@ from PIL import Image
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.samples.table import write_sample
-from slideviz.session.changes import seen_beside
+from slideviz.session.changes import second_view
 
 
 @pytest.fixture
@@ -85,7 +85,7 @@ def test_each_run_judges_the_undeformed_mesh_by_its_own_metric(tmp_path, monkeyp
     drawn = []
 
     def draw(session, file, *_, **__):
-        drawn.extend((session, seen_beside(session)))
+        drawn.extend((session, second_view(session)))
         yield from ()
 
     monkeypatch.setattr("slideviz.export.film.film", draw)

@@ -16,7 +16,7 @@ from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancell
 def run_designs(
     case: Case, mesh: Mesh, table: DesignTable, report: Report, stopped: Stopped
 ) -> None:
-    """Run designs without a result; report each one's `DesignRow`, and the progress as `JobProgress`.
+    """Run designs without a result; report each `DesignRow`, and the progress as `JobProgress`.
 
     Raises
     ------

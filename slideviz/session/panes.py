@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from slideviz.session.changes import (
     UNDEFORMED,
-    seen_beside,
+    second_view,
     set_view,
     show_beside,
     show_frame,
@@ -39,7 +39,7 @@ def shown_views(session: Session) -> tuple[Session, ...]:
     other = session.view.beside
     if other is None or (other != UNDEFORMED and session.run(other) is None):
         return (session,)
-    second = seen_beside(session)
+    second = second_view(session)
     return (second, session) if session.view.swapped else (session, second)
 
 

@@ -344,7 +344,8 @@ def tabs(window):
     while time.monotonic() < end:
         app.processEvents()
         time.sleep(0.01)
-    inside = [bar for bar in window.dock_manager.tabs.bars() if window.rect().intersects(bar.geometry())]
+    bars = window.dock_manager.tabs.bars()
+    inside = [bar for bar in bars if window.rect().intersects(bar.geometry())]
     return sorted([bar.tabText(index) for index in range(bar.count())] for bar in inside)
 
 for _ in range(2):

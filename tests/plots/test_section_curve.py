@@ -183,7 +183,7 @@ def test_of_two_runs_that_are_compared_both_have_a_curve(session):
     frames = session.runs[0].frames
     session = changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
     session = changes.show_beside(session, 1)
-    shown = [(session, Cuts()), (changes.seen_beside(session), Cuts())]
+    shown = [(session, Cuts()), (changes.second_view(session), Cuts())]
     rows = CurveRows().of(shown, LINE)
     assert [one.label for one in rows] == ["undeformed", "run 1", "run 2"]
 

@@ -253,7 +253,7 @@ def test_the_undeformed_mesh_can_be_shown_beside_a_run(session):
     ran = changes.add_frames(changes.start_run(session), [frame, frame])
     both = changes.show_beside(ran, changes.UNDEFORMED)
     assert both.view.beside == changes.UNDEFORMED
-    assert changes.seen_beside(both).frame is session.first
+    assert changes.second_view(both).frame is session.first
     assert both.frame is frame
     gone = changes.remove_run(changes.end_run(both, "done"), 1)
     assert gone.view.beside is None

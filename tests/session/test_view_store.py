@@ -310,7 +310,7 @@ def require_valid(session: Session):
     )
     numbers = [run.number for run in session.runs]
     assert numbers == sorted(set(numbers))
-    assert changes.seen_beside(session).frame is not None
+    assert changes.second_view(session).frame is not None
     assert np.isfinite(session.color_range).all()
 
 

@@ -1,8 +1,8 @@
 """Run long jobs in a thread, one at a time, each ending with exactly one signal.
 
 The object with the signals lives in the GUI thread, so that every slot runs there; the job itself
-runs in its thread and never uses Qt or VTK. Its reports go through a mailbox: of `JobProgress` only the
-newest is delivered, everything else in full.
+runs in its thread and never uses Qt or VTK. Its reports go through a mailbox: only the newest
+`JobProgress` is delivered, everything else in full.
 """
 
 from __future__ import annotations

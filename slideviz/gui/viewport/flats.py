@@ -10,7 +10,7 @@ from slideviz.gui.viewport.section_curve import CurveView
 from slideviz.gui.viewport.unrolled import FlatView
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.sections.model import Section
-from slideviz.session.changes import UNDEFORMED, seen_beside
+from slideviz.session.changes import UNDEFORMED, second_view
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Session
 
@@ -129,7 +129,7 @@ def beside(session: Session) -> Session | None:
     other = session.view.beside
     if other is None or (other != UNDEFORMED and session.run(other) is None):
         return None
-    return seen_beside(session)
+    return second_view(session)
 
 
 def called(session: Session) -> str:

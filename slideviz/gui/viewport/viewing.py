@@ -109,7 +109,7 @@ class Viewing(QWidget):
         self.second.spare_software()
         self.second.set_flat(session.mesh.dim == 2)
         self.second_scene.set_coarse_boundaries(self.coarse)
-        self.second_scene.open(changes.seen_beside(session), self.surfaces)
+        self.second_scene.open(changes.second_view(session), self.surfaces)
         self.second_scene.set_motion_ghosts(self.scene.motion_ghosts)
         self.second_scene.camera.take(self.scene.camera)
         self._share_legend(session.view.swapped)
@@ -248,7 +248,7 @@ class Viewing(QWidget):
             self._make_second(session)
         else:
             self._swap(session.view.swapped)
-            self.second_scene.update(changes.seen_beside(session))
+            self.second_scene.update(changes.second_view(session))
             self.second.render_soon()
 
     def views_and_scenes(self) -> list[tuple[View3D, Scene]]:

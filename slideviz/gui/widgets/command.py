@@ -42,7 +42,7 @@ class Command:
     image : str
         The name of its icon.
     enabled, checked : callable
-        Return whether it is enabled and, of a toggle, whether it is on, given the window's `CommandState`.
+        Return whether it is enabled and, of a toggle, whether it is on.
     title_now : callable, optional
         Returns its present title, given the `CommandState`; an empty one hides it in the menu.
     tip_now : callable, optional
