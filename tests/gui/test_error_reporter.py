@@ -124,7 +124,7 @@ def test_two_errors_that_alternate_are_told_once_each_and_a_line_that_repeats_is
 ):
     told, now = [], [0.0]
     made = error_reporter.ErrorReporter(window.banner, clock=lambda: now[0])
-    monkeypatch.setattr(window.banner, "tell_error", lambda error: told.append(str(error)))
+    monkeypatch.setattr(window.banner, "show_error", lambda error: told.append(str(error)))
     for _ in range(5):
         made.show(CaseError("one"))
         made.show(CaseError("two"))
