@@ -19,24 +19,19 @@ INTERSECTION_COLOR = "#e8112d"
 
 @dataclass(frozen=True)
 class ColorScheme:
-    """A color scheme: colors of a view that belong together.
-
-    Attributes
-    ----------
-    name : str
-    background, background_top : str
-        Colors of the bottom and the top of the background, as ``#rrggbb``.
-    text, edge, cell, ghost : str
-        Colors of letters, of edges of cells, of faces without a value, of undeformed boundaries.
-    """
+    """A color scheme: colors of a view that belong together."""
 
     name: str
     background: str
     background_top: str
+    """`background`, `background_top`: colors of the bottom and the top of the background, as
+    ``#rrggbb``."""
     text: str
     edge: str
     cell: str
     ghost: str
+    """`text`, `edge`, `cell`, `ghost`: colors of letters, of edges of cells, of faces without a
+    value, of undeformed boundaries."""
 
 
 LIGHT = ColorScheme("light", "#ffffff", "#e9edf2", "#20262e", "#5b6672", "#e3e8ee", "#4a5562")

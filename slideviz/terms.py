@@ -15,24 +15,16 @@ from typing import Any, Literal, get_args
 
 @dataclass(frozen=True)
 class Term:
-    """The words for one value of an enumeration.
-
-    Attributes
-    ----------
-    label : str
-        Its words in a list with a heading.
-    tip : str
-        Its meaning, as a tip.
-    color : str
-        The color it is drawn in, ``#rrggbb``; empty for none.
-    alone : str
-        Its words without a heading, where they differ from ``label``.
-    """
+    """The words for one value of an enumeration."""
 
     label: str
+    """Its words in a list with a heading."""
     tip: str = ""
+    """Its meaning, as a tip."""
     color: str = ""
+    """The color it is drawn in, ``#rrggbb``; empty for none."""
     alone: str = ""
+    """Its words without a heading, where they differ from ``label``."""
 
     @property
     def name(self) -> str:
@@ -401,27 +393,18 @@ Shown = Literal[
 
 @dataclass(frozen=True)
 class ShownTerm(Term):
-    """The words for a thing in the view that the user can switch on and off.
-
-    Attributes
-    ----------
-    shortcut : str
-        The key that switches it.
-    at_first : bool
-        Whether it is drawn by default.
-    needs : {"", "boxes", "3d"}
-        What it needs: nothing, FFD boxes, or a 3D mesh.
-    why_not : str
-        The tip where this is missing.
-    in_bar : bool
-        Whether the tool bar has a button for it.
-    """
+    """The words for a thing in the view that the user can switch on and off."""
 
     shortcut: str = ""
+    """The key that switches it."""
     at_first: bool = False
+    """Whether it is drawn by default."""
     needs: Literal["", "boxes", "3d"] = ""
+    """What it needs: nothing, FFD boxes, or a 3D mesh."""
     why_not: str = ""
+    """The tip where this is missing."""
     in_bar: bool = True
+    """Whether the tool bar has a button for it."""
 
 
 SHOWN: dict[Shown, ShownTerm] = {

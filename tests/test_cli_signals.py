@@ -64,7 +64,7 @@ def wait_for(what: Callable[[], object]) -> None:
 
 
 def heeds_signals(child: subprocess.Popen[str]) -> bool:
-    """Tell whether a program has its own answer to SIGTERM already."""
+    """Return whether a program has its own answer to SIGTERM already."""
     status = Path(f"/proc/{child.pid}/status").read_text()
     caught = int(status.partition("SigCgt:")[2].split()[0], 16)
     return bool(caught >> (signal.SIGTERM - 1) & 1)

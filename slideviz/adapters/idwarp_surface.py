@@ -22,22 +22,15 @@ COINCIDES = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class SolverSurface:
-    """The nodes of a solver's surface, as nodes of a mesh.
-
-    Attributes
-    ----------
-    mesh : Mesh
-        Undeformed.
-    moving : (m,) int64
-        The moving nodes of the case, ascending.
-    nodes : (N,) int64
-        The nodes of the surface, in the solver's order: all moving nodes and perhaps others, each
-        once or several times.
-    """
+    """The nodes of a solver's surface, as nodes of a mesh."""
 
     mesh: Mesh
+    """Undeformed."""
     moving: IntArray
+    """(m,): the moving nodes of the case, ascending."""
     nodes: IntArray
+    """(N,): the nodes of the surface, in the solver's order: all moving nodes and perhaps others,
+    each once or several times."""
 
     @cached_property
     def start(self) -> FloatArray:

@@ -18,21 +18,14 @@ from slideviz.rbf.slide_rows import RANK_TOLERANCE
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The mesh as an elastic body, the same over all steps.
-
-    Attributes
-    ----------
-    parts : list of ShapeBlock
-        Its elements.
-    frame : Frame
-        The frame of the problem's displacements; the body is solved in Cartesian ones.
-    axis : (n,) bool
-        Nodes on the axis of a cylindrical frame, which move along it only.
-    """
+    """The mesh as an elastic body, the same over all steps."""
 
     parts: list[ShapeBlock]
+    """Its elements."""
     frame: Frame
+    """The frame of the problem's displacements; the body is solved in Cartesian ones."""
     axis: np.ndarray
+    """(n,): nodes on the axis of a cylindrical frame, which move along it only."""
 
 
 def conditions(problem: Problem, body: Body, nodes: IntArray, values: FloatArray) -> Conditions:
@@ -125,25 +118,19 @@ def _turns(problem: Problem, frame: Frame, nodes: IntArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class HeldRows:
-    """The directions in which unknowns may not move, as rows: normals of sliding nodes, then axis.
-
-    Attributes
-    ----------
-    axis : (a, d) float64
-        Directions that hold nodes on the axis: rows after the problem's normals.
-    images, back : (i,) int64, (i, d, d) float64
-        The rows of periodic images, and the rotations of their directions to the representative.
-    order, place, turn : (r,) int64
-        The rows that hold an unknown, sorted by its block; the block; and the number of the row
-        among those of the block, from 0.
-    """
+    """Directions in which unknowns may not move, as rows: normals of sliding nodes, then axis."""
 
     axis: FloatArray
+    """(a, d): directions that hold nodes on the axis: rows after the problem's normals."""
     images: IntArray
     back: FloatArray
+    """`images`, `back` (i,) int64, (i, d, d) float64: the rows of periodic images, and the
+    rotations of their directions to the representative."""
     order: IntArray
     place: IntArray
     turn: IntArray
+    """`order`, `place`, `turn` (r,): the rows that hold an unknown, sorted by its block; the block;
+    and the number of the row among those of the block, from 0."""
 
 
 def held_rows(problem: Problem, body: Body, place: IntArray) -> HeldRows:

@@ -30,21 +30,14 @@ LAM = POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Computes the forces of a body, and their derivatives.
-
-    Attributes
-    ----------
-    points : (n, d) float64
-        Positions of the nodes.
-    parts : list of ShapeBlock
-        The elements.
-    volume : (c,) float64
-        Volume (area in 2D) of each cell.
-    """
+    """Computes the forces of a body, and their derivatives."""
 
     points: FloatArray
+    """(n, d): positions of the nodes."""
     parts: list[ShapeBlock]
+    """The elements."""
     volume: FloatArray
+    """(c,): volume (area in 2D) of each cell."""
 
     @classmethod
     def at(cls, points: FloatArray, parts: list[ShapeBlock]) -> Forces:

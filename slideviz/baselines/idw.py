@@ -30,18 +30,12 @@ from slideviz.system.jit_cache import njit
 
 @dataclass(frozen=True)
 class Weights:
-    """Settings of inverse distance weighting.
-
-    Attributes
-    ----------
-    power : float
-        The power c of the distance.
-    fixed_weight : float
-        The weight g_j of nodes with displacement zero.
-    """
+    """Settings of inverse distance weighting."""
 
     power: float
+    """The power c of the distance."""
     fixed_weight: float = 1.0
+    """The weight g_j of nodes with displacement zero."""
 
     def of(self, values: FloatArray) -> FloatArray:
         """Return g_j, (n,), of nodes with the displacements ``values`` (n, d)."""
@@ -131,24 +125,16 @@ def deform_idw(problem: Problem, watch: Watch, weights: Weights) -> Solution:
 
 @dataclass(frozen=True, eq=False)
 class WeightedField:
-    """Displacement field: means of the displacements of sources, by their inverse distance.
-
-    Attributes
-    ----------
-    basis : Basis
-    sources : (k, n) float64
-        Features of the boundary nodes.
-    values, weights : (n, d), (n,) float64
-        Their displacements v_j in the frame, and g_j.
-    power : float
-        c.
-    """
+    """Displacement field: means of the displacements of sources, by their inverse distance."""
 
     basis: Basis
     sources: FloatArray
+    """(k, n): features of the boundary nodes."""
     values: FloatArray
     weights: FloatArray
+    """`values`, `weights` (n, d), (n,): their displacements v_j in the frame, and g_j."""
     power: float
+    """c."""
 
     def at(self, features: FloatArray, _: FloatArray, /, tick: Tick = no_tick) -> FloatArray:
         """Return the displacement (m, d) at features (k, m)."""

@@ -46,47 +46,33 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "fastmath": True}
 
 @dataclass(frozen=True, eq=False)
 class LinearSolution:
-    """What the iteration found.
-
-    Attributes
-    ----------
-    x : (n,) float64
-        The solution.
-    iterations : int
-    residual_ratio : float
-        Last residual over that of x = 0, in the energy norm of the preconditioner: small is good.
-    """
+    """What the iteration found."""
 
     x: FloatArray
+    """(n,): the solution."""
     iterations: int
     residual_ratio: float
+    """Last residual over that of x = 0, in the energy norm of the preconditioner: small is good."""
 
     @property
     def converged(self) -> bool:
-        """Tell whether the residual ratio is at most `TOLERANCE`."""
+        """Return whether the residual ratio is at most `TOLERANCE`."""
         return self.residual_ratio <= TOLERANCE
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A level of the hierarchy.
-
-    Attributes
-    ----------
-    matrix : bsr_array
-    inverse : (m, b, b) float64
-        Inverses of its diagonal blocks; empty on the coarsest level.
-    up, down : sparse matrices or None
-        Prolongation from the next coarser level, and restriction to it; None on the coarsest.
-    factor : tuple or None
-        Dense Cholesky factor, on the coarsest level only.
-    """
+    """A level of the hierarchy."""
 
     matrix: bsr_array
     inverse: FloatArray
+    """(m, b, b): inverses of its diagonal blocks; empty on the coarsest level."""
     up: Any = None
     down: Any = None
+    """`up`, `down`: prolongation from the next coarser level, and restriction to it; None on the
+    coarsest."""
     factor: Any = None
+    """Dense Cholesky factor, on the coarsest level only."""
 
 
 def solve(

@@ -38,18 +38,12 @@ _ORDER = {5: 1, 9: 2, 10: 1, 12: 2}
 
 @dataclass(frozen=True, eq=False)
 class ReferenceShape:
-    """A reference element.
-
-    Attributes
-    ----------
-    gradients : (q, a, d) float64
-        Of the a shape functions, at q integration points, in the reference element.
-    weights : (q,) float64
-        Of the integration points; their sum is the reference element's volume.
-    """
+    """A reference element."""
 
     gradients: FloatArray
+    """(q, a, d): of the a shape functions, at q integration points, in the reference element."""
     weights: FloatArray
+    """(q,): of the integration points; their sum is the reference element's volume."""
 
 
 @cache
@@ -91,22 +85,15 @@ def _quadrature(vtk: int, element: object) -> tuple[FloatArray, FloatArray]:
 
 @dataclass(frozen=True, eq=False)
 class ShapeBlock:
-    """The elements of a mesh that have one shape.
-
-    Attributes
-    ----------
-    shape : ReferenceShape
-    nodes : (m, a) int64
-    cell : (m,) int64
-        The cell of the mesh that each element is (a part of).
-    share : float
-        Weight of each element: 1, or 1/2 for the parts of pyramids.
-    """
+    """The elements of a mesh that have one shape."""
 
     shape: ReferenceShape
     nodes: IntArray
+    """(m, a)."""
     cell: IntArray
+    """(m,): the cell of the mesh that each element is (a part of)."""
     share: float
+    """Weight of each element: 1, or 1/2 for the parts of pyramids."""
 
 
 def blocks(cells: Cells) -> list[ShapeBlock]:

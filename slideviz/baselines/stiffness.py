@@ -36,27 +36,19 @@ OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Boundary conditions of all nodes, u_i = T_i z_k + g_i.
-
-    Attributes
-    ----------
-    place : (n,) int64
-        Number of each node's block of unknowns; -1 for known nodes. Periodic images share one.
-    turn : (n, d, d) float64
-        T_i; the identity for most.
-    plain : (n,) bool
-        Whether T_i is the identity.
-    known : (n, d) float64
-        g_i.
-    free : (k, d, d) float64
-        P_k of each block of unknowns.
-    """
+    """Boundary conditions of all nodes, u_i = T_i z_k + g_i."""
 
     place: IntArray
+    """(n,): number of each node's block of unknowns; -1 for known nodes. Periodic images share
+    one."""
     turn: FloatArray
+    """(n, d, d): T_i; the identity for most."""
     plain: np.ndarray
+    """(n,): whether T_i is the identity."""
     known: FloatArray
+    """(n, d): g_i."""
     free: FloatArray
+    """(k, d, d): P_k of each block of unknowns."""
 
 
 def assemble(

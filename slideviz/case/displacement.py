@@ -27,21 +27,14 @@ PART = 4000
 
 @dataclass(frozen=True)
 class Columns:
-    """The columns of a file with a line for each node, such as displacements or coordinates.
-
-    Attributes
-    ----------
-    what : str
-        What the numbers of a node are together, for messages.
-    names : (str, str, str)
-        The names of the columns after that of the node, for messages.
-    flat : bool
-        Whether files for a 2D mesh may have a third number, which is 0.
-    """
+    """The columns of a file with a line for each node, such as displacements or coordinates."""
 
     what: str
+    """What the numbers of a node are together, for messages."""
     names: tuple[str, str, str]
+    """(str, str, str): the names of the columns after that of the node, for messages."""
     flat: bool = False
+    """Whether files for a 2D mesh may have a third number, which is 0."""
 
     def heading(self, dim: int) -> str:
         """Return the names of all columns for a mesh of ``dim`` dimensions, with blanks between."""
@@ -53,21 +46,14 @@ DISPLACEMENT = Columns("displacement", ("dx", "dy", "dz"))
 
 @dataclass(frozen=True, eq=False)
 class Displacements:
-    """Prescribed displacements of nodes.
-
-    Attributes
-    ----------
-    nodes : (k,) int64
-        Node indices, sorted, each once.
-    vectors : (k, d) float64
-        Cartesian displacements, in the mesh's length unit.
-    warnings : tuple of str
-        What the user should know about them.
-    """
+    """Prescribed displacements of nodes."""
 
     nodes: IntArray
+    """(k,): node indices, sorted, each once."""
     vectors: FloatArray
+    """(k, d): Cartesian displacements, in the mesh's length unit."""
     warnings: tuple[str, ...] = ()
+    """What the user should know about them."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "nodes", frozen_array(self.nodes, np.int64))

@@ -22,61 +22,44 @@ GROUPS = (FILES, BOUNDARIES, MOTION, PERIODICITY, METHOD, REDUCTION, QUALITY, VI
 
 @dataclass(frozen=True)
 class Key:
-    """A key of the case file.
-
-    Attributes
-    ----------
-    name, group : str
-        The key in upper case, and the heading above it in files and in the reference.
-    kind : Kind
-        How its value is read and written.
-    meaning : str
-        What it does, in a sentence.
-    put, get : callable
-        ``put`` returns a case with a value in it, or raises ``CaseError`` where the value
-        contradicts the case; ``get`` returns the value, or None where a file need not have it.
-    default : str
-        The text of the value where the file does not have the key.
-    rbf_slide : bool
-        Whether RBF-SliDe has the key too.
-    field : str
-        The field of ``Case``, or of its ``Reduction``, that is the value; empty where the value is
-        made of several fields, or is only a part of one.
-    label, unit : str
-        What the window calls it, and the unit of its value, if it has one.
-    form : "main", "more" or None
-        Whether the method panel has a field for it: among the first ones, below "More settings",
-        or not.
-    tip : str
-        The tip of that field; empty: ``meaning``.
-    said : str or None
-        Words in the label of a run whose value differs from those of other runs, with ``{}`` for
-        the value. None: the key's label and the value; empty: no words.
-    method : str or None
-        The only method that uses it.
-    unless : callable
-        Returns why the key has no effect in a case with that method; empty where it has one.
-    no_effect : str
-        Why it never changes a result: for keys that are read only because RBF-SliDe has them.
-    """
+    """A key of the case file."""
 
     name: str
     group: str
+    """`name`, `group`: the key in upper case, and the heading above it in files and in the
+    reference."""
     kind: Kind
+    """How its value is read and written."""
     meaning: str
+    """What it does, in a sentence."""
     put: Put
     get: Get
+    """`put`, `get`: ``put`` returns a case with a value in it, or raises ``CaseError`` where the
+    value contradicts the case; ``get`` returns the value, or None where a file need not have it."""
     default: str = NO_DEFAULT
+    """The text of the value where the file does not have the key."""
     rbf_slide: bool = False
+    """Whether RBF-SliDe has the key too."""
     field: str = ""
+    """The field of ``Case``, or of its ``Reduction``, that is the value; empty where the value is
+    made of several fields, or is only a part of one."""
     label: str = ""
     unit: str = ""
+    """`label`, `unit`: what the window calls it, and the unit of its value, if it has one."""
     form: Form | None = None
+    """Whether the method panel has a field for it: among the first ones, below "More settings", or
+    not."""
     tip: str = ""
+    """The tip of that field; empty: ``meaning``."""
     said: str | None = None
+    """Words in the label of a run whose value differs from those of other runs, with ``{}`` for the
+    value. None: the key's label and the value; empty: no words."""
     method: Method | None = None
+    """The only method that uses it."""
     unless: Callable[[Case], str] = lambda _: ""
+    """Returns why the key has no effect in a case with that method; empty where it has one."""
     no_effect: str = ""
+    """Why it never changes a result: for keys that are read only because RBF-SliDe has them."""
 
     @property
     def title(self) -> str:

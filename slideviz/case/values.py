@@ -42,39 +42,26 @@ _SU2_PAIR, _SU2_GROUP = 2, 11
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of value of a key.
-
-    Attributes
-    ----------
-    allowed : str
-        The texts that are allowed, in words, for the reference and for messages.
-    read : callable
-        Returns the value of a text; raises ``CaseError`` with one sentence.
-    write : callable
-        Returns the text of a value; raises ``CaseError`` if it has none.
-    remark : callable
-        Returns a warning about a text, empty if there is none.
-    details : tuple of str
-        Further lines for the reference.
-    entry : str
-        The kind of field in the window.
-    words : mapping of value to str
-        The window's words for values, where they differ from those of a case file.
-    tips : mapping of value to str
-        The window's tips on values.
-    span : (int, int)
-        The smallest and the largest whole number that the window offers.
-    """
+    """A kind of value of a key."""
 
     allowed: str
+    """The texts that are allowed, in words, for the reference and for messages."""
     read: Callable[[str], Any]
+    """Returns the value of a text; raises ``CaseError`` with one sentence."""
     write: Callable[[Any], str]
+    """Returns the text of a value; raises ``CaseError`` if it has none."""
     remark: Callable[[str], str] = lambda _: ""
+    """Returns a warning about a text, empty if there is none."""
     details: tuple[str, ...] = ()
+    """Further lines for the reference."""
     entry: Entry = "text"
+    """The kind of field in the window."""
     words: Mapping[Any, str] = field(default_factory=dict)
+    """The window's words for values, where they differ from those of a case file."""
     tips: Mapping[Any, str] = field(default_factory=dict)
+    """The window's tips on values."""
     span: tuple[int, int] = (0, LARGEST_WHOLE)
+    """(int, int): the smallest and the largest whole number that the window offers."""
 
     def problem(self, text: str) -> str:
         """Return why a text cannot be read as a value of the kind; "" where it can."""

@@ -33,33 +33,23 @@ REPLACED = "there already, and replaced by this run"
 
 @dataclass(frozen=True)
 class OutputPath:
-    """A file that a command writes, or a folder of files.
-
-    Attributes
-    ----------
-    path : Path or None
-        None, or ``-`` for the terminal, where no file is written.
-    option : str
-        The option or the key of the case that gives it, for messages.
-    named : bool
-        Whether it is on the command line; if not, there is a note where an older file is replaced.
-    files : str
-        For a folder: a regular expression for the names of the files in it; else empty.
-    is_mesh : bool
-        Whether its ending must be that of a mesh.
-    replaces : Path or None
-        The only input file that it may overwrite.
-    remedy : str
-        The advice in the message where it is an input file.
-    """
+    """A file that a command writes, or a folder of files."""
 
     path: Path | None
+    """None, or ``-`` for the terminal, where no file is written."""
     option: str
+    """The option or the key of the case that gives it, for messages."""
     named: bool = True
+    """Whether it is on the command line; if not, there is a note where an older file is
+    replaced."""
     files: str = ""
+    """For a folder: a regular expression for the names of the files in it; else empty."""
     is_mesh: bool = False
+    """Whether its ending must be that of a mesh."""
     replaces: Path | None = None
+    """The only input file that it may overwrite."""
     remedy: str = ""
+    """The advice in the message where it is an input file."""
 
 
 def inputs_of(arguments: argparse.Namespace) -> dict[Path, str]:

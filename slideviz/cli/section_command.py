@@ -91,31 +91,21 @@ def add_section(calls: argparse._SubParsersAction) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """A mesh to be cut, and the section.
-
-    Attributes
-    ----------
-    mesh, base : Mesh
-        The mesh and, where there is a reference, the undeformed one; with ``--stream`` only the
-        cells that the section can cut.
-    found : Quality
-        Quality of the cells of ``mesh``.
-    chosen : Section
-    matrices : dict of int to (4, 4) float64
-        The transformation of each passage, by number.
-    outer : (n, d) float64
-        Points that have the extent of the whole mesh.
-    reference : Path or None
-        The file of the undeformed mesh.
-    """
+    """A mesh to be cut, and the section."""
 
     mesh: Mesh
     base: Mesh | None
+    """`mesh`, `base`: the mesh and, where there is a reference, the undeformed one; with
+    ``--stream`` only the cells that the section can cut."""
     found: Quality
+    """Quality of the cells of ``mesh``."""
     chosen: Section
     matrices: dict[int, FloatArray]
+    """dict of int to (4, 4) float64: the transformation of each passage, by number."""
     outer: FloatArray
+    """(n, d): points that have the extent of the whole mesh."""
     reference: Path | None
+    """The file of the undeformed mesh."""
 
 
 def section(arguments: argparse.Namespace) -> int:

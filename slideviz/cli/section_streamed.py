@@ -47,33 +47,25 @@ def skins(arguments: argparse.Namespace, case: Case | None) -> Iterator[tuple[Lo
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """Cells that a section can cut.
-
-    Attributes
-    ----------
-    ids, types : (k,)
-        Their numbers in the whole mesh, and VTK types.
-    flat : (c,) int64
-        The nodes of all cells, one cell after the other, by their numbers in the whole mesh.
-    values, size, skew, status, signs : (k,)
-        Their quality.
-    nodes : (n,) int64
-        The numbers of their points in the whole mesh.
-    points, before : (n, d) float64
-        Their points now, and undeformed (where there is a reference).
-    """
+    """Cells that a section can cut."""
 
     ids: IntArray
     types: np.ndarray
+    """`ids`, `types` (k,): their numbers in the whole mesh, and VTK types."""
     flat: IntArray
+    """(c,): the nodes of all cells, one cell after the other, by their numbers in the whole
+    mesh."""
     values: FloatArray
     size: FloatArray
     skew: FloatArray
     status: np.ndarray
     signs: np.ndarray
+    """`values`, `size`, `skew`, `status`, `signs` (k,): their quality."""
     nodes: IntArray
+    """(n,): the numbers of their points in the whole mesh."""
     points: FloatArray
     before: FloatArray
+    """`points`, `before` (n, d): their points now, and undeformed (where there is a reference)."""
 
     @classmethod
     def of(cls, part: Rated, chosen: IntArray) -> _Kept:

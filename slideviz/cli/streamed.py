@@ -20,24 +20,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Looked:
-    """A mesh that is read block by block.
-
-    Attributes
-    ----------
-    skin : Mesh
-        Its boundary and the cells at it.
-    mesh : (Path, int or None)
-        File and zone of all its cells.
-    base : Given or None
-        The undeformed mesh, if there is a reference.
-    reference : Path or None
-        The file of the reference, as the user gave it.
-    """
+    """A mesh that is read block by block."""
 
     skin: Mesh
+    """Its boundary and the cells at it."""
     mesh: Zone
+    """(Path, int or None): file and zone of all its cells."""
     base: Given | None = None
+    """The undeformed mesh, if there is a reference."""
     reference: Path | None = None
+    """The file of the reference, as the user gave it."""
 
     @property
     def base_zone(self) -> Zone | None:

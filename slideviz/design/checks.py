@@ -24,26 +24,17 @@ from slideviz.solver.setup import Setup
 
 @dataclass(frozen=True, eq=False)
 class Checks:
-    """The checks of a design.
-
-    Attributes
-    ----------
-    mesh : Mesh
-    setup : Setup
-    steps : tuple of FrozenStep
-    facets : dict of int to (s,) int64
-        For each track, by its index, the simplex that each of its sliding nodes is on at the
-        reference.
-    least : float
-        A motion that nodes may make in any design, in the frame: the reference's, or an edge of
-        the moving boundary.
-    """
+    """The checks of a design."""
 
     mesh: Mesh
     setup: Setup
     steps: tuple[FrozenStep, ...]
     facets: Mapping[int, IntArray]
+    """dict of int to (s,) int64: for each track, by its index, the simplex that each of its sliding
+    nodes is on at the reference."""
     least: float
+    """A motion that nodes may make in any design, in the frame: the reference's, or an edge of the
+    moving boundary."""
 
     def errors(self, targets: FloatArray, states: list[StepState]) -> FloatArray:
         """Return the largest error of each design, (...,), in the mesh's length unit.

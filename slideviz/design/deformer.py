@@ -56,9 +56,6 @@ class Deformer:
         The nodes of the moving markers, ascending.
     displacement : (m, d) float64
         Displacement of these nodes by the case's motions, in the mesh's length unit.
-    warnings : tuple of str
-        About case and mesh, zones that no longer fit at the reference, and systems that are solved
-        with twice the digits (a note).
 
     Notes
     -----
@@ -151,6 +148,8 @@ class Deformer:
         self._setup, self._input = setup, given_input(mesh, setup, asked)
         self._references = references
         self.warnings = (*case.warnings, *setup.warnings)
+        """About case and mesh, zones that no longer fit at the reference, and systems that are
+        solved with twice the digits (a note)."""
         targets = [value(self._input.target(reference)) for reference in references]
         tell = progress or (lambda _: None)
         self._steps: tuple[FrozenStep, ...]

@@ -20,36 +20,27 @@ from slideviz.solver.setup import Setup
 
 @dataclass(frozen=True, eq=False)
 class Input:
-    """The map from the displacement of the moving nodes to that of the known nodes.
-
-    Attributes
-    ----------
-    mesh : Mesh
-    setup : Setup
-    nodes : (m,) int64
-        The moving nodes, ascending.
-    points : (s, d) float64
-        The sources, undeformed: nodes whose displacement all their periodic images have.
-    rows, turn : (s,) int64, (s, d, d) float64 or None
-        The moving node, by its place in ``nodes``, whose displacement each source has, and the
-        rotation of it (None: none is rotated). They differ for copies in a halo.
-    known, source : (k,) int64
-        Known nodes that move, by their place in ``setup.known``, and the source that each follows.
-    others, followed : (o,) int64
-        Moving nodes that are not sources, by their place in ``nodes``, and the source that each
-        must follow.
-    """
+    """The map from the displacement of the moving nodes to that of the known nodes."""
 
     mesh: Mesh
     setup: Setup
     nodes: IntArray
+    """(m,): the moving nodes, ascending."""
     points: FloatArray
+    """(s, d): the sources, undeformed: nodes whose displacement all their periodic images have."""
     rows: IntArray
     turn: FloatArray | None
+    """`rows`, `turn` (s,) int64, (s, d, d) float64 or None: the moving node, by its place in
+    ``nodes``, whose displacement each source has, and the rotation of it (None: none is rotated).
+    They differ for copies in a halo."""
     known: IntArray
     source: IntArray
+    """`known`, `source` (k,): known nodes that move, by their place in ``setup.known``, and the
+    source that each follows."""
     others: IntArray
     followed: IntArray
+    """`others`, `followed` (o,): moving nodes that are not sources, by their place in ``nodes``,
+    and the source that each must follow."""
 
     def target(self, vectors: Array) -> Array:
         """Return the displacement (..., a, d) of the known nodes, in the frame.

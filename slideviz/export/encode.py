@@ -45,24 +45,16 @@ _NUMBER = re.compile(r"(%(?:0\d)?d)")
 
 @dataclass(frozen=True)
 class EncoderSettings:
-    """The settings that a writer has to know before the first image.
-
-    Attributes
-    ----------
-    size : (int, int)
-        Width and height in pixels.
-    count : int
-        Number of images.
-    fps : float
-        Images per second.
-    samples : callable
-        Returns a few images from all over the film, by which a GIF's palette is chosen.
-    """
+    """The settings that a writer has to know before the first image."""
 
     size: tuple[int, int]
+    """(int, int): width and height in pixels."""
     count: int
+    """Number of images."""
     fps: float
+    """Images per second."""
     samples: Callable[[], Sequence[Pixels]]
+    """Returns a few images from all over the film, by which a GIF's palette is chosen."""
 
 
 def film_kind(file: Path) -> str:

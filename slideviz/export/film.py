@@ -41,25 +41,18 @@ FPS, SECONDS = 10.0, 3.0
 
 @dataclass(frozen=True)
 class FilmOptions:
-    """The size, speed and images in between of a film.
-
-    Attributes
-    ----------
-    size : (int, int) or None
-        Width and height in pixels, even numbers for an MP4; None: the default of the kind of file.
-    fps : float or None
-        Images per second; None: ten, or fewer, so that a film of few images lasts 3 s.
-    hold : float
-        Seconds that the last image is shown.
-    between : int
-        Number of images between two steps, whose nodes are interpolated linearly, with the quality
-        of that mesh.
-    """
+    """The size, speed and images in between of a film."""
 
     size: tuple[int, int] | None = None
+    """(int, int) or None: width and height in pixels, even numbers for an MP4; None: the default of
+    the kind of file."""
     fps: float | None = None
+    """Images per second; None: ten, or fewer, so that a film of few images lasts 3 s."""
     hold: float = 1.5
+    """Seconds that the last image is shown."""
     between: int = 0
+    """Number of images between two steps, whose nodes are interpolated linearly, with the quality
+    of that mesh."""
 
     def pixels(self, file: Path) -> tuple[int, int]:
         """Return width and height in pixels of the film in a file."""

@@ -35,52 +35,36 @@ GAP = 12.0
 
 @dataclass(frozen=True)
 class PictureOptions:
-    """Size, background, legend, title and camera of a picture of a view.
-
-    Attributes
-    ----------
-    size : (int, int)
-        Width and height in pixels.
-    background : {"white", "shown", "transparent"}
-    legend, edges, triad : bool
-        Whether there are the legend of roles or the color bar; edges of cells; the axes.
-    title : bool
-        Whether there is a title: what is shown, with minimum, mean and inverted cells.
-    fill : bool
-        Whether the whole mesh is fitted to the picture, instead of the view's part of it.
-    both : bool
-        Whether the session of the second view is drawn too, if there is one.
-    letters : float
-        Size of the letters; 1 is 13 pixels in a picture 620 pixels high.
-    dpi : float or None
-        Pixels per inch on paper, stored in the file.
-    film : bool
-        Whether it is an image of a film.
-    named : bool
-        Whether it has the name of its run even without a title, as one of two side by side.
-    marked : bool
-        Whether the marked cell is drawn, with its number and value.
-    lines : int
-        Number of lines of the title.
-    heading : str
-        A title instead of the usual one; empty for the usual one.
-    """
+    """Size, background, legend, title and camera of a picture of a view."""
 
     size: tuple[int, int] = (1600, 1000)
+    """(int, int): width and height in pixels."""
     background: Background = "white"
     legend: bool = True
     edges: bool = True
     triad: bool = False
+    """`legend`, `edges`, `triad`: whether there are the legend of roles or the color bar; edges of
+    cells; the axes."""
     title: bool = False
+    """Whether there is a title: what is shown, with minimum, mean and inverted cells."""
     fill: bool = True
+    """Whether the whole mesh is fitted to the picture, instead of the view's part of it."""
     both: bool = True
+    """Whether the session of the second view is drawn too, if there is one."""
     letters: float = 1.25
+    """Size of the letters; 1 is 13 pixels in a picture 620 pixels high."""
     dpi: float | None = None
+    """Pixels per inch on paper, stored in the file."""
     film: bool = False
+    """Whether it is an image of a film."""
     named: bool = False
+    """Whether it has the name of its run even without a title, as one of two side by side."""
     marked: bool = True
+    """Whether the marked cell is drawn, with its number and value."""
     lines: int = 1
+    """Number of lines of the title."""
     heading: str = ""
+    """A title instead of the usual one; empty for the usual one."""
 
     @property
     def headed(self) -> bool:

@@ -34,22 +34,15 @@ _SHOWN = "shown: "
 
 @dataclass(frozen=True)
 class PageFormat:
-    """The format of a section's picture.
-
-    Attributes
-    ----------
-    size : (int, int)
-        Width and maximum height in pixels.
-    dpi : float or None
-        Pixels per inch of a picture for paper.
-    title, axes : bool
-        Whether it has a title, and numbers along its axes.
-    """
+    """The format of a section's picture."""
 
     size: tuple[int, int]
+    """(int, int): width and maximum height in pixels."""
     dpi: float | None = None
+    """Pixels per inch of a picture for paper."""
     title: bool = True
     axes: bool = True
+    """`title`, `axes`: whether it has a title, and numbers along its axes."""
 
     @classmethod
     def of_cm(cls, width: float, height: float, dpi: float = 300.0) -> PageFormat:

@@ -37,21 +37,15 @@ CORNERS = np.array(
 
 @dataclass(frozen=True, eq=False)
 class Embedding:
-    """Nodes in a box, with their weights of the control points (I, J, K).
-
-    Attributes
-    ----------
-    nodes : (m,) int64
-        Sorted.
-    uvw : (m, 3) float64
-        Parametric coordinates of the nodes.
-    factors : tuple of (m, I), (m, J), (m, K) float64
-        Blending functions at the nodes in each direction; their products are the weights.
-    """
+    """Nodes in a box, with their weights of the control points (I, J, K)."""
 
     nodes: IntArray
+    """(m,): sorted."""
     uvw: FloatArray
+    """(m, 3): parametric coordinates of the nodes."""
     factors: tuple[FloatArray, FloatArray, FloatArray]
+    """tuple of (m, I), (m, J), (m, K) float64: blending functions at the nodes in each direction;
+    their products are the weights."""
 
     def sums(self, lattice: FloatArray) -> FloatArray:
         """Return the weighted sums (m, c), for each node, of values (I, J, K, c)."""
@@ -72,34 +66,24 @@ class Embedding:
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """A box for free-form deformation.
-
-    Attributes
-    ----------
-    name : str
-    points : (I, J, K, 3) float64
-        The control points, in the mesh's length unit.
-    orders : (int, int, int) or None
-        Orders of the uniform B-splines; None: Bézier.
-    corners : (8, 3) float64
-        Corners of the undeformed box, in SU2's order (`CORNERS`).
-    embedded : mapping of str to (nodes, uvw)
-        For each marker that the mesh file lists for the box, nodes (m,) and parametric
-        coordinates (m, 3).
-    system : CoordinateSystem
-        Of the coordinates q in which control points are blended.
-    level, parent : int, str
-        Of a nested box: 1 or more, and the name of the box whose control points move its own.
-    """
+    """A box for free-form deformation."""
 
     name: str
     points: FloatArray
+    """(I, J, K, 3): the control points, in the mesh's length unit."""
     orders: Index | None
+    """(int, int, int) or None: orders of the uniform B-splines; None: Bézier."""
     corners: FloatArray
+    """(8, 3): corners of the undeformed box, in SU2's order (`CORNERS`)."""
     embedded: Mapping[str, tuple[IntArray, FloatArray]] = field(default_factory=dict)
+    """mapping of str to (nodes, uvw): for each marker that the mesh file lists for the box, nodes
+    (m,) and parametric coordinates (m, 3)."""
     system: CoordinateSystem = CARTESIAN
+    """Of the coordinates q in which control points are blended."""
     level: int = 0
     parent: str = ""
+    """`level`, `parent`: of a nested box: 1 or more, and the name of the box whose control points
+    move its own."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen_array(self.points, np.float64))

@@ -23,39 +23,26 @@ from slideviz.mesh.model import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class Limits:
-    """What keeps boxes from being deformed too much.
-
-    Attributes
-    ----------
-    bound : float
-        OPT_LINE_SEARCH_BOUND: largest displacement of a node by a box.
-    iterations, depth : int
-        FFD_INTPREV_ITER and FFD_INTPREV_DEPTH; 0 iterations: boxes may intersect themselves.
-    """
+    """What keeps boxes from being deformed too much."""
 
     bound: float = np.inf
+    """OPT_LINE_SEARCH_BOUND: largest displacement of a node by a box."""
     iterations: int = 0
     depth: int = 3
+    """`iterations`, `depth`: FFD_INTPREV_ITER and FFD_INTPREV_DEPTH; 0 iterations: boxes may
+    intersect themselves."""
 
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """A move of a box by one of the values of a design.
-
-    Attributes
-    ----------
-    box : str
-    move : Move
-    value : int
-        Place of the value in the design.
-    relaxed : bool
-        Whether the relaxation factor multiplies it.
-    """
+    """A move of a box by one of the values of a design."""
 
     box: str
     move: Move
     value: int
+    """Place of the value in the design."""
     relaxed: bool = True
+    """Whether the relaxation factor multiplies it."""
 
 
 @dataclass(eq=False)
@@ -72,43 +59,29 @@ class _Rates:
 
 @dataclass(eq=False)
 class BoxDeformation:
-    """The displacement of nodes by boxes that a design deforms.
-
-    Attributes
-    ----------
-    boxes : sequence of Box
-        Undeformed, in the order of the file.
-    inside : dict of str to Embedding
-        Nodes in each box, by their place in 0..m-1.
-    drives : sequence of Drive
-    values : (v,) float64
-        The design.
-    relax : float
-        OPT_RELAX_FACTOR.
-    count : int
-        m, the number of nodes.
-    limits : Limits
-    nodes : (m, 3) float64
-        The displacement.
-    change : dict of str to (I, J, K, 3)
-        Change of the control points of each box, in its coordinates q.
-    notes : list of str
-        What the limits did, and which nodes a later box took over.
-    missed : set of int
-        Values whose twist has no centre, so that they do nothing.
-    """
+    """The displacement of nodes by boxes that a design deforms."""
 
     boxes: Sequence[Box]
+    """Undeformed, in the order of the file."""
     inside: dict[str, Embedding]
+    """Nodes in each box, by their place in 0..m-1."""
     drives: Sequence[Drive]
     values: FloatArray
+    """(v,): the design."""
     relax: float
+    """OPT_RELAX_FACTOR."""
     count: int
+    """m, the number of nodes."""
     limits: Limits = Limits()
     nodes: FloatArray = field(init=False)
+    """(m, 3): the displacement."""
     change: dict[str, FloatArray] = field(init=False)
+    """dict of str to (I, J, K, 3): change of the control points of each box, in its coordinates
+    q."""
     notes: list[str] = field(init=False, default_factory=list)
+    """What the limits did, and which nodes a later box took over."""
     missed: set[int] = field(init=False, default_factory=set)
+    """Values whose twist has no centre, so that they do nothing."""
 
     def __post_init__(self) -> None:
         self._by_name = {box.name: box for box in self.boxes}

@@ -22,24 +22,16 @@ NONE: Planes = (frozenset(), frozenset(), frozenset())
 
 @dataclass(frozen=True)
 class Request:
-    """What an FFD variable asks of its box.
-
-    Attributes
-    ----------
-    kind : str
-        A key of `KINDS`.
-    index : tuple of int
-        The indices among its parameters, as SU2 lists them; -1 means all.
-    numbers : tuple of float
-        Its other parameters.
-    length : float
-        REF_LENGTH, over which the value of FFD_TWIST is a slope.
-    """
+    """What an FFD variable asks of its box."""
 
     kind: str
+    """A key of `KINDS`."""
     index: tuple[int, ...]
+    """The indices among its parameters, as SU2 lists them; -1 means all."""
     numbers: tuple[float, ...]
+    """Its other parameters."""
     length: float = 1.0
+    """REF_LENGTH, over which the value of FFD_TWIST is a slope."""
 
     @property
     def direct(self) -> bool:

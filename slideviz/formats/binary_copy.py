@@ -48,30 +48,21 @@ class Plan:
     """The layout of the binary form of a text mesh: at which byte each part begins.
 
     `slideviz.formats.su2b.layout` describes the format.
-
-    Attributes
-    ----------
-    text : Text
-        The text mesh.
-    width : int
-        Bytes of a count or an index, 4 or 8.
-    named : bool
-        Whether the file gets the names of the markers; else numbers, which always fit.
-    before : (p + 1, t) int64
-        Number of elements of each type before each of the p pieces, and in the last row of all.
-        Types are in the order of ``SORTED``.
-    begin : int
-        First byte of its zone.
-    number : int
-        Number of its zone.
     """
 
     text: Text
+    """The text mesh."""
     width: int
+    """Bytes of a count or an index, 4 or 8."""
     named: bool
+    """Whether the file gets the names of the markers; else numbers, which always fit."""
     before: IntArray
+    """(p + 1, t): number of elements of each type before each of the p pieces, and in the last row
+    of all. Types are in the order of ``SORTED``."""
     begin: int = HEAD
+    """First byte of its zone."""
     number: int = 1
+    """Number of its zone."""
 
     @property
     def conn(self) -> np.dtype:

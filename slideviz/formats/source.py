@@ -20,22 +20,16 @@ KEPT_BYTES = 1 << 26
 
 
 class Source:
-    """The bytes of a file; a slice of it returns some of them.
-
-    Attributes
-    ----------
-    path : Path
-        The file, for messages.
-    size : int
-        Number of bytes.
-    """
+    """The bytes of a file; a slice of it returns some of them."""
 
     def __init__(self, path: Path, content: bytes | BinaryIO) -> None:
         self.path = path
+        """The file, for messages."""
         self._content = content if isinstance(content, bytes) else None
         self._file = None if isinstance(content, bytes) else content
         self._stamp = self._now()
         self.size = len(content) if isinstance(content, bytes) else self._stamp[0]
+        """Number of bytes."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what pickle makes a copy from: the bytes, or how to open a large file again."""

@@ -45,22 +45,15 @@ Values = Mapping[str, NDArray]
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """A block of the collection.
-
-    Attributes
-    ----------
-    group : h5py.Group
-        Its group in the file.
-    nodes : (n,) int64
-        The mesh nodes of its points, one partition after the other.
-    partitions, count : int
-        Numbers of its partitions and of its cells.
-    """
+    """A block of the collection."""
 
     group: h5py.Group
+    """Its group in the file."""
     nodes: IntArray
+    """(n,): the mesh nodes of its points, one partition after the other."""
     partitions: int
     count: int
+    """`partitions`, `count`: numbers of its partitions and of its cells."""
 
 
 class StepSeries:

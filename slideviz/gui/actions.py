@@ -26,14 +26,7 @@ if TYPE_CHECKING:
 
 
 class Actions:
-    """The actions of the main window.
-
-    Attributes
-    ----------
-    by_name : dict of str to QAction
-    menus : dict of str to QMenu
-    bar : ToolBar
-    """
+    """The actions of the main window."""
 
     def __init__(self, window: MainWindow) -> None:
         self.window = window

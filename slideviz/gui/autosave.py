@@ -154,24 +154,16 @@ class Autosave(QObject):
 
 @dataclass(frozen=True, eq=False)
 class LeftSession:
-    """A session found in the file of a program that did not end properly.
-
-    Attributes
-    ----------
-    path : Path
-        The session's file.
-    case : Case
-        The case in the file.
-    source : Path or None
-        The case file that the session was opened from or saved to.
-    lock : QLockFile
-        Held by this window, so that no other window offers the session too.
-    """
+    """A session found in the file of a program that did not end properly."""
 
     path: Path
+    """The session's file."""
     case: Case
+    """The case in the file."""
     source: Path | None
+    """The case file that the session was opened from or saved to."""
     lock: QLockFile
+    """Held by this window, so that no other window offers the session too."""
 
     @property
     def when(self) -> datetime:

@@ -40,22 +40,16 @@ Hit = tuple["FloatArray", int, int]
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """A place where the moved boundary goes through another.
-
-    Attributes
-    ----------
-    marker : str
-        Name of the other boundary.
-    point : (d,) float64
-        A point of both.
-    facet, other_facet : int
-        The two elements, counted from 0 in the moved and in the other boundary.
-    """
+    """A place where the moved boundary goes through another."""
 
     marker: str
+    """Name of the other boundary."""
     point: FloatArray
+    """(d,): A point of both."""
     facet: int
     other_facet: int
+    """`facet`, `other_facet`: the two elements, counted from 0 in the moved and in the other
+    boundary."""
 
 
 def first_crossing(

@@ -14,32 +14,22 @@ import numpy as np
 
 @dataclass(frozen=True)
 class ElementType:
-    """One element type.
-
-    Attributes
-    ----------
-    vtk : int
-        The identifier in VTK and SU2 files.
-    name : str
-        Singular English name.
-    n_nodes, dim : int
-        Number of nodes, dimension (0 for a vertex to 3).
-    facets : tuple of tuple of int
-        Local nodes of each side (dimension ``dim - 1``), with outward normal.
-    edges : tuple of tuple of int
-        Local nodes of each edge.
-    corners : tuple of tuple of int
-        ``(k, a, b[, c])``: local nodes of the corner and its neighbours, right-handed; empty for
-        vertex and line.
-    """
+    """One element type."""
 
     vtk: int
+    """The identifier in VTK and SU2 files."""
     name: str
+    """Singular English name."""
     n_nodes: int
     dim: int
+    """`n_nodes`, `dim`: number of nodes, dimension (0 for a vertex to 3)."""
     facets: tuple[tuple[int, ...], ...] = ()
+    """Local nodes of each side (dimension ``dim - 1``), with outward normal."""
     edges: tuple[tuple[int, int], ...] = ()
+    """Local nodes of each edge."""
     corners: tuple[tuple[int, ...], ...] = ()
+    """``(k, a, b[, c])``: local nodes of the corner and its neighbours, right-handed; empty for
+    vertex and line."""
 
 
 _ROWS = (

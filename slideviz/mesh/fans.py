@@ -30,22 +30,16 @@ from slideviz.system.jit_cache import njit
 
 @dataclass(frozen=True, eq=False)
 class Fans:
-    """Groups of smoothly joined facets of one marker around one node.
-
-    Attributes
-    ----------
-    facet, node, fan : (i,) int64
-        One entry for each pair of a facet and a node of it: the fan, an index below m, that the
-        facet belongs to at that node.
-    fan_node, fan_marker : (m,) int64
-        The node and the marker of each fan.
-    """
+    """Groups of smoothly joined facets of one marker around one node."""
 
     facet: IntArray
     node: IntArray
     fan: IntArray
+    """`facet`, `node`, `fan` (i,): one entry for each pair of a facet and a node of it: the fan, an
+    index below m, that the facet belongs to at that node."""
     fan_node: IntArray
     fan_marker: IntArray
+    """`fan_node`, `fan_marker` (m,): the node and the marker of each fan."""
 
 
 def smooth_joints(

@@ -34,31 +34,22 @@ class RigidMotion:
 
 @dataclass(frozen=True, eq=False)
 class Halo:
-    """The halo of a mesh: nodes that are copies of others, and the cells beyond the periodic sides.
-
-    Attributes
-    ----------
-    receivers, donors : (h,) int64
-        Each copy, and the node that it is a copy of. A donor is never a copy itself.
-    rotations : (h, d, d) float64
-        Matrices that turn the displacement of a donor into that of its receiver.
-    outer : (o,) int64
-        The receivers that belong to no cell of the domain, sorted.
-    cells : (m,) bool
-        The cells of the halo: those with an outer receiver.
-    sides : tuple of (str, str)
-        Pairs of boundaries of the domain: the first is a copy of the second.
-    mismatch : (h,) float64
-        Distance of each copy from where the motion of the halo puts its donor, undeformed.
-    """
+    """The halo of a mesh: copies of nodes, and the cells beyond the periodic sides."""
 
     receivers: IntArray
     donors: IntArray
+    """`receivers`, `donors` (h,): each copy, and the node that it is a copy of. A donor is never a
+    copy itself."""
     rotations: FloatArray
+    """(h, d, d): matrices that turn the displacement of a donor into that of its receiver."""
     outer: IntArray
+    """(o,): the receivers that belong to no cell of the domain, sorted."""
     cells: NDArray[np.bool_]
+    """(m,): the cells of the halo: those with an outer receiver."""
     sides: tuple[tuple[str, str], ...]
+    """tuple of (str, str): pairs of boundaries of the domain: the first is a copy of the second."""
     mismatch: FloatArray
+    """(h,): distance of each copy from where the motion of the halo puts its donor, undeformed."""
 
     def follow(self, before: FloatArray, after: FloatArray, rows: IntArray) -> FloatArray:
         """Return ``after`` (n, d), with receivers moved as their donors, turned by their rotations.

@@ -59,21 +59,14 @@ def sorted_nodes(nodes: IntArray) -> IntArray:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Cells:
-    """Elements of mixed type, in file order.
-
-    Attributes
-    ----------
-    types : (m,) uint8
-        VTK identifier of each element.
-    offsets : (m + 1,) int64
-        Element ``i`` has the nodes ``connectivity[offsets[i]:offsets[i + 1]]``.
-    connectivity : (k,) int64
-        Node indices, zero-based.
-    """
+    """Elements of mixed type, in file order."""
 
     types: NDArray[np.uint8]
+    """(m,): VTK identifier of each element."""
     offsets: IntArray
+    """(m + 1,): element ``i`` has the nodes ``connectivity[offsets[i]:offsets[i + 1]]``."""
     connectivity: IntArray
+    """(k,): node indices, zero-based."""
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -179,20 +172,15 @@ class Marker:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Where the points and cells of a part of a mesh are in the whole mesh.
-
-    Attributes
-    ----------
-    points, cells : (n,), (m,) int64
-        Index in the whole mesh of each point and cell of the part, ascending.
-    n_points, n_cells : int
-        Numbers of points and cells of the whole mesh.
-    """
+    """Where the points and cells of a part of a mesh are in the whole mesh."""
 
     points: IntArray
     cells: IntArray
+    """`points`, `cells` (n,), (m,): index in the whole mesh of each point and cell of the part,
+    ascending."""
     n_points: int
     n_cells: int
+    """`n_points`, `n_cells`: numbers of points and cells of the whole mesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,69 +203,47 @@ class Origin:
     """What a mesh keeps of its file besides points, cells and boundaries, to write it back.
 
     A format whose files have more than that has a subclass of its own.
-
-    Attributes
-    ----------
-    ending : str
-        File name ending of the format, with its dot; "" where no more of the file is kept.
-    ffd : bytes or None
-        Text of the boxes for free-form deformation that an SU2 file gets in place of those it had;
-        None: those it had.
-    ffd_at : tuple of range
-        The lines of the file, from 0, that its boxes are on, if that is known.
-    ffd_elsewhere : dict of str to int
-        Names of the boxes that other zones of the file have, and the numbers of these zones.
     """
 
     ending: ClassVar[str] = ""
+    """File name ending of the format, with its dot; "" where no more of the file is kept."""
     ffd: bytes | None = field(default=None, kw_only=True)
+    """Text of the boxes for free-form deformation that an SU2 file gets in place of those it had;
+    None: those it had."""
     ffd_at: tuple[range, ...] = field(default=(), kw_only=True)
+    """The lines of the file, from 0, that its boxes are on, if that is known."""
     ffd_elsewhere: Mapping[str, int] = field(default_factory=dict, kw_only=True)
+    """Names of the boxes that other zones of the file have, and the numbers of these zones."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
-    """Points, cells and boundaries of one zone.
-
-    Attributes
-    ----------
-    points : (n, d) float64
-        Cartesian coordinates, d = 2 or 3, in the file's length unit.
-    cells : Cells
-        The volume elements (3D) or faces (2D).
-    markers : tuple of Marker
-        The named boundaries, in file order.
-    origin : Origin
-        What else of its file is kept, to write it back.
-    name : str
-        Name of its file or sample, for messages.
-    zone, zones : int
-        Number of this zone in the file (from 1) and of all its zones.
-    source : Path or None
-        The file it was read from, which is overwritten only on request.
-    halo : Halo or None
-        Copies of cells beyond the periodic sides, which only follow the cells they copy.
-    remarks : tuple of str
-        Warnings of the reader, a sentence each.
-    interfaces : tuple of ZoneInterface
-        The boundaries that coincide with boundaries of other zones of the file.
-    part : Part or None
-        For a mesh that is only a part of another (its skin, where that is larger than memory):
-        where its points and cells are in the whole.
-    """
+    """Points, cells and boundaries of one zone."""
 
     points: FloatArray
+    """(n, d): Cartesian coordinates, d = 2 or 3, in the file's length unit."""
     cells: Cells
+    """The volume elements (3D) or faces (2D)."""
     markers: tuple[Marker, ...] = ()
+    """The named boundaries, in file order."""
     origin: Origin = Origin()
+    """What else of its file is kept, to write it back."""
     name: str = "mesh"
+    """Name of its file or sample, for messages."""
     zone: int = 1
     zones: int = 1
+    """`zone`, `zones`: number of this zone in the file (from 1) and of all its zones."""
     source: Path | None = None
+    """The file it was read from, which is overwritten only on request."""
     halo: Halo | None = None
+    """Copies of cells beyond the periodic sides, which only follow the cells they copy."""
     remarks: tuple[str, ...] = ()
+    """Warnings of the reader, a sentence each."""
     interfaces: tuple[ZoneInterface, ...] = ()
+    """The boundaries that coincide with boundaries of other zones of the file."""
     part: Part | None = None
+    """For a mesh that is only a part of another (its skin, where that is larger than memory): where
+    its points and cells are in the whole."""
 
     def __post_init__(self) -> None:
         check_fields(self)

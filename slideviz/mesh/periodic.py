@@ -35,34 +35,24 @@ _AXES = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Two markers that are images of each other.
-
-    Attributes
-    ----------
-    first, second : str
-        Marker names; ``second`` is the image of ``first``.
-    kind : "translational" or "rotational"
-    vector : (d,) float64
-        Translation from first to second; zero when rotational.
-    angle : float
-        Rotation in radians about ``axis`` through ``origin``; zero when translational.
-    axis, origin : (3,) tuple of float
-        Direction of the axis of rotation, and a point on it; without effect when translational.
-    nodes : (k, 2) int64
-        Each node of ``first`` and its image.
-    mismatch : float
-        Largest distance between an image and its partner, in the mesh's length unit.
-    """
+    """Two markers that are images of each other."""
 
     first: str
     second: str
+    """`first`, `second`: marker names; ``second`` is the image of ``first``."""
     kind: PeriodicKind
     vector: FloatArray
+    """(d,): translation from first to second; zero when rotational."""
     angle: float
+    """Rotation in radians about ``axis`` through ``origin``; zero when translational."""
     axis: tuple[float, float, float]
     origin: tuple[float, float, float]
+    """`axis`, `origin` (3,) tuple of float: direction of the axis of rotation, and a point on it;
+    without effect when translational."""
     nodes: IntArray
+    """(k, 2): each node of ``first`` and its image."""
     mismatch: float
+    """Largest distance between an image and its partner, in the mesh's length unit."""
 
     @property
     def period(self) -> float:

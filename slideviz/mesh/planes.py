@@ -33,18 +33,12 @@ ANGLE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class FacetSimplices:
-    """The lines (2D) or triangles (3D) that facets are divided into, in the order of the facets.
-
-    Attributes
-    ----------
-    nodes : (s, d) int64
-        The mesh nodes of each simplex: two in 2D, three in 3D.
-    facet : (s,) int64
-        Index of the facet that each is part of: a quadrilateral is two triangles.
-    """
+    """The lines (2D) or triangles (3D) that facets are divided into, in the order of the facets."""
 
     nodes: IntArray
+    """(s, d): the mesh nodes of each simplex: two in 2D, three in 3D."""
     facet: IntArray
+    """(s,): index of the facet that each is part of: a quadrilateral is two triangles."""
 
     @classmethod
     def of(cls, cells: Cells, dim: int) -> FacetSimplices:
@@ -107,18 +101,13 @@ class FacetSimplices:
 
 @dataclass(frozen=True, eq=False)
 class BoxTree:
-    """A complete binary tree over axis-parallel boxes, the *items*.
-
-    Attributes
-    ----------
-    order : (s,) int64
-        Indices of the items in the order of the leaves, filled up with -1.
-    levels : tuple of ((k, d), (k, d))
-        Low and high corners of the boxes of each level, from the root (k = 1) to the items (k = s).
-    """
+    """A complete binary tree over axis-parallel boxes, the *items*."""
 
     order: IntArray
+    """(s,): indices of the items in the order of the leaves, filled up with -1."""
     levels: tuple[tuple[FloatArray, FloatArray], ...]
+    """tuple of ((k, d), (k, d)): low and high corners of the boxes of each level, from the root (k
+    = 1) to the items (k = s)."""
 
     @classmethod
     def of(cls, low: FloatArray, high: FloatArray) -> BoxTree:
@@ -182,28 +171,20 @@ class BoxTree:
 
 @dataclass(frozen=True, eq=False)
 class Planes:
-    """The planes of a surface's simplices at given points of its nodes, with a search tree.
-
-    Attributes
-    ----------
-    corners : (s, d, d) float64
-        The corners of the simplices.
-    normals : (s, d) float64
-        Unit normals; NaN where a simplex is degenerate, so that all comparisons with it fail.
-    inwards : (s, d, d) float64
-        For each corner a unit vector in the plane of the simplex, pointing inward: in 3D normal to
-        the side that begins there, in 2D along the line.
-    tree : BoxTree
-        The boxes around the simplices.
-    margin : float
-        Length up to which a point off the surface counts as lying on it.
-    """
+    """The planes of a surface's simplices at given points of its nodes, with a search tree."""
 
     corners: FloatArray
+    """(s, d, d): the corners of the simplices."""
     normals: FloatArray
+    """(s, d): unit normals; NaN where a simplex is degenerate, so that all comparisons with it
+    fail."""
     inwards: FloatArray
+    """(s, d, d): for each corner a unit vector in the plane of the simplex, pointing inward: in 3D
+    normal to the side that begins there, in 2D along the line."""
     tree: BoxTree
+    """The boxes around the simplices."""
     margin: float
+    """Length up to which a point off the surface counts as lying on it."""
 
     @classmethod
     def of(cls, points: FloatArray, surface: FacetSimplices, margin: float) -> Planes:

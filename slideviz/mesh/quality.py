@@ -42,37 +42,26 @@ __all__ = ["INVERTED", "UNPROVEN", "VALID", "Quality", "corner_jacobians", "qual
 
 @dataclass(frozen=True, eq=False)
 class Quality:
-    """Quality of every cell of a mesh, in the order of the cells.
-
-    Attributes
-    ----------
-    values : (m,) float64
-        Size-skew, 0 to 1; 0 for an inverted cell, as are its ``size`` and ``skew``.
-    size, skew : (m,) float64
-        The two factors: ``values = √size · skew``.
-    status : (m,) uint8
-        ``VALID`` (positive Jacobian in the whole cell, proved), ``INVERTED`` (a point was found
-        where it is not positive) or ``UNPROVEN`` (a hexahedron that is neither).
-    signs : (m,) int8
-        1, or -1 for a cell that is numbered the other way round.
-    metric : {"knupp", "rbf-slide"}
-        ``knupp``, or ``rbf-slide``: hexahedra with exponent 1 instead of 2/3 in ``f_skew``, as
-        the program of the thesis has it, for comparison with its figures.
-    halo : (m,) bool or None
-        The cells of the halo. They have values like all others, but are copies: numbers of the
-        whole mesh (minimum, mean, counts, histogram, worst cells) leave them out.
-    derivative : QualityDerivative or None
-        By the points, if it was asked for.
-    """
+    """Quality of every cell of a mesh, in the order of the cells."""
 
     values: FloatArray
+    """(m,): size-skew, 0 to 1; 0 for an inverted cell, as are its ``size`` and ``skew``."""
     size: FloatArray
     skew: FloatArray
+    """`size`, `skew` (m,): the two factors: ``values = √size · skew``."""
     status: NDArray[np.uint8]
+    """(m,): ``VALID`` (positive Jacobian in the whole cell, proved), ``INVERTED`` (a point was
+    found where it is not positive) or ``UNPROVEN`` (a hexahedron that is neither)."""
     signs: NDArray[np.int8]
+    """(m,): 1, or -1 for a cell that is numbered the other way round."""
     metric: Metric
+    """``knupp``, or ``rbf-slide``: hexahedra with exponent 1 instead of 2/3 in ``f_skew``, as the
+    program of the thesis has it, for comparison with its figures."""
     halo: NDArray[np.bool_] | None = None
+    """(m,): the cells of the halo. They have values like all others, but are copies: numbers of the
+    whole mesh (minimum, mean, counts, histogram, worst cells) leave them out."""
     derivative: QualityDerivative | None = None
+    """By the points, if it was asked for."""
 
     def __len__(self) -> int:
         return len(self.values)

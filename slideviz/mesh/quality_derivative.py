@@ -56,24 +56,20 @@ class QualityDerivative:
     that is folded inside, between positive corners, the Bernstein coefficients that are not
     positive. So it is finite, 0 or below as long as a cell is inverted, lower the further cells are
     folded, and its derivative points to where they unfold. It is continuous where a corner folds.
-
-    Attributes
-    ----------
-    p : float
-        The exponent.
-    minimum, mean : float
-        The smooth minimum, and the mean as `Quality` has it, where inverted cells count as 0.
-    of_minimum, of_mean : (n, d) float64
-        Their derivatives by the points, per unit of length. Inverted cells add nothing to that of
-        the mean. Where a cell is as large as the undeformed one, at the kink of ``min(τ, 1/τ)``,
-        its factor of size adds 0, the mean of both sides. Else all are exact.
     """
 
     p: float
+    """The exponent."""
     minimum: float
     mean: float
+    """`minimum`, `mean`: the smooth minimum, and the mean as `Quality` has it, where inverted cells
+    count as 0."""
     of_minimum: FloatArray
     of_mean: FloatArray
+    """`of_minimum`, `of_mean` (n, d): their derivatives by the points, per unit of length.
+    Inverted cells add nothing to that of the mean. Where a cell is as large as the undeformed
+    one, at the kink of ``min(τ, 1/τ)``, its factor of size adds 0, the mean of both sides. Else
+    all are exact."""
 
 
 def derivative_of(

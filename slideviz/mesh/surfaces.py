@@ -13,27 +13,19 @@ from slideviz.mesh.unique_rows import row_groups
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """One boundary, ready to be drawn.
-
-    Attributes
-    ----------
-    name : str
-        The marker.
-    nodes : (u,) int64
-        The mesh nodes it uses.
-    facets : (f, 2 or 4) int64
-        Its lines or faces, as indices into ``nodes``; a triangle repeats its last node.
-    owner : (f,) int64
-        The cell whose side each facet is.
-    rim : (r, 2) int64
-        Edges that only one facet has, as indices into ``nodes``; empty in 2D.
-    """
+    """One boundary, ready to be drawn."""
 
     name: str
+    """The marker."""
     nodes: IntArray
+    """(u,): the mesh nodes it uses."""
     facets: IntArray
+    """(f, 2 or 4): its lines or faces, as indices into ``nodes``; a triangle repeats its last
+    node."""
     owner: IntArray
+    """(f,): the cell whose side each facet is."""
     rim: IntArray
+    """(r, 2): edges that only one facet has, as indices into ``nodes``; empty in 2D."""
 
     @property
     def flat(self) -> bool:

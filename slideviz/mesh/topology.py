@@ -27,30 +27,20 @@ TINY = float(np.finfo(float).tiny)
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """The facets of all markers, nodes ordered so that normals point out of the cells.
-
-    Attributes
-    ----------
-    facets : (f, k) int64
-        Node indices; k = 2 in 2D, 4 in 3D, where a triangle repeats its last node.
-    marker : (f,) int64
-        Index into ``names``.
-    names : tuple of str
-        The markers, in file order.
-    owner : (f,) int64
-        The cell each facet is a side of.
-    joints : (j, 2) int64
-        Pairs of facets of any markers that share a joint (node in 2D, edge in 3D).
-    joint_nodes : (j, dim - 1) int64
-        The nodes that each pair shares.
-    """
+    """The facets of all markers, nodes ordered so that normals point out of the cells."""
 
     facets: IntArray
+    """(f, k): node indices; k = 2 in 2D, 4 in 3D, where a triangle repeats its last node."""
     marker: IntArray
+    """(f,): index into ``names``."""
     names: tuple[str, ...]
+    """The markers, in file order."""
     owner: IntArray
+    """(f,): the cell each facet is a side of."""
     joints: IntArray
+    """(j, 2): pairs of facets of any markers that share a joint (node in 2D, edge in 3D)."""
     joint_nodes: IntArray
+    """(j, dim - 1): the nodes that each pair shares."""
 
     @property
     def dim(self) -> int:

@@ -27,25 +27,17 @@ _FILLED, _FOLDED = 0.85, 0.3
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The values of the cells along a section of a 2D mesh, sorted by position.
-
-    Attributes
-    ----------
-    ends : (q, 2) float64
-        The positions between which each cell is cut, the smaller one first: along a line in the
-        mesh's length unit, along a circle in degrees.
-    values : (q,) float64
-        The value of each cell.
-    inverted : (q,) bool
-        Whether each cell is inverted.
-    cells : (q,) int64
-        The index of each cell in the mesh.
-    """
+    """The values of the cells along a section of a 2D mesh, sorted by position."""
 
     ends: FloatArray
+    """(q, 2): the positions between which each cell is cut, the smaller one first: along a line in
+    the mesh's length unit, along a circle in degrees."""
     values: FloatArray
+    """(q,): the value of each cell."""
     inverted: np.ndarray
+    """(q,): whether each cell is inverted."""
     cells: IntArray
+    """(q,): the index of each cell in the mesh."""
 
     def cell_at(self, position: float) -> int | None:
         """Return the index of the cell at a position, or None; an inverted one before others."""

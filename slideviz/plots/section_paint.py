@@ -15,27 +15,18 @@ from slideviz.terms import Quantity
 
 @dataclass(frozen=True, eq=False)
 class Paint:
-    """A value for every cell of a mesh, with limits and color map.
-
-    Attributes
-    ----------
-    label : str
-        The quantity.
-    values : (m,) float64
-        Its value in every cell.
-    inverted : (m,) bool
-        Whether each cell is inverted, and drawn in the color of inverted cells.
-    limits : (float, float)
-        The values at the ends of the color map.
-    color_map : str
-        A color map of matplotlib.
-    """
+    """A value for every cell of a mesh, with limits and color map."""
 
     label: Quantity
+    """The quantity."""
     values: FloatArray
+    """(m,): its value in every cell."""
     inverted: np.ndarray
+    """(m,): whether each cell is inverted, and drawn in the color of inverted cells."""
     limits: tuple[float, float]
+    """(float, float): the values at the ends of the color map."""
     color_map: str = COLOR_MAP
+    """A color map of matplotlib."""
 
     def within(self, low: float, high: float) -> Paint:
         """Return the paint with other limits.

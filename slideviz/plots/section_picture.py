@@ -44,36 +44,24 @@ _LONGEST = 36
 
 @dataclass(frozen=True)
 class SectionStyle:
-    """The size and the parts of a picture of a section.
-
-    Attributes
-    ----------
-    size : (int, int)
-        Width and height of the picture in pixels; SVG and PDF keep their ratio.
-    trimmed : bool
-        Whether the picture is only as high as the section needs, the height of ``size`` at most.
-    edges : bool
-        Whether mesh lines are drawn.
-    in_space : bool
-        Whether the section is shown in space instead of flat.
-    name : str
-        Name of the mesh, with which the title begins, shortened if it is long.
-    dpi : float, optional
-        Pixels per inch; by default such that the picture is 5 to 10 inches wide.
-    title : bool
-        Whether it has a title: what was cut, where, and its quality.
-    axes : bool
-        Whether a flat section has axes with numbers.
-    """
+    """The size and the parts of a picture of a section."""
 
     size: tuple[int, int] = (1600, 1000)
+    """(int, int): width and height of the picture in pixels; SVG and PDF keep their ratio."""
     trimmed: bool = False
+    """Whether the picture is only as high as the section needs, the height of ``size`` at most."""
     edges: bool = True
+    """Whether mesh lines are drawn."""
     in_space: bool = False
+    """Whether the section is shown in space instead of flat."""
     name: str = ""
+    """Name of the mesh, with which the title begins, shortened if it is long."""
     dpi: float | None = None
+    """Pixels per inch; by default such that the picture is 5 to 10 inches wide."""
     title: bool = True
+    """Whether it has a title: what was cut, where, and its quality."""
     axes: bool = True
+    """Whether a flat section has axes with numbers."""
 
     @property
     def inches(self) -> tuple[float, float]:
@@ -88,29 +76,20 @@ class SectionStyle:
 
 @dataclass(frozen=True, eq=False)
 class SectionInRun:
-    """The cut of a section in one run.
-
-    Attributes
-    ----------
-    pieces : mapping of int to Polygons
-        The polygons that the section shows of each passage, by number; 0 is the mesh itself (see
-        `slideviz.session.passages.show_passages`).
-    paint : Paint
-        The values of the mesh's cells, to which the pieces' cell indices refer.
-    around : Polygons, optional
-        The other cells of a 2D mesh (see `slideviz.plots.around.surroundings`).
-    name, place : str
-        The run and the step in words.
-    note : str
-        A text behind the numbers of the title.
-    """
+    """The cut of a section in one run."""
 
     pieces: Mapping[int, Polygons]
+    """The polygons that the section shows of each passage, by number; 0 is the mesh itself (see
+    `slideviz.session.passages.show_passages`)."""
     paint: Paint
+    """The values of the mesh's cells, to which the pieces' cell indices refer."""
     around: Polygons | None = None
+    """The other cells of a 2D mesh (see `slideviz.plots.around.surroundings`)."""
     name: str = ""
     place: str = ""
+    """`name`, `place`: the run and the step in words."""
     note: str = ""
+    """A text behind the numbers of the title."""
 
     @property
     def drawn(self) -> dict[int, Polygons]:

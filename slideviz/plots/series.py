@@ -16,41 +16,27 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class QualityRun:
-    """Qualities of the cells of one mesh.
-
-    Attributes
-    ----------
-    label : str
-    values : (m,) float64
-        0 to 1.
-    inverted : (m,) bool, optional
-        Cells to count apart, whatever their value.
-    series : int, optional
-        Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot.
-    """
+    """Qualities of the cells of one mesh."""
 
     label: str
     values: FloatArray
+    """(m,): 0 to 1."""
     inverted: NDArray[np.bool_] | None = None
+    """(m,): cells to count apart, whatever their value."""
     series: int | None = None
+    """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
 
 
 @dataclass(frozen=True, eq=False)
 class Distribution:
-    """The number of cells of one mesh in intervals of a value.
-
-    Attributes
-    ----------
-    counts : (k,) int64
-    edges : (k + 1,) float64
-        Limits of the intervals; values outside are counted in the first or the last.
-    inverted : int
-        Number of inverted cells, which are in no interval.
-    """
+    """The number of cells of one mesh in intervals of a value."""
 
     counts: IntArray
+    """(k,)."""
     edges: FloatArray
+    """(k + 1,): limits of the intervals; values outside are counted in the first or the last."""
     inverted: int
+    """Number of inverted cells, which are in no interval."""
 
     @classmethod
     def of(cls, values: FloatArray, edges: FloatArray) -> Distribution:
@@ -84,77 +70,50 @@ class Outline:
 
 @dataclass(frozen=True, eq=False)
 class StepRun:
-    """Quality after each step of a run.
-
-    Attributes
-    ----------
-    label : str
-    steps : (k,) int64
-        Numbers of the steps; 0 is the undeformed mesh.
-    minimum, mean : (k,) float64
-    series : int, optional
-        Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot.
-    """
+    """Quality after each step of a run."""
 
     label: str
     steps: IntArray
+    """(k,): numbers of the steps; 0 is the undeformed mesh."""
     minimum: FloatArray
+    """(k,)."""
     mean: FloatArray
+    """(k,)."""
     series: int | None = None
+    """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
 
 
 @dataclass(frozen=True, eq=False)
 class GreedyRun:
-    """The convergence of a greedy selection, cycle by cycle.
-
-    Attributes
-    ----------
-    label : str
-    control_nodes : (c,) int64
-    error : (c,) float64
-        Largest error of the boundary after each cycle, in the mesh's length unit.
-    level : (c,) int64
-        Number of the level of each cycle.
-    tolerance : float or None
-    series : int, optional
-        Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot.
-    """
+    """The convergence of a greedy selection, cycle by cycle."""
 
     label: str
     control_nodes: IntArray
+    """(c,)."""
     error: FloatArray
+    """(c,): largest error of the boundary after each cycle, in the mesh's length unit."""
     level: IntArray
+    """(c,): number of the level of each cycle."""
     tolerance: float | None = None
     series: int | None = None
+    """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one run.
-
-    Attributes
-    ----------
-    label : str
-        The combination of methods; runs of one label are joined by a line.
-    steps : int
-    minimum, mean : float
-    inverted : int
-        Inverted cells.
-    seconds : float
-        Processor time of the deformation.
-    control_nodes : int
-    max_error : float
-        In the mesh's length unit.
-    series : int, optional
-        Series number of its label; by default the index of the label among all labels.
-    """
+    """The outcome of one run."""
 
     label: str
+    """The combination of methods; runs of one label are joined by a line."""
     steps: int
     minimum: float
     mean: float
     inverted: int = 0
+    """Inverted cells."""
     seconds: float = float("nan")
+    """Processor time of the deformation."""
     control_nodes: int = 0
     max_error: float = float("nan")
+    """In the mesh's length unit."""
     series: int | None = None
+    """Series number of its label; by default the index of the label among all labels."""

@@ -26,31 +26,21 @@ MOST_LAYERS = 40
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """Quality in layers from one end of the span to the other.
-
-    Attributes
-    ----------
-    label : str
-        Name of the run.
-    coordinate : str
-        The coordinate of the layers: ``r``, ``x``, ``y``, ``z``, or ``s`` for another direction.
-    edges : (k + 1,) float64
-        Borders of the layers, in the mesh's length unit.
-    minimum, mean : (k,) float64
-        Minimum and mean in each layer; NaN in a layer without cells.
-    count : (k,) int64
-        Cells in each layer.
-    series : int, optional
-        Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot.
-    """
+    """Quality in layers from one end of the span to the other."""
 
     label: str
+    """Name of the run."""
     coordinate: str
+    """The coordinate of the layers: ``r``, ``x``, ``y``, ``z``, or ``s`` for another direction."""
     edges: FloatArray
+    """(k + 1,): borders of the layers, in the mesh's length unit."""
     minimum: FloatArray
     mean: FloatArray
+    """`minimum`, `mean` (k,): minimum and mean in each layer; NaN in a layer without cells."""
     count: IntArray
+    """(k,): cells in each layer."""
     series: int | None = None
+    """Series number (see `slideviz.plots.style.Style.series`); by default its index in the plot."""
 
     @property
     def position(self) -> FloatArray:

@@ -41,40 +41,26 @@ _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 @dataclass(frozen=True)
 class Series:
-    """The look of a series: color, marker and dash.
-
-    Attributes
-    ----------
-    color, marker : str
-    dash : str or tuple
-        A line style of matplotlib.
-    """
+    """The look of a series: color, marker and dash."""
 
     color: str
     marker: str
     dash: Any
+    """A line style of matplotlib."""
 
 
 @dataclass(frozen=True)
 class Style:
-    """Colors, letters and lines of a plot.
-
-    Attributes
-    ----------
-    scheme : ColorScheme
-        Colors of background and letters; series have lighter colors on a dark background.
-    size : float
-        Size of letters in points, 8 or more at the printed size.
-    width : float
-        Width of lines in points.
-    legend : bool
-        Whether axes with more than one series get a legend.
-    """
+    """Colors, letters and lines of a plot."""
 
     scheme: ColorScheme = PAPER
+    """Colors of background and letters; series have lighter colors on a dark background."""
     size: float = SMALLEST + 0.5
+    """Size of letters in points, 8 or more at the printed size."""
     width: float = 1.4
+    """Width of lines in points."""
     legend: bool = True
+    """Whether axes with more than one series get a legend."""
 
     @property
     def dark(self) -> bool:

@@ -29,35 +29,26 @@ change them together."""
 
 @dataclass(frozen=True, eq=False)
 class Classes:
-    """The nodes of a mesh by class: moving, fixed, sliding on edges or on surfaces, internal.
-
-    Attributes
-    ----------
-    moving, fixed : (a,), (b,) int64
-        Nodes whose displacement is known: prescribed, or zero.
-    edge, surface : (c,), (e,) int64
-        Nodes that slide along a curve (in 2D all sliding nodes), and on a surface.
-    cluster_node : (q,) int64
-        The node of each cluster, sorted. A cluster is the fans of a sliding node that share a
-        normal; a node has as many clusters as different normals.
-    row_fan, row_cluster : (p,) int64
-        Pairs of a fan and the cluster that it belongs to.
-    stands : (n,) int64
-        For each node of the mesh, the number of the periodic image that represents it (itself,
-        if it has none).
-    beyond : int
-        Number of nodes beyond the periodic sides (in a halo), which `counts` leaves out.
-    """
+    """The nodes of a mesh by class: moving, fixed, sliding on edges or on surfaces, internal."""
 
     moving: IntArray
     fixed: IntArray
+    """`moving`, `fixed` (a,), (b,): nodes whose displacement is known: prescribed, or zero."""
     edge: IntArray
     surface: IntArray
+    """`edge`, `surface` (c,), (e,): nodes that slide along a curve (in 2D all sliding nodes), and
+    on a surface."""
     cluster_node: IntArray
+    """(q,): the node of each cluster, sorted. A cluster is the fans of a sliding node that share a
+    normal; a node has as many clusters as different normals."""
     row_fan: IntArray
     row_cluster: IntArray
+    """`row_fan`, `row_cluster` (p,): pairs of a fan and the cluster that it belongs to."""
     stands: IntArray
+    """(n,): for each node of the mesh, the number of the periodic image that represents it (itself,
+    if it has none)."""
     beyond: int = 0
+    """Number of nodes beyond the periodic sides (in a halo), which `counts` leaves out."""
 
     @property
     def total(self) -> int:

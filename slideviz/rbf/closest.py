@@ -174,13 +174,13 @@ def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _before(a, b):  # type: ignore[no-untyped-def]
-    """Tell whether point a comes before b along a direction that no symmetry of a mesh has."""
+    """Return whether point a comes before b along a direction that no symmetry of a mesh has."""
     return (a[0] - b[0]) + 0.6180339887 * (a[1] - b[1]) + 0.4142135624 * (a[2] - b[2]) < 0.0
 
 
 @njit(inline="always", **_OPTIONS)
 def _is_beside(a, b, gap):  # type: ignore[no-untyped-def]
-    """Tell whether a and b, both at squared distance ``gap`` from a node, are one place.
+    """Return whether a and b, both at squared distance ``gap`` from a node, are one place.
 
     Where facets meet, the end of one facet ties with a point of the next facet that is 1e-6 of the
     distance away: there the nearer point is taken, however little it is nearer.
@@ -263,11 +263,6 @@ class ClosestPoints:
 
     The tree has the images one period before and after. A point more than one period from the
     middle of the simplices is taken back by whole periods, and its closest point forth by as many.
-
-    Attributes
-    ----------
-    corners : (n, c, d) float64
-        The simplices. Their images are not stored, to save memory.
     """
 
     def __init__(self, corners: FloatArray, shift: FloatArray | None = None) -> None:
@@ -281,6 +276,7 @@ class ClosestPoints:
             One period; None: there are no images.
         """
         self.corners = corners
+        """(n, c, d): the simplices. Their images are not stored, to save memory."""
         n, count, dim = corners.shape
         self._corners: FloatArray = corners
         if (count, dim) != (3, 3) or not corners.flags.c_contiguous:

@@ -27,21 +27,14 @@ boundaries, far below any angle that a mesh could mean."""
 
 @dataclass(frozen=True, eq=False)
 class ConstraintRows:
-    """Scalar constraints: the displacement of ``nodes`` along ``normals`` is ``right``.
-
-    Attributes
-    ----------
-    nodes : (r,) int64
-        Rows of one node are neighbours.
-    normals : (r, d) float64 or None
-        None: every row stands for all axes, and ``right`` has a column for each.
-    right : (r, m) float64
-        m = d without normals, and 1 with them.
-    """
+    """Scalar constraints: the displacement of ``nodes`` along ``normals`` is ``right``."""
 
     nodes: IntArray
+    """(r,): rows of one node are neighbours."""
     normals: FloatArray | None
+    """(r, d): None: every row stands for all axes, and ``right`` has a column for each."""
     right: FloatArray
+    """(r, m): m = d without normals, and 1 with them."""
 
     def followed_by(self, more: ConstraintRows) -> ConstraintRows:
         """Return these rows followed by ``more``; neither may have normals."""

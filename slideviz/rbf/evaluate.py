@@ -25,21 +25,14 @@ def no_tick(fraction: float) -> None:
 
 @dataclass(frozen=True)
 class Basis:
-    """A radial function: kernel, support radius and rule of distance.
-
-    Attributes
-    ----------
-    radius : float
-        Support radius R, in the mesh's length unit.
-    period : float
-        Angle in radians of a rotational periodic distance (Eq. 2.15); 0: Euclidean features.
-    kernel : str
-        A key of ``KERNELS``.
-    """
+    """A radial function: kernel, support radius and rule of distance."""
 
     radius: float
+    """Support radius R, in the mesh's length unit."""
     period: float = 0.0
+    """Angle in radians of a rotational periodic distance (Eq. 2.15); 0: Euclidean features."""
     kernel: str = "wendland-c2"
+    """A key of ``KERNELS``."""
 
     @property
     def period_over_pi(self) -> float:

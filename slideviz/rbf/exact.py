@@ -26,16 +26,10 @@ class ExactFit:
 
     Attributes
     ----------
-    found : Interpolant
-        Of all rows added so far.
-    dropped : (m,) int64
-        Nodes of which the pivot guard left out a constraint.
     short : str
         Empty: there is no tolerance that it could miss.
     doubt, refined : float
         As of a ``Solution``.
-    stages : tuple of Levels
-        The rows in the system after each call of ``add``.
     """
 
     short = ""
@@ -47,8 +41,11 @@ class ExactFit:
         self._factors: dict[int, Factor] = {}
         self.history: tuple[Cycle, ...] = ()
         self.found = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
+        """Of all rows added so far."""
         self.dropped: IntArray = np.empty(0, np.int64)
+        """(m,): nodes of which the pivot guard left out a constraint."""
         self.stages: tuple[Levels, ...] = ()
+        """The rows in the system after each call of ``add``."""
         self.doubt = self.refined = 0.0
 
     def add(self, rows: ConstraintRows) -> None:

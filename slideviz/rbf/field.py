@@ -47,20 +47,14 @@ class Correction:
     cheap, and continues beyond periodic boundaries. Where several boundary nodes are equally near,
     as on symmetric meshes, the node takes over the mean of their errors, for the nearest one would
     be chosen by its number.
-
-    Attributes
-    ----------
-    tree : cKDTree
-        The sources: Cartesian positions of the boundary nodes and of their periodic images.
-    lacking : (s, d) float64
-        The error of each source: prescribed less interpolated displacement, in the frame.
-    radius : float
-        Distance at which the correction ends, in the mesh's length unit (Eq. 2.31).
     """
 
     tree: cKDTree
+    """The sources: Cartesian positions of the boundary nodes and of their periodic images."""
     lacking: FloatArray
+    """(s, d): the error of each source: prescribed less interpolated displacement, in the frame."""
     radius: float
+    """Distance at which the correction ends, in the mesh's length unit (Eq. 2.31)."""
 
     def near(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return which points (m, d) are within reach of a source, (h,), and their part, (h, d).
@@ -142,25 +136,17 @@ class Correction:
 
 @dataclass(frozen=True, eq=False)
 class RadialField:
-    """A sum of radial functions and, for some kernels, a linear polynomial, with its correction.
-
-    Attributes
-    ----------
-    basis : Basis
-    controls : (k, c) float64
-        Features of the control nodes.
-    weights : (c, d) float64
-    tail : (q, d) float64 or None
-        Coefficients of the polynomial's terms (`linear_terms`).
-    correction : Correction or None
-        None: errors at the boundary are not spread.
-    """
+    """A sum of radial functions and, for some kernels, a linear polynomial, with its correction."""
 
     basis: Basis
     controls: FloatArray
+    """(k, c): features of the control nodes."""
     weights: FloatArray
+    """(c, d)."""
     tail: FloatArray | None = None
+    """(q, d): coefficients of the polynomial's terms (`linear_terms`)."""
     correction: Correction | None = None
+    """None: errors at the boundary are not spread."""
 
     def at(self, features: FloatArray, points: FloatArray, /, tick: Tick = no_tick) -> FloatArray:
         """Return the displacement (m, d) at Cartesian points (m, d) with features (k, m)."""

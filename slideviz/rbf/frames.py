@@ -34,35 +34,25 @@ SECTORS = 1 << 12
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """The coordinates and the distance of the interpolation, and the maps from and to points.
-
-    Attributes
-    ----------
-    dim : int
-        2 or 3.
-    direction : (d,) float64 or None
-        Unit vector of a translational period; None: there is none.
-    period : float
-        Translational: length. Rotational: angle in radians. 0: not periodic.
-    axis, origin : (3,) float64 or None
-        Set for a cylindrical frame.
-    theta0 : float
-        Angle from which theta is counted, opposite the largest empty sector.
-    radius : float
-        The reference radius rho, which turns angles into lengths.
-    """
+    """The coordinates and the distance of the interpolation, and the maps from and to points."""
 
     dim: int
+    """2 or 3."""
     direction: FloatArray | None = None
+    """(d,): unit vector of a translational period; None: there is none."""
     period: float = 0.0
+    """Translational: length. Rotational: angle in radians. 0: not periodic."""
     axis: FloatArray | None = None
     origin: FloatArray | None = None
+    """`axis`, `origin` (3,): set for a cylindrical frame."""
     theta0: float = 0.0
+    """Angle from which theta is counted, opposite the largest empty sector."""
     radius: float = 1.0
+    """The reference radius rho, which turns angles into lengths."""
 
     @property
     def cylindrical(self) -> bool:
-        """Tell whether the coordinates are (r, rho theta[, z])."""
+        """Return whether the coordinates are (r, rho theta[, z])."""
         return self.axis is not None
 
     def coords(self, points: FloatArray) -> FloatArray:

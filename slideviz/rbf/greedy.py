@@ -53,16 +53,9 @@ class GreedyFit:
 
     Attributes
     ----------
-    found : Interpolant
-        The chosen nodes, in the order of their choice, and their coefficients, summed over the
-        levels (Eq. 2.38).
-    dropped : (m,) int64
-        Nodes left out by the pivot guard although their error is above the tolerance.
     short : str
         Why the last selection ended above the tolerance, and a remedy; empty where it did not.
     history : tuple of Cycle
-    stages : tuple of Levels
-        The rows chosen after each call of ``add``.
     """
 
     def __init__(
@@ -81,8 +74,12 @@ class GreedyFit:
         d = problem.values.shape[1]
         self.history, self.short = history, ""
         self.found = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
+        """The chosen nodes, in the order of their choice, and their coefficients, summed over the
+        levels (Eq. 2.38)."""
         self.dropped: IntArray = np.empty(0, np.int64)
+        """(m,): nodes left out by the pivot guard although their error is above the tolerance."""
         self.stages: tuple[Levels, ...] = ()
+        """The rows chosen after each call of ``add``."""
         self.doubt = self.refined = 0.0
         self._start = perf_counter() - (history[-1].seconds if history else 0.0)
         self._number = history[-1].level if history else 1
@@ -179,14 +176,14 @@ class GreedyFit:
         return float(errors.max(initial=0.0)) * self._settings.level_ratio
 
     def _level_done(self, errors: FloatArray, goal: float) -> bool:
-        """Tell whether the level is complete (section 2.5.2, 5.3.2); never for a single level."""
+        """Return whether the level is complete (section 2.5.2, 5.3.2); never for a single level."""
         if self._settings.level == "size":
             return self._level.nodes >= self._settings.level_size
         some = len(self._level.chosen) > 0
         return self._settings.level == "ratio" and some and errors.max() < goal
 
     def _full(self) -> bool:
-        """Tell whether as many nodes as MAX_CONTROL_NODES allows are chosen."""
+        """Return whether as many nodes as MAX_CONTROL_NODES allows are chosen."""
         limit = self._settings.max_nodes
         return limit is not None and len(self.found.nodes) >= limit
 

@@ -75,21 +75,14 @@ def find_images(
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """Copies the displacements of given nodes to their periodic images.
-
-    Attributes
-    ----------
-    given : (k,) int64
-        Sorted, each once.
-    vectors : (k, d) float64
-        The displacements of the given nodes in the frame.
-    stands : (n,) int64
-        For each node, the number of the periodic image that represents it.
-    """
+    """Copies the displacements of given nodes to their periodic images."""
 
     given: IntArray
+    """(k,): sorted, each once."""
     vectors: FloatArray
+    """(k, d): the displacements of the given nodes in the frame."""
     stands: IntArray
+    """(n,): for each node, the number of the periodic image that represents it."""
 
     @cached_property
     def _row(self) -> IntArray:

@@ -23,27 +23,18 @@ SHAPE = 0.05
 
 @dataclass(frozen=True)
 class Kernel:
-    """A radial function.
-
-    Attributes
-    ----------
-    name : str
-        The value of RBF_KERNEL.
-    code : int
-        Its number in the compiled loops.
-    compact : bool
-        Whether it has compact support: is 0 from xi = 1 on.
-    polynomial : bool
-        Whether it needs the linear polynomial of Eq. 2.1.
-    function : callable
-        phi(xi) on arrays, as printed: the definition that the compiled loops are tested against.
-    """
+    """A radial function."""
 
     name: str
+    """The value of RBF_KERNEL."""
     code: int
+    """Its number in the compiled loops."""
     compact: bool
+    """Whether it has compact support: is 0 from xi = 1 on."""
     polynomial: bool
+    """Whether it needs the linear polynomial of Eq. 2.1."""
     function: Callable[[FloatArray], FloatArray]
+    """phi(xi) on arrays, as printed: the definition that the compiled loops are tested against."""
 
     def __call__(self, xi: FloatArray) -> FloatArray:
         """Return phi(xi) for an array of xi >= 0; at 0 its limit."""

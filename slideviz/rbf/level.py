@@ -21,27 +21,19 @@ from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """The nodes that may be chosen, with their constraint rows; rows of one node are neighbours.
-
-    Attributes
-    ----------
-    rows : ConstraintRows
-        Sorted by position, so that the numbering of the mesh changes no choice.
-    block : (r,) int64
-        The block of the system that each row is in.
-    candidate : (r,) int64
-        The candidate, from 0 to c - 1, that each row belongs to.
-    first : (c,) int64
-        The first row of each candidate.
-    favour : (c,) float64
-        Factor of each candidate's error, which decides between equal errors (`selection.favour`).
-    """
+    """The nodes that may be chosen, with their constraint rows; rows of one node are neighbours."""
 
     rows: ConstraintRows
+    """Sorted by position, so that the numbering of the mesh changes no choice."""
     block: IntArray
+    """(r,): the block of the system that each row is in."""
     candidate: IntArray
+    """(r,): the candidate, from 0 to c - 1, that each row belongs to."""
     first: IntArray
+    """(c,): the first row of each candidate."""
     favour: FloatArray
+    """(c,): factor of each candidate's error, which decides between equal errors
+    (`selection.favour`)."""
 
     @classmethod
     def of(cls, problem: Problem, rows: ConstraintRows) -> Candidates:
@@ -85,14 +77,13 @@ class GrowingFactor:
         The place of each in the order of choice over all blocks.
     lower : (k, k) float64
         L.
-    forward : (k, m) float64
-        L^-1 b; shorter than L between `append` and `follow`.
     """
 
     def __init__(self, width: int) -> None:
         self.rows = self.turn = np.empty(0, np.int64)
         self.lower = self._store = np.empty((0, 0))
         self.forward = np.empty((0, width))
+        """(k, m): L^-1 b; shorter than L between `append` and `follow`."""
 
     def append(
         self, rows: IntArray, turn: IntArray, *, beside: FloatArray, corner: FloatArray
@@ -128,10 +119,6 @@ class GreedyLevel:
     ----------
     settled, now : Interpolant
         The sum of the levels before, and what this level adds to it.
-    chosen : (k,) int64
-        The chosen rows, in the order of their choice.
-    barred : (r,) bool
-        Rows that cannot be chosen any more: they are, or would make the system singular.
     singular : bool
         The system with a polynomial has no solution.
     """
@@ -145,7 +132,10 @@ class GreedyLevel:
         self._basis = replace(problem.basis, kernel=PLAIN) if self._tailed else problem.basis
         self.now = Interpolant(np.empty(0, np.int64), settled.weights[:0])
         self.chosen: IntArray = np.empty(0, np.int64)
+        """(k,): the chosen rows, in the order of their choice."""
         self.barred = np.zeros(len(candidates.rows.nodes), bool)
+        """(r,): rows that cannot be chosen any more: they are, or would make the system
+        singular."""
         count = int(candidates.block.max(initial=0)) + 1
         self._grown = [GrowingFactor(candidates.rows.right.shape[1]) for _ in range(count)]
 

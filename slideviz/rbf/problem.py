@@ -50,55 +50,38 @@ class Watch:
 
 @dataclass(frozen=True)
 class GreedySettings:
-    """Settings of the greedy selection of control nodes (thesis section 2.5).
-
-    Attributes
-    ----------
-    tolerance : float
-        Largest error at the boundary, of all steps together, that is left to the correction; in
-        the mesh's length unit.
-    pick : "block", "double" or "one"
-        Nodes added in a cycle: a growing number of them, the worst and the worst with an error
-        in an opposite direction, or the worst one.
-    level : "none", "size" or "ratio"
-        Single level, or levels that end at ``level_size`` nodes, or when the error has fallen
-        by the factor ``level_ratio``.
-    max_nodes : int or None
-        Stop at so many control nodes even if the error is larger.
-    gamma : float
-        Correction radius over largest error (Eq. 2.31).
-    """
+    """Settings of the greedy selection of control nodes (thesis section 2.5)."""
 
     tolerance: float
+    """Largest error at the boundary, of all steps together, that is left to the correction; in the
+    mesh's length unit."""
     pick: Selection = "block"
+    """Nodes added in a cycle: a growing number of them, the worst and the worst with an error in an
+    opposite direction, or the worst one."""
     level: Literal["none", "size", "ratio"] = "none"
+    """Single level, or levels that end at ``level_size`` nodes, or when the error has fallen by the
+    factor ``level_ratio``."""
     level_size: int = 16
     level_ratio: float = 0.5
     max_nodes: int | None = None
+    """Stop at so many control nodes even if the error is larger."""
     gamma: float = GAMMA
+    """Correction radius over largest error (Eq. 2.31)."""
 
 
 @dataclass(frozen=True)
 class Cycle:
-    """One cycle of the selection: its number, its level, and what it found.
-
-    Attributes
-    ----------
-    cycle, level : int
-        Numbers from 1.
-    error : float
-        Largest error at the candidates, in the mesh's length unit.
-    control_nodes : int
-        Nodes chosen so far.
-    seconds : float
-        Since the selection began.
-    """
+    """One cycle of the selection: its number, its level, and what it found."""
 
     cycle: int
     level: int
+    """`cycle`, `level`: numbers from 1."""
     error: float
+    """Largest error at the candidates, in the mesh's length unit."""
     control_nodes: int
+    """Nodes chosen so far."""
     seconds: float
+    """Since the selection began."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,59 +90,45 @@ class Problem:
 
     Of periodic images, ``known``, ``edge``, ``surface`` and ``normal_nodes`` have the one that
     represents them.
-
-    Attributes
-    ----------
-    basis : Basis
-    features : (k, n) float64
-        Of all nodes, at their current positions.
-    known : (a,) int64
-        Nodes whose displacement is given, by ``values`` (a, d).
-    edge, surface : (c,), (e,) int64
-        Sliding nodes, in the order in which pseudo sliding projects them.
-    normal_nodes, normals : (q,) int64, (q, d) float64
-        The constraints of the sliding nodes: unit directions of no displacement.
-    same_as : (n,) int64
-        For each node, the node that represents all that coincide with it under the periodic
-        distance (its images); itself, if there are none.
-    project : callable
-        Projects displacements of sliding nodes (`Project`).
-    curved : bool
-        Whether slid nodes must be projected after direct sliding.
-    cartesian : callable
-        Returns the Cartesian points (m, d) of coordinates (m, d).
-    coords, shift : (n, d), (d,) float64
-        Current positions in the frame, and one period in it (zero: none), for the correction.
-    reduction : GreedySettings or None
-        None: all candidates are control nodes.
-    before : Solution or None
-        Of the step before; None in the first step.
-    stages : tuple of Levels
-        The rows that were chosen for other data, of each system: a selection in levels takes
-        them first.
-    lasting : bool
-        Whether the factor will be used for other data too (as for gradients). Then its accuracy
-        is tested with other data, too.
     """
 
     basis: Basis
     features: FloatArray
+    """(k, n): of all nodes, at their current positions."""
     known: IntArray
+    """(a,): nodes whose displacement is given, by ``values`` (a, d)."""
     values: FloatArray
     edge: IntArray
     surface: IntArray
+    """`edge`, `surface` (c,), (e,): sliding nodes, in the order in which pseudo sliding projects
+    them."""
     normal_nodes: IntArray
     normals: FloatArray
+    """`normal_nodes`, `normals` (q,) int64, (q, d) float64: the constraints of the sliding nodes:
+    unit directions of no displacement."""
     same_as: IntArray
+    """(n,): for each node, the node that represents all that coincide with it under the periodic
+    distance (its images); itself, if there are none."""
     project: Project
+    """Projects displacements of sliding nodes (`Project`)."""
     curved: bool
+    """Whether slid nodes must be projected after direct sliding."""
     cartesian: Callable[[FloatArray], FloatArray]
+    """Returns the Cartesian points (m, d) of coordinates (m, d)."""
     coords: FloatArray
     shift: FloatArray
+    """`coords`, `shift` (n, d), (d,): current positions in the frame, and one period in it (zero:
+    none), for the correction."""
     reduction: GreedySettings | None = None
+    """None: all candidates are control nodes."""
     before: Solution | None = None
+    """Of the step before; None in the first step."""
     stages: tuple[Levels, ...] = ()
+    """The rows that were chosen for other data, of each system: a selection in levels takes them
+    first."""
     lasting: bool = False
+    """Whether the factor will be used for other data too (as for gradients). Then its accuracy is
+    tested with other data, too."""
 
     @cached_property
     def reach(self) -> tuple[IntArray, np.ndarray]:
@@ -196,18 +165,12 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Lag:
-    """The errors that the interpolants of all steps so far left at boundary nodes.
-
-    Attributes
-    ----------
-    nodes : (b,) int64
-        Sorted, each once.
-    values : (b, d) float64
-        Prescribed less interpolated displacement, in the frame.
-    """
+    """The errors that the interpolants of all steps so far left at boundary nodes."""
 
     nodes: IntArray
+    """(b,): sorted, each once."""
     values: FloatArray
+    """(b, d): prescribed less interpolated displacement, in the frame."""
 
     def at(self, nodes: IntArray) -> FloatArray:
         """Return the errors at nodes (m,), (m, d); zero at nodes that are not in ``nodes``."""
@@ -217,89 +180,61 @@ class Lag:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The result of one step: displacements, control nodes and errors.
-
-    Attributes
-    ----------
-    displacement : (n, d) float64
-        Of all nodes, in the frame.
-    control_nodes : int
-        Nodes in the final system, coinciding ones counted once.
-    max_error : float
-        Largest misfit at the nodes whose displacement is known or projected, before the
-        correction sets these exactly; with data reduction that of all steps so far.
-    dropped : (m,) int64
-        Nodes that the pivot guard left out.
-    condition : float
-        Estimated condition number of the final system.
-    history : tuple of Cycle
-        Convergence of the selection; empty without data reduction.
-    warnings : tuple of str
-        What the user should know.
-    control : (c,) int64
-        The nodes in the final system; empty where a method has no such system.
-    lag : Lag or None
-        The errors that the interpolants of all steps so far left at boundary nodes; None without
-        data reduction.
-    dropped_error : float
-        Largest misfit of this step at the nodes that the pivot guard left out.
-    short : str
-        Why the selection ended above its tolerance, and a remedy; empty where it did not.
-    lost : float
-        Largest error of an exact solution at its own control nodes, before they are set exactly;
-        in the mesh's length unit.
-    doubt : float
-        Estimated error of an exact solution between its control nodes, as a part of the largest
-        displacement (`slideviz.rbf.refine`). With ``Problem.lasting``, also that for a wave over
-        the whole mesh.
-    refined : float
-        The same estimate for the solution before refinement, where refinement was needed and
-        helped; else 0.
-    field : Field or None
-        The field that displaced the nodes inside the mesh; None where a method has no such field.
-    stages : tuple of Levels
-        The rows of each system that was solved, in order: pseudo sliding has up to three, direct
-        sliding one or two; empty where a method has no such systems.
-    """
+    """The result of one step: displacements, control nodes and errors."""
 
     displacement: FloatArray
+    """(n, d): of all nodes, in the frame."""
     control_nodes: int
+    """Nodes in the final system, coinciding ones counted once."""
     max_error: float
+    """Largest misfit at the nodes whose displacement is known or projected, before the correction
+    sets these exactly; with data reduction that of all steps so far."""
     dropped: IntArray
+    """(m,): nodes that the pivot guard left out."""
     condition: float
+    """Estimated condition number of the final system."""
     history: tuple[Cycle, ...] = ()
+    """Convergence of the selection; empty without data reduction."""
     warnings: tuple[str, ...] = ()
+    """What the user should know."""
     control: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
+    """(c,): the nodes in the final system; empty where a method has no such system."""
     lag: Lag | None = None
+    """The errors that the interpolants of all steps so far left at boundary nodes; None without
+    data reduction."""
     dropped_error: float = 0.0
+    """Largest misfit of this step at the nodes that the pivot guard left out."""
     short: str = ""
+    """Why the selection ended above its tolerance, and a remedy; empty where it did not."""
     lost: float = 0.0
+    """Largest error of an exact solution at its own control nodes, before they are set exactly; in
+    the mesh's length unit."""
     doubt: float = 0.0
+    """Estimated error of an exact solution between its control nodes, as a part of the largest
+    displacement (`slideviz.rbf.refine`). With ``Problem.lasting``, also that for a wave over the
+    whole mesh."""
     refined: float = 0.0
+    """The same estimate for the solution before refinement, where refinement was needed and helped;
+    else 0."""
     field: Field | None = None
+    """The field that displaced the nodes inside the mesh; None where a method has no such field."""
     stages: tuple[Levels, ...] = ()
+    """The rows of each system that was solved, in order: pseudo sliding has up to three, direct
+    sliding one or two; empty where a method has no such systems."""
 
 
 @dataclass(frozen=True, eq=False)
 class Interpolant:
-    """A sum of radial functions and, for some kernels, a linear polynomial (Eq. 2.1).
-
-    Attributes
-    ----------
-    nodes : (c,) int64
-        The control nodes.
-    weights : (c, d) float64
-        Coefficients alpha, ``sum_a w_a n_a`` over the constraints of each node.
-    tail : (q, d) float64 or None
-        Coefficients beta of the polynomial's terms.
-    levels : Levels
-        The rows that it meets, of each level.
-    """
+    """A sum of radial functions and, for some kernels, a linear polynomial (Eq. 2.1)."""
 
     nodes: IntArray
+    """(c,): the control nodes."""
     weights: FloatArray
+    """(c, d): coefficients alpha, ``sum_a w_a n_a`` over the constraints of each node."""
     tail: FloatArray | None = None
+    """(q, d): coefficients beta of the polynomial's terms."""
     levels: Levels = ()
+    """The rows that it meets, of each level."""
 
     def at(self, problem: Problem, nodes: IntArray | slice, tick: Tick = no_tick) -> FloatArray:
         """Return the displacements (m, d) of nodes in the frame."""

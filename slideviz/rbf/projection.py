@@ -33,22 +33,15 @@ ROLE_NUMBER: dict[str, int] = {role: number for number, role in enumerate(ROLES)
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
-    """The tracks (curves and surfaces on which nodes slide), and the track of each sliding node.
-
-    Attributes
-    ----------
-    tracks : tuple of ClosestPoints
-        The curves and surfaces on which nodes slide.
-    of_node : (n,) int64
-        Index of the node's track; -1 for nodes that do not slide.
-    curved : bool
-        Whether any track bends or has an end within reach of its own tangent plane: whether
-        projection does more than removing the normal component.
-    """
+    """The tracks (curves and surfaces on which nodes slide), and the track of each sliding node."""
 
     tracks: tuple[ClosestPoints, ...]
+    """The curves and surfaces on which nodes slide."""
     of_node: IntArray
+    """(n,): index of the node's track; -1 for nodes that do not slide."""
     curved: bool
+    """Whether any track bends or has an end within reach of its own tangent plane: whether
+    projection does more than removing the normal component."""
 
     def project(self, coords: FloatArray, nodes: IntArray, free: FloatArray) -> FloatArray:
         """Return the displacements (m, d) from ``coords`` to the closest points on the tracks.
@@ -226,7 +219,7 @@ def _simplices(sides: FloatArray) -> FloatArray:
 
 
 def _bends(vectors: FloatArray, either_way: bool = False) -> bool:
-    """Tell whether vectors (m, d) have different directions; ``either_way``: up to their sign."""
+    """Return whether vectors (m, d) have different directions; ``either_way``: up to their sign."""
     directions = unit(vectors)
     along = directions @ directions[0]
     return bool(np.min(np.abs(along) if either_way else along) < 1.0 - 1e-12)

@@ -64,42 +64,28 @@ CHECKS = 60
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """A refined solution.
-
-    Attributes
-    ----------
-    weights : (n, m) float64
-    doubt : (m,) float64
-        Error of each column's field, as a part of its largest data: a bound where ``exact``, an
-        estimate times `MARGIN` else.
-    before : (m,) float64
-        The same of the solution that was refined, measured in the first round.
-    exact : bool
-        Whether the system was factorised with twice the digits.
-    """
+    """A refined solution."""
 
     weights: FloatArray
+    """(n, m)."""
     doubt: FloatArray
+    """(m,): error of each column's field, as a part of its largest data: a bound where ``exact``,
+    an estimate times `MARGIN` else."""
     before: FloatArray
+    """(m,): the same of the solution that was refined, measured in the first round."""
     exact: bool
+    """Whether the system was factorised with twice the digits."""
 
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """An interpolation system with its factor, to estimate errors and to refine solutions.
-
-    Attributes
-    ----------
-    basis : Basis
-    place : tuple
-        Features (k, n) of the node of each row, and its unit direction (n, d) or None.
-    factor : Factor
-        Without the rows that the pivot guard left out.
-    """
+    """An interpolation system with its factor, to estimate errors and to refine solutions."""
 
     basis: Basis
     place: tuple[FloatArray, FloatArray | None]
+    """Features (k, n) of the node of each row, and its unit direction (n, d) or None."""
     factor: Factor
+    """Without the rows that the pivot guard left out."""
     _kept: dict[str, Any] = made_by(default_factory=dict)
 
     def rough_data(self) -> FloatArray:

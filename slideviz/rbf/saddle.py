@@ -18,20 +18,14 @@ QR is at most this part of the largest one."""
 
 @dataclass(frozen=True, eq=False)
 class Saddle:
-    """Solution of a system with a polynomial (Eq. 2.4).
-
-    Attributes
-    ----------
-    weights : (n, m) float64
-    tail : (q, m) float64
-        Coefficients of the polynomial's terms.
-    rank_deficient : bool
-        Whether the system was singular, so that this is its least-squares solution.
-    """
+    """Solution of a system with a polynomial (Eq. 2.4)."""
 
     weights: FloatArray
+    """(n, m)."""
     tail: FloatArray
+    """(q, m): coefficients of the polynomial's terms."""
     rank_deficient: bool
+    """Whether the system was singular, so that this is its least-squares solution."""
 
 
 def solve_saddle(matrix: FloatArray, terms: FloatArray, right: FloatArray) -> Saddle:
@@ -76,7 +70,7 @@ def _regular(system: FloatArray, right: FloatArray) -> FloatArray | None:
 
 
 def is_singular(system: FloatArray) -> bool:
-    """Tell whether a symmetric system (n, n) is singular, so that least squares solve it."""
+    """Return whether a symmetric system (n, n) is singular, so that least squares solve it."""
     return _regular(system, np.zeros((len(system), 1))) is None
 
 

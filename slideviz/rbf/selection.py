@@ -182,15 +182,11 @@ class LevelLimit:
 
     The other ends of a selection (tolerance, number of nodes, a singular system) are in
     `slideviz.rbf.greedy.GreedyFit`.
-
-    Attributes
-    ----------
-    budget : float
-        How many rows all levels together may choose.
     """
 
     def __init__(self, error: float, budget: float) -> None:
         self.budget = budget
+        """How many rows all levels together may choose."""
         self._lowest, self._losses, self._spent = error, 0, 0.0
 
     def ends(self, error: float, cost: float) -> bool:

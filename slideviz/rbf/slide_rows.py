@@ -22,28 +22,21 @@ IN_PLANE = np.sqrt(1.0 - RANK_TOLERANCE**2)
 
 @dataclass(frozen=True, eq=False)
 class FansAround:
-    """All fans, with what decides which of them are one surface.
-
-    Attributes
-    ----------
-    node, own : (m,) int64
-        The node that represents the fan's node and its periodic images, and the fan's node itself.
-    role : (m,) str
-        Role of the fan's marker.
-    normals : (m, d) float64
-        Unit normals.
-    smooth, merge : float
-        Fans of one role are one surface when the cosine of the angle between their normals is
-        above these: ``smooth`` for fans of two periodic images, where a surface may continue
-        beyond the periodic boundary, ``merge`` for fans of one node.
-    """
+    """All fans, with what decides which of them are one surface."""
 
     node: IntArray
     own: IntArray
+    """`node`, `own` (m,): the node that represents the fan's node and its periodic images, and the
+    fan's node itself."""
     role: np.ndarray
+    """(m,) str: role of the fan's marker."""
     normals: FloatArray
+    """(m, d): unit normals."""
     smooth: float
     merge: float
+    """`smooth`, `merge`: fans of one role are one surface when the cosine of the angle between
+    their normals is above these: ``smooth`` for fans of two periodic images, where a surface may
+    continue beyond the periodic boundary, ``merge`` for fans of one node."""
 
 
 def nodes_with(at: IntArray, chosen: np.ndarray, total: int) -> np.ndarray:

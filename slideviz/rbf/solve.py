@@ -56,21 +56,14 @@ def enough_threads(flops: float) -> AbstractContextManager[object]:
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """The Cholesky factor L of a system G (n, n) without some rows: L L^T = G[kept][:, kept].
-
-    Attributes
-    ----------
-    lower : (k, k) float64
-        L.
-    kept : (k,) int64
-        The rows of G that are in the system, in order.
-    dropped : (n - k,) int64
-        Rows left out because their remaining pivot is below the guard.
-    """
+    """The Cholesky factor L of a system G (n, n) without some rows: L L^T = G[kept][:, kept]."""
 
     lower: FloatArray
+    """(k, k): L."""
     kept: IntArray
+    """(k,): the rows of G that are in the system, in order."""
     dropped: IntArray
+    """(n - k,): rows left out because their remaining pivot is below the guard."""
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the weights (n, m) for right-hand sides (n, m); zero in dropped rows."""

@@ -259,18 +259,12 @@ def _solve(u, ul, x, xl):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Computes residuals of an interpolation system with twice the digits of a float64.
-
-    Attributes
-    ----------
-    basis : Basis
-        Its kernel is one of ``FUNCTIONS``.
-    place : tuple
-        Features (k, n) of the node of each row, and its unit direction (n, d) or None.
-    """
+    """Computes residuals of an interpolation system with twice the digits of a float64."""
 
     basis: Basis
+    """Its kernel is one of ``FUNCTIONS``."""
     place: tuple[FloatArray, FloatArray | None]
+    """Features (k, n) of the node of each row, and its unit direction (n, d) or None."""
     _kept: dict[int, tuple[FloatArray, FloatArray]] = made_by(default_factory=dict)
 
     def __call__(
@@ -351,5 +345,5 @@ class DoubleFactor:
 
 
 def usable(basis: Basis) -> bool:
-    """Tell whether `Residuals` can be computed for the kernel of ``basis``."""
+    """Return whether `Residuals` can be computed for the kernel of ``basis``."""
     return basis.kernel in FUNCTIONS and not KERNELS[basis.kernel].polynomial

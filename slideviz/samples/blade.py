@@ -23,29 +23,21 @@ Both are lengths; `_spread` adds strength x arctan(arc length / distance) to the
 
 @dataclass(frozen=True)
 class BladeSection:
-    """The shape of a blade and of the channel around it; its axial chord is 1, from x = 0.
-
-    Attributes
-    ----------
-    angles_deg : (float, float)
-        Angles of the camber line to the x axis, at the leading and at the trailing edge.
-    thickness : (float, float, float)
-        a, b, c of the half thickness sqrt(x (1 - x)) (a + b (1 - x)^c). The root rounds both
-        ends: the radii are (a + b)^2 / 2 in front and a^2 / 2 behind.
-    pitch : float
-        Distance of the periodic sides in y.
-    ends : (float, float)
-        x of inflow and outflow.
-    hole : (float, float, float)
-        First and last x of the hole that the O-grid fills, before smoothing, and its half
-        height about the camber line.
-    """
+    """The shape of a blade and of the channel around it; its axial chord is 1, from x = 0."""
 
     angles_deg: tuple[float, float] = (30.0, -50.0)
+    """(float, float): angles of the camber line to the x axis, at the leading and at the trailing
+    edge."""
     thickness: tuple[float, float, float] = (0.1, 0.2, 1.4)
+    """(float, float, float): a, b, c of the half thickness sqrt(x (1 - x)) (a + b (1 - x)^c). The
+    root rounds both ends: the radii are (a + b)^2 / 2 in front and a^2 / 2 behind."""
     pitch: float = 0.75
+    """Distance of the periodic sides in y."""
     ends: tuple[float, float] = (-0.5, 1.6)
+    """(float, float): x of inflow and outflow."""
     hole: tuple[float, float, float] = (-0.1, 1.12, 0.14)
+    """(float, float, float): first and last x of the hole that the O-grid fills, before smoothing,
+    and its half height about the camber line."""
 
 
 PASSAGE = BladeSection()
@@ -96,24 +88,19 @@ def _spread(curve: FloatArray, edges: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class Shares:
-    """Relative numbers of cells, and how the O-grid is turned in its hole; `counts` scales them.
-
-    Attributes
-    ----------
-    ahead, along, behind, beside, layers : int
-        As of `GridCounts`, for 36 cells along the inflow.
-    nose, tail : float
-        Where the grid lines from leading and trailing edge end on the first and the last side of
-        the hole, as a part of the side's length: 0 is the corner on the pressure side.
-    """
+    """Relative numbers of cells, and how the O-grid is turned in its hole; `counts` scales them."""
 
     ahead: int = 20
     along: int = 52
     behind: int = 22
     beside: int = 16
     layers: int = 18
+    """`ahead`, `along`, `behind`, `beside`, `layers`: as of `GridCounts`, for 36 cells along the
+    inflow."""
     nose: float = 0.25
     tail: float = 0.0
+    """`nose`, `tail`: where the grid lines from leading and trailing edge end on the first and the
+    last side of the hole, as a part of the side's length: 0 is the corner on the pressure side."""
 
 
 PASSAGE_SHARES = Shares()
@@ -122,30 +109,22 @@ PASSAGE_SHARES = Shares()
 
 @dataclass(frozen=True)
 class GridCounts:
-    """Numbers of cells of the channel and of the O-grid around the blade.
-
-    Attributes
-    ----------
-    ahead, along, behind : int
-        In the channel along x: before, beside and behind the hole.
-    below, beside, above : int
-        In the channel along y: below, beside and above the hole.
-    layers : int
-        In the O-grid, away from the blade.
-    nose, tail : int
-        On the first and last side of the hole, from the lower corner to the grid line from leading
-        and trailing edge.
-    """
+    """Numbers of cells of the channel and of the O-grid around the blade."""
 
     ahead: int
     along: int
     behind: int
+    """`ahead`, `along`, `behind`: in the channel along x: before, beside and behind the hole."""
     below: int
     beside: int
     above: int
+    """`below`, `beside`, `above`: in the channel along y: below, beside and above the hole."""
     layers: int
+    """In the O-grid, away from the blade."""
     nose: int
     tail: int
+    """`nose`, `tail`: on the first and last side of the hole, from the lower corner to the grid
+    line from leading and trailing edge."""
 
     @property
     def lower(self) -> int:

@@ -48,24 +48,17 @@ _EDGES = np.array(
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """The node numbers of O-grid and channel, which do not depend on the shape of the blade.
-
-    Attributes
-    ----------
-    n : GridCounts
-        Numbers of cells.
-    number : (i, j) int
-        Node at each place of the channel, -1 inside the hole.
-    ring : (layers + 1, k) int
-        Nodes of the O-grid, from the blade out, counter-clockwise; the last are the hole's rim.
-    quads : (m, 4) int
-        Nodes of the cells, counter-clockwise.
-    """
+    """The node numbers of O-grid and channel, which do not depend on the shape of the blade."""
 
     n: GridCounts
+    """Numbers of cells."""
     number: IntArray
+    """(i, j) int: node at each place of the channel, -1 inside the hole."""
     ring: IntArray
+    """(layers + 1, k) int: nodes of the O-grid, from the blade out, counter-clockwise; the last are
+    the hole's rim."""
     quads: IntArray
+    """(m, 4) int: nodes of the cells, counter-clockwise."""
 
     def sides(self) -> dict[str, IntArray]:
         """Return the edges (k, 2) of blade, inflow, outflow and periodic sides, by name."""

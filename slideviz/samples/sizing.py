@@ -100,19 +100,13 @@ def inside(places: FloatArray, points: FloatArray, edges: IntArray) -> NDArray[n
 
 @dataclass(frozen=True, eq=False)
 class Sizing:
-    """Edge length tabulated over the rectangle around the channel.
-
-    Attributes
-    ----------
-    low, step : (2,)
-        First grid point, and distances of grid points in x and y.
-    table : (nx, ny)
-        Edge length at the grid points.
-    """
+    """Edge length tabulated over the rectangle around the channel."""
 
     low: FloatArray
     step: FloatArray
+    """`low`, `step` (2,): first grid point, and distances of grid points in x and y."""
     table: FloatArray
+    """(nx, ny): edge length at the grid points."""
 
     def at(self, points: FloatArray) -> FloatArray:
         """Return the edge length (k,) at points (k, 2), bilinear between grid points."""

@@ -95,21 +95,14 @@ def stator_zone(size: int) -> tuple[ZoneContent, Displacements]:
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """A `Structured` grid of smoothed grids at three radii, stacked between hub and shroud.
-
-    Attributes
-    ----------
-    grid : Grid
-        Node numbers of a plane.
-    planes : (3, m, 2) float64
-        z and theta of the nodes at ``RADII``.
-    layers : int
-        Number of cells in r.
-    """
+    """A `Structured` grid of smoothed grids at three radii, stacked between hub and shroud."""
 
     grid: Grid
+    """Node numbers of a plane."""
     planes: FloatArray
+    """(3, m, 2): z and theta of the nodes at ``RADII``."""
     layers: int
+    """Number of cells in r."""
     dim: ClassVar[int] = 3
 
     @property

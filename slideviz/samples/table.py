@@ -24,24 +24,16 @@ from slideviz.terms import FileFormat
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """A mesh and a case that deforms it.
-
-    Attributes
-    ----------
-    name : str
-        One of ``SAMPLES``.
-    mesh : Mesh
-        The undeformed mesh.
-    case : Case
-        The case; its files are named as if they were in the current folder.
-    displacement : Displacements or None
-        The content of the case's displacement file; None if it has none.
-    """
+    """A mesh and a case that deforms it."""
 
     name: str
+    """One of ``SAMPLES``."""
     mesh: Mesh
+    """The undeformed mesh."""
     case: Case
+    """The case; its files are named as if they were in the current folder."""
     displacement: Displacements | None = None
+    """The content of the case's displacement file; None if it has none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,30 +50,21 @@ class StreamedSample:
 
 @dataclass(frozen=True)
 class SampleKind:
-    """A kind of sample, a row of ``SAMPLES``.
-
-    Attributes
-    ----------
-    about : str
-        What it is, in words for users.
-    size : int
-        The default size.
-    make : callable
-        Returns the sample of a name, a size and a variant.
-    variants : tuple of str
-        Names of its motions, the default first. ``file``: by a displacement file; ``motion``: the
-        same by MOTION keys; ``translate``: that of thesis Figure 4.4, which moves the block close
-        to two sides; ``flat``: that of Figure 4.14, without a component in z; ``layers``: thin
-        cells at the wall.
-    stream : callable or None
-        Returns the same as a `StreamedSample`; None if that is not possible.
-    """
+    """A kind of sample, a row of ``SAMPLES``."""
 
     about: str
+    """What it is, in words for users."""
     size: int
+    """The default size."""
     make: Callable[[str, int, str], Sample]
+    """Returns the sample of a name, a size and a variant."""
     variants: tuple[str, ...] = ("motion",)
+    """Names of its motions, the default first. ``file``: by a displacement file; ``motion``: the
+    same by MOTION keys; ``translate``: that of thesis Figure 4.4, which moves the block close to
+    two sides; ``flat``: that of Figure 4.14, without a component in z; ``layers``: thin cells at
+    the wall."""
     stream: Callable[[str, int, str], StreamedSample] | None = None
+    """Returns the same as a `StreamedSample`; None if that is not possible."""
 
 
 def _thesis(name: str, size: int, variant: str) -> Sample:

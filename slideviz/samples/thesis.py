@@ -124,18 +124,13 @@ class HollowGrid:
 
     The *linear index* of a place counts all places, the first axis fastest; its *number* only those
     outside the box, in the same order.
-
-    Attributes
-    ----------
-    m : int
-        Places in each direction.
-    start, stop : tuple of int
-        The box has the places ``start[a]`` to ``stop[a] - 1`` along axis a.
     """
 
     m: int
+    """Places in each direction."""
     start: tuple[int, ...]
     stop: tuple[int, ...]
+    """`start`, `stop`: the box has the places ``start[a]`` to ``stop[a] - 1`` along axis a."""
 
     @property
     def size(self) -> int:
@@ -170,23 +165,16 @@ class HollowGrid:
 
 @dataclass(frozen=True)
 class Layout:
-    """A `Structured` grid of n x n (x n) cells, without those of a block.
-
-    Attributes
-    ----------
-    n, dim : int
-        Cells in each direction; dimension.
-    start, stop : tuple of int
-        The block has the cells ``start[a]`` to ``stop[a] - 1`` along axis a.
-    polar : bool
-        Whether it is a sector of 30 degrees instead of a square or a cube.
-    """
+    """A `Structured` grid of n x n (x n) cells, without those of a block."""
 
     n: int
     dim: int
+    """`n`, `dim`: cells in each direction; dimension."""
     start: tuple[int, ...]
     stop: tuple[int, ...]
+    """`start`, `stop`: the block has the cells ``start[a]`` to ``stop[a] - 1`` along axis a."""
     polar: bool
+    """Whether it is a sector of 30 degrees instead of a square or a cube."""
 
     @property
     def n_points(self) -> int:

@@ -25,18 +25,11 @@ LIFT = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class DrawnBoundary:
-    """A boundary in the scene: its surface, data set and actor.
-
-    Attributes
-    ----------
-    surface : Surface
-    shape : pyvista.PolyData
-        Its facets.
-    actor : pyvista.Actor
-    """
+    """A boundary in the scene: its surface, data set and actor."""
 
     surface: Surface
     shape: Any
+    """Its facets."""
     actor: Any
 
 

@@ -41,12 +41,6 @@ class Camera:
     stage : Stage
     shapes : callable
         Returns the data sets that a fitted camera shows.
-
-    Attributes
-    ----------
-    beside : Camera or None
-        The linked camera of the view beside this one, in the same position; both are fitted to
-        the data sets of both.
     """
 
     def __init__(self, stage: Stage, shapes: Callable[[], list[Any]]) -> None:
@@ -55,6 +49,8 @@ class Camera:
         self._fitted: tuple[float, ...] = ()
         self._restored: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
         self.beside: Camera | None = None
+        """The linked camera of the view beside this one, in the same position; both are fitted to
+        the data sets of both."""
 
     @property
     def _camera(self) -> Any:

@@ -27,8 +27,6 @@ class CoarseLayer(Layer):
 
     Attributes
     ----------
-    surfaces : mapping of str to Surface
-        The coarse boundaries by name, set before a mesh is opened; empty for small meshes.
     on : bool
         Whether they are drawn.
     """
@@ -37,6 +35,7 @@ class CoarseLayer(Layer):
         self.stage = stage
         self._sections = sections
         self.surfaces: Mapping[str, Surface] = {}
+        """The coarse boundaries by name, set before a mesh is opened; empty for small meshes."""
         self._boundaries = boundaries
         self.clear()
 

@@ -46,18 +46,6 @@ class FlatScene:
     cuts : Cuts
         The cuts of the 3D scene, shared with it.
     scheme : ColorScheme
-
-    Attributes
-    ----------
-    section : Section or None
-        The section that is shown.
-    polygons : Polygons or None
-        The polygons that are drawn, laid flat.
-    session : Session
-        The state that is shown.
-    camera : Camera
-    beside : FlatScene or None
-        Another scene whose camera is linked: `fit` shows both sections whole.
     """
 
     def __init__(self, plotter: Any, cuts: Cuts, scheme: ColorScheme = LIGHT) -> None:
@@ -66,8 +54,11 @@ class FlatScene:
         self.camera = Camera(self.stage, list)
         self.cuts = cuts
         self.beside: FlatScene | None = None
+        """Another scene whose camera is linked: `fit` shows both sections whole."""
         self.section: Section | None = None
+        """The section that is shown."""
         self.polygons: Polygons | None = None
+        """The polygons that are drawn, laid flat."""
         self._all: Polygons | None = None
         self._shown = PolygonActor(self.stage, "flat")
         self._instances = Instances(self.stage, self._shown)
@@ -77,6 +68,7 @@ class FlatScene:
         self._made_of: tuple[object, ...] = ()
         self._level: tuple[tuple[object, ...], float | None] = (), None
         self.session = Session()
+        """The state that is shown."""
         self.set_scheme(scheme)
 
     @property

@@ -39,17 +39,13 @@ ARRIVED = 0.01
 
 
 class GhostLayer(Layer):
-    """The ghosts: boundaries as they were undeformed, and as the motions will move them.
-
-    Attributes
-    ----------
-    moved : dict of str to (u, d) float64
-        The points of the nodes of each boundary that will move.
-    """
+    """The ghosts: boundaries as they were undeformed, and as the motions will move them."""
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
         self.moved: dict[str, FloatArray] = {}
+        """dict of str to (u, d) float64: the points of the nodes of each boundary that will
+        move."""
         self._surfaces: dict[str, Surface] = {}
         self._actors: dict[str, Any] = {}
         # Kept here: a data set that only VTK holds may come back from a mapper without points.

@@ -39,20 +39,15 @@ def recolored(old: Session | None, new: Session) -> bool:
 
 
 class CellLayer(Layer):
-    """The cells of a 2D mesh; of a 3D mesh without boundaries, the outside of its cells.
-
-    Attributes
-    ----------
-    part : (k,) int64 or None
-        Indices of the cells of a 3D mesh whose outside is drawn; None for all.
-    order : (m,) int64 or None
-        Indices of the cells of a 2D mesh in the order of drawing; None for the mesh's order.
-    """
+    """The cells of a 2D mesh; of a 3D mesh without boundaries, the outside of its cells."""
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
         self.part: IntArray | None = None
+        """(k,): indices of the cells of a 3D mesh whose outside is drawn; None for all."""
         self.order: IntArray | None = None
+        """(m,): indices of the cells of a 2D mesh in the order of drawing; None for the mesh's
+        order."""
         self.shape: Any = None
         self.actor: Any = None
         self._veil: tuple[Any, Any] | None = None
@@ -135,23 +130,16 @@ class CellLayer(Layer):
 
 
 class BoundaryLayer(Layer):
-    """The boundaries, an actor each, with a band around the selected ones.
-
-    Attributes
-    ----------
-    drawn : dict of str to DrawnBoundary
-        The boundaries by name.
-    bands : dict of str to Band
-        The bands by name of the boundaries that are selected, or have been.
-    glass : frozenset of str
-        Names of the boundaries that are transparent because they enclose moving ones.
-    """
+    """The boundaries, an actor each, with a band around the selected ones."""
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
         self.drawn: dict[str, DrawnBoundary] = {}
+        """The boundaries by name."""
         self.bands: dict[str, Band] = {}
+        """The bands by name of the boundaries that are selected, or have been."""
         self.glass: frozenset[str] = frozenset()
+        """Names of the boundaries that are transparent because they enclose moving ones."""
         self._lift = 0.0
         self._closed = self._buried = False
         self._enclosed: frozenset[str] = frozenset()

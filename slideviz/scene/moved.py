@@ -19,18 +19,12 @@ MARGIN = 2.5
 
 @dataclass(frozen=True)
 class Detail:
-    """A part of the mesh to show.
-
-    Attributes
-    ----------
-    centre : tuple of float
-        Its centre, two or three coordinates in the mesh's length unit.
-    width : float
-        The width that is seen, in the mesh's length unit.
-    """
+    """A part of the mesh to show."""
 
     centre: tuple[float, ...]
+    """Its centre, two or three coordinates in the mesh's length unit."""
     width: float
+    """The width that is seen, in the mesh's length unit."""
 
 
 Zoom = Detail | Literal["auto", "all"]
@@ -60,22 +54,15 @@ def require_detail(zoom: Zoom, mesh: Mesh) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Overview:
-    """The default view of a deformed mesh: the cells that are drawn, and the camera's direction.
-
-    Attributes
-    ----------
-    cells : (k,) int64
-        Indices of the cells that are drawn.
-    towards, up : (3,) float64
-        Direction from the mesh to the camera, and the up vector.
-    detail : Detail or None
-        The part that is seen; None for everything.
-    """
+    """The default view of a deformed mesh: the cells that are drawn, and the camera's direction."""
 
     cells: IntArray
+    """(k,): indices of the cells that are drawn."""
     towards: FloatArray
     up: FloatArray
+    """`towards`, `up` (3,): direction from the mesh to the camera, and the up vector."""
     detail: Detail | None
+    """The part that is seen; None for everything."""
 
     @classmethod
     def of(cls, mesh: Mesh, base: Mesh, zoom: Zoom = "auto") -> Overview:

@@ -25,25 +25,18 @@ class PolygonActor:
         The name of the actor.
     pickable : bool
         Whether the mouse can pick it.
-
-    Attributes
-    ----------
-    actor : pyvista.Actor
-    mapper : pyvista.DataSetMapper
-        The actor's mapper, referenced here as VTK alone may lose its Python attributes.
-    shape : pyvista.PolyData
-        The data set that is drawn.
-    polygons : Polygons
-        The polygons that are drawn.
     """
 
     def __init__(self, stage: Stage, name: str, pickable: bool = True) -> None:
         # The plotter refuses an empty data set, which a section may have.
         self.shape = pv.PolyData(np.zeros((3, 3)), faces=[3, 0, 1, 2])
+        """The data set that is drawn."""
         self.shape.cell_data[VALUES] = np.zeros(1)
         self.actor = stage.add(self.shape, name, lighting=False, pickable=pickable)
         self.mapper = self.actor.mapper
+        """The actor's mapper, referenced here as VTK alone may lose its Python attributes."""
         self.polygons = Polygons(np.empty((0, 3)), *(np.zeros(n, np.int64) for n in (1, 0, 0)))
+        """The polygons that are drawn."""
         self.actor.visibility = False
 
     def show(self, polygons: Polygons, lift: float = 0.0) -> None:
@@ -88,17 +81,13 @@ class Instances:
     stage : Stage
     base : PolygonActor
         The actor that is repeated; its name and a number are the name of an instance.
-
-    Attributes
-    ----------
-    drawn : dict of int to pyvista.Actor
-        The instances by number.
     """
 
     def __init__(self, stage: Stage, base: PolygonActor) -> None:
         self.stage = stage
         self.base = base
         self.drawn: dict[int, Any] = {}
+        """The instances by number."""
 
     def show(self, matrices: Mapping[int, FloatArray]) -> None:
         """Draw an instance for each matrix (4, 4), by number; remove those of other numbers."""

@@ -34,20 +34,15 @@ LIFTS = {NAME: 0.7, BAND: 0.6, RIM: 0.5}
 
 @dataclass(eq=False)
 class SectionDrawn:
-    """A section in the scene: the actor of its polygons, and what they were made of.
-
-    Attributes
-    ----------
-    made_of : tuple
-        Everything that the polygons depend on, to be compared.
-    frame, of : StepFrame, Mesh
-        The frame with the cut cells (of a mesh in its file: those read); the shown frame's mesh.
-    """
+    """A section in the scene: the actor of its polygons, and what they were made of."""
 
     shown: PolygonActor
     made_of: tuple[object, ...] = ()
+    """Everything that the polygons depend on, to be compared."""
     frame: StepFrame | None = None
     of: Mesh | None = None
+    """`frame`, `of`: the frame with the cut cells (of a mesh in its file: those read); the shown
+    frame's mesh."""
 
     @property
     def polygons(self) -> Polygons:
@@ -65,8 +60,6 @@ class SectionLayer(Layer):
 
     Attributes
     ----------
-    cuts : Cuts
-        The cached cuts, shared with flat views.
     drawn : dict of str to SectionDrawn
         The sections by name of their actor: ``section:0`` is the first section through the mesh
         itself, ``section:0:1`` that through its next passage.
@@ -75,6 +68,7 @@ class SectionLayer(Layer):
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
         self.cuts = Cuts()
+        """The cached cuts, shared with flat views."""
         self._lines = CutLines(stage)
         self.clear()
 

@@ -41,36 +41,24 @@ class Layer:
 
 
 class Stage:
-    """The plotter of a scene, and what its layers share.
-
-    Attributes
-    ----------
-    plotter : pyvista.BasePlotter
-    scheme : ColorScheme
-        Colors of background, text and edges.
-    font_scale : float
-        Factor of the letters' size, for pictures of many pixels.
-    table : pyvista.LookupTable
-        The colors of values, and of inverted cells (NaN); changed in place.
-    point_words : tuple of (str, str)
-        Texts and colors of the legend for the nodes drawn as points.
-    ring_words : tuple of (str, str)
-        Texts and colors of the legend for the rings.
-    has_legend : bool
-        Whether this scene may have a legend, and leaves its strip free.
-    has_plate : bool
-        Whether the legend has a half-transparent plate; False for a transparent background.
-    """
+    """The plotter of a scene, and what its layers share."""
 
     def __init__(self, plotter: Any, scheme: ColorScheme = LIGHT, font_scale: float = 1.0) -> None:
         self.plotter = plotter
         self.scheme = scheme
+        """Colors of background, text and edges."""
         self.font_scale = font_scale
+        """Factor of the letters' size, for pictures of many pixels."""
         self.table = lookup_table()
+        """The colors of values, and of inverted cells (NaN); changed in place."""
         self.point_words: tuple[tuple[str, str], ...] = ()
+        """tuple of (str, str): texts and colors of the legend for the nodes drawn as points."""
         self.ring_words: tuple[tuple[str, str], ...] = ()
+        """tuple of (str, str): texts and colors of the legend for the rings."""
         self.has_legend = True
+        """Whether this scene may have a legend, and leaves its strip free."""
         self.has_plate = True
+        """Whether the legend has a half-transparent plate; False for a transparent background."""
         self._values: tuple[object, FloatArray] | None = None
         self._in_threshold: tuple[FloatArray, object, CellsInRange] | None = None
 

@@ -32,25 +32,17 @@ _MOST = 400
 
 
 class Unrolled(NamedTuple):
-    """Polygons around an axis, cut open at the seam: a point on it is there once for each side.
-
-    Attributes
-    ----------
-    local : (p, 3) float64
-        The points in the section's frame.
-    angle : (p,) float64
-        Their angles around the axis in radians, within one turn but for polygons on the seam,
-        which stay whole.
-    corners : (k,) int64
-        The point of each corner of the polygons.
-    middle : float
-        The middle of the range of angles, in radians.
-    """
+    """Polygons around an axis, cut open at the seam: a point on it is there once for each side."""
 
     local: FloatArray
+    """(p, 3): the points in the section's frame."""
     angle: FloatArray
+    """(p,): their angles around the axis in radians, within one turn but for polygons on the seam,
+    which stay whole."""
     corners: IntArray
+    """(k,): the point of each corner of the polygons."""
     middle: float
+    """The middle of the range of angles, in radians."""
 
 
 def unrolled(section: Section, polygons: Polygons, near: float | None) -> Unrolled:
@@ -99,23 +91,17 @@ the straight line of the surface at that angle."""
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """The part of a section about an axis that lies in a mesh (beside it where nothing is cut).
-
-    Attributes
-    ----------
-    angles, along : (float, float)
-        Lowest and highest angle in radians, and length along the lines in the mesh's length unit.
-    middle : (float, float)
-        The place of the handle: the middle of the patch or, where that is in a hole, the place of
-        the cut nearest to it.
-    places : (k, 2) float64
-        Some places of the cut, with angles in the range of ``angles``.
-    """
+    """The part of a section about an axis that lies in a mesh (beside it where nothing is cut)."""
 
     angles: tuple[float, float]
     along: tuple[float, float]
+    """`angles`, `along` (float, float): lowest and highest angle in radians, and length along the
+    lines in the mesh's length unit."""
     middle: PlaceOnSection
+    """(float, float): the place of the handle: the middle of the patch or, where that is in a hole,
+    the place of the cut nearest to it."""
     places: FloatArray
+    """(k, 2): some places of the cut, with angles in the range of ``angles``."""
 
     @property
     def whole(self) -> bool:

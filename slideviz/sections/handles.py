@@ -23,21 +23,14 @@ _DIGITS = 4
 
 @dataclass(frozen=True, eq=False)
 class HandleParts:
-    """The handle of a section in a 2D mesh: what of it can be seen and dragged.
-
-    Attributes
-    ----------
-    middle : (m, 2) float64
-        One point; none where it is out of view.
-    ends : (e, 2) float64
-        The two ends of a line, or one point on a circle.
-    lines : list of (k, 2) float64
-        The section itself, as polylines.
-    """
+    """The handle of a section in a 2D mesh: what of it can be seen and dragged."""
 
     middle: FloatArray
+    """(m, 2): one point; none where it is out of view."""
     ends: FloatArray
+    """(e, 2): the two ends of a line, or one point on a circle."""
     lines: list[FloatArray]
+    """list of (k, 2) float64: the section itself, as polylines."""
 
 
 def handle_parts(section: Section, box: Box) -> HandleParts | None:

@@ -33,29 +33,6 @@ layer of nodes lies in it up to rounding, one layer of cells is cut, and not som
 class Section:
     """A plane, cylinder or other surface that cuts a mesh.
 
-    Attributes
-    ----------
-    kind : str
-        Its shape: a key of `SHAPES`.
-    origin : (3,) tuple of float
-        A point of the plane or of the cylinder's axis, or the apex of the cone, in the mesh's
-        length unit.
-    direction : (3,) tuple of float
-        The plane's normal, or the direction of the axis; any length but zero.
-    radius : float
-        The radius of the cylinder; 0 for others.
-    whole : bool
-        Whether the cells it cuts are shown whole, instead of cut.
-    name : str
-        The user's name for it; empty: the words of `describe`.
-    shown : bool
-        Whether the view draws it.
-    flat : bool
-        Whether it has a flat view beside the 3D view: a plane seen along its normal, others
-        unrolled.
-    half_angle_deg : float
-        The half angle of the cone; 0 for others.
-
     Raises
     ------
     CaseError
@@ -63,14 +40,26 @@ class Section:
     """
 
     kind: str
+    """Its shape: a key of `SHAPES`."""
     origin: Triple = (0.0, 0.0, 0.0)
+    """(3,) tuple of float: A point of the plane or of the cylinder's axis, or the apex of the cone,
+    in the mesh's length unit."""
     direction: Triple = (0.0, 0.0, 1.0)
+    """(3,) tuple of float: the plane's normal, or the direction of the axis; any length but
+    zero."""
     radius: float = 0.0
+    """The radius of the cylinder; 0 for others."""
     whole: bool = False
+    """Whether the cells it cuts are shown whole, instead of cut."""
     name: str = ""
+    """The user's name for it; empty: the words of `describe`."""
     shown: bool = True
+    """Whether the view draws it."""
     flat: bool = False
+    """Whether it has a flat view beside the 3D view: a plane seen along its normal, others
+    unrolled."""
     half_angle_deg: float = 0.0
+    """The half angle of the cone; 0 for others."""
 
     def __post_init__(self) -> None:
         numbers, terms = (*self.origin, *self.direction, self.size), self.shape.terms

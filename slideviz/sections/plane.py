@@ -38,18 +38,12 @@ _STEEP = 0.8
 
 @dataclass(frozen=True, eq=False)
 class Axes:
-    """The camera's axes for looking straight at a plane.
-
-    Attributes
-    ----------
-    rows : (3, 3) float64
-        Unit vectors to the right, up, and towards the camera.
-    labels : (Label, Label)
-        The axis labels for the right and for up.
-    """
+    """The camera's axes for looking straight at a plane."""
 
     rows: FloatArray
+    """(3, 3): unit vectors to the right, up, and towards the camera."""
     labels: tuple[Label, Label]
+    """(Label, Label): the axis labels for the right and for up."""
 
 
 def plane_axes(section: Section) -> Axes:

@@ -12,23 +12,16 @@ from slideviz.mesh.model import FloatArray, IntArray
 
 @dataclass(frozen=True, eq=False)
 class Polygons:
-    """Polygons, or lines where the mesh is 2D, each with the cell it belongs to.
-
-    Attributes
-    ----------
-    points : (p, 3) float64
-    offsets : (q + 1,) int64
-        Polygon ``i`` has the corners ``connectivity[offsets[i]:offsets[i + 1]]``.
-    connectivity : (k,) int64
-        Indices into ``points``.
-    cells : (q,) int64
-        The cell of the mesh that each polygon is a part of.
-    """
+    """Polygons, or lines where the mesh is 2D, each with the cell it belongs to."""
 
     points: FloatArray
+    """(p, 3)."""
     offsets: IntArray
+    """(q + 1,): polygon ``i`` has the corners ``connectivity[offsets[i]:offsets[i + 1]]``."""
     connectivity: IntArray
+    """(k,): indices into ``points``."""
     cells: IntArray
+    """(q,): the cell of the mesh that each polygon is a part of."""
 
     def __len__(self) -> int:
         return len(self.cells)

@@ -32,20 +32,14 @@ class Shape(Protocol):
 
     A section (`slideviz.sections.model.Section`) has the numbers: point, direction and size. Where
     the length unit is meant, it is that of the mesh.
-
-    Attributes
-    ----------
-    terms : ShapeTerms
-        Its names, numbers and words.
-    in_plane : InPlane or None
-        Its functions in 2D meshes; None where it cannot cut these.
-    directed : bool
-        Whether the sign of the direction matters, for signed distances at least.
     """
 
     terms: ShapeTerms
+    """Its names, numbers and words."""
     in_plane: InPlane | None
+    """Its functions in 2D meshes; None where it cannot cut these."""
     directed: bool
+    """Whether the sign of the direction matters, for signed distances at least."""
 
     # What it cuts ----------------------------------------------------------------------
 

@@ -15,21 +15,14 @@ ONLY_INVERTED = (-1.0, -0.5)
 
 @dataclass(frozen=True)
 class CellsInRange:
-    """The cells of a mesh within a threshold; instances with the same cells are equal.
-
-    Attributes
-    ----------
-    key : bytes
-        The mask, packed to bits, for comparing and hashing.
-    mask : (m,) bool
-        Whether each cell is within.
-    words : str
-        The range in words.
-    """
+    """The cells of a mesh within a threshold; instances with the same cells are equal."""
 
     key: bytes
+    """The mask, packed to bits, for comparing and hashing."""
     mask: np.ndarray = field(compare=False, repr=False)
+    """(m,): whether each cell is within."""
     words: str = field(compare=False)
+    """The range in words."""
 
     @classmethod
     def of(cls, values: FloatArray, threshold: tuple[float, float]) -> CellsInRange:

@@ -29,21 +29,14 @@ _RANGE = re.compile(r"(\S+)\s*(?:to|\.\.)\s*(\S+)\s*(?:in|:)\s*(\d+)\Z", re.IGNO
 
 @dataclass(frozen=True)
 class DesignTable:
-    """A table of designs and their results.
-
-    Attributes
-    ----------
-    columns : tuple of str
-        Their names, as `slideviz.sweep` takes them.
-    rows : tuple of tuple of str
-        The values of each design, a text for each column.
-    results : mapping of int to DesignRow
-        By the number of the design, from 1.
-    """
+    """A table of designs and their results."""
 
     columns: tuple[str, ...] = ()
+    """Their names, as `slideviz.sweep` takes them."""
     rows: tuple[tuple[str, ...], ...] = ()
+    """The values of each design, a text for each column."""
     results: Mapping[int, DesignRow] = field(default_factory=lambda: MappingProxyType({}))
+    """By the number of the design, from 1."""
 
     def crossed(self, column: str, values: Iterable[str]) -> DesignTable:
         """Return the table with each design once for each of ``values`` in a column, and no result.

@@ -27,64 +27,43 @@ WORST = 100
 
 @dataclass(frozen=True, eq=False)
 class CellInfo:
-    """The facts about one cell.
-
-    Attributes
-    ----------
-    cell : int
-        Its number in the mesh, from 0, as in an SU2 file.
-    kind : str
-        The name of its element type.
-    state : CellState
-    size_skew, size, skew : float
-        Its qualities, 0 to 1.
-    jacobians : (k,) float64
-        Its corner Jacobians, an area or volume; negative at folded corners.
-    position : (d,) float64
-        The mean of its nodes, in the mesh's length unit.
-    """
+    """The facts about one cell."""
 
     cell: int
+    """Its number in the mesh, from 0, as in an SU2 file."""
     kind: str
+    """The name of its element type."""
     state: CellState
     size_skew: float
     size: float
     skew: float
+    """`size_skew`, `size`, `skew`: its qualities, 0 to 1."""
     jacobians: FloatArray
+    """(k,): its corner Jacobians, an area or volume; negative at folded corners."""
     position: FloatArray
+    """(d,): the mean of its nodes, in the mesh's length unit."""
 
 
 @dataclass(frozen=True, eq=False)
 class WorstCells:
-    """The worst cells of a frame, worst first.
-
-    Attributes
-    ----------
-    cells : (k,) int64
-        Their numbers in the mesh.
-    values : (k,) float64
-        Their measure; 0 for an inverted cell.
-    inverted : (k,) bool
-    positions : (k, d) float64
-        The means of their nodes, in the mesh's length unit.
-    steps : (k,) int64
-        The first frame at which each was worst; 0 is the undeformed mesh.
-    kinds : tuple of str
-        The names of their element types.
-    measure : str
-        The quality in ``values``.
-    numbers : (k,) int64 or None
-        The numbers of the cells in the file, where only a part of the mesh is in memory.
-    """
+    """The worst cells of a frame, worst first."""
 
     cells: IntArray
+    """(k,): their numbers in the mesh."""
     values: FloatArray
+    """(k,): their measure; 0 for an inverted cell."""
     inverted: np.ndarray
+    """(k,)."""
     positions: FloatArray
+    """(k, d): the means of their nodes, in the mesh's length unit."""
     steps: IntArray
+    """(k,): the first frame at which each was worst; 0 is the undeformed mesh."""
     kinds: tuple[str, ...]
+    """The names of their element types."""
     measure: ColorBy
+    """The quality in ``values``."""
     numbers: IntArray | None = None
+    """(k,): the numbers of the cells in the file, where only a part of the mesh is in memory."""
 
     @property
     def known_as(self) -> IntArray:

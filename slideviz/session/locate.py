@@ -16,16 +16,11 @@ NEAR = 4
 
 @dataclass(frozen=True)
 class RotationAxis:
-    """The axis of rotational periodicity.
-
-    Attributes
-    ----------
-    axis, origin : (3,) tuple of float
-        Its direction, and a point on it.
-    """
+    """The axis of rotational periodicity."""
 
     axis: tuple[float, float, float]
     origin: tuple[float, float, float]
+    """`axis`, `origin` (3,) tuple of float: its direction, and a point on it."""
 
 
 def axis_of(session: Session) -> RotationAxis | None:

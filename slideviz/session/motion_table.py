@@ -22,21 +22,14 @@ LARGEST = 5_000_000
 
 @dataclass(frozen=True, eq=False)
 class TableRows:
-    """The nodes that a table of displacements may list.
-
-    Attributes
-    ----------
-    of : str
-        Their boundaries, in words.
-    nodes : (k,) int64
-        The nodes, sorted.
-    shape : (n, d)
-        Shape of the points of the mesh.
-    """
+    """The nodes that a table of displacements may list."""
 
     of: str
+    """Their boundaries, in words."""
     nodes: IntArray
+    """(k,): the nodes, sorted."""
     shape: tuple[int, ...]
+    """(n, d): shape of the points of the mesh."""
 
     @classmethod
     def on(cls, mesh: Mesh, case: Case, marker: Target) -> TableRows:

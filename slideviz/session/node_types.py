@@ -18,18 +18,12 @@ from slideviz.terms import NODE_TYPES, NodeType
 
 @dataclass(frozen=True, eq=False)
 class TypedNodes:
-    """Nodes to be drawn as points, each with its type.
-
-    Attributes
-    ----------
-    nodes : (k,) int64
-        The nodes, ascending.
-    kinds : (k,) int64
-        The types of the nodes, as places in ``NODE_TYPES``.
-    """
+    """Nodes to be drawn as points, each with its type."""
 
     nodes: IntArray
+    """(k,): the nodes, ascending."""
     kinds: IntArray
+    """(k,): the types of the nodes, as places in ``NODE_TYPES``."""
 
     @property
     def present(self) -> tuple[NodeType, ...]:

@@ -25,30 +25,20 @@ LABEL = 20
 
 @dataclass(frozen=True, eq=False)
 class StepFrame:
-    """The mesh after a step, with its quality; the first frame is the undeformed mesh.
-
-    Attributes
-    ----------
-    mesh : Mesh
-        The mesh, or the skin of one that is larger than memory (see `slideviz.streaming.skin`).
-    quality : Quality
-    step : Step or None
-        The step; None for the undeformed mesh.
-    extra : StepFrame or None
-        The worst cells of a mesh of which only the skin is in memory, worst first. As numbers of
-        cells of this frame, they follow those of the skin (see `place_of`).
-    base : Mesh or None
-        The undeformed mesh of this frame, where it is not that of the session.
-    file : Path or None
-        The file of the whole mesh, if only the skin is in memory.
-    """
+    """The mesh after a step, with its quality; the first frame is the undeformed mesh."""
 
     mesh: Mesh
+    """The mesh, or the skin of one that is larger than memory (see `slideviz.streaming.skin`)."""
     quality: Quality
     step: Step | None = None
+    """The step; None for the undeformed mesh."""
     extra: StepFrame | None = None
+    """The worst cells of a mesh of which only the skin is in memory, worst first. As numbers of
+    cells of this frame, they follow those of the skin (see `place_of`)."""
     base: Mesh | None = None
+    """The undeformed mesh of this frame, where it is not that of the session."""
     file: Path | None = None
+    """The file of the whole mesh, if only the skin is in memory."""
 
     def has(self, cell: int | None) -> bool:
         """Return whether the frame has a cell of that number, its own or of ``extra``."""
@@ -88,36 +78,24 @@ class StepFrame:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A deformation that was computed: its case and its steps.
-
-    Attributes
-    ----------
-    number : int
-        From 1, in the order of the starts; never used twice in a session.
-    case : Case
-        The settings.
-    frames : tuple of StepFrame
-        The steps, without the undeformed mesh.
-    end : {"", "done", "cancelled", "failed"}
-        How it ended; empty while it goes on.
-    saved : bool
-        Whether the mesh of its last step was written to a file.
-    name : str
-        The user's name for it, or "".
-    undeformed : StepFrame or None
-        The undeformed mesh with its quality, where this run has another metric than the session.
-    panels : Case or None
-        For the run of a design: the session's case when it was asked for.
-    """
+    """A deformation that was computed: its case and its steps."""
 
     number: int
+    """From 1, in the order of the starts; never used twice in a session."""
     case: Case
+    """The settings."""
     frames: tuple[StepFrame, ...] = ()
+    """The steps, without the undeformed mesh."""
     end: Literal["", "done", "cancelled", "failed"] = ""
+    """How it ended; empty while it goes on."""
     saved: bool = False
+    """Whether the mesh of its last step was written to a file."""
     name: str = ""
+    """The user's name for it, or ""."""
     undeformed: StepFrame | None = None
+    """The undeformed mesh with its quality, where this run has another metric than the session."""
     panels: Case | None = None
+    """For the run of a design: the session's case when it was asked for."""
 
     @property
     def label(self) -> str:

@@ -128,24 +128,16 @@ def notes_of(run: Run) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Requirement:
-    """A requirement of a run that is not met.
-
-    Attributes
-    ----------
-    text : str
-        A sentence for the user.
-    place : str
-        The panel in which it can be met.
-    marker : str
-        The boundary that lacks a motion; empty for other requirements.
-    motion : int
-        The place of the motion that the requirement is about, from 0.
-    """
+    """A requirement of a run that is not met."""
 
     text: str
+    """A sentence for the user."""
     place: PanelPlace
+    """The panel in which it can be met."""
     marker: str = ""
+    """The boundary that lacks a motion; empty for other requirements."""
     motion: int = 0
+    """The place of the motion that the requirement is about, from 0."""
 
 
 def run_requirements(session: Session) -> tuple[Requirement, ...]:

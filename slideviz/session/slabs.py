@@ -35,19 +35,14 @@ KEPT = 8
 
 @dataclass(frozen=True, eq=False)
 class Groups:
-    """Bounding balls of groups of `GROUP` cells, in the order of the file.
-
-    Attributes
-    ----------
-    centres : (g, 3) float64
-    radii : (g,) float64
-    scale : float
-        The diagonal of the mesh's bounding box.
-    """
+    """Bounding balls of groups of `GROUP` cells, in the order of the file."""
 
     centres: FloatArray
+    """(g, 3)."""
     radii: FloatArray
+    """(g,)."""
     scale: float
+    """The diagonal of the mesh's bounding box."""
 
     @classmethod
     def of(cls, files: PointFiles, tick: Tick) -> Groups:

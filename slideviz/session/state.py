@@ -23,67 +23,46 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ViewState:
-    """The view of a session: colors, threshold, sections, step, things drawn.
-
-    Attributes
-    ----------
-    color_by : ColorBy
-        The quantity that cells are colored by.
-    color_range : (float, float) or None
-        Values at the ends of the color bar; None: 0 to 1 for quality, and 0 to a round number
-        above the largest of all runs for the displacement.
-    color_map : str
-        One of `slideviz.terms.COLOR_MAPS`.
-    threshold : (float, float) or None
-        Draw only the cells whose value is in this range; None draws all.
-    points : PointsShown
-        Which nodes are drawn as points.
-    drawn : frozenset of Shown
-        Which things are drawn of those that the user can switch off.
-    sections : tuple of Section
-        The sections of the mesh.
-    passages : int
-        Passages drawn on each side of a periodic mesh; -1 draws all there are.
-    hidden : frozenset of str
-        Boundaries that are not drawn.
-    selected : tuple of str
-        Boundaries that are highlighted.
-    frame : int
-        The number of the frame that is shown; 0 is the undeformed mesh.
-    marked_cell : int or None
-        The number of the cell that is marked, as of ``StepFrame.place_of``.
-    marked_in : int or None
-        The run that was shown when it was marked; None for none.
-    beside : int or None
-        The number of a run shown in a second view beside the first; 0 is the undeformed mesh.
-    swapped : bool
-        Whether the second view is to the left of the first.
-    ranges : tuple of (str, (float, float))
-        The color ranges of other quantities that the view was colored by before.
-    section_index : int or None
-        The place in ``sections`` of the one that is selected.
-    handle : bool
-        Whether the selected section has its handle drawn.
-    """
+    """The view of a session: colors, threshold, sections, step, things drawn."""
 
     color_by: ColorBy = "role"
+    """The quantity that cells are colored by."""
     color_range: tuple[float, float] | None = None
+    """(float, float) or None: values at the ends of the color bar; None: 0 to 1 for quality, and 0
+    to a round number above the largest of all runs for the displacement."""
     color_map: str = "viridis"
+    """One of `slideviz.terms.COLOR_MAPS`."""
     threshold: tuple[float, float] | None = None
+    """(float, float) or None: draw only the cells whose value is in this range; None draws all."""
     points: PointsShown = "none"
+    """Which nodes are drawn as points."""
     drawn: frozenset[Shown] = frozenset(name for name, term in SHOWN.items() if term.at_first)
+    """Which things are drawn of those that the user can switch off."""
     sections: tuple[Section, ...] = ()
+    """The sections of the mesh."""
     passages: int = 0
+    """Passages drawn on each side of a periodic mesh; -1 draws all there are."""
     hidden: frozenset[str] = frozenset()
+    """Boundaries that are not drawn."""
     selected: tuple[str, ...] = ()
+    """Boundaries that are highlighted."""
     frame: int = 0
+    """The number of the frame that is shown; 0 is the undeformed mesh."""
     marked_cell: int | None = None
+    """The number of the cell that is marked, as of ``StepFrame.place_of``."""
     marked_in: int | None = None
+    """The run that was shown when it was marked; None for none."""
     beside: int | None = None
+    """The number of a run shown in a second view beside the first; 0 is the undeformed mesh."""
     swapped: bool = False
+    """Whether the second view is to the left of the first."""
     ranges: tuple[tuple[ColorBy, tuple[float, float]], ...] = ()
+    """tuple of (str, (float, float)): the color ranges of other quantities that the view was
+    colored by before."""
     section_index: int | None = None
+    """The place in ``sections`` of the one that is selected."""
     handle: bool = False
+    """Whether the selected section has its handle drawn."""
 
     @property
     def style(self) -> ViewState:
@@ -148,61 +127,42 @@ class Guess:
 
 @dataclass(frozen=True, eq=False)
 class Session:
-    """The open mesh, its case, its runs, and the view of them.
-
-    Attributes
-    ----------
-    mesh : Mesh or None
-        The undeformed mesh; None before anything is open.
-    path : Path or None
-        The mesh file.
-    case : Case
-        The case in the panels, with guessed roles.
-    guesses : mapping of str to Guess
-        Guesses that the user has not confirmed, by boundary.
-    pairs : tuple of Pair
-        Boundaries that match each other.
-    first : StepFrame or None
-        The undeformed mesh with its quality.
-    runs : tuple of Run
-        The runs, in the order of their starts.
-    shown : int or None
-        The number of the run whose steps are shown.
-    saved : Case or None
-        The case as it was saved or opened last, without its view.
-    saved_sections : tuple of Section
-        The sections in the view of that case.
-    view : ViewState
-    intersection : str
-        A sentence on boundaries that the motions put through each other, which keeps a run from
-        starting; empty if none are known.
-    folding : str
-        A sentence on moving boundaries that cross themselves, with which a run can start; or empty.
-    invalid : tuple of (PanelPlace, str)
-        Fields whose text is not valid, so that the case still has the value before: the panel, and
-        a sentence. No run starts meanwhile.
-    removed : tuple of Run
-        The last runs removed from ``runs``, which undo can bring back.
-    newest : int
-        The highest number that a run had so far, removed ones too.
-    """
+    """The open mesh, its case, its runs, and the view of them."""
 
     mesh: Mesh | None = None
+    """The undeformed mesh; None before anything is open."""
     path: Path | None = None
+    """The mesh file."""
     case: Case = field(default_factory=Case)
+    """The case in the panels, with guessed roles."""
     guesses: Mapping[str, Guess] = field(default_factory=dict)
+    """Guesses that the user has not confirmed, by boundary."""
     pairs: tuple[Pair, ...] = ()
+    """Boundaries that match each other."""
     first: StepFrame | None = None
+    """The undeformed mesh with its quality."""
     runs: tuple[Run, ...] = ()
+    """The runs, in the order of their starts."""
     shown: int | None = None
+    """The number of the run whose steps are shown."""
     saved: Case | None = None
+    """The case as it was saved or opened last, without its view."""
     saved_sections: tuple[Section, ...] = ()
+    """The sections in the view of that case."""
     view: ViewState = field(default_factory=ViewState)
     intersection: str = ""
+    """A sentence on boundaries that the motions put through each other, which keeps a run from
+    starting; empty if none are known."""
     folding: str = ""
+    """A sentence on moving boundaries that cross themselves, with which a run can start; or
+    empty."""
     invalid: tuple[tuple[PanelPlace, str], ...] = ()
+    """tuple of (PanelPlace, str): fields whose text is not valid, so that the case still has the
+    value before: the panel, and a sentence. No run starts meanwhile."""
     removed: tuple[Run, ...] = ()
+    """The last runs removed from ``runs``, which undo can bring back."""
     newest: int = 0
+    """The highest number that a run had so far, removed ones too."""
 
     @property
     def in_file(self) -> bool:

@@ -46,22 +46,16 @@ def notify(
 
 @dataclass(frozen=True)
 class UndoState:
-    """The state that undo brings back: case, guesses, style of the view, removed runs.
-
-    Attributes
-    ----------
-    removed : frozenset of int
-        The numbers of the runs that were removed at that time. Undo removes these alone: later
-        runs stay.
-    shown : int or None
-        The number of the run that was shown; it is shown again if undo brings it back.
-    """
+    """The state that undo brings back: case, guesses, style of the view, removed runs."""
 
     case: Case
     guesses: Mapping[str, Guess]
     style: ViewState
     removed: frozenset[int] = frozenset()
+    """The numbers of the runs that were removed at that time. Undo removes these alone: later runs
+    stay."""
     shown: int | None = field(default=None, compare=False)
+    """The number of the run that was shown; it is shown again if undo brings it back."""
 
     @classmethod
     def of(cls, session: Session) -> UndoState:
@@ -114,25 +108,18 @@ class _OutsideChange:
 
 @dataclass(frozen=True)
 class UndoEntry:
-    """A change that can be undone.
-
-    Attributes
-    ----------
-    before : Memento or _OutsideChange
-        The state before the change (in the list for redo: after it).
-    words : str
-        Words for the menu.
-    kind : tuple
-        The function, what it changed, and names of values: changes with the same are undone as one.
-    at_s : float
-        When it was made, in seconds: infinity while the mouse drags, so that what follows belongs
-        to it; minus infinity where nothing more can.
-    """
+    """A change that can be undone."""
 
     before: UndoState | _OutsideChange
+    """The state before the change (in the list for redo: after it)."""
     words: str
+    """Words for the menu."""
     kind: tuple[object, ...]
+    """The function, what it changed, and names of values: changes with the same are undone as
+    one."""
     at_s: float
+    """When it was made, in seconds: infinity while the mouse drags, so that what follows belongs to
+    it; minus infinity where nothing more can."""
 
 
 class Store:

@@ -14,18 +14,12 @@ from slideviz.session.state import Session
 
 @dataclass(frozen=True, eq=False)
 class Unsaved:
-    """Unsaved work of a session.
-
-    Attributes
-    ----------
-    session : Session
-    lost : mapping of str to str
-        The words for what would be lost, by its kind: ``case``; ``mesh``, the deformed mesh of the
-        run shown, or ``run`` while that goes on; ``table``, a sentence on the table of designs.
-    """
+    """Unsaved work of a session."""
 
     session: Session
     lost: Mapping[str, str]
+    """The words for what would be lost, by its kind: ``case``; ``mesh``, the deformed mesh of the
+    run shown, or ``run`` while that goes on; ``table``, a sentence on the table of designs."""
 
     @classmethod
     def of(cls, session: Session, busy: bool, designs: str = "") -> Unsaved:

@@ -28,40 +28,29 @@ FINE = 10_000
 
 @dataclass(frozen=True, eq=False)
 class Tally:
-    """Counts and size-skew qualities of all cells of a mesh, summed up.
-
-    Attributes
-    ----------
-    cells, inverted, unproven : int
-        The number of all cells, and of those with these statuses.
-    min, mean : float
-        Lowest and mean quality.
-    counts : (FINE,) int64
-        The number of cells, without inverted ones, in equal intervals of their quality from 0 to 1.
-    worst : (k,) int64
-        The numbers in the file of the cells of lowest value, worst first.
-    """
+    """Counts and size-skew qualities of all cells of a mesh, summed up."""
 
     cells: int
+    """`cells`, `inverted`, `unproven`: the number of all cells, and of those with these
+    statuses."""
     min: float
     mean: float
+    """`min`, `mean`: lowest and mean quality."""
     inverted: int
     unproven: int
     counts: IntArray
+    """(FINE,): the number of cells, without inverted ones, in equal intervals of their quality from
+    0 to 1."""
     worst: IntArray
+    """(k,): the numbers in the file of the cells of lowest value, worst first."""
 
 
 @dataclass(frozen=True, eq=False)
 class PartQuality(Quality):
-    """A quality with the arrays of the cells in memory, but counts, minimum and mean of all cells.
-
-    Attributes
-    ----------
-    tally : Tally
-        The counts and qualities of all cells of the mesh.
-    """
+    """A quality with arrays of the cells in memory, but counts, minimum and mean of all cells."""
 
     tally: Tally | None = None
+    """The counts and qualities of all cells of the mesh."""
 
     @classmethod
     def of(cls, found: Quality, tally: Tally) -> PartQuality:

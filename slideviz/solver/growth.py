@@ -122,21 +122,14 @@ def overshoot_of_rest(
 
 @dataclass(frozen=True, eq=False)
 class Farthest:
-    """The node of a mesh that went farthest.
-
-    Attributes
-    ----------
-    length : float
-        How far, in the mesh's length unit.
-    node : int
-        Its number; of several, the lowest.
-    point : (d,) float64
-        Its undeformed place.
-    """
+    """The node of a mesh that went farthest."""
 
     length: float
+    """How far, in the mesh's length unit."""
     node: int
+    """Its number; of several, the lowest."""
     point: FloatArray
+    """(d,): its undeformed place."""
 
     def further(self, other: Farthest) -> Farthest:
         """Return the one of two that went farther."""

@@ -52,70 +52,46 @@ that slide past the end of their surface have something to slide on."""
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """Everything made of a case and a mesh that stays the same over the steps of a deformation.
-
-    Attributes
-    ----------
-    frame : Frame
-    basis : Basis
-    coords : (n, d) float64
-        Undeformed positions in the frame.
-    classes : Classes
-    known : (a,) int64
-        Moving and fixed nodes.
-    target : (a, d) float64
-        Their displacement in the frame after the last step.
-    same_as : (n,) int64
-        For each node the one that represents all that coincide with it.
-    images : (p, 2) int64
-        Pairs of periodic images, which move alike; the first represents the second.
-    candidates : int
-        Nodes that could be control nodes; periodic images count as one.
-    reduction : GreedySettings or None
-        Settings of the greedy selection; None: all candidates are control nodes.
-    layers : float
-        As of a ``Step``.
-    axis : (n,) bool
-        Nodes on the axis of a cylindrical frame.
-    held : (h,) int64
-        Sliding nodes on the axis that stay in place.
-    boundary, fans
-        Facets of the boundary, and their fans around each node.
-    tracks : Tracks
-        The edges and surfaces along which nodes slide.
-    pairs : tuple of Pair
-        Periodic pairs of markers.
-    solve : callable
-        Solves one step by the method of the case.
-    fitted_radius : float
-        The support radius that fits the motion, whatever the case says.
-    halo : Halo or None
-        Copies that follow their donors.
-    warnings : tuple of str
-        What the user should know of case and mesh.
-    """
+    """Everything made of a case and a mesh that stays the same over the steps of a deformation."""
 
     frame: Frame
     basis: Basis
     coords: FloatArray
+    """(n, d): undeformed positions in the frame."""
     classes: Classes
     known: IntArray
+    """(a,): moving and fixed nodes."""
     target: FloatArray
+    """(a, d): their displacement in the frame after the last step."""
     same_as: IntArray
+    """(n,): for each node the one that represents all that coincide with it."""
     images: IntArray
+    """(p, 2): pairs of periodic images, which move alike; the first represents the second."""
     candidates: int
+    """Nodes that could be control nodes; periodic images count as one."""
     reduction: GreedySettings | None
+    """Settings of the greedy selection; None: all candidates are control nodes."""
     layers: float
+    """As of a ``Step``."""
     axis: np.ndarray
+    """(n,): nodes on the axis of a cylindrical frame."""
     held: IntArray
+    """(h,): sliding nodes on the axis that stay in place."""
     boundary: Boundary
     fans: Fans
+    """`boundary`, `fans`: facets of the boundary, and their fans around each node."""
     tracks: Tracks
+    """The edges and surfaces along which nodes slide."""
     pairs: tuple[Pair, ...]
+    """Periodic pairs of markers."""
     solve: Callable[[Problem, Watch], Solution]
+    """Solves one step by the method of the case."""
     fitted_radius: float
+    """The support radius that fits the motion, whatever the case says."""
     halo: Halo | None
+    """Copies that follow their donors."""
     warnings: tuple[str, ...]
+    """What the user should know of case and mesh."""
 
     @cached_property
     def largest(self) -> float:

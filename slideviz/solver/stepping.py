@@ -33,28 +33,20 @@ HALVINGS = 3
 
 @dataclass(frozen=True, eq=False)
 class Stepping:
-    """A deformation that can be made in any number of steps.
-
-    Attributes
-    ----------
-    case, mesh, setup
-        What is asked, the undeformed mesh, and the arrays made of both.
-    tell : callable
-        Called with each ``Progress``; an exception it raises ends the run.
-    seconds : dict of str to float
-        Spent before the first step, by phase; added to those of the first step.
-    rate : callable or None
-        Returns the quality of all cells after the last of the steps it is given, where ``mesh`` is
-        only the skin of a streamed mesh; the steps then have a ``field``. None: the quality of
-        the last step's mesh.
-    """
+    """A deformation that can be made in any number of steps."""
 
     case: Case
     mesh: Mesh
     setup: Setup
+    """`case`, `mesh`, `setup`: what is asked, the undeformed mesh, and the arrays made of both."""
     tell: Callable[[Progress], None]
+    """Called with each ``Progress``; an exception it raises ends the run."""
     seconds: dict[str, float]
+    """Spent before the first step, by phase; added to those of the first step."""
     rate: Callable[[Sequence[Step]], Quality] | None = None
+    """Returns the quality of all cells after the last of the steps it is given, where ``mesh`` is
+    only the skin of a streamed mesh; the steps then have a ``field``. None: the quality of the last
+    step's mesh."""
 
     def steps(self, count: int, halve: bool = False) -> Iterator[Step]:
         """Yield the steps that divide the displacement into ``count`` equal parts.

@@ -22,21 +22,14 @@ from slideviz.solver.steps import Step
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """Displaces any nodes of a mesh, by the steps of its skin.
-
-    Attributes
-    ----------
-    skin : Mesh
-        The undeformed skin.
-    setup : Setup
-        The setup of the skin.
-    steps : sequence of Step
-        The steps of the skin, with their ``field``.
-    """
+    """Displaces any nodes of a mesh, by the steps of its skin."""
 
     skin: Mesh
+    """The undeformed skin."""
     setup: Setup
+    """The setup of the skin."""
     steps: Sequence[Step]
+    """The steps of the skin, with their ``field``."""
 
     def bare(self) -> Rest:
         """Return the same without the skin's cells and markers, which no displacement needs."""

@@ -86,32 +86,24 @@ def ways_of(signs: NDArray[np.int8]) -> NDArray[np.int8]:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredBlock:
-    """The quality of a block of cells, undeformed and deformed.
-
-    Attributes
-    ----------
-    ids : (k,) int64 or slice
-        The numbers of the cells.
-    values, before : (k,) float64
-        Quality of the deformed and of the undeformed cells.
-    status, old : (k,) uint8
-        Status (``Quality.status``) of the deformed and of the undeformed cells.
-    signs : (1,) or (2,) int8
-        Orientations that occur: 1, -1 (numbered the other way round), or both.
-    inverted : dict of int to (int, (n,) int64)
-        VTK type and nodes of inverted cells, by their number: those with the lowest numbers.
-    farthest : Farthest
-        The node that went farthest.
-    """
+    """The quality of a block of cells, undeformed and deformed."""
 
     ids: Index
+    """(k,) int64 or slice: the numbers of the cells."""
     values: FloatArray
     before: FloatArray
+    """`values`, `before` (k,): quality of the deformed and of the undeformed cells."""
     status: NDArray[np.uint8]
     old: NDArray[np.uint8]
+    """`status`, `old` (k,): status (``Quality.status``) of the deformed and of the undeformed
+    cells."""
     signs: NDArray[np.int8]
+    """(1,) or (2,) int8: orientations that occur: 1, -1 (numbered the other way round), or both."""
     inverted: dict[int, tuple[int, IntArray]]
+    """dict of int to (int, (n,) int64): VTK type and nodes of inverted cells, by their number:
+    those with the lowest numbers."""
     farthest: Farthest
+    """The node that went farthest."""
 
 
 def measured(

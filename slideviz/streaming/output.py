@@ -44,14 +44,7 @@ Part = tuple[int, int]
 
 
 class Output:
-    """Writes the deformed mesh of a streamed run, and measures the quality of its cells.
-
-    Attributes
-    ----------
-    files : PointFiles
-        The undeformed and the deformed points. Before the first call of a method that writes or
-        measures, the deformed ones are the undeformed.
-    """
+    """Writes the deformed mesh of a streamed run, and measures the quality of its cells."""
 
     def __init__(
         self,
@@ -73,6 +66,8 @@ class Output:
         source = BinaryFile(given.path, stack.enter_context(given.path.open("rb")))
         self._place = find_zone(source, given.zone)
         self.files = PointFiles(source, source, self._place)
+        """The undeformed and the deformed points. Before the first call of a method that writes or
+        measures, the deformed ones are the undeformed."""
         about = f"{about} {is_text} {parts(self._place.n_points)[0]}"
         if is_text:
             require_no_input(output, MeshError, replaces)

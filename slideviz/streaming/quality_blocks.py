@@ -29,25 +29,16 @@ Zone = tuple[Path, int | None]
 
 @dataclass(frozen=True, eq=False)
 class Rated:
-    """A block of cells of a mesh, with their quality.
-
-    Attributes
-    ----------
-    ids : (k,) int64
-        The numbers of the cells in the whole mesh.
-    nodes : (n,) int64
-        The numbers of the block's points in the whole mesh, ascending.
-    mesh : Mesh
-        These points and cells, without boundaries.
-    base : Mesh or None
-        The same cells in the undeformed mesh; None where there is no reference.
-    quality : Quality
-    """
+    """A block of cells of a mesh, with their quality."""
 
     ids: IntArray
+    """(k,): the numbers of the cells in the whole mesh."""
     nodes: IntArray
+    """(n,): the numbers of the block's points in the whole mesh, ascending."""
     mesh: Mesh
+    """These points and cells, without boundaries."""
     base: Mesh | None
+    """The same cells in the undeformed mesh; None where there is no reference."""
     quality: Quality
 
 
@@ -136,25 +127,18 @@ def has_cells_of(mesh: Zone, other: Zone) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Whole:
-    """The quality and the counts of all cells of a mesh.
-
-    Attributes
-    ----------
-    quality : Quality
-        Without size and skew; its arrays are in scratch files.
-    worst : list of (int, int)
-        Numbers and VTK types of the cells of lowest quality, worst first, ties by number.
-    types : dict of int to int
-        The number of cells of each VTK type.
-    points, unused : int
-        The number of points, and of those that no cell uses.
-    """
+    """The quality and the counts of all cells of a mesh."""
 
     quality: Quality
+    """Without size and skew; its arrays are in scratch files."""
     worst: list[tuple[int, int]]
+    """list of (int, int): numbers and VTK types of the cells of lowest quality, worst first, ties
+    by number."""
     types: dict[int, int]
+    """The number of cells of each VTK type."""
     points: int
     unused: int
+    """`points`, `unused`: the number of points, and of those that no cell uses."""
 
 
 def rated_whole(

@@ -47,29 +47,21 @@ Tell = Callable[[Progress], None]
 
 @dataclass(frozen=True, eq=False)
 class StreamedRun:
-    """The outcome of a streamed run.
-
-    Attributes
-    ----------
-    skin : Mesh
-        The undeformed points of the skin; it has no cells, and its markers have no elements.
-    steps : tuple of Step
-        Their meshes are the deformed skin, their ``node_counts`` those of the whole mesh.
-    quality, undeformed : Quality
-        Quality of all cells after and before the run; without ``size`` and ``skew``.
-    folded : dict of int to (int, int)
-        VTK type of inverted cells, and the step after which they are first inverted, by cell
-        number; at most ``listed``, those with the lowest numbers.
-    seconds : dict of str to float
-        Spent by phase, besides those of the steps.
-    """
+    """The outcome of a streamed run."""
 
     skin: Mesh
+    """The undeformed points of the skin; it has no cells, and its markers have no elements."""
     steps: tuple[Step, ...]
+    """Their meshes are the deformed skin, their ``node_counts`` those of the whole mesh."""
     quality: Quality
     undeformed: Quality
+    """`quality`, `undeformed`: quality of all cells after and before the run; without ``size`` and
+    ``skew``."""
     folded: dict[int, tuple[int, int]]
+    """dict of int to (int, int): VTK type of inverted cells, and the step after which they are
+    first inverted, by cell number; at most ``listed``, those with the lowest numbers."""
     seconds: dict[str, float]
+    """Spent by phase, besides those of the steps."""
 
 
 def stream(

@@ -111,23 +111,17 @@ def _ticking(tick: Tick, begin: float, end: float, count: int) -> Callable[[Any]
 
 @dataclass(frozen=True, eq=False)
 class _Near:
-    """Cells of a block of the file that may have a side on the boundary.
-
-    Attributes
-    ----------
-    first : int
-        Place in the file of the block's first cell.
-    types, nodes, ids : (k,), flat, (k,)
-        Of the cells that may have a side on the boundary: VTK identifiers, nodes, numbers.
-    every : slice or (b,)
-        The numbers of all cells of the block.
-    """
+    """Cells of a block of the file that may have a side on the boundary."""
 
     first: int
+    """Place in the file of the block's first cell."""
     types: NDArray[np.uint8]
     nodes: IntArray
     ids: IntArray
+    """`types`, `nodes`, `ids` (k,), flat, (k,): of the cells that may have a side on the boundary:
+    VTK identifiers, nodes, numbers."""
     every: Index
+    """slice or (b,): the numbers of all cells of the block."""
 
 
 @contextmanager

@@ -51,24 +51,16 @@ checksums of the copy are computed."""
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """A mesh to be streamed, in an SU2 binary file.
-
-    Attributes
-    ----------
-    path : Path
-        The binary file: the user's, or a copy of a text.
-    zone : int or None
-        The zone in it, from 1; the first where it is None.
-    text : Text or None
-        The text that ``path`` is a copy of.
-    is_left : bool
-        Whether the copy was made by an earlier run that was stopped.
-    """
+    """A mesh to be streamed, in an SU2 binary file."""
 
     path: Path
+    """The binary file: the user's, or a copy of a text."""
     zone: int | None
+    """The zone in it, from 1; the first where it is None."""
     text: Text | None = None
+    """The text that ``path`` is a copy of."""
     is_left: bool = False
+    """Whether the copy was made by an earlier run that was stopped."""
 
     def text_size(self, place: ZonePlace) -> int:
         """Return about how many bytes the zone at ``place`` has as a text."""

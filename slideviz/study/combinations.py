@@ -46,20 +46,13 @@ AUTO = 0
 
 @dataclass(frozen=True)
 class Combination:
-    """A method, a periodic mode and a number of steps.
-
-    Attributes
-    ----------
-    method : str
-        One of ``COMPARED_METHODS``.
-    periodic : PeriodicMode
-    steps : int
-        ``AUTO``: the solver chooses.
-    """
+    """A method, a periodic mode and a number of steps."""
 
     method: str
+    """One of ``COMPARED_METHODS``."""
     periodic: PeriodicMode
     steps: int
+    """``AUTO``: the solver chooses."""
 
     @property
     def label(self) -> str:
@@ -75,45 +68,31 @@ class Combination:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """The result of a combination: quality, errors and time.
-
-    Attributes
-    ----------
-    steps : int
-        Steps made.
-    mesh : Mesh or None
-        After the last step; None where it was not kept, so that there is no picture of it.
-    quality : Quality
-        Of that mesh.
-    minimum, mean : (steps,) float64
-        Lowest and mean quality after each step.
-    control_nodes : int
-        In the last step.
-    max_error : float
-        The largest of all steps, in the mesh's length unit.
-    condition : float
-        The largest of all steps; NaN where the method has no system.
-    seconds, processor_seconds : float
-        Of the deformation: by the clock, and of all processors together.
-    tolerance : float or None
-        Of the greedy selection, in the mesh's length unit.
-    history : tuple of (int, Cycle)
-        Number of the step, and a cycle of its greedy selection.
-    warnings : tuple of str
-    """
+    """The result of a combination: quality, errors and time."""
 
     steps: int
+    """Steps made."""
     mesh: Mesh | None
+    """After the last step; None where it was not kept, so that there is no picture of it."""
     quality: Quality
+    """Of that mesh."""
     minimum: FloatArray
     mean: FloatArray
+    """`minimum`, `mean` (steps,): lowest and mean quality after each step."""
     control_nodes: int
+    """In the last step."""
     max_error: float
+    """The largest of all steps, in the mesh's length unit."""
     condition: float
+    """The largest of all steps; NaN where the method has no system."""
     seconds: float
     processor_seconds: float
+    """`seconds`, `processor_seconds`: of the deformation: by the clock, and of all processors
+    together."""
     tolerance: float | None
+    """Of the greedy selection, in the mesh's length unit."""
     history: tuple[tuple[int, Cycle], ...]
+    """tuple of (int, Cycle): number of the step, and a cycle of its greedy selection."""
     warnings: tuple[str, ...]
 
 
@@ -149,7 +128,7 @@ class _Shared:
     processor_seconds: float
 
     def serves(self, combination: Combination) -> bool:
-        """Tell whether a combination differs from ``first`` in the number of steps only."""
+        """Return whether a combination differs from ``first`` in the number of steps only."""
         return replace(combination, steps=self.first.steps) == self.first
 
 

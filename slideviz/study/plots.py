@@ -251,7 +251,7 @@ def _one_legend(figure: Figure) -> None:
 
 
 def _is_cross(gid: str) -> bool:
-    """Tell whether a line with this gid is the crosses at meshes with inverted cells."""
+    """Return whether a line with this gid is the crosses at meshes with inverted cells."""
     return gid.startswith("inverted:")
 
 

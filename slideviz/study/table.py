@@ -17,21 +17,15 @@ Value = str | int | float
 
 @dataclass(frozen=True)
 class StudyColumn:
-    """A column of the table.
-
-    Attributes
-    ----------
-    meaning : str
-    value : callable
-        Returns the value of a result.
-    head, form : str
-        Head and format on a terminal; columns with an empty head are not shown there.
-    """
+    """A column of the table."""
 
     meaning: str
     value: Callable[[Result], Value]
+    """Returns the value of a result."""
     head: str = ""
     form: str = ""
+    """`head`, `form`: head and format on a terminal; columns with an empty head are not shown
+    there."""
 
 
 COLUMNS: Mapping[str, StudyColumn] = {

@@ -82,21 +82,15 @@ ALONE = Alone()
 
 @dataclass(eq=False)
 class Ranks(Alone):
-    """Processes that MPI connects. Rank 0 works in ``with ranks:``; the others call `serve`.
-
-    Attributes
-    ----------
-    comm : Intracomm
-        A communicator that only slideviz uses.
-    threads : int
-        Threads of each rank, while all work: the cores of its machine, divided by the ranks there.
-    _owing : set of int
-        Ranks with a task whose result rank 0 has not received.
-    """
+    """Processes that MPI connects. Rank 0 works in ``with ranks:``; the others call `serve`."""
 
     comm: Intracomm
+    """A communicator that only slideviz uses."""
     threads: int
+    """Threads of each rank, while all work: the cores of its machine, divided by the ranks
+    there."""
     _owing: set[int] = field(default_factory=set)
+    """Ranks with a task whose result rank 0 has not received."""
 
     @classmethod
     def joined(cls, launched: int) -> Ranks:

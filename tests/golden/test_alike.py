@@ -115,7 +115,7 @@ def test_a_picture_of_another_size_is_told():
         ("inverted  3", "inverted  4", False),
         ("STEPS_GAIN= a number   [0.02]", "STEPS_GAIN= a number   [0.03]", False),
         ("a  6.6e-14     0", "a 1.06e-13  0", True),
-        ("color bar", "color bar", False),
+        ("color bar", "colour bar", False),
         ("  indented", "indented", False),
         ("wendland-c2", "wendland-c4", False),
         ("condition = [131.5]", "condition = [140.5]", True),

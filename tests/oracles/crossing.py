@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 
 
 def meet(a, b):
-    """Tell whether the convex hulls of points a (k, d) and b (l, d) have a common point."""
+    """Return whether the convex hulls of points a (k, d) and b (l, d) have a common point."""
     a, b = np.asarray(a, float), np.asarray(b, float)
     k, m = len(a), len(b)
     equal = np.vstack(

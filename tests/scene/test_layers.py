@@ -69,7 +69,7 @@ def near(scene, point, reach=3):
 
 
 def has(colors, wanted, within=45, least=1):
-    """Tell whether so many pixels have about that color."""
+    """Return whether so many pixels have about that color."""
     off = np.abs(colors - np.array(pv.Color(wanted).int_rgb)).max(axis=1)
     return int((off < within).sum()) >= least
 

@@ -95,9 +95,11 @@ def test_all_loops_have_this_cache():
     root = Path(sys.modules["slideviz"].__file__).parent
     users = [path.name for path in root.rglob("*.py") if "njit" in path.read_text()]
     own = [
-        path.name for path in root.rglob("*.py") if "mesh.caching import njit" in path.read_text()
+        path.name
+        for path in root.rglob("*.py")
+        if "system.jit_cache import njit" in path.read_text()
     ]
-    assert sorted(users) == sorted([*own, "caching.py"])
+    assert sorted(users) == sorted([*own, "jit_cache.py"])
 
 
 @pytest.mark.slow

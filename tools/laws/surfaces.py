@@ -75,7 +75,7 @@ def _shift(run: Run, frame: Frame) -> FloatArray:
 
 
 def _smooth(run: Run, one: Marker, other: Marker, coords: FloatArray, by: FloatArray) -> bool:
-    """Tell whether a marker and another, shifted ``by`` (d,), share nodes and go on smoothly."""
+    """Return whether a marker and another, shifted ``by`` (d,), share nodes and go on smoothly."""
     same = 1e-9 * run.mesh.extent
     gap, _ = cKDTree(coords[other.nodes] + by).query(coords[one.nodes])
     shared = coords[one.nodes[gap < same]]
@@ -97,7 +97,7 @@ def distance_to_any(sides: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def _flat(sides: FloatArray, rounding: float) -> bool:
-    """Tell whether all simplices lie in one plane."""
+    """Return whether all simplices lie in one plane."""
     corners = sides.reshape(-1, sides.shape[2])
     middle = corners - corners.mean(axis=0)
     normal = np.linalg.svd(middle, full_matrices=False)[2][-1]

@@ -46,7 +46,7 @@ class Line:
         return _difference(self.ours, self.thesis), _difference(self.ours, self.rbf_slide)
 
     def notable(self) -> bool:
-        """Tell whether a number on the same mesh differs by more than 2 %."""
+        """Return whether a number on the same mesh differs by more than 2 %."""
         found = self.differences()
         return not self.other_mesh and any(d is None or abs(d) > NOTABLE for d in found)
 

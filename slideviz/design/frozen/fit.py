@@ -44,20 +44,14 @@ Keep = Callable[[str, Callable[[], Any]], Any]
 
 @dataclass(frozen=True, eq=False)
 class Sum:
-    """A sum of radial functions, as `slideviz.rbf.problem.Interpolant`, on a tape.
-
-    Attributes
-    ----------
-    nodes : (c,) int64
-        The control nodes.
-    weights : (..., c, d)
-    tail : (..., q, d) or None
-        Coefficients of the polynomial's terms.
-    """
+    """A sum of radial functions, as `slideviz.rbf.problem.Interpolant`, on a tape."""
 
     nodes: IntArray
+    """(c,): the control nodes."""
     weights: Array
+    """(..., c, d)."""
     tail: Array | None = None
+    """(..., q, d) or None: coefficients of the polynomial's terms."""
 
 
 @dataclass(eq=False)
@@ -70,15 +64,7 @@ class TapedRows:
 
 
 class FrozenFit:
-    """The interpolant of one step, whose rows were chosen before.
-
-    Attributes
-    ----------
-    found : Sum or None
-        Of all rows added so far; None before any.
-    doubt : (...,) float64
-        As of a ``Solution``.
-    """
+    """The interpolant of one step, whose rows were chosen before."""
 
     def __init__(
         self,
@@ -110,9 +96,11 @@ class FrozenFit:
         tailed = KERNELS[basis.kernel].polynomial
         self._refined, self._checked = refined and usable(basis), checked and not tailed
         self.doubt: FloatArray = np.zeros(())
+        """(...,): as of a ``Solution``."""
         self._rows: TapedRows | None = None
         self._factors: dict[int, tuple[IntArray, Factor]] = {}
         self.found: Sum | None = None
+        """Of all rows added so far; None before any."""
 
     def add(self, rows: TapedRows, levels: Levels, stage: str) -> None:
         """Add rows, solve with those in ``levels`` of all rows added so far, and set ``found``.

@@ -37,25 +37,18 @@ ROUNDING = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """The result of a method in one step.
-
-    Attributes
-    ----------
-    displacement : (..., n, d)
-        Of all nodes, in the frame.
-    lag : (..., b, d) or None
-        The errors that the interpolants of all steps so far left at the boundary nodes ``of``
-        (b,); None without data reduction.
-    max_error, lost, doubt : (...,) float64
-        As of a ``Solution``.
-    """
+    """The result of a method in one step."""
 
     displacement: Array
+    """(..., n, d): of all nodes, in the frame."""
     lag: Array | None
+    """(..., b, d) or None: the errors that the interpolants of all steps so far left at the
+    boundary nodes ``of`` (b,); None without data reduction."""
     of: IntArray
     max_error: FloatArray
     lost: FloatArray
     doubt: FloatArray = made_by(default_factory=lambda: np.zeros(()))
+    """`max_error`, `lost`, `doubt` (...,): as of a ``Solution``."""
 
 
 class Method(ABC):

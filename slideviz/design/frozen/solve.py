@@ -24,17 +24,12 @@ REMEDY = (
 
 
 class MeasuredSystem:
-    """Solves a system in blocks, and estimates the errors of the fields of its solutions.
-
-    Attributes
-    ----------
-    doubt : (...,) float64
-        Estimated error of each of the last solutions, as a part of its largest datum.
-    """
+    """Solves a system in blocks, and estimates the errors of the fields of its solutions."""
 
     def __init__(self, blocks: list[IntArray], systems: list[System], *, refined: bool) -> None:
         self._blocks, self._systems, self._refined = blocks, systems, refined
         self.doubt: FloatArray = np.zeros(())
+        """(...,): estimated error of each of the last solutions, as a part of its largest datum."""
 
     def __call__(self, right: FloatArray, *, settle: bool = False) -> FloatArray:
         """Return the solutions (..., n, m) for right-hand sides, and set ``doubt``.
@@ -104,19 +99,13 @@ class MeasuredSystem:
 
 @dataclass(frozen=True, eq=False)
 class LeastSquares:
-    """Solves a singular symmetric system of constant rank: least-squares solutions of least norm.
-
-    Attributes
-    ----------
-    values, vectors : (k,), (q, k) float64
-        Eigenvalues that are not zero, and their eigenvectors.
-    rows : (q,) int64
-        The rows that are in the system; the others of a solution are zero.
-    """
+    """Solves a singular symmetric system of constant rank: least squares, least norm."""
 
     values: FloatArray
     vectors: FloatArray
+    """`values`, `vectors` (k,), (q, k): eigenvalues that are not zero, and their eigenvectors."""
     rows: IntArray
+    """(q,): the rows that are in the system; the others of a solution are zero."""
 
     def __call__(self, right: FloatArray) -> FloatArray:
         """Return the solutions (..., n, m) for right-hand sides (..., n, m)."""

@@ -25,29 +25,22 @@ from slideviz.solver.setup import Setup
 
 @dataclass(frozen=True, eq=False)
 class FrozenSpread:
-    """Which nodes take over the errors of which boundary nodes.
-
-    Attributes
-    ----------
-    targets : (h,) int64
-        The nodes that take over an error.
-    row, source, weight : (k,)
-        One entry for each pair of a target, by its place in ``targets``, and a boundary node, by
-        its place in ``nodes`` of `chosen_spread`, with its weight in the mean of their errors.
-    radius : float
-        Distance at which the correction ends, in the mesh's length unit.
-    nearest, turn : (h,) int64
-        The boundary node nearest to each target, and the number of periods, -1, 0 or 1, by which
-        it is shifted.
-    """
+    """Which nodes take over the errors of which boundary nodes."""
 
     targets: IntArray
+    """(h,): the nodes that take over an error."""
     row: IntArray
     source: IntArray
     weight: FloatArray
+    """`row`, `source`, `weight` (k,): one entry for each pair of a target, by its place in
+    ``targets``, and a boundary node, by its place in ``nodes`` of `chosen_spread`, with its weight
+    in the mean of their errors."""
     radius: float
+    """Distance at which the correction ends, in the mesh's length unit."""
     nearest: IntArray
     turn: IntArray
+    """`nearest`, `turn` (h,): the boundary node nearest to each target, and the number of periods,
+    -1, 0 or 1, by which it is shifted."""
 
     def mixing(self, count: int) -> csr_array:
         """Return the matrix (h, count) from values at boundary nodes to their means at targets."""

@@ -40,28 +40,20 @@ from slideviz.terms import Sliding
 
 @dataclass(frozen=True, eq=False)
 class StepState:
-    """The state of a deformation after some steps.
-
-    Attributes
-    ----------
-    coords : (..., n, d)
-        Positions in the frame.
-    lag : (..., b, d) or None
-        The errors that the interpolants of all steps so far left at the boundary nodes ``of``
-        (b,); None without data reduction.
-    max_error, lost, doubt : (...,) float64
-        As of a ``Solution``.
-    points : (..., n, d)
-        Cartesian positions; empty before the first step.
-    """
+    """The state of a deformation after some steps."""
 
     coords: Array
+    """(..., n, d): positions in the frame."""
     lag: Array | None = None
+    """(..., b, d) or None: the errors that the interpolants of all steps so far left at the
+    boundary nodes ``of`` (b,); None without data reduction."""
     of: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
     max_error: FloatArray = made_by(default_factory=lambda: np.zeros(()))
     lost: FloatArray = made_by(default_factory=lambda: np.zeros(()))
     doubt: FloatArray = made_by(default_factory=lambda: np.zeros(()))
+    """`max_error`, `lost`, `doubt` (...,): as of a ``Solution``."""
     points: Array = made_by(default_factory=lambda: np.empty((0, 0)))
+    """(..., n, d): Cartesian positions; empty before the first step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,57 +71,39 @@ class Kept:
 
 @dataclass(frozen=True, eq=False)
 class FrozenStep:
-    """One step with its choices.
-
-    Attributes
-    ----------
-    setup : Setup
-    mesh : Mesh
-        Undeformed.
-    sliding : Sliding
-    part : float
-        Part of the whole displacement that is made after this step, up to 1.
-    first : bool
-        Whether positions are those of the undeformed mesh, the same for all designs.
-    stages : tuple of Levels
-        Rows of the systems.
-    dropped : (m,) int64
-        Nodes that the pivot guard left out of the systems.
-    condition : float
-        Estimated condition number of the last system, at the reference.
-    refined : float
-        Where systems are solved with twice the digits, as at the reference: the estimated error of
-        ordinary solutions, as of a ``Solution``; else 0.
-    doubt : float
-        As of a ``Solution``, at the reference.
-    weights : Weights or None
-        Settings of inverse distance weighting, if that is the method.
-    body : Body or None
-        The elastic body, if the method is linear elasticity.
-    reuse : bool
-        Whether a later step keeps the factors of the last positions that it began at.
-    choices, constants : Kept
-        Discrete choices; and, used in the first step only, what depends on positions only.
-    last : Kept
-        The last positions that a later step began at, and its factors there.
-    """
+    """One step with its choices."""
 
     setup: Setup
     mesh: Mesh
+    """Undeformed."""
     sliding: Sliding
     part: float
+    """Part of the whole displacement that is made after this step, up to 1."""
     first: bool
+    """Whether positions are those of the undeformed mesh, the same for all designs."""
     stages: tuple[Levels, ...]
+    """Rows of the systems."""
     dropped: IntArray
+    """(m,): nodes that the pivot guard left out of the systems."""
     condition: float
+    """Estimated condition number of the last system, at the reference."""
     refined: float = 0.0
+    """Where systems are solved with twice the digits, as at the reference: the estimated error of
+    ordinary solutions, as of a ``Solution``; else 0."""
     doubt: float = 0.0
+    """As of a ``Solution``, at the reference."""
     weights: Weights | None = None
+    """Settings of inverse distance weighting, if that is the method."""
     body: Body | None = None
+    """The elastic body, if the method is linear elasticity."""
     reuse: bool = False
+    """Whether a later step keeps the factors of the last positions that it began at."""
     choices: Kept = made_by(default_factory=Kept)
     constants: Kept = made_by(default_factory=Kept)
+    """`choices`, `constants`: discrete choices; and, used in the first step only, what depends on
+    positions only."""
     last: Kept = made_by(default_factory=Kept)
+    """The last positions that a later step began at, and its factors there."""
 
     def factors(self, coords: FloatArray) -> Kept:
         """Return the store of the factors of systems at positions ``coords`` (n, d).

@@ -28,19 +28,13 @@ the argument to those of the result, and from adjoints of the result to those of
 
 @dataclass(frozen=True, eq=False)
 class Variable:
-    """The result of an operation on a tape.
-
-    Attributes
-    ----------
-    value : (n, c) float64
-    tape : Tape
-    place : int
-        Its number on the tape.
-    """
+    """The result of an operation on a tape."""
 
     value: FloatArray
+    """(n, c)."""
     tape: Tape
     place: int
+    """Its number on the tape."""
 
     __array_ufunc__ = None
 

@@ -98,33 +98,22 @@ CONTINUITIES = {"NO_DERIVATIVE": 1, "1ST_DERIVATIVE": 2, "2ND_DERIVATIVE": 3, "U
 
 @dataclass(frozen=True)
 class Su2Config:
-    """A configuration of SU2: the part about a deformation.
-
-    Attributes
-    ----------
-    case : Case
-        Roles, settings and the files of the meshes, without motions.
-    markers : tuple of str
-        The boundaries that the design variables move.
-    variables : tuple of DesignVariable
-    files, words : dict of str to Path, dict of str to str
-        Values of the keys in ``FILES`` and ``WORDS``.
-    ignored : tuple of str
-        The keys that are not read.
-    named : dict of str to str
-        For each marker with a role, the key that lists it.
-    given : frozenset of str
-        The keys that it has.
-    """
+    """A configuration of SU2: the part about a deformation."""
 
     case: Case
+    """Roles, settings and the files of the meshes, without motions."""
     markers: tuple[str, ...]
+    """The boundaries that the design variables move."""
     variables: tuple[DesignVariable, ...]
     files: dict[str, Path]
     words: dict[str, str]
+    """`files`, `words`: values of the keys in ``FILES`` and ``WORDS``."""
     ignored: tuple[str, ...]
+    """The keys that are not read."""
     named: dict[str, str]
+    """For each marker with a role, the key that lists it."""
     given: frozenset[str]
+    """The keys that it has."""
 
     @property
     def source(self) -> Path:

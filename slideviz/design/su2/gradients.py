@@ -39,28 +39,19 @@ INSUFFICIENT = (
 
 @dataclass(frozen=True, eq=False)
 class Gradients:
-    """Gradients of an objective at a design.
-
-    Attributes
-    ----------
-    surface : (m, d) float64
-        With respect to the displacement of each moving node, with all inner points following.
-    variables : (v,) float64
-        With respect to each value of the design variables.
-    points : (m, d) float64
-        Positions of the moving nodes at the design.
-    at_design : bool
-        Whether the design is that of the configuration; else it is the undeformed mesh.
-    source : str
-        Path of the sensitivities.
-    warnings : tuple of str
-    """
+    """Gradients of an objective at a design."""
 
     surface: FloatArray
+    """(m, d): with respect to the displacement of each moving node, with all inner points
+    following."""
     variables: FloatArray
+    """(v,): with respect to each value of the design variables."""
     points: FloatArray
+    """(m, d): positions of the moving nodes at the design."""
     at_design: bool
+    """Whether the design is that of the configuration; else it is the undeformed mesh."""
     source: str
+    """Path of the sensitivities."""
     warnings: tuple[str, ...]
 
 

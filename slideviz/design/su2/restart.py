@@ -44,7 +44,7 @@ def angle_sensitivity(path: Path) -> float | None:
 
 
 def is_number(word: str) -> bool:
-    """Tell whether Python reads a word as a number."""
+    """Return whether Python reads a word as a number."""
     try:
         float(word)
     except ValueError:

@@ -74,38 +74,24 @@ is of other points."""
 
 @dataclass(frozen=True, eq=False)
 class Sensitivities:
-    """Derivatives of an objective with respect to the points of a mesh.
-
-    Attributes
-    ----------
-    path : Path
-    values : (n, d) float64
-        In the order of the mesh's points; if not ``ordered``, of the rows of the file.
-    points : (n, d) float64 or None
-        Positions of the points, in the same order; None if the file has none.
-    ordered : bool
-    """
+    """Derivatives of an objective with respect to the points of a mesh."""
 
     path: Path
     values: FloatArray
+    """(n, d): in the order of the mesh's points; if not ``ordered``, of the rows of the file."""
     points: FloatArray | None
+    """(n, d): positions of the points, in the same order; None if the file has none."""
     ordered: bool = True
 
 
 @dataclass(frozen=True, eq=False)
 class Matched:
-    """Sensitivities in the order of a mesh's points.
-
-    Attributes
-    ----------
-    values : (n, d) float64
-    at_design : bool
-        Whether they were computed at the design's points; else at those of the undeformed mesh.
-    warnings : tuple of str
-    """
+    """Sensitivities in the order of a mesh's points."""
 
     values: FloatArray
+    """(n, d)."""
     at_design: bool
+    """Whether they were computed at the design's points; else at those of the undeformed mesh."""
     warnings: tuple[str, ...] = ()
 
 
@@ -130,7 +116,7 @@ def read_sensitivities(config: Su2Config, mesh: Mesh, moving: IntArray) -> Sensi
 
 
 def _is_unordered(config: Su2Config) -> bool:
-    """Tell whether DV_SENSITIVITY_FORMAT says that rows are matched by position."""
+    """Return whether DV_SENSITIVITY_FORMAT says that rows are matched by position."""
     return config.words["DV_SENSITIVITY_FORMAT"].upper() == "UNORDERED_ASCII"
 
 

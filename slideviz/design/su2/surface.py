@@ -68,21 +68,12 @@ DISPLACERS: dict[Group, Callable[[Su2Config, Mesh, IntArray], Displacer]] = {
 
 @dataclass(frozen=True, eq=False)
 class MovingSurface:
-    """The moving boundaries of a configuration, and its design.
-
-    Attributes
-    ----------
-    config : Su2Config
-    mesh : Mesh
-    nodes : (m,) int64
-        Of all moving boundaries, or of the mesh (``*_GRID``), ascending.
-    displacer : Displacer
-    warnings : tuple of str
-    """
+    """The moving boundaries of a configuration, and its design."""
 
     config: Su2Config
     mesh: Mesh
     nodes: IntArray
+    """(m,): of all moving boundaries, or of the mesh (``*_GRID``), ascending."""
     displacer: Displacer
     warnings: tuple[str, ...]
 

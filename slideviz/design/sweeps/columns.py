@@ -252,7 +252,7 @@ def _parts(motion: Motion, at: int) -> Iterator[tuple[str, NumberPlace]]:
 
 
 def _is_number(value: object) -> bool:
-    """Tell whether a value is a real number, and not a bool."""
+    """Return whether a value is a real number, and not a bool."""
     return isinstance(value, Real) and not isinstance(value, bool)
 
 

@@ -169,17 +169,12 @@ class Processes(Executor):
 
 
 class _Process:
-    """A process that is started at its first call, and again when it was lost.
-
-    Attributes
-    ----------
-    load : int
-        Number of calls it was given: the one it does, and perhaps the next.
-    """
+    """A process that is started at its first call, and again when it was lost."""
 
     def __init__(self, owner: Processes) -> None:
         self._owner = owner
         self.load = 0
+        """Number of calls it was given: the one it does, and perhaps the next."""
         self._pool: ProcessPoolExecutor | None = None
         self._begun: Future | None = None
         # Kept, for a pool must not be deleted by its own callback, which holds its lock.
@@ -193,7 +188,7 @@ class _Process:
 
     @property
     def takes_more(self) -> bool:
-        """Tell whether it has the mesh and does one call, so that it can be given the next."""
+        """Return whether it has the mesh and does one call, so that it can be given the next."""
         return self.load == 1 and self._begun is not None and _succeeded(self._begun)
 
     def run(self, call: _Call) -> None:
@@ -250,7 +245,7 @@ class _Process:
 
 
 def _succeeded(future: Future) -> bool:
-    """Tell whether a future is done and has a result."""
+    """Return whether a future is done and has a result."""
     return future.done() and not future.cancelled() and future.exception() is None
 
 

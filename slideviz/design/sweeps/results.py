@@ -266,7 +266,7 @@ def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
 
 
 def _has(row: DesignRow, meshes: bool) -> bool:
-    """Tell whether the mesh of a row exists, or is not wanted."""
+    """Return whether the mesh of a row exists, or is not wanted."""
     return not meshes or (row.mesh is not None and row.mesh.is_file())
 
 
@@ -287,7 +287,7 @@ def _line(cells: Sequence[Any]) -> bytes:
 
 
 def _same(text: str, value: Value) -> bool:
-    """Tell whether a cell's text means a value: the same text, or the same number."""
+    """Return whether a cell's text means a value: the same text, or the same number."""
     if text == str(value):
         return True
     try:

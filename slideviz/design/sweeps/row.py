@@ -12,50 +12,34 @@ from slideviz.design.sweeps.columns import Value
 
 @dataclass(frozen=True)
 class DesignRow:
-    """The result of a design, or the reason why there is none.
-
-    Attributes
-    ----------
-    design : int
-        Its number in the table of designs, from 1.
-    values : mapping of str to str or float
-        Its values, by column of that table.
-    min, mean : float
-        Quality of the deformed mesh; NaN where there is none.
-    inverted : int
-        Inverted cells.
-    max_error : float
-        Largest error of a boundary node before it is corrected, of all steps, in the mesh's
-        length unit.
-    control_nodes, steps : int
-        Control nodes in the last step, and steps made.
-    seconds : float
-        Time that the worker spent on it.
-    mesh : Path or None
-        The file of the deformed mesh, where it was written.
-    warnings : tuple of str
-    problem : str
-        Why there is no result; empty where there is one.
-    lost : int
-        How often its worker was lost, so that it was done again.
-    earlier : bool
-        Whether it was done before the sweep was stopped and resumed.
-    """
+    """The result of a design, or the reason why there is none."""
 
     design: int
+    """Its number in the table of designs, from 1."""
     values: Mapping[str, Value] = field(default_factory=dict)
+    """Its values, by column of that table."""
     min: float = nan
     mean: float = nan
+    """`min`, `mean`: quality of the deformed mesh; NaN where there is none."""
     inverted: int = 0
+    """Inverted cells."""
     max_error: float = nan
+    """Largest error of a boundary node before it is corrected, of all steps, in the mesh's length
+    unit."""
     control_nodes: int = 0
     steps: int = 0
+    """`control_nodes`, `steps`: control nodes in the last step, and steps made."""
     seconds: float = 0.0
+    """Time that the worker spent on it."""
     mesh: Path | None = None
+    """The file of the deformed mesh, where it was written."""
     warnings: tuple[str, ...] = ()
     problem: str = ""
+    """Why there is no result; empty where there is one."""
     lost: int = 0
+    """How often its worker was lost, so that it was done again."""
     earlier: bool = False
+    """Whether it was done before the sweep was stopped and resumed."""
 
 
 NUMBERS: Mapping[str, tuple[str, Callable[[str], float]]] = {

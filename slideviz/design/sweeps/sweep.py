@@ -191,13 +191,7 @@ class _Tasks:
 
 
 class _Loop:
-    """Submits the designs to the executor, and yields their rows.
-
-    Attributes
-    ----------
-    holding, lacking : set of str
-        Workers that have the mesh, and workers that answered that they need it.
-    """
+    """Submits the designs to the executor, and yields their rows."""
 
     def __init__(
         self,
@@ -211,6 +205,8 @@ class _Loop:
         self._flying: dict[Future[Answer], tuple[Design, bool]] = {}
         self._tries: dict[int, int] = {}
         self.holding: set[str] = set()
+        """`holding`, `lacking`: workers that have the mesh, and workers that answered that they
+        need it."""
         self.lacking: set[str] = set()
         self._refused = False
 

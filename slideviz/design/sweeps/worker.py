@@ -48,32 +48,21 @@ class Packed:
 
 @dataclass(frozen=True)
 class Task:
-    """A design as it is sent to a worker.
-
-    Attributes
-    ----------
-    design : int
-        Its number, from 1.
-    case : Case
-    mesh : str
-        Name of the packed mesh.
-    version : str
-        Of the slideviz that sends it.
-    packed : Packed or None
-        The mesh, for a worker that lacks it.
-    output : Path or None
-        Where the deformed mesh is written; None: it is not.
-    file_format : FileFormat or None
-        Of ``output``; None: as its ending says.
-    """
+    """A design as it is sent to a worker."""
 
     design: int
+    """Its number, from 1."""
     case: Case
     mesh: str
+    """Name of the packed mesh."""
     version: str = __version__
+    """Of the slideviz that sends it."""
     packed: Packed | None = None
+    """The mesh, for a worker that lacks it."""
     output: Path | None = None
+    """Where the deformed mesh is written; None: it is not."""
     file_format: FileFormat | None = None
+    """Of ``output``; None: as its ending says."""
 
 
 @dataclass(frozen=True)

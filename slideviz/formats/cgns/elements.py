@@ -37,21 +37,14 @@ _MIXED = _NAMES.index("MIXED")
 
 @dataclass(frozen=True, eq=False)
 class CgnsElements:
-    """Elements of an unstructured zone.
-
-    Attributes
-    ----------
-    cells : Cells
-        The m elements, of any dimension.
-    numbers : (m,) int64
-        Their numbers in the zone, from 1, ascending.
-    section : (m,) int64
-        Index of the section that each is in.
-    """
+    """Elements of an unstructured zone."""
 
     cells: Cells
+    """The m elements, of any dimension."""
     numbers: IntArray
+    """(m,): their numbers in the zone, from 1, ascending."""
     section: NDArray[np.int64]
+    """(m,): index of the section that each is in."""
 
     def where(self, mask: NDArray[np.bool_]) -> CgnsElements:
         """Return the elements where the mask (m,) is true."""

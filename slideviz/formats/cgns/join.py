@@ -26,28 +26,20 @@ _ONE_TO_ONE = "Abutting1to1"
 
 @dataclass(frozen=True, eq=False)
 class Interface:
-    """An interface of a zone with another one, or with itself.
-
-    Attributes
-    ----------
-    node : Node
-        Its place in the tree.
-    zone, donor : int
-        Numbers of the zones.
-    pairs : ((m,), (m,)) or None
-        Nodes of the zone and of the donor that are the same point; None if it is not to be joined.
-    period : tuple of float
-        Centre and angles of the rotation, and translation; empty if it is not periodic.
-    why : str
-        Reason why it cannot be joined, for a remark; empty if it can, or is periodic.
-    """
+    """An interface of a zone with another one, or with itself."""
 
     node: Node
+    """Its place in the tree."""
     zone: int
     donor: int
+    """`zone`, `donor`: numbers of the zones."""
     pairs: tuple[IntArray, IntArray] | None
+    """((m,), (m,)) or None: nodes of the zone and of the donor that are the same point; None if it
+    is not to be joined."""
     period: tuple[float, ...] = ()
+    """Centre and angles of the rotation, and translation; empty if it is not periodic."""
     why: str = ""
+    """Reason why it cannot be joined, for a remark; empty if it can, or is periodic."""
 
     def gap(self, zones: Sequence[CgnsZone]) -> float:
         """Return the largest distance between the two nodes of a pair."""
@@ -59,24 +51,16 @@ class Interface:
 
 @dataclass(frozen=True, eq=False)
 class Joined:
-    """Zones joined to one mesh.
-
-    Attributes
-    ----------
-    points : (n, p) float64
-        Points of the mesh.
-    numbers : tuple of (n_z,) int64
-        For each zone, the index in ``points`` of each of its vertices.
-    open : tuple of Interface
-        Interfaces that are not joined.
-    parts : (z,) int64
-        Index of the connected part of the mesh that each zone is in.
-    """
+    """Zones joined to one mesh."""
 
     points: FloatArray
+    """(n, p): points of the mesh."""
     numbers: tuple[IntArray, ...]
+    """tuple of (n_z,) int64: for each zone, the index in ``points`` of each of its vertices."""
     open: tuple[Interface, ...]
+    """Interfaces that are not joined."""
     parts: IntArray
+    """(z,): index of the connected part of the mesh that each zone is in."""
 
 
 def join(zones: Sequence[CgnsZone]) -> Joined:

@@ -28,22 +28,16 @@ from slideviz.mesh.unique_rows import row_groups
 
 @dataclass(frozen=True, eq=False)
 class CgnsForm(Origin):
-    """Where the coordinates of a mesh are in the CGNS file it was read from.
-
-    Attributes
-    ----------
-    datasets : tuple of tuple of str
-        For each zone the paths of the datasets of its coordinates.
-    numbers : tuple of (n_z,) int64
-        For each zone the index of each of its vertices among the points of the mesh.
-    points : (n, d) float64
-        The points as read.
-    """
+    """Where the coordinates of a mesh are in the CGNS file it was read from."""
 
     ending = ".cgns"
     datasets: tuple[tuple[str, ...], ...]
+    """For each zone the paths of the datasets of its coordinates."""
     numbers: tuple[IntArray, ...]
+    """tuple of (n_z,) int64: for each zone the index of each of its vertices among the points of
+    the mesh."""
     points: FloatArray
+    """(n, d): the points as read."""
 
 
 def read_cgns(path: Path) -> Mesh:

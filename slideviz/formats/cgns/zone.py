@@ -30,33 +30,22 @@ _LABELS = ("IndexRange_t", "IndexArray_t")
 
 @dataclass(frozen=True, eq=False)
 class CgnsZone:
-    """A zone: its vertices, its cells, and where its coordinates are in the file.
-
-    Attributes
-    ----------
-    node : Node
-        Its place in the tree.
-    shape : tuple of int
-        Vertices along i, j (and k) of a structured zone; their number in an unstructured one.
-    points : (n, p) float64
-        Vertices, i running fastest; p is the number of coordinates.
-    cells : Cells
-        Its cells.
-    sides : CgnsElements or None
-        Elements of an unstructured zone with one dimension less; None for a structured zone.
-    sections : tuple of Node
-        Its sections of elements; empty for a structured zone.
-    datasets : tuple of str
-        Paths of the datasets of the p coordinates.
-    """
+    """A zone: its vertices, its cells, and where its coordinates are in the file."""
 
     node: Node
+    """Its place in the tree."""
     shape: tuple[int, ...]
+    """Vertices along i, j (and k) of a structured zone; their number in an unstructured one."""
     points: FloatArray
+    """(n, p): vertices, i running fastest; p is the number of coordinates."""
     cells: Cells
+    """Its cells."""
     sides: CgnsElements | None
+    """Elements of an unstructured zone with one dimension less; None for a structured zone."""
     sections: tuple[Node, ...]
+    """Its sections of elements; empty for a structured zone."""
     datasets: tuple[str, ...]
+    """Paths of the datasets of the p coordinates."""
 
     @property
     def dim(self) -> int:

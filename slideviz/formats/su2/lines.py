@@ -31,27 +31,21 @@ _LINE_BYTES = 256
 
 @dataclass(frozen=True)
 class Piece:
-    """A piece of the file with consecutive rows of one section.
-
-    Attributes
-    ----------
-    begin, end : int
-        Its bytes, whole lines; those that are no rows are blank, comments or text.
-    line : int
-        Number of its first line in the file.
-    row, rows : int
-        Number of its first row in the section, and number of rows.
-    node, nodes : int
-        If the rows are elements: the number of nodes in the section before it, and in it.
-    """
+    """A piece of the file with consecutive rows of one section."""
 
     begin: int
     end: int
+    """`begin`, `end`: its bytes, whole lines; those that are no rows are blank, comments or
+    text."""
     line: int
+    """Number of its first line in the file."""
     row: int
     rows: int
+    """`row`, `rows`: number of its first row in the section, and number of rows."""
     node: int
     nodes: int
+    """`node`, `nodes`: if the rows are elements: the number of nodes in the section before it, and
+    in it."""
 
 
 Rows = tuple[Piece, ...]
@@ -69,26 +63,20 @@ class Lines:
 
     A run is a line of text with the rows, blank lines and comments after it. With each block of the
     file a new run begins, which may have no line of text.
-
-    Attributes
-    ----------
-    raw : Source
-        The file.
-    begins, firsts : (m + 1,) int64
-        First byte and number of the first line of each run; last the size and number of lines of
-        the file.
-    kinds : (m,) int64
-        ``ROWS``, ``TEXT`` or ``KEYWORD``, by the first line of each run.
-    rows, nodes : (m,) int64
-        Numbers of rows in each run, and of nodes on them if they are elements.
     """
 
     raw: Source
+    """The file."""
     begins: IntArray
     firsts: IntArray
+    """`begins`, `firsts` (m + 1,): first byte and number of the first line of each run; last the
+    size and number of lines of the file."""
     kinds: IntArray
+    """(m,): ``ROWS``, ``TEXT`` or ``KEYWORD``, by the first line of each run."""
     rows: IntArray
     nodes: IntArray
+    """`rows`, `nodes` (m,): numbers of rows in each run, and of nodes on them if they are
+    elements."""
 
     @property
     def name(self) -> str:

@@ -23,35 +23,25 @@ _SCANNED = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Document(Origin):
-    """An SU2 file as it was read, with the places of its parts, so that it can be written again.
-
-    Attributes
-    ----------
-    raw : Source
-        The whole file.
-    rows : tuple of Piece
-        The rows of the points in it.
-    points : (n, d) float64
-        The points as read.
-    cells : Cells
-        The cells as read.
-    markers : tuple of Marker
-        The boundaries as read.
-    zone : (int, int)
-        First byte and end of the zone, without its ``IZONE`` line.
-    sends, unknown : tuple of (int, int)
-        First byte and end of each ``SEND_RECEIVE`` marker, and of each unknown section.
-    """
+    """An SU2 file as it was read, with the places of its parts, so that it can be written again."""
 
     ending = ".su2"
     raw: Source
+    """The whole file."""
     rows: Rows
+    """The rows of the points in it."""
     points: FloatArray
+    """(n, d): the points as read."""
     cells: Cells
+    """The cells as read."""
     markers: tuple[Marker, ...]
+    """The boundaries as read."""
     zone: tuple[int, int]
+    """(int, int): first byte and end of the zone, without its ``IZONE`` line."""
     sends: tuple[tuple[int, int], ...]
     unknown: tuple[tuple[int, int], ...]
+    """`sends`, `unknown`: first byte and end of each ``SEND_RECEIVE`` marker, and of each unknown
+    section."""
 
 
 def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:

@@ -20,21 +20,14 @@ from slideviz.mesh.model import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """One zone of an SU2 text file, located but not read.
-
-    Attributes
-    ----------
-    lines : Lines
-        The lines of the file.
-    zone : TextZone
-        Where the zone's parts are.
-    sections : list of KeywordBlock
-        All sections of the file.
-    """
+    """One zone of an SU2 text file, located but not read."""
 
     lines: Lines
+    """The lines of the file."""
     zone: TextZone
+    """Where the zone's parts are."""
     sections: list[KeywordBlock]
+    """All sections of the file."""
 
     @property
     def path(self) -> Path:

@@ -115,34 +115,23 @@ class SendRows:
 
 @dataclass(frozen=True, eq=False)
 class TextZone:
-    """Where the parts of one zone are in the file.
-
-    Attributes
-    ----------
-    bounds : Bounds
-        Which zone, and its lines.
-    dim : int
-        2 or 3.
-    elements, points : tuple of Piece
-        The rows of the elements and of the points.
-    markers : tuple of MarkerRows
-        The boundaries.
-    sends : tuple of SendRows
-        The ``SEND_RECEIVE`` markers, which list donors and receivers of a halo.
-    unknown : tuple of KeywordBlock
-        The unknown sections.
-    remarks : tuple of str
-        Sentences on what is unusual.
-    """
+    """Where the parts of one zone are in the file."""
 
     bounds: Bounds
+    """Which zone, and its lines."""
     dim: int
+    """2 or 3."""
     elements: Rows
     points: Rows
+    """`elements`, `points`: the rows of the elements and of the points."""
     markers: tuple[MarkerRows, ...]
+    """The boundaries."""
     sends: tuple[SendRows, ...]
+    """The ``SEND_RECEIVE`` markers, which list donors and receivers of a halo."""
     unknown: tuple[KeywordBlock, ...]
+    """The unknown sections."""
     remarks: tuple[str, ...] = ()
+    """Sentences on what is unusual."""
 
     @property
     def ffd_at(self) -> tuple[range, ...]:

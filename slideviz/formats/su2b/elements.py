@@ -23,24 +23,16 @@ BLOCK = 1 << 18
 
 @dataclass(frozen=True, eq=False)
 class ElementBlock:
-    """Consecutive elements of a file.
-
-    Attributes
-    ----------
-    first : int
-        Place of the first element.
-    types : (k,) uint8
-        VTK identifiers.
-    nodes : (n,) int64
-        Nodes of all elements, one after the other.
-    ids : (k,) int64
-        Index of each element; empty where elements have none (in markers).
-    """
+    """Consecutive elements of a file."""
 
     first: int
+    """Place of the first element."""
     types: NDArray[np.uint8]
+    """(k,): VTK identifiers."""
     nodes: IntArray
+    """(n,): nodes of all elements, one after the other."""
     ids: IntArray
+    """(k,): index of each element; empty where elements have none (in markers)."""
 
 
 def element_blocks(

@@ -35,25 +35,17 @@ MAGIC = {
 
 @dataclass(frozen=True)
 class ElementTable:
-    """Where the elements of a zone or marker are in the file.
-
-    Attributes
-    ----------
-    count : int
-        Number of elements.
-    offsets, entries : int
-        First byte of the offsets, and of the list.
-    length : int
-        How many numbers the list has.
-    numbered : bool
-        Whether each element ends with its index.
-    """
+    """Where the elements of a zone or marker are in the file."""
 
     count: int
+    """Number of elements."""
     offsets: int
     entries: int
+    """`offsets`, `entries`: first byte of the offsets, and of the list."""
     length: int
+    """How many numbers the list has."""
     numbered: bool
+    """Whether each element ends with its index."""
 
 
 @dataclass(frozen=True)
@@ -67,32 +59,22 @@ class MarkerPlace:
 
 @dataclass(frozen=True)
 class ZonePlace:
-    """Where a zone is in the file.
-
-    Attributes
-    ----------
-    number : int
-        Number of the zone, from 1.
-    begin, end : int
-        Its first byte, and the one after its last.
-    dim : int
-        2 or 3.
-    cells : ElementTable
-        Its cells.
-    n_points, points : int
-        Number of points, and the first byte of the first.
-    markers : tuple of MarkerPlace
-        Its markers.
-    """
+    """Where a zone is in the file."""
 
     number: int
+    """Number of the zone, from 1."""
     begin: int
     end: int
+    """`begin`, `end`: its first byte, and the one after its last."""
     dim: int
+    """2 or 3."""
     cells: ElementTable
+    """Its cells."""
     n_points: int
     points: int
+    """`n_points`, `points`: number of points, and the first byte of the first."""
     markers: tuple[MarkerPlace, ...]
+    """Its markers."""
 
 
 class BinaryFile:
@@ -102,14 +84,8 @@ class BinaryFile:
     ----------
     name : str
         The file, for messages.
-    size : int
-        Number of bytes.
     width : int
         Bytes of a count or an index, 4 or 8.
-    order : "<" or ">"
-        The byte order.
-    zones : int
-        Number of zones by its head.
 
     Raises
     ------
@@ -120,6 +96,7 @@ class BinaryFile:
     def __init__(self, path: Path, file: BinaryIO) -> None:
         self.name, self._file, self._lock = printable(path), file, Lock()
         self.size = os.fstat(file.fileno()).st_size
+        """Number of bytes."""
         head = file.read(2 * _INT)
         if head[:_INT] not in MAGIC:
             raise self.error(
@@ -129,7 +106,9 @@ class BinaryFile:
             )
         self.width, sign = MAGIC[head[:_INT]]
         self.order: Literal["<", ">"] = "<" if sign == "<" else ">"
+        """The byte order."""
         self.zones = self.whole(_INT, "the number of zones")
+        """Number of zones by its head."""
         if self.zones < 1:
             raise self.error(_INT, f"the number of zones is {self.zones}, but at least 1 is needed")
 

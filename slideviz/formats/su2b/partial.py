@@ -34,29 +34,20 @@ HEAD = 8
 
 @dataclass(eq=False)
 class Partial:
-    """A partial file.
-
-    Attributes
-    ----------
-    file : BinaryIO
-        Open for reading and writing.
-    path : Path
-        Its hidden name.
-    sums : list of int
-        Checksum of each part that is done; what a part is, the caller decides.
-    mode : int or None
-        Permissions of the target, None if it does not exist.
-    ready : callable
-        Waits until the file is a complete copy; call it before the first writing.
-    """
+    """A partial file."""
 
     file: BinaryIO
+    """Open for reading and writing."""
     path: Path
+    """Its hidden name."""
     sums: list[int]
+    """Checksum of each part that is done; what a part is, the caller decides."""
     mode: int | None
+    """Permissions of the target, None if it does not exist."""
     _note: Path
     _about: str
     ready: Callable[[Tick], None] = lambda _: None
+    """Waits until the file is a complete copy; call it before the first writing."""
 
     @property
     def done(self) -> int:

@@ -23,32 +23,22 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origi
 
 @dataclass(frozen=True, eq=False)
 class BinaryForm(Origin):
-    """The form of the ``.su2b`` file that a mesh was read from, to write it the same way.
-
-    Attributes
-    ----------
-    width : int
-        Bytes of an index, 4 or 8.
-    byte_order : "<" or ">"
-        Little or big endian.
-    before, after : bytes
-        The file before and after the zone: its head and the other zones.
-    order : (m,) int64 or None
-        Index of the cell at each place of the file; None where each is at its place.
-    names : tuple of bytes
-        Names of the markers with the bytes that pad them.
-    cells : Cells
-        The cells as read.
-    """
+    """The form of the ``.su2b`` file that a mesh was read from, to write it the same way."""
 
     ending = ".su2b"
     width: int
+    """Bytes of an index, 4 or 8."""
     byte_order: Literal["<", ">"]
+    """Little or big endian."""
     before: bytes
     after: bytes
+    """`before`, `after`: the file before and after the zone: its head and the other zones."""
     order: IntArray | None
+    """(m,): index of the cell at each place of the file; None where each is at its place."""
     names: tuple[bytes, ...]
+    """Names of the markers with the bytes that pad them."""
     cells: Cells
+    """The cells as read."""
 
 
 def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:

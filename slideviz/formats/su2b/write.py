@@ -38,31 +38,22 @@ class ZoneContent:
     """The content of a zone to write, with functions that return parts of its large arrays.
 
     The functions get numbers i, j and return the k = j - i items from i on.
-
-    Attributes
-    ----------
-    dim : int
-        2 or 3.
-    n_cells, n_points : int
-        Numbers of cells and points.
-    cells : callable
-        Returns cells in the order of the file: types (k,), nodes one after the other, and the
-        index of each (k,).
-    types : callable
-        Returns the types (k,) of these cells.
-    points : callable
-        Returns coordinates (k, d).
-    markers : tuple of Marker
-        The boundaries.
     """
 
     dim: int
+    """2 or 3."""
     n_cells: int
     n_points: int
+    """`n_cells`, `n_points`: numbers of cells and points."""
     cells: Callable[[int, int], tuple[NDArray[np.uint8], IntArray, IntArray]]
+    """Returns cells in the order of the file: types (k,), nodes one after the other, and the index
+    of each (k,)."""
     types: Callable[[int, int], NDArray[np.uint8]]
+    """Returns the types (k,) of these cells."""
     points: Callable[[int, int], FloatArray]
+    """Returns coordinates (k, d)."""
     markers: tuple[Marker, ...]
+    """The boundaries."""
 
 
 def su2b_blocks(*meshes: Mesh) -> Iterator[bytes]:

@@ -34,16 +34,6 @@ RUN = "Run the designs that have no result yet, or failed."
 class DesignsPanel(Panel):
     """The table of designs, and their results as curves.
 
-    Attributes
-    ----------
-    table : DesignTable
-    case, mesh
-        The case and the mesh that the results were computed with; the session may have others.
-    shown : int or None
-        The number, from 1, of the design that the user last asked to see.
-    written : DesignTable or None
-        The table as it was saved last.
-
     Signals
     -------
     changed()
@@ -57,9 +47,13 @@ class DesignsPanel(Panel):
         self.services = services
         self.table = DesignTable()
         self.case: Case | None = None
+        """`case`, `mesh`: the case and the mesh that the results were computed with; the session
+        may have others."""
         self.mesh: Mesh | None = None
         self.shown: int | None = None
+        """The number, from 1, of the design that the user last asked to see."""
         self.written: DesignTable | None = None
+        """The table as it was saved last."""
         self._drawn: tuple[object, object] = (None, None)
         self._mistakes = ""
         self.job = DesignsJob(self._ended, self)

@@ -27,22 +27,15 @@ RESULTS = {
 
 
 class DesignsModel(QAbstractTableModel):
-    """The model of a table of designs.
-
-    Attributes
-    ----------
-    table : DesignTable
-    edited : callable
-        Called with row, column and text, when a value was typed.
-    editable : bool
-        Whether values can be typed now.
-    """
+    """The model of a table of designs."""
 
     def __init__(self) -> None:
         super().__init__()
         self.table = DesignTable()
         self.edited: Callable[[int, int, str], None] = lambda *_: None
+        """Called with row, column and text, when a value was typed."""
         self.editable = True
+        """Whether values can be typed now."""
 
     def show(self, table: DesignTable) -> None:
         """Show a table; if only its results changed, selection and scroll position stay."""

@@ -47,17 +47,12 @@ class DesignCanvas(PlotCanvas):
 
 
 class DesignPlot(QWidget):
-    """The plot of a result of the designs against a varied number, with choices of both.
-
-    Attributes
-    ----------
-    picked : callable
-        Called with the number of the design whose point was clicked.
-    """
+    """The plot of a result of the designs against a varied number, with choices of both."""
 
     def __init__(self) -> None:
         super().__init__()
         self.picked: Callable[[int], None] = lambda _: None
+        """Called with the number of the design whose point was clicked."""
         self._table = DesignTable()
         self._shown: int | None = None
         self.across = Choice(

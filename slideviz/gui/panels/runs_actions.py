@@ -27,14 +27,7 @@ OF_ALL = ("copy", "export")
 
 
 class RunActions:
-    """The actions of the runs panel, for the selected run or the run with a given number.
-
-    Attributes
-    ----------
-    buttons : dict of str to QToolButton
-    row : FoldingRow
-        The buttons.
-    """
+    """The actions of the runs panel, for the selected run or the run with a given number."""
 
     def __init__(self, panel: QWidget, tree: RunTree, store: Store) -> None:
         self.panel, self.tree, self.store = panel, tree, store
@@ -48,6 +41,7 @@ class RunActions:
             button.setIconSize(QSize(18, 18))
         every, left = list(self.buttons.values()), 1 + RUN_COMMANDS.index(None)
         self.row = FoldingRow(every[:left], every[left:], spacing=2)
+        """The buttons."""
 
     @property
     def _window(self) -> Services:

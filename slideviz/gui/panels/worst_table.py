@@ -80,30 +80,22 @@ def digits_more(places: FloatArray, digits: Sequence[int]) -> int:
 
 
 class WorstModel(QAbstractTableModel):
-    """The Qt model of the worst cells.
-
-    Attributes
-    ----------
-    worst : WorstCells or None
-    names : tuple of str
-        Titles of the columns of coordinates.
-    places : (n, d) float64
-        The coordinates, in mesh units or degrees.
-    order : (n,) int64
-        The index in ``worst`` of the cell in each row.
-    """
+    """The Qt model of the worst cells."""
 
     def __init__(self) -> None:
         super().__init__()
         self.worst: WorstCells | None = None
         self.names: tuple[str, ...] = ()
+        """Titles of the columns of coordinates."""
         self.places = np.empty((0, 0))
+        """(n, d): the coordinates, in mesh units or degrees."""
         self._decimals: list[int] = []
         self._figures: list[int] = []
         self._more = 0
         self._mixed = False
         self._digits = FEWEST
         self.order = np.empty(0, np.int64)
+        """(n,): the index in ``worst`` of the cell in each row."""
         self._by, self._down = QUALITY, False
 
     def show(self, worst: WorstCells | None, around: RotationAxis | None = None) -> None:

@@ -56,15 +56,7 @@ class ViewSignals(QObject):
 
 
 class View3D(QtInteractor):
-    """A 3D view: pyvistaqt's widget, repainted only when something changed.
-
-    Attributes
-    ----------
-    flat : bool
-        Whether dragging moves the camera (2D mesh) rather than turns it.
-    frame_s : float
-        How long the last frame took to draw, in seconds.
-    """
+    """A 3D view: pyvistaqt's widget, repainted only when something changed."""
 
     def __init__(self, parent: QWidget | None = None, multi_samples: int = 4) -> None:
         super().__init__(parent, auto_update=False, multi_samples=multi_samples)
@@ -73,10 +65,12 @@ class View3D(QtInteractor):
         self.signals = ViewSignals(self)
         self._pressed: QPoint | None = None
         self.flat = False
+        """Whether dragging moves the camera (2D mesh) rather than turns it."""
         self._repaints = RepaintCoalescer(self)
         self._veiled: list[list[vtkProp]] = []
         self._resizing = False
         self.frame_s = 0.0
+        """How long the last frame took to draw, in seconds."""
         # Each movement of the mouse would be drawn at once, and then once more by Qt.
         self._Iren.EnableRenderOff()
         event, wanted = "RenderEvent", self._drawing_wanted

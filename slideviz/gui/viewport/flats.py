@@ -28,12 +28,6 @@ class Flats(QWidget):
     scheme : ColorScheme
     multi_samples : int
         Samples per pixel for antialiasing; 0 for none.
-
-    Attributes
-    ----------
-    first, second
-        The flat views of the first and the second 3D view, each None if there is none. The curves
-        of a 2D mesh are one view, ``first``.
     """
 
     closed = Signal()
@@ -44,6 +38,8 @@ class Flats(QWidget):
         self.viewing, self.scheme = viewing, scheme
         self._multi_samples = multi_samples
         self.first: FlatView | CurveView | None = None
+        """`first`, `second`: the flat views of the first and the second 3D view, each None if there
+        is none. The curves of a 2D mesh are one view, ``first``."""
         self.second: FlatView | None = None
         self._row = QHBoxLayout(self)
         self._row.setContentsMargins(0, 0, 0, 0)

@@ -32,17 +32,7 @@ _LONG = 1.5
 
 
 class SectionViews(QSplitter):
-    """The 3D views, and beside or below them the flat views of the selected section.
-
-    Attributes
-    ----------
-    handles
-        The handles of the selected section, one in each 3D view while they are switched on.
-    flats
-        The flat views; None while no section is laid flat.
-    scheme : ColorScheme
-        The colors of handles and flat views.
-    """
+    """The 3D views, and beside or below them the flat views of the selected section."""
 
     def __init__(self, viewing: Viewing, multi_samples: int, parent: QWidget | None = None) -> None:
         super().__init__(Qt.Orientation.Vertical, parent)
@@ -51,10 +41,13 @@ class SectionViews(QSplitter):
         self.addWidget(viewing)
         self._multi_samples = multi_samples
         self.handles = Handles(self._replaced, self.store.set_dragging)
+        """The handles of the selected section, one in each 3D view while they are switched on."""
         self.flats: Flats | None = None
+        """The flat views; None while no section is laid flat."""
         self._closed = False
         self._kind: tuple[object, ...] = ()
         self.scheme = viewing.scene.scheme
+        """The colors of handles and flat views."""
         self.store.listen(self._session_changed)
         viewing.second_made.connect(lambda: self._sync_handles(self.store.session))
         viewing.second_leaves.connect(self._second_leaves)

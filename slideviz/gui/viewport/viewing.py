@@ -29,15 +29,6 @@ from slideviz.session.store import Store
 class Viewing(QWidget):
     """The 3D views: one, or two side by side with linked cameras and the same range of colors.
 
-    Attributes
-    ----------
-    view, scene
-        The first view and its scene.
-    second, second_scene
-        The second view and its scene; None while there is one view.
-    titles
-        The title bar above each view, visible while there are two.
-
     Signals
     -------
     second_made(), second_leaves()
@@ -58,11 +49,14 @@ class Viewing(QWidget):
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setSpacing(2)
         self.titles = [self._title(column) for column in (0, 1)]
+        """The title bar above each view, visible while there are two."""
         self.view = self._make_view()
+        """`view`, `scene`: the first view and its scene."""
         self._grid.addWidget(self.view, 1, 0)
         self.scene = Scene(self.view)
         self._connect(self.view, self.scene)
         self.second: View3D | None = None
+        """`second`, `second_scene`: the second view and its scene; None while there is one view."""
         self.second_scene: Scene | None = None
         # Shared with the second flat view.
         self.second_cuts = Cuts()

@@ -27,46 +27,31 @@ def always(_: Any) -> bool:
 
 @dataclass(frozen=True)
 class Command:
-    """A command of the window (an action or a toggle): function, texts, keys, icon, conditions.
-
-    Attributes
-    ----------
-    name : str
-    title : str
-        Its text in a menu, with ``&`` before its mnemonic.
-    tip : str
-        What it does, in a sentence.
-    do : callable
-        Called with the window to do it.
-    keys : tuple of str or standard keys
-    image : str
-        The name of its icon.
-    enabled, checked : callable
-        Return whether it is enabled and, of a toggle, whether it is on.
-    title_now : callable, optional
-        Returns its present title, given the `CommandState`; an empty one hides it in the menu.
-    tip_now : callable, optional
-        Returns a tooltip to be shown instead of ``tip``, or an empty text; for a disabled command,
-        why it is disabled.
-    button_tip, button_key : str
-        Tooltip and shortcut of its button in a panel.
-    short : str
-        Its text on the tool bar, if it has no icon.
-    """
+    """A command of the window (an action or a toggle): function, texts, keys, icon, conditions."""
 
     name: str
     title: str
+    """Its text in a menu, with ``&`` before its mnemonic."""
     tip: str
+    """What it does, in a sentence."""
     do: Callable[..., object]
+    """Called with the window to do it."""
     keys: tuple[Keys, ...] = ()
     image: str = ""
+    """The name of its icon."""
     enabled: Callable[[Any], bool] = always
     checked: Callable[[CommandState], bool] | None = None
+    """`enabled`, `checked`: return whether it is enabled and, of a toggle, whether it is on."""
     title_now: Callable[[CommandState], str] | None = None
+    """Returns its present title, given the `CommandState`; an empty one hides it in the menu."""
     tip_now: Callable[[CommandState], str] | None = None
+    """Returns a tooltip to be shown instead of ``tip``, or an empty text; for a disabled command,
+    why it is disabled."""
     button_tip: str = ""
     button_key: str = ""
+    """`button_tip`, `button_key`: tooltip and shortcut of its button in a panel."""
     short: str = ""
+    """Its text on the tool bar, if it has no icon."""
 
     def called(self, now: CommandState) -> str:
         """Return the present title of the command."""
@@ -109,18 +94,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Menu:
-    """A menu: its commands, submenus and separators (None).
-
-    Attributes
-    ----------
-    fill : callable, optional
-        Adds entries that are not known beforehand, given the window and the menu: once, above
-        ``entries``; or, if there are no ``entries``, each time the menu opens.
-    one_of : bool
-        Whether its toggles exclude each other.
-    tooltips : bool
-        Whether it shows tooltips, which say why a command is disabled.
-    """
+    """A menu: its commands, submenus and separators (None)."""
 
     name: str
     title: str
@@ -128,8 +102,12 @@ class Menu:
     entries: tuple[Command | Menu | None, ...] = ()
     enabled: Callable[[CommandState], bool] = always
     fill: Callable[[Any, QMenu], object] | None = None
+    """Adds entries that are not known beforehand, given the window and the menu: once, above
+    ``entries``; or, if there are no ``entries``, each time the menu opens."""
     one_of: bool = False
+    """Whether its toggles exclude each other."""
     tooltips: bool = False
+    """Whether it shows tooltips, which say why a command is disabled."""
 
     def commands(self) -> Iterator[Command]:
         """Yield the commands of the menu and of its submenus."""
@@ -142,26 +120,19 @@ class Menu:
 
 @dataclass(frozen=True)
 class CommandState:
-    """The state of the window on which the commands' conditions depend.
-
-    Attributes
-    ----------
-    busy : bool
-        Whether a job runs.
-    ready : bool
-        Whether all requirements of a run are met.
-    undo, redo : str
-        The change that would be undone or redone, in words; empty if there is none.
-    theme : str
-        The chosen theme: one of `slideviz.gui.widgets.theme.THEMES`.
-    """
+    """The state of the window on which the commands' conditions depend."""
 
     session: Session
     busy: bool = False
+    """Whether a job runs."""
     ready: bool = False
+    """Whether all requirements of a run are met."""
     undo: str = ""
     redo: str = ""
+    """`undo`, `redo`: the change that would be undone or redone, in words; empty if there is
+    none."""
     theme: str = ""
+    """The chosen theme: one of `slideviz.gui.widgets.theme.THEMES`."""
 
 
 def has_mesh(now: CommandState) -> bool:

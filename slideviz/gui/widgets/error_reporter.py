@@ -65,13 +65,7 @@ class Notice(Protocol):
 
 
 class ErrorReporter(QObject):
-    """Receives the unexpected errors of a window: shows each once in its banner, then counts it.
-
-    Attributes
-    ----------
-    count : int
-        The number of all errors so far.
-    """
+    """Receives the unexpected errors of a window: shows each once in its banner, then counts it."""
 
     _came = Signal(object)
 
@@ -83,6 +77,7 @@ class ErrorReporter(QObject):
     ) -> None:
         super().__init__(parent)
         self.count = 0
+        """The number of all errors so far."""
         self._banner = banner
         self._clock = clock
         self._known: dict[tuple[object, ...], tuple[int, float]] = {}

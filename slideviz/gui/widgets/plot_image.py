@@ -52,22 +52,14 @@ class AxesPlace:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A drawn figure; it is never drawn again, so any thread may read it.
-
-    Attributes
-    ----------
-    figure : Figure
-    pixels : (height, width, 4) uint8
-        Red, green, blue, opacity.
-    place : AxesPlace
-    seconds : float
-        How long it took to draw.
-    """
+    """A drawn figure; it is never drawn again, so any thread may read it."""
 
     figure: Figure = field(default_factory=Figure)
     pixels: np.ndarray = field(default_factory=lambda: np.zeros((1, 1, 4), np.uint8))
+    """(height, width, 4): red, green, blue, opacity."""
     place: AxesPlace = AxesPlace()
     seconds: float = 0.0
+    """How long it took to draw."""
 
 
 def picture(draw_on: Draw, paper: PlotFormat, place: AxesPlace) -> Picture:

@@ -21,37 +21,26 @@ if TYPE_CHECKING:
 
 
 class Services(QMainWindow):
-    """The window as panels and dialogs see it: the base of `slideviz.gui.window.MainWindow`.
-
-    Attributes
-    ----------
-    store : Store
-        Holds the session; all changes of it go through the store.
-    settings : QSettings
-        The settings kept from one start to the next.
-    banner : Banner
-        Shows errors and messages above the view.
-    running : Running
-        Starts jobs and runs.
-    runner : JobRunner
-        Runs the job; ``busy`` while there is one.
-    files : Files
-        Opens and saves; knows the folder and the stem of file names that dialogs offer.
-    viewing, section_views
-        The 3D views; the handles and flat views of the selected section.
-    dock_manager : Docks
-        The docks with the panels.
-    """
+    """The window as panels and dialogs see it: the base of `slideviz.gui.window.MainWindow`."""
 
     store: Store
+    """Holds the session; all changes of it go through the store."""
     settings: QSettings
+    """The settings kept from one start to the next."""
     banner: Banner
+    """Shows errors and messages above the view."""
     running: Running
+    """Starts jobs and runs."""
     runner: JobRunner
+    """Runs the job; ``busy`` while there is one."""
     files: Files
+    """Opens and saves; knows the folder and the stem of file names that dialogs offer."""
     viewing: Viewing
     section_views: SectionViews
+    """`viewing`, `section_views`: the 3D views; the handles and flat views of the selected
+    section."""
     dock_manager: Docks
+    """The docks with the panels."""
 
     def say(self, text: str) -> None:
         """Show a short message in the status bar; an empty text clears it."""
