@@ -32,9 +32,9 @@ def info(arguments: argparse.Namespace) -> int:
     require_places(arguments, OutputPath(arguments.json, "--json"))
     if arguments.stream:
         from slideviz.cli.report import MeshCounts
-        from slideviz.cli.streamed import rated
+        from slideviz.cli.streamed import streamed_quality
 
-        with rated(arguments) as (skin, whole, _):
+        with streamed_quality(arguments) as (skin, whole, _):
             counts = MeshCounts(whole.points, whole.unused, whole.types)
             return _told(arguments, skin, counts, whole.quality)
     from slideviz import quality, read

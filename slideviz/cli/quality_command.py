@@ -48,7 +48,7 @@ def quality(arguments: argparse.Namespace) -> int:
     from slideviz import read, write
     from slideviz.cli.places import OutputPath, require_places
     from slideviz.cli.report import cell_data, worst_cells
-    from slideviz.cli.streamed import rated, require_no_file
+    from slideviz.cli.streamed import require_no_file, streamed_quality
 
     if arguments.stream:
         require_no_file(arguments)
@@ -60,7 +60,7 @@ def quality(arguments: argparse.Namespace) -> int:
         OutputPath(arguments.json, "--json"),
     )
     if arguments.stream:
-        with rated(arguments, case) as (skin, whole, path):
+        with streamed_quality(arguments, case) as (skin, whole, path):
             return _told(arguments, skin.name, whole.quality, whole.worst, path)
     mesh = read(arguments.mesh, zone=arguments.zone)
     base = reference_of(arguments, mesh, case)

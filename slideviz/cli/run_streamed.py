@@ -94,7 +94,7 @@ def run_streamed(
     from slideviz.cli.report import LISTED, run_report
     from slideviz.cli.run_finished import finished, note_finished
     from slideviz.streaming.run import about_run, stream
-    from slideviz.system.ranks import ALONE
+    from slideviz.system.ranks import SERIAL
 
     note = partial(say, "" if arguments.quiet else "note")
     about = about_run(case)
@@ -116,7 +116,7 @@ def run_streamed(
             replaces=case.mesh_file if arguments.force else None,
             listed=LISTED,
             later=QUALITY_BYTES if qualities else 0,
-            ranks=arguments.ranks or ALONE,
+            ranks=arguments.ranks or SERIAL,
         )
     seconds = dict(done.seconds)
     if qualities:

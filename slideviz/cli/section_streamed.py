@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from slideviz.cli.progress import Bar
-from slideviz.cli.streamed import Looked, looked
+from slideviz.cli.streamed import StreamedMesh, open_streamed
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part
 from slideviz.mesh.quality import Quality
 from slideviz.sections.model import Section
 from slideviz.session.passages import keeps, moved
 from slideviz.solver.steps import Progress
-from slideviz.streaming.quality_blocks import Rated, Zone, rated_blocks
+from slideviz.streaming.quality_blocks import QualityBlock, Zone, quality_blocks
 from slideviz.terms import Metric
 
 if TYPE_CHECKING:
@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def skins(arguments: argparse.Namespace, case: Case | None) -> Iterator[tuple[Looked, Mesh | None]]:
+def skins(
+    arguments: argparse.Namespace, case: Case | None
+) -> Iterator[tuple[StreamedMesh, Mesh | None]]:
     """Context with a mesh to be read block by block, and the skin of the undeformed one or None.
 
     Raises
@@ -34,9 +36,9 @@ def skins(arguments: argparse.Namespace, case: Case | None) -> Iterator[tuple[Lo
     CaseError
         The mesh is 2D.
     MeshError
-        As by `slideviz.cli.streamed.looked`.
+        As by `slideviz.cli.streamed.open_streamed`.
     """
-    with looked(arguments, case) as seen:
+    with open_streamed(arguments, case) as seen:
         if seen.skin.dim == 2:
             raise CaseError(
                 f"{seen.skin.name} is 2D, where all cells are shown around the cut; leave out "
@@ -68,7 +70,7 @@ class _Kept:
     """`points`, `before` (n, d): their points now, and undeformed (where there is a reference)."""
 
     @classmethod
-    def of(cls, part: Rated, chosen: IntArray) -> _Kept:
+    def of(cls, part: QualityBlock, chosen: IntArray) -> _Kept:
         """Return the cells of a block with the places ``chosen`` (k,) in it."""
         cells, found = part.mesh.cells.take(chosen), part.quality
         base = part.mesh if part.base is None else part.base
@@ -120,7 +122,7 @@ def cells_near(
     kept: list[_Kept] = []
     with Bar() as bar:
         tick = lambda part: bar.phase(Progress(1, 1, "quality", part))  # noqa: E731
-        for part in rated_blocks(mesh, reference, metric, tick):
+        for part in quality_blocks(mesh, reference, metric, tick):
             near = np.zeros(len(part.ids), bool)
             for matrix in ways:
                 near |= _meets(section, moved(part.mesh.points, matrix), part.mesh.cells)

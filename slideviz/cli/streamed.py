@@ -13,20 +13,20 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
-    from slideviz.streaming.quality_blocks import Whole, Zone
-    from slideviz.streaming.stream_input import Given
+    from slideviz.streaming.quality_blocks import MeshQuality, Zone
+    from slideviz.streaming.stream_input import StreamInput
     from slideviz.terms import FileFormat
 
 
 @dataclass(frozen=True, eq=False)
-class Looked:
+class StreamedMesh:
     """A mesh that is read block by block."""
 
     skin: Mesh
     """Its boundary and the cells at it."""
     mesh: Zone
     """(Path, int or None): file and zone of all its cells."""
-    base: Given | None = None
+    base: StreamInput | None = None
     """The undeformed mesh, if there is a reference."""
     reference: Path | None = None
     """The file of the reference, as the user gave it."""
@@ -38,7 +38,7 @@ class Looked:
 
 
 @contextmanager
-def looked(arguments: argparse.Namespace, case: Case | None) -> Iterator[Looked]:
+def open_streamed(arguments: argparse.Namespace, case: Case | None) -> Iterator[StreamedMesh]:
     """Context with the mesh of a command, and its reference.
 
     The reference is found as by `slideviz.cli.options.reference_of`. Binary copies of texts are in
@@ -54,7 +54,7 @@ def looked(arguments: argparse.Namespace, case: Case | None) -> Iterator[Looked]
     from slideviz.errors import MeshError
     from slideviz.solver.steps import Progress
     from slideviz.streaming.quality_blocks import has_cells_of
-    from slideviz.streaming.stream_input import given_mesh
+    from slideviz.streaming.stream_input import open_read_only
 
     folder = Path(tempfile.gettempdir())
     with ExitStack() as stack, Bar() as bar:
@@ -62,12 +62,12 @@ def looked(arguments: argparse.Namespace, case: Case | None) -> Iterator[Looked]
         def tick(part: float) -> None:
             bar.phase(Progress(1, 1, "read", part))
 
-        def opened(path: Path, zone: int | None, kind: FileFormat | None = None) -> Given:
-            return stack.enter_context(given_mesh(path, zone, tick, folder, kind))
+        def opened(path: Path, zone: int | None, kind: FileFormat | None = None) -> StreamInput:
+            return stack.enter_context(open_read_only(path, zone, tick, folder, kind))
 
         one = opened(arguments.mesh, arguments.zone)
         skin, mesh = one.skin(tick), (one.path, one.zone)
-        found = Looked(skin, mesh)
+        found = StreamedMesh(skin, mesh)
         path = getattr(arguments, "reference", None)
         if path is not None:
             base = opened(path, arguments.zone)
@@ -76,33 +76,33 @@ def looked(arguments: argparse.Namespace, case: Case | None) -> Iterator[Looked]
                     f"{path} cannot be the reference of {skin.name}: it must have the same cells; "
                     "give the undeformed mesh"
                 )
-            found = Looked(skin, mesh, base, path)
+            found = StreamedMesh(skin, mesh, base, path)
         elif case is not None and case.mesh_file is not None and case.mesh_file.is_file():
             base = opened(case.mesh_file, arguments.zone or case.zone, case.mesh_format)
             if has_cells_of(mesh, (base.path, base.zone)):
-                found = Looked(skin, mesh, base, case.mesh_file)
+                found = StreamedMesh(skin, mesh, base, case.mesh_file)
         yield found
 
 
 @contextmanager
-def rated(
+def streamed_quality(
     arguments: argparse.Namespace, case: Case | None = None
-) -> Iterator[tuple[Mesh, Whole, Path | None]]:
+) -> Iterator[tuple[Mesh, MeshQuality, Path | None]]:
     """Context with the skin of a mesh, quality and counts of all cells, and the reference's file.
 
     Raises
     ------
     MeshError
-        As by `looked`.
+        As by `open_streamed`.
     """
     from slideviz.cli.progress import Bar
     from slideviz.solver.steps import Progress
-    from slideviz.streaming.quality_blocks import rated_whole
+    from slideviz.streaming.quality_blocks import measure_mesh
 
     with ExitStack() as stack:
-        seen = stack.enter_context(looked(arguments, case))
+        seen = stack.enter_context(open_streamed(arguments, case))
         with Bar() as bar:
-            whole = rated_whole(
+            whole = measure_mesh(
                 stack,
                 Path(tempfile.gettempdir()),
                 seen.mesh,

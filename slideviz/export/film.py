@@ -30,7 +30,7 @@ from slideviz.export.titles import (
 )
 from slideviz.mesh.quality import Quality, quality
 from slideviz.scene.moved import Zoom
-from slideviz.session.pieces import Beside, GoingOn, here, never
+from slideviz.session.pieces import GoingOn, InThread, not_cancelled, run_inline
 from slideviz.session.state import Session, StepFrame
 
 SIZES = {".mp4": (1280, 800), ".gif": (800, 500), ".png": (1600, 1000)}
@@ -135,7 +135,7 @@ class FilmProgress:
 
 def images_drawn(pieces: Generator[object, Any, None]) -> Generator[FilmProgress, None, None]:
     """Do all pieces of a film here, without threads, and yield its progress after each image."""
-    run = here(pieces)
+    run = run_inline(pieces)
     try:
         yield from (piece for piece in run if isinstance(piece, FilmProgress))
     finally:
@@ -150,7 +150,7 @@ def render_frames(
 ) -> Generator[object, Any, None]:
     """Draw and encode all images; yield `FilmProgress` after each one, and between its pieces.
 
-    Encoding is yielded as `Beside`, to be done in a thread.
+    Encoding is yielded as `InThread`, to be done in a thread.
 
     Parameters
     ----------
@@ -170,13 +170,13 @@ def render_frames(
             samples.append(image)
     settings = EncoderSettings(film_options.pixels(file), total, pace, lambda: samples)
     with ExitStack() as stack:
-        add = yield Beside(lambda _: stack.enter_context(writer(file, settings)))
+        add = yield InThread(lambda _: stack.enter_context(writer(file, settings)))
         for done, position in enumerate(_positions(frames - 1, film_options.between), start=1):
             image = yield from draw(position)
             seconds = 1.0 / pace if done < total else max(film_options.hold, 1.0 / pace)
-            yield Beside(partial(_add, add, image, seconds))
+            yield InThread(partial(_add, add, image, seconds))
             yield FilmProgress(done, total)
-        yield Beside(lambda _: stack.close())
+        yield InThread(lambda _: stack.close())
 
 
 def _add(add: Callable[[Pixels, float], None], image: Pixels, seconds: float, _: object) -> None:
@@ -303,7 +303,7 @@ def filming(
             if len(one.frames) < count:  # as far deformed
                 part = (len(one.frames) - 1) / (count - 1)
                 at = round(position * part, 9 if film_options.between else 0)
-            film_frames.append((yield Beside(partial(film_frame_at, one.frames, at))))
+            film_frames.append((yield InThread(partial(film_frame_at, one.frames, at))))
         shown = [
             _showing(one, film_frame.frame)
             for one, film_frame in zip(runs, film_frames, strict=True)
@@ -319,7 +319,7 @@ def aim_at_largest(
     """Aim a renderer's camera so that the largest step is seen whole, yielding between pieces."""
     yield from renderer.prepare_steps()
     frames = renderer.session.frames
-    widest = yield Beside(lambda _: max(range(len(frames)), key=lambda k: frames[k].mesh.extent))
+    widest = yield InThread(lambda _: max(range(len(frames)), key=lambda k: frames[k].mesh.extent))
     renderer.pose(options, widest)
     yield None
 
@@ -346,7 +346,7 @@ def require_steps(
 
 
 def film_frame_at(
-    frames: Sequence[StepFrame], position: float, going_on: GoingOn = never
+    frames: Sequence[StepFrame], position: float, going_on: GoingOn = not_cancelled
 ) -> FilmFrame:
     """Return the frame at a position in a run: a step, or a mesh between two steps.
 

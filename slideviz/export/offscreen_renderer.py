@@ -29,7 +29,7 @@ from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.scene.moved import Overview, Zoom, lengths
 from slideviz.session.changes import show_frame
 from slideviz.session.panes import shown_views
-from slideviz.session.pieces import appearing, whole
+from slideviz.session.pieces import appearing, run_to_end
 from slideviz.session.state import Session
 from slideviz.system.atomic import atomic_write
 
@@ -148,7 +148,7 @@ class OffscreenRenderer:
         SlidevizError
             The size cannot be drawn.
         """
-        return whole(self.render_steps(options))
+        return run_to_end(self.render_steps(options))
 
     def render_steps(
         self, options: PictureOptions, aim: bool = True, frame: int | None = None

@@ -15,7 +15,7 @@ from slideviz.export.titles import DETAIL, caption
 from slideviz.mesh.model import Mesh
 from slideviz.scene.moved import Zoom
 from slideviz.session.opening import of_runs
-from slideviz.session.pieces import whole
+from slideviz.session.pieces import run_to_end
 from slideviz.session.state import Run, Session, StepFrame
 
 SIZE = PictureOptions.size
@@ -80,7 +80,7 @@ def pictures_alike(frames: Sequence[StepFrame], base: Mesh, side: int) -> list[P
 
         def draw(run: Run, options: PictureOptions) -> Pixels:
             shown = replace(session, shown=run.number)
-            return whole(renderer.drawing([shown], options, ([""], 1.0)))
+            return run_to_end(renderer.drawing([shown], options, ([""], 1.0)))
 
         inked = int((draw(runs[0], options) < WHITE).any(axis=2).sum())
         # The edges of small cells would hide their colors.

@@ -32,8 +32,8 @@ from slideviz.mesh.check import LARGEST, too_large, within
 from slideviz.mesh.elements import SIZES
 from slideviz.mesh.model import Cells, IntArray
 from slideviz.system.cleanup import open_temporary
-from slideviz.system.in_order import in_order
-from slideviz.system.ranks import ALONE, Alone
+from slideviz.system.in_order import ordered_map
+from slideviz.system.ranks import SERIAL, SerialPool
 
 HEAD = 8
 """Bytes before the first zone."""
@@ -159,11 +159,11 @@ def _counted(text: Text) -> IntArray:
         count_types(np.frombuffer(text.lines.text(piece), np.uint8), counts)
         return counts[list(SORTED)]
 
-    out[:] = list(in_order(count, pieces))
+    out[:] = list(ordered_map(count, pieces))
     return out
 
 
-def fill(plan: Plan, path: Path, progress: Progress, ranks: Alone = ALONE) -> bytes:
+def fill(plan: Plan, path: Path, progress: Progress, ranks: SerialPool = SERIAL) -> bytes:
     """Write the binary form of a text into an existing file of its size, but for the file's head.
 
     Returns the head (``HEAD`` bytes) for a file with only this zone; the caller writes it.
@@ -221,7 +221,7 @@ def _filling(plan: Plan, path: Path, synced: bool) -> Iterator[Callable[[_Task],
     def work(task: _Task) -> IntArray:
         kind, first, end = task
         put = _put_cells if kind == "cells" else _put_points
-        found = list(in_order(partial(put, plan, out), range(first, end)))
+        found = list(ordered_map(partial(put, plan, out), range(first, end)))
         if synced:
             os.fsync(out)
         return np.array(found)

@@ -154,7 +154,7 @@ def _colors(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
 
 
 _MIDDLES = (np.arange(FINE) + 0.5) / FINE
-"""Middles of the fine intervals (`FINE`) of a tally of qualities."""
+"""Middles of the fine intervals (`FINE`) of a totals of qualities."""
 
 BINS = 25
 """Number of intervals: few enough that an outline's steps show its dashes in a narrow panel."""
@@ -172,10 +172,10 @@ def distribution(
     """
     edges = np.linspace(*limits, BINS + 1)
     if isinstance(frame.quality, PartQuality):
-        tally = frame.quality.all
+        totals = frame.quality.all
         places = np.clip(np.searchsorted(edges, _MIDDLES, "right") - 1, 0, BINS - 1)
-        counts = np.bincount(places, tally.counts, BINS).astype(np.int64)
-        return Distribution(counts, edges, tally.inverted)
+        counts = np.bincount(places, totals.counts, BINS).astype(np.int64)
+        return Distribution(counts, edges, totals.inverted)
     return Distribution.of(_values(frame, what, undeformed), edges)
 
 

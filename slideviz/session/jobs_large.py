@@ -16,7 +16,7 @@ from slideviz.session.jobs import (
 )
 from slideviz.session.large import frame_of
 from slideviz.session.results import StepFrame
-from slideviz.session.whole import tally_of
+from slideviz.session.whole import totals_of
 from slideviz.solver.deform import Progress
 from slideviz.streaming.run import stream
 
@@ -44,5 +44,5 @@ def compute_in_file(
     done = stream(case.change(mesh_file=skin.source), output, tell=tell)
     step = done.steps[-1]
     now = skin.with_points(step.mesh.points)
-    frame = frame_of(now, skin, output, tally_of(done.quality), case.quality_metric)
+    frame = frame_of(now, skin, output, totals_of(done.quality), case.quality_metric)
     report(replace(frame, step=replace(step, mesh=now)))

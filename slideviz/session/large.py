@@ -11,7 +11,7 @@ from slideviz.formats.su2b.read import is_su2b
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import quality
 from slideviz.session.results import StepFrame
-from slideviz.session.whole import PartQuality, Tally, measure_all, worst_frame
+from slideviz.session.whole import PartQuality, QualityTotals, measure_all, worst_frame
 from slideviz.solver.deform import free_memory
 from slideviz.streaming.memory import NEEDED
 from slideviz.streaming.skin import read_skin
@@ -65,11 +65,11 @@ def read_boundary(path: Path, zone: int | None, tick: Callable[[float], object])
 def first_frame(skin: Mesh, metric: Metric, tick: Callable[[float], object]) -> StepFrame:
     """Return the undeformed frame of a mesh by its ``skin``, with the quality of all its cells."""
     assert skin.source is not None
-    tally = measure_all(skin.source, skin.zone, metric, tick)
-    return frame_of(skin, skin, skin.source, tally, metric)
+    totals = measure_all(skin.source, skin.zone, metric, tick)
+    return frame_of(skin, skin, skin.source, totals, metric)
 
 
-def frame_of(now: Mesh, skin: Mesh, file: Path, tally: Tally, metric: Metric) -> StepFrame:
+def frame_of(now: Mesh, skin: Mesh, file: Path, totals: QualityTotals, metric: Metric) -> StepFrame:
     """Return the frame of a large mesh: its boundary in memory, its cells in a file.
 
     Parameters
@@ -78,10 +78,10 @@ def frame_of(now: Mesh, skin: Mesh, file: Path, tally: Tally, metric: Metric) ->
         The boundary, deformed and undeformed.
     file : Path
         The deformed mesh.
-    tally : Tally
+    totals : QualityTotals
         The qualities of all its cells.
     """
     assert skin.source is not None
-    extra = worst_frame(skin.source, skin.zone, file, tally.worst, metric)
-    found = PartQuality.of(quality(now, skin, metric), tally)
+    extra = worst_frame(skin.source, skin.zone, file, totals.worst, metric)
+    found = PartQuality.of(quality(now, skin, metric), totals)
     return StepFrame(now, found, extra=extra, file=file)

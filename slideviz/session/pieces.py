@@ -1,7 +1,7 @@
 """Long work in pieces, so that a window stays responsive.
 
 The work is a generator that yields between two pieces: None, or its progress. Pieces that draw run
-in the generator, in the thread that pulls it. A piece that does not draw is yielded as `Beside`:
+in the generator, in the thread that pulls it. A piece that does not draw is yielded as `InThread`:
 who pulls the generator may run it in another thread, and sends back its result, or throws its
 error.
 """
@@ -21,26 +21,26 @@ PART_CELLS = 10_000
 
 
 @dataclass(frozen=True)
-class Beside:
+class InThread:
     """Work that draws nothing: who pulls the generator runs ``call`` and sends its result back."""
 
     call: Callable[[GoingOn], Any]
 
 
-def here(pieces: Generator[object, Any, Result]) -> Generator[object, None, Result]:
-    """Yield what some work yields, but do its `Beside` pieces at once, in this thread.
+def run_inline(pieces: Generator[object, Any, Result]) -> Generator[object, None, Result]:
+    """Yield what some work yields, but do its `InThread` pieces at once, in this thread.
 
     Returns the result of the work.
     """
     try:
         piece = next(pieces)
         while True:
-            if not isinstance(piece, Beside):
+            if not isinstance(piece, InThread):
                 yield piece
                 piece = next(pieces)
                 continue
             try:
-                value = piece.call(never)
+                value = piece.call(not_cancelled)
             except Exception as error:
                 piece = pieces.throw(error)
             else:
@@ -52,9 +52,9 @@ def here(pieces: Generator[object, Any, Result]) -> Generator[object, None, Resu
         pieces.close()
 
 
-def whole(pieces: Generator[object, Any, Result]) -> Result:
+def run_to_end(pieces: Generator[object, Any, Result]) -> Result:
     """Return the result of some work, after doing all its pieces in this thread."""
-    run = here(pieces)
+    run = run_inline(pieces)
     while True:
         try:
             next(run)
@@ -107,5 +107,5 @@ def _faces(actor: Any) -> int:
     return 0 if data is None else int(data.GetNumberOfCells())
 
 
-def never() -> None:
+def not_cancelled() -> None:
     """Do nothing: the `GoingOn` of work that cannot be stopped."""

@@ -27,7 +27,7 @@ FINE = 10_000
 
 
 @dataclass(frozen=True, eq=False)
-class Tally:
+class QualityTotals:
     """Counts and size-skew qualities of all cells of a mesh, summed up."""
 
     cells: int
@@ -49,20 +49,20 @@ class Tally:
 class PartQuality(Quality):
     """A quality with arrays of the cells in memory, but counts, minimum and mean of all cells."""
 
-    tally: Tally | None = None
+    totals: QualityTotals | None = None
     """The counts and qualities of all cells of the mesh."""
 
     @classmethod
-    def of(cls, found: Quality, tally: Tally) -> PartQuality:
-        """Return the quality ``found`` of the cells in memory, with the tally of all cells."""
+    def of(cls, found: Quality, totals: QualityTotals) -> PartQuality:
+        """Return the quality ``found`` of the cells in memory, with the totals of all cells."""
         own = (found.values, found.size, found.skew, found.status, found.signs, found.metric)
-        return cls(*own, tally=tally)
+        return cls(*own, totals=totals)
 
     @property
-    def all(self) -> Tally:
-        """Return the tally of all cells."""
-        assert self.tally is not None
-        return self.tally
+    def all(self) -> QualityTotals:
+        """Return the totals of all cells."""
+        assert self.totals is not None
+        return self.totals
 
     @cached_property
     def cells(self) -> int:
@@ -91,8 +91,8 @@ class PartQuality(Quality):
         return counts.astype(np.int64), edges
 
 
-class Tallying:
-    """Makes a `Tally` of cells that are added block by block, in any order."""
+class QualityAccumulator:
+    """Makes a `QualityTotals` of cells that are added block by block, in any order."""
 
     def __init__(self) -> None:
         self._counts = np.zeros(FINE, np.int64)
@@ -118,10 +118,10 @@ class Tallying:
         order = np.lexsort((ids, values))[:WORST]
         self._worst = ids[order], values[order]
 
-    def tally(self) -> Tally:
-        """Return the tally of all cells that were added; there must be one at least."""
+    def totals(self) -> QualityTotals:
+        """Return the totals of all cells that were added; there must be one at least."""
         ids, values = self._worst
-        return Tally(
+        return QualityTotals(
             self._cells,
             float(values[0]),
             math.fsum(self._sums) / self._cells,
@@ -132,18 +132,18 @@ class Tallying:
         )
 
 
-def tally_of(found: Quality) -> Tally:
-    """Return the tally of a quality, counted block by block: its arrays may not fit into memory."""
-    made, step = Tallying(), 1 << 20
+def totals_of(found: Quality) -> QualityTotals:
+    """Return the totals of a quality, block by block: its arrays may not fit into memory."""
+    made, step = QualityAccumulator(), 1 << 20
     for first in range(0, len(found.values), step):
         part = slice(first, first + step)
         values, status = np.array(found.values[part]), np.array(found.status[part])
         made.add(np.arange(first, first + len(values)), values, status)
-    return made.tally()
+    return made.totals()
 
 
-def measure_all(path: Path, zone: int | None, metric: Metric, tick: Tick) -> Tally:
-    """Return the tally of an undeformed mesh, whose cells are read and measured block by block.
+def measure_all(path: Path, zone: int | None, metric: Metric, tick: Tick) -> QualityTotals:
+    """Return the totals of an undeformed mesh, whose cells are read and measured block by block.
 
     Raises
     ------
@@ -152,7 +152,7 @@ def measure_all(path: Path, zone: int | None, metric: Metric, tick: Tick) -> Tal
     OSError
         It cannot be read.
     """
-    made = Tallying()
+    made = QualityAccumulator()
     with ExitStack() as stack:
         files = open_points(stack, path, zone, path)
         place = files.place
@@ -160,7 +160,7 @@ def measure_all(path: Path, zone: int | None, metric: Metric, tick: Tick) -> Tal
             found = quality(files.cells_of(block)[0], metric=metric)
             made.add(block.ids, found.values, found.status)
             tick((block.first + len(block.types)) / place.cells.count)
-    return made.tally()
+    return made.totals()
 
 
 def open_points(stack: ExitStack, path: Path, zone: int | None, moved: Path) -> PointFiles:

@@ -20,7 +20,7 @@ from slideviz.formats.su2b.write import (
     require_binary_names,
     sentence_of_lost,
 )
-from slideviz.streaming.disk_space import require_room, text_size
+from slideviz.streaming.disk_space import require_disk_space, text_size
 from slideviz.streaming.skin import read_skin
 from slideviz.streaming.stream_input import part_of
 from slideviz.streaming.text_of_binary import text_of_binary
@@ -86,7 +86,7 @@ def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: T
         warn(sentence_of_lost(target, name, lost, alone=zone is not None and zones > 1))
         begin = plans[-1].size if plans else 8
         plans.append(planned(text, is_result=True, begin=begin, number=number))
-    require_room(target, target, plans[-1].size)
+    require_disk_space(target, target, plans[-1].size)
     with atomic_write(target) as file:
         os.truncate(file.fileno(), plans[-1].size)
         for k, plan in enumerate(plans):
@@ -121,7 +121,7 @@ def _to_text(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tic
             warn(sentence_of_lost(target, name, [OTHER_ZONES], alone=True))
         sizes = [text_size(place) for place in places]
         more = PLACE * max(place.cells.count for place in places)
-        require_room(target, target, sum(sizes) + more)
+        require_disk_space(target, target, sum(sizes) + more)
         for place in places:  # finds every mistake in the file, as reading it whole would
             read_skin(source, place.number, part_of(tick, 0.0, 0.3))
         written = 0

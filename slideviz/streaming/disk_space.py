@@ -12,11 +12,11 @@ from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.formats.su2b.partial import names_of
 from slideviz.system.atomic import reason_of
 
-RATED = 18
+CELL_BYTES = 18
 """Bytes of disk for each cell during a run: quality and status, before and after, twice 8 + 1."""
 
 
-def require_room(place: Path, path: Path, size: int) -> None:
+def require_disk_space(place: Path, path: Path, size: int) -> None:
     """Raise where the disk of the file ``place`` has no room for ``size`` more bytes.
 
     Raises
@@ -54,7 +54,7 @@ def bytes_of_text(plan: Plan, is_text: bool, later: int) -> int:
     result = plan.text.lines.raw.size if is_text else plan.size
     points = plan.markers - plan.points if is_text else 0
     cells = plan.text.n_cells
-    return result + RATED * cells + max(plan.size + points, later * cells)
+    return result + CELL_BYTES * cells + max(plan.size + points, later * cells)
 
 
 def bytes_of_binary(path: Path, zone: int | None, *, is_text: bool, later: int) -> int:
@@ -65,10 +65,10 @@ def bytes_of_binary(path: Path, zone: int | None, *, is_text: bool, later: int) 
     result = text_size(place) if is_text else source.size
     points = place.n_points * source.point(place.dim).itemsize if is_text else 0
     cells = place.cells.count
-    return result + RATED * cells + max(points, later * cells)
+    return result + CELL_BYTES * cells + max(points, later * cells)
 
 
-def bytes_left(output: Path) -> int:
+def reusable_bytes(output: Path) -> int:
     """Return how many bytes on the disk a stopped run has left, which this run will replace."""
     files = (names_of(output, more)[0] for more in ("", ".binary"))
     return sum(file.stat().st_blocks * 512 for file in files if file.exists())

@@ -21,7 +21,7 @@ from slideviz.solver.steps import Step
 
 
 @dataclass(frozen=True, eq=False)
-class Rest:
+class InteriorDisplacer:
     """Displaces any nodes of a mesh, by the steps of its skin."""
 
     skin: Mesh
@@ -31,7 +31,7 @@ class Rest:
     steps: Sequence[Step]
     """The steps of the skin, with their ``field``."""
 
-    def bare(self) -> Rest:
+    def without_cells(self) -> InteriorDisplacer:
         """Return the same without the skin's cells and markers, which no displacement needs."""
         none = Cells.from_blocks([])
         skin = replace(self.skin, cells=none, markers=())

@@ -18,7 +18,7 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality, quality
 from slideviz.solver.deform import folded_at
 from slideviz.solver.growth import Farthest, farthest_node
-from slideviz.streaming.interior import Rest
+from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.skin import Index, index_of
 from slideviz.system.cleanup import draft, open_temporary
 from slideviz.terms import Metric
@@ -79,7 +79,7 @@ def nodes_of(block: ElementBlock) -> tuple[IntArray, IntArray]:
     return nodes, flat
 
 
-def ways_of(signs: NDArray[np.int8]) -> NDArray[np.int8]:
+def orientations_of(signs: NDArray[np.int8]) -> NDArray[np.int8]:
     """Return which of -1 and 1 occur in ``signs`` (k,): (1,), or both, (2,)."""
     return np.unique([signs.min(), signs.max()])
 
@@ -124,7 +124,7 @@ def measured(
         one.values,
         other.status,
         one.status,
-        ways_of(one.signs),
+        orientations_of(one.signs),
         {
             int(block.ids[k]): (int(block.types[k]), block.nodes[ends[k] : ends[k + 1]].copy())
             for k in lowest
@@ -161,7 +161,7 @@ class QualityCollector:
 
     def add(self, found: MeasuredBlock, listed: int) -> None:
         """Add a block; the ``listed`` inverted cells with the lowest numbers so far are kept."""
-        self._signs = ways_of(np.concatenate([self._signs, found.signs]))
+        self._signs = orientations_of(np.concatenate([self._signs, found.signs]))
         self.farthest = self.farthest.further(found.farthest)
         ids = found.ids
         self._values[ids], self._status[ids] = found.values, found.status
@@ -170,7 +170,7 @@ class QualityCollector:
         self._release()
 
     @property
-    def is_both_ways(self) -> bool:
+    def has_both_orientations(self) -> bool:
         """Return whether both orientations occur: cells numbered in both directions, or folded."""
         return len(self._signs) > 1
 
@@ -241,7 +241,7 @@ class Scratch:
 
 
 def folded_steps(
-    rest: Rest, files: PointFiles, cells: Mapping[int, tuple[int, IntArray]]
+    displacer: InteriorDisplacer, files: PointFiles, cells: Mapping[int, tuple[int, IntArray]]
 ) -> dict[int, tuple[int, int]]:
     """Return VTK type and first step with an inverted cell, by cell number.
 
@@ -258,10 +258,10 @@ def folded_steps(
     )
     points = files.points(files.before, nodes)
     part = Mesh(points, Cells.from_types(types, flat))
-    moved = rest.after_steps(nodes, points)
+    moved = displacer.after_steps(nodes, points)
     steps = [
         replace(step, mesh=part.with_points(now))
-        for step, now in zip(rest.steps, moved, strict=True)
+        for step, now in zip(displacer.steps, moved, strict=True)
     ]
     when = folded_at(steps, part, np.arange(len(cells)))
     return dict(zip(cells, zip(types, when.tolist(), strict=True), strict=True))

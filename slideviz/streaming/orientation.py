@@ -59,7 +59,7 @@ def facet_sums(path: Path, zone: int | None) -> Iterator[Callable[[tuple[int, in
         yield add
 
 
-def require_right(found: Iterable[int], name: str, also: str = "") -> None:
+def require_consistent_orientation(found: Iterable[int], name: str, also: str = "") -> None:
     """Raise where the sums of the hashes of all parts of the cells do not add up to 0.
 
     Parameters

@@ -22,14 +22,14 @@ from slideviz.formats.su2b.elements import element_block
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.formats.su2b.partial import Partial, partial_copy, partial_file
 from slideviz.rbf.problem import Watch
-from slideviz.streaming.interior import Rest
+from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.measuring import MeasuredBlock, PointFiles, QualityCollector, measured
-from slideviz.streaming.orientation import facet_sums, require_right
-from slideviz.streaming.stream_input import Given, text_blocks
+from slideviz.streaming.orientation import facet_sums, require_consistent_orientation
+from slideviz.streaming.stream_input import StreamInput, text_blocks
 from slideviz.streaming.text_of_binary import text_of_binary
 from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_no_input
-from slideviz.system.ranks import Alone
+from slideviz.system.ranks import SerialPool
 from slideviz.terms import Metric
 
 CHUNK = 1 << 20
@@ -49,11 +49,11 @@ class Output:
     def __init__(
         self,
         stack: ExitStack,
-        given: Given,
+        given: StreamInput,
         metric: Metric,
         output: Path,
         watch: Watch,
-        ranks: Alone,
+        ranks: SerialPool,
         about: str,
         *,
         is_text: bool,
@@ -83,7 +83,7 @@ class Output:
                 ranks=ranks,
             )
         self._partial = stack.enter_context(made)
-        self._is_ready = self._is_right = False
+        self._is_ready = self._is_oriented = False
         self._rating: QualityCollector | None = None
 
     def _opened(self) -> Partial:
@@ -116,7 +116,7 @@ class Output:
         done, total = self._opened().done, len(parts(self._place.n_points))
         if done:
             return f"{self._path.name}: goes on after {done} of {total} parts"
-        if self._given.is_left:
+        if self._given.is_reused:
             return (
                 f"{self._path.name}: goes on with the text as it was read; no part is written yet"
             )
@@ -125,7 +125,7 @@ class Output:
             "it is made from the beginning"
         )
 
-    def displace(self, rest: Rest, *, final: bool) -> None:
+    def displace(self, displacer: InteriorDisplacer, *, final: bool) -> None:
         """Write all points after the last step, but for parts that a stopped run has written.
 
         Points that are not ``final`` are those of a trial number of steps: all are written, and a
@@ -136,7 +136,7 @@ class Output:
             partial.note([])
         # Ranks must see what others write, and none write a page back with old bytes of others.
         synced = final or self._ranks.size > 1
-        given = self._mesh_file, self._zone, partial.path, rest.bare(), synced
+        given = self._mesh_file, self._zone, partial.path, displacer.without_cells(), synced
         with self._watch.phase("evaluate") as tick, self._ranks.sharing(moving, *given) as do:
             todo = parts(total, partial.done)
             for (_, end), checksum in zip(todo, do(todo), strict=True):
@@ -162,10 +162,10 @@ class Output:
             for (_, end), found in zip(parts(count), do(parts(count)), strict=True):
                 self._rating.add(found, listed)
                 tick(end / count)
-        if self._rating.is_both_ways and not self._is_right:
+        if self._rating.has_both_orientations and not self._is_oriented:
             with self._ranks.sharing(facet_sums, self._mesh_file, self._zone) as do:
-                require_right(do(parts(count)), self.files.before.name)
-            self._is_right = True
+                require_consistent_orientation(do(parts(count)), self.files.before.name)
+            self._is_oriented = True
         return self._rating
 
     def finish(self, ffd: bytes | None) -> None:
@@ -200,7 +200,7 @@ def parts(count: int, done: int = 0) -> list[Part]:
 
 @contextmanager
 def moving(
-    path: Path, zone: int | None, partial: Path, rest: Rest, synced: bool
+    path: Path, zone: int | None, partial: Path, displacer: InteriorDisplacer, synced: bool
 ) -> Iterator[Callable[[Part], int]]:
     """Context with a function that writes the deformed points of a part, as `move` does.
 
@@ -211,17 +211,19 @@ def moving(
         source, place = _zone(path, file, zone)
         out = os.open(partial, os.O_WRONLY | os.O_NOFOLLOW | (os.O_DSYNC if synced else 0))
         try:
-            yield lambda part: move(source, place, rest, out, part)
+            yield lambda part: move(source, place, displacer, out, part)
         finally:
             os.close(out)
 
 
-def move(source: BinaryFile, place: ZonePlace, rest: Rest, out: int, part: Part) -> int:
+def move(
+    source: BinaryFile, place: ZonePlace, displacer: InteriorDisplacer, out: int, part: Part
+) -> int:
     """Write the deformed points of a part to a file descriptor; return the CRC-32 of its bytes."""
     at = _byte(source, place, part[0])
     rows = source.array(at, part[1] - part[0], source.point(place.dim), "the points")
     points = rows["x"].astype(np.float64)
-    for now in rest.after_steps(np.arange(*part), points):
+    for now in displacer.after_steps(np.arange(*part), points):
         points = now
     rows["x"] = points
     left = rows.view(np.uint8).data

@@ -14,10 +14,10 @@ from slideviz.formats.su2b.elements import ElementBlock, element_blocks
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.quality import Quality, quality
-from slideviz.streaming.measuring import PointFiles, Scratch, nodes_of, ways_of
-from slideviz.streaming.orientation import facet_sums, require_right
+from slideviz.streaming.measuring import PointFiles, Scratch, nodes_of, orientations_of
+from slideviz.streaming.orientation import facet_sums, require_consistent_orientation
 from slideviz.streaming.skin import index_of
-from slideviz.system.ranks import ALONE
+from slideviz.system.ranks import SERIAL
 from slideviz.system.threads import Tick
 from slideviz.terms import Metric
 
@@ -28,7 +28,7 @@ Zone = tuple[Path, int | None]
 
 
 @dataclass(frozen=True, eq=False)
-class Rated:
+class QualityBlock:
     """A block of cells of a mesh, with their quality."""
 
     ids: IntArray
@@ -42,9 +42,9 @@ class Rated:
     quality: Quality
 
 
-def rated_blocks(
+def quality_blocks(
     mesh: Zone, reference: Zone | None, metric: Metric, tick: Tick = lambda _: None
-) -> Iterator[Rated]:
+) -> Iterator[QualityBlock]:
     """Yield all cells of an SU2 binary mesh with their quality, in the order of the file.
 
     Parameters
@@ -72,10 +72,10 @@ def rated_blocks(
             now = Mesh(files.points(source, nodes), cells, name=source.name)
             base = now.with_points(before.points(before.before, nodes)) if before else None
             found = quality(now, base, metric)
-            known, signs = len(signs), ways_of(np.concatenate([signs, found.signs]))
+            known, signs = len(signs), orientations_of(np.concatenate([signs, found.signs]))
             if known < 2 == len(signs):
                 _require_right(reference or mesh, source.name, place.cells.count, before is None)
-            yield Rated(block.ids, nodes, now, base, found)
+            yield QualityBlock(block.ids, nodes, now, base, found)
             tick((block.first + len(block.types)) / place.cells.count)
 
 
@@ -93,8 +93,8 @@ def _require_right(mesh: Zone, name: str, count: int, alone: bool) -> None:
     """
     also = "rate a deformed mesh with --reference UNDEFORMED, " if alone else ""
     parts = [(first, min(first + CELLS, count)) for first in range(0, count, CELLS)]
-    with ALONE.sharing(facet_sums, *mesh) as do:
-        require_right(do(parts), name, also)
+    with SERIAL.sharing(facet_sums, *mesh) as do:
+        require_consistent_orientation(do(parts), name, also)
 
 
 def has_cells_of(mesh: Zone, other: Zone) -> bool:
@@ -126,7 +126,7 @@ def has_cells_of(mesh: Zone, other: Zone) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Whole:
+class MeshQuality:
     """The quality and the counts of all cells of a mesh."""
 
     quality: Quality
@@ -141,7 +141,7 @@ class Whole:
     """`points`, `unused`: the number of points, and of those that no cell uses."""
 
 
-def rated_whole(
+def measure_mesh(
     stack: ExitStack,
     folder: Path,
     mesh: Zone,
@@ -150,7 +150,7 @@ def rated_whole(
     metric: Metric = "knupp",
     listed: int = 10,
     tick: Tick = lambda _: None,
-) -> Whole:
+) -> MeshQuality:
     """Return the quality and the counts of all cells of an SU2 binary mesh.
 
     Parameters
@@ -160,14 +160,14 @@ def rated_whole(
     folder : Path
         Where these files are made: 9 bytes for each cell.
     reference : file and zone, optional
-        The undeformed mesh, as for `rated_blocks`.
+        The undeformed mesh, as for `quality_blocks`.
     listed : int
         How many of the worst cells are wanted.
 
     Raises
     ------
     MeshError
-        As by `rated_blocks`.
+        As by `quality_blocks`.
     """
     with ExitStack() as here:
         place = _opened(here, mesh)[1]
@@ -177,7 +177,7 @@ def rated_whole(
     counts = np.zeros(256, np.int64)
     worst: list[tuple[float, int, int]] = []
     signs = np.zeros(0, np.int8)
-    for part in rated_blocks(mesh, reference, metric, tick):
+    for part in quality_blocks(mesh, reference, metric, tick):
         at, found = index_of(part.ids), part.quality
         values[at], status[at], signs = found.values, found.status, found.signs[:1]
         used[part.nodes[part.mesh.cells.connectivity]] = True
@@ -188,7 +188,7 @@ def rated_whole(
         for file in files:
             file.release()
     none = np.empty(0)
-    return Whole(
+    return MeshQuality(
         Quality(values, none, none, status, signs, metric),
         [(i, t) for _, i, t in worst],
         {vtk: int(counts[vtk]) for vtk in np.flatnonzero(counts).tolist()},

@@ -19,7 +19,7 @@ SURE = 0.1
 its own pace. Before stages worth so many seconds of `SECONDS` are done, nothing is estimated."""
 
 
-class Course:
+class RemainingTime:
     """The stages of a streamed run: passes each `Progress` on, with the seconds that are left.
 
     All stages but ``solve`` go through all points or cells. So the time that those took which are

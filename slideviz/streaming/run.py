@@ -33,12 +33,12 @@ from slideviz.solver.deform import (
 from slideviz.solver.growth import Farthest, stray_warning
 from slideviz.solver.setup import make_setup
 from slideviz.solver.stepping import Stepping
-from slideviz.streaming.interior import Rest
+from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.measuring import folded_steps
 from slideviz.streaming.output import Output
-from slideviz.streaming.remaining_time import Course
-from slideviz.streaming.stream_input import given_for, require_su2
-from slideviz.system.ranks import ALONE, Alone
+from slideviz.streaming.remaining_time import RemainingTime
+from slideviz.streaming.stream_input import open_for_run, require_su2
+from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import give_back
 from slideviz.terms import FileFormat
 
@@ -76,7 +76,7 @@ def stream(
     replaces: Path | None = None,
     listed: int = 100,
     later: int = 0,
-    ranks: Alone = ALONE,
+    ranks: SerialPool = SERIAL,
 ) -> StreamedRun:
     """Deform the mesh of a case from file to file, with only its skin in memory; return numbers.
 
@@ -101,7 +101,7 @@ def stream(
     later : int
         Bytes for each cell that the caller writes beside the output afterwards: the disk must
         have room for them, too.
-    ranks : Alone or Ranks
+    ranks : SerialPool or Ranks
         The processes that share the work; this one is rank 0.
 
     Raises
@@ -118,12 +118,12 @@ def stream(
     total = max(1, case.steps)
     is_text = (file_format or output.suffix.lower().removeprefix(".")) == "su2"
     first = "text" if require_su2(path, case.mesh_format) == "su2" else "read"
-    course = Course(tell, first, "solve", "evaluate", "quality", *("write",) * is_text)
-    watch = Watch(lambda phase, part: course(Progress(total, total, phase, part)))
+    remaining = RemainingTime(tell, first, "solve", "evaluate", "quality", *("write",) * is_text)
+    watch = Watch(lambda phase, part: remaining(Progress(total, total, phase, part)))
     with ExitStack() as stack:
         with watch.phase("read") as tick:
             given = stack.enter_context(
-                given_for(
+                open_for_run(
                     output,
                     path,
                     case.zone,
@@ -155,23 +155,23 @@ def stream(
         def read() -> Mesh:
             with watch.phase("read") as tick:
                 skin = given.skin(tick, ranks)
-            course.next()
+            remaining.next()
             return skin
 
-        rest = _solved(case, read, out, course)
+        displacer = _solved(case, read, out, remaining)
         give_back()
-        course.next()
-        out.displace(rest, final=True)
-        course.next()
+        remaining.next()
+        out.displace(displacer, final=True)
+        remaining.next()
         rating = out.rating(listed)
-        folded = folded_steps(rest, out.files, rating.inverted)
-        moved = rest.steps[-1].mesh.origin.ffd
+        folded = folded_steps(displacer, out.files, rating.inverted)
+        moved = displacer.steps[-1].mesh.origin.ffd
         if is_text:
-            course.next()
-        out.finish(None if moved is rest.skin.origin.ffd else moved)
+            remaining.next()
+        out.finish(None if moved is displacer.skin.origin.ffd else moved)
     return StreamedRun(
-        rest.skin,
-        _of_whole(rest, rating.farthest),
+        displacer.skin,
+        _of_whole(displacer, rating.farthest),
         rating.quality(),
         rating.undeformed(),
         folded,
@@ -179,7 +179,7 @@ def stream(
     )
 
 
-def _solved(case: Case, read: Callable[[], Mesh], out: Output, tell: Tell) -> Rest:
+def _solved(case: Case, read: Callable[[], Mesh], out: Output, tell: Tell) -> InteriorDisplacer:
     """Read and deform the skin; return what displaces the rest of the mesh.
 
     With STEPS= auto, trials write the points of the whole mesh to ``out`` to rate it.
@@ -203,11 +203,11 @@ def _solved(case: Case, read: Callable[[], Mesh], out: Output, tell: Tell) -> Re
         give_back()
 
         def rate(steps: Sequence[Step]) -> Quality:
-            out.displace(Rest(skin, lean, steps), final=False)
+            out.displace(InteriorDisplacer(skin, lean, steps), final=False)
             return out.rating(0).quality()
 
         steps = tuple(all_steps(Stepping(case, skin, setup, tell, watch.seconds, rate)))
-    return Rest(skin, lean, steps)
+    return InteriorDisplacer(skin, lean, steps)
 
 
 @contextmanager
@@ -259,16 +259,16 @@ def about_run(case: Case) -> str:
     return hashlib.sha256(f"{text}{state.st_size} {state.st_mtime_ns}".encode()).hexdigest()
 
 
-def _of_whole(rest: Rest, farthest: Farthest) -> tuple[Step, ...]:
+def _of_whole(displacer: InteriorDisplacer, farthest: Farthest) -> tuple[Step, ...]:
     """Return the steps of the skin, with the ``node_counts`` of the whole mesh.
 
     The last one warns of the node of the whole mesh that went farthest, if it strays.
     """
-    skin, last = rest.skin, rest.steps[-1]
+    skin, last = displacer.skin, displacer.steps[-1]
     assert skin.part is not None
     more = skin.part.n_points - len(skin.points)
-    stray = stray_warning(rest.setup, skin, last.mesh.points, farthest)
-    steps = (*rest.steps[:-1], replace(last, warnings=(*last.warnings, *stray)))
+    stray = stray_warning(displacer.setup, skin, last.mesh.points, farthest)
+    steps = (*displacer.steps[:-1], replace(last, warnings=(*last.warnings, *stray)))
     return tuple(
         replace(
             step,

@@ -24,7 +24,7 @@ from slideviz.formats.su2b.read import boundaries_elsewhere, point_block, read_e
 from slideviz.mesh.check import LARGEST, first_fault
 from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Part, frozen_array
-from slideviz.system.ranks import ALONE, Alone
+from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import Tick
 
 Index = slice | IntArray
@@ -32,7 +32,7 @@ Index = slice | IntArray
 
 
 def read_skin(
-    path: Path, zone: int | None, progress: Tick = lambda _: None, ranks: Alone = ALONE
+    path: Path, zone: int | None, progress: Tick = lambda _: None, ranks: SerialPool = SERIAL
 ) -> Mesh:
     """Return the skin of a zone of an SU2 binary mesh; the whole zone is read and checked.
 

@@ -30,17 +30,17 @@ from slideviz.formats.su2b.write import (
 )
 from slideviz.mesh.model import Mesh
 from slideviz.streaming.disk_space import (
-    bytes_left,
     bytes_of_binary,
     bytes_of_text,
-    require_room,
+    require_disk_space,
+    reusable_bytes,
     text_size,
 )
 from slideviz.streaming.skin import read_skin
 from slideviz.streaming.text_skin import naming_text, skin_of_text
 from slideviz.system.atomic import reason_of
 from slideviz.system.cleanup import draft, open_temporary
-from slideviz.system.ranks import ALONE, Alone
+from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import Tick
 from slideviz.terms import FileFormat
 
@@ -50,7 +50,7 @@ checksums of the copy are computed."""
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
+class StreamInput:
     """A mesh to be streamed, in an SU2 binary file."""
 
     path: Path
@@ -59,7 +59,7 @@ class Given:
     """The zone in it, from 1; the first where it is None."""
     text: Text | None = None
     """The text that ``path`` is a copy of."""
-    is_left: bool = False
+    is_reused: bool = False
     """Whether the copy was made by an earlier run that was stopped."""
 
     def text_size(self, place: ZonePlace) -> int:
@@ -68,7 +68,7 @@ class Given:
             return self.text.lines.raw.size
         return text_size(place)
 
-    def skin(self, tick: Tick, ranks: Alone = ALONE) -> Mesh:
+    def skin(self, tick: Tick, ranks: SerialPool = SERIAL) -> Mesh:
         """Return the boundary and the cells at it; the whole mesh is read and checked.
 
         Raises
@@ -122,13 +122,13 @@ def _streamable(path: Path, zone: int | None, tick: Tick) -> Text:
 
 
 @contextmanager
-def given_mesh(
+def open_read_only(
     path: Path,
     zone: int | None,
     tick: Tick,
     folder: Path,
     file_format: FileFormat | None = None,
-) -> Iterator[Given]:
+) -> Iterator[StreamInput]:
     """Context with a mesh that is only looked at; the binary copy of a text is in ``folder``.
 
     The copy is removed at the end.
@@ -139,13 +139,13 @@ def given_mesh(
         It is of no format that can be streamed, or has a mistake.
     """
     if require_su2(path, file_format) == "su2b":
-        yield Given(path, zone)
+        yield StreamInput(path, zone)
         return
     plan = planned(_streamable(path, zone, tick), is_result=False)
     with draft(folder) as ours:
         try:
             open_temporary(ours, new=True).close()
-            require_room(ours, path, plan.size)
+            require_disk_space(ours, path, plan.size)
             os.truncate(ours, plan.size)
             head = fill(plan, ours, part_of(tick, SCANNED, COPIED))
             with open_temporary(ours) as file:
@@ -156,11 +156,11 @@ def given_mesh(
                 "(TMPDIR names another folder)"
             ) from problem
         with naming_text(plan.text, ours):
-            yield Given(ours, None, plan.text)
+            yield StreamInput(ours, None, plan.text)
 
 
 @contextmanager
-def given_for(
+def open_for_run(
     output: Path,
     path: Path,
     zone: int | None,
@@ -171,9 +171,9 @@ def given_for(
     resume: bool,
     warn: Callable[[str], object],
     tick: Tick,
-    ranks: Alone,
+    ranks: SerialPool,
     later: int = 0,
-) -> Iterator[Given]:
+) -> Iterator[StreamInput]:
     """Context with a mesh to be deformed; the binary copy of a text is beside the output.
 
     The copy is removed at the end, but kept where the run is stopped, to go on with.
@@ -200,29 +200,29 @@ def given_for(
         if is_text:
             warn(_lost_in_text(output, path, zone))
         size = bytes_of_binary(path, zone, is_text=is_text, later=later)
-        require_room(output, output, size - bytes_left(output))
-        yield Given(path, zone)
+        require_disk_space(output, output, size - reusable_bytes(output))
+        yield StreamInput(path, zone)
         return
     text = _streamable(path, zone, tick)
     if not is_text:
         require_binary_names(printable(path.name), (m.name for m in text.zone.markers))
         lost = lost_of_text((part.key for part in text.zone.unknown), text.zone.bounds.zones)
         warn(sentence_of_lost(output, printable(path.name), lost))
-    plan, left = planned(text, is_result=not is_text), bytes_left(output)
+    plan, left = planned(text, is_result=not is_text), reusable_bytes(output)
     state = path.stat()
     about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {plan.size}"
     with partial_file(output, plan.size, about, resume=resume, more=BINARY) as copy:
-        is_left = (
+        is_reused = (
             copy.done > 0
             and checksums(copy.path, part_of(tick, SCANNED, COPIED), ranks) == copy.sums
         )
-        require_room(output, output, bytes_of_text(plan, is_text, later) - left)
-        if not is_left:
+        require_disk_space(output, output, bytes_of_text(plan, is_text, later) - left)
+        if not is_reused:
             head = fill(plan, copy.path, part_of(tick, SCANNED, FILLED), ranks)
             finish_head(copy.file, head)
             copy.note(checksums(copy.path, part_of(tick, FILLED, COPIED), ranks))
         with naming_text(text, copy.path):
-            yield Given(copy.path, None, text, is_left)
+            yield StreamInput(copy.path, None, text, is_reused)
         copy.remove()
 
 
@@ -243,7 +243,7 @@ def _lost_in_text(output: Path, path: Path, zone: int | None) -> str:
 
 
 def text_blocks(
-    given: Given, source: BinaryFile, place: ZonePlace, after: Path, ffd: bytes | None
+    given: StreamInput, source: BinaryFile, place: ZonePlace, after: Path, ffd: bytes | None
 ) -> Iterator[bytes]:
     """Yield the text of ``given`` block by block, with the coordinates in the file ``after``.
 

@@ -13,11 +13,11 @@ from slideviz.formats.su2.text import Text, boundaries_elsewhere
 from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import Mesh, Origin
 from slideviz.streaming.skin import read_skin
-from slideviz.system.ranks import ALONE, Alone
+from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import Tick
 
 
-def skin_of_text(text: Text, path: Path, tick: Tick, ranks: Alone = ALONE) -> Mesh:
+def skin_of_text(text: Text, path: Path, tick: Tick, ranks: SerialPool = SERIAL) -> Mesh:
     """Return the skin of a zone of a text mesh, whose conversion to a binary mesh is at ``path``.
 
     Names, zone and source are those of the text. Raises MeshError as `read_skin`, naming the text.

@@ -13,7 +13,7 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 
-def in_order(work: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Result]:
+def ordered_map(work: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Result]:
     """Yield what ``work`` returns for each task, in order; raise its error in place of a result.
 
     Tasks are done in as many threads as `cores`, at most twice as many ahead: so results that

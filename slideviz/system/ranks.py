@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
-Make = Callable[..., AbstractContextManager[Callable[[Task], Result]]]
+WorkerFactory = Callable[..., AbstractContextManager[Callable[[Task], Result]]]
 """What makes a worker: a context manager with the function that does one task."""
-Do = Callable[[Sequence[Task]], Iterator[Result]]
+RunTasks = Callable[[Sequence[Task]], Iterator[Result]]
 """A function that does tasks, in parallel, and yields their results in order."""
 
 AHEAD = 4
@@ -37,13 +37,15 @@ PIECE = 1 << 30
 """Most bytes of one message: MPI counts them in 32 bits."""
 
 
-class Alone:
+class SerialPool:
     """A single process without MPI, which does as many parts at a time as it has cores."""
 
     size = 1
 
     @contextmanager
-    def sharing(self, make: Make[Task, Result], *given: Any) -> Iterator[Do[Task, Result]]:
+    def sharing(
+        self, make: WorkerFactory[Task, Result], *given: Any
+    ) -> Iterator[RunTasks[Task, Result]]:
         """Context with a function that does tasks and yields their results in order.
 
         Parameters
@@ -76,12 +78,12 @@ def _in_order(
         yield ahead.popleft().result()
 
 
-ALONE = Alone()
+SERIAL = SerialPool()
 """The default where no ranks are given."""
 
 
 @dataclass(eq=False)
-class Ranks(Alone):
+class Ranks(SerialPool):
     """Processes that MPI connects. Rank 0 works in ``with ranks:``; the others call `serve`."""
 
     comm: Intracomm
@@ -140,10 +142,12 @@ class Ranks(Alone):
         self._send_all(None)
 
     @contextmanager
-    def sharing(self, make: Make[Task, Result], *given: Any) -> Iterator[Do[Task, Result]]:
+    def sharing(
+        self, make: WorkerFactory[Task, Result], *given: Any
+    ) -> Iterator[RunTasks[Task, Result]]:
         """Context with a function that does tasks on all ranks and yields their results in order.
 
-        Only rank 0 calls it; `Alone.sharing` has the parameters.
+        Only rank 0 calls it; `SerialPool.sharing` has the parameters.
         """
         content = pickle.dumps((make, given), 5)
         self._send_all(True)
@@ -170,7 +174,9 @@ class Ranks(Alone):
                 with ExitStack() as stack:
                     self._serve(stack, make, given)
 
-    def _serve(self, stack: ExitStack, make: Make[Any, Any], given: tuple[Any, ...]) -> None:
+    def _serve(
+        self, stack: ExitStack, make: WorkerFactory[Any, Any], given: tuple[Any, ...]
+    ) -> None:
         """Do the tasks of one `sharing` context, and send each result or error to rank 0.
 
         If ``make`` fails, its error is the answer to each task.

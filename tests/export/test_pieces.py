@@ -11,7 +11,7 @@ from slideviz.export.picture_options import PictureOptions
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.session import changes, pieces
-from slideviz.session.pieces import Beside, appearing, here, portions, whole
+from slideviz.session.pieces import InThread, appearing, portions, run_inline, run_to_end
 from slideviz.session.state import StepFrame
 
 PLAIN = PictureOptions((300, 200))
@@ -21,7 +21,7 @@ def work(log, value=2):
     try:
         yield "begun"
         try:
-            found = yield Beside(lambda going_on: 1 / value)
+            found = yield InThread(lambda going_on: 1 / value)
         except ZeroDivisionError:
             found = "none"
         yield None
@@ -34,27 +34,27 @@ def work(log, value=2):
 
 def test_what_may_be_done_beside_is_done_here_and_sent():
     log = []
-    run = here(work(log))
+    run = run_inline(work(log))
     assert list(run) == ["begun", None, "middle"]
     assert log == [0.5, "tidied"]
-    assert whole(work([])) == 0.5
+    assert run_to_end(work([])) == 0.5
 
 
 def test_what_goes_wrong_beside_is_thrown_into_the_work():
     log = []
-    assert whole(work(log, 0)) == "none"
+    assert run_to_end(work(log, 0)) == "none"
     assert log == ["none", "tidied"]
 
     def careless():
-        yield Beside(lambda _: 1 / 0)
+        yield InThread(lambda _: 1 / 0)
 
     with pytest.raises(ZeroDivisionError, match="division"):
-        whole(careless())
+        run_to_end(careless())
 
 
 def test_work_that_is_closed_tidies_up():
     log = []
-    run = here(work(log))
+    run = run_inline(work(log))
     next(run)
     run.close()
     assert log == ["tidied"]
@@ -122,7 +122,7 @@ def test_a_picture_in_pieces_is_the_one_that_is_drawn_at_once(session, square, m
     with OffscreenRenderer(session, surfaces) as renderer:
         assert sum(1 for _ in renderer.prepare_steps()) > 10
         assert not list(renderer.prepare_steps()), "once"
-        assert np.array_equal(whole(renderer.render_steps(PLAIN)), at_once)
+        assert np.array_equal(run_to_end(renderer.render_steps(PLAIN)), at_once)
     with OffscreenRenderer(session, surfaces) as renderer:
         stopped = renderer.render_steps(PLAIN)
         for _ in range(5):
@@ -143,7 +143,7 @@ def test_a_picture_is_drawn_once(session, square):
 def test_another_step_is_pictured_and_the_session_stays(session, square):
     with OffscreenRenderer(session, find_surfaces(square)) as renderer:
         last = renderer.image(PLAIN)
-        first = whole(renderer.render_steps(PLAIN, frame=0))
+        first = run_to_end(renderer.render_steps(PLAIN, frame=0))
         assert renderer.session is session
         assert not np.array_equal(first, last)
         assert np.array_equal(renderer.image(PLAIN), last)

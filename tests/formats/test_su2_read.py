@@ -10,7 +10,7 @@ import slideviz.formats.su2.scan as su2_scan
 from slideviz.formats.files import read
 from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.check import unused_nodes
-from slideviz.streaming.stream_input import given_mesh
+from slideviz.streaming.stream_input import open_read_only
 
 
 def test_square(tmp_path):
@@ -118,7 +118,7 @@ def test_another_spelling_that_su2_reads_is_read_with_a_remark(tmp_path):
     assert_same(mesh, read(save(tmp_path, SQUARE, "usual.su2")))
     (remark,) = mesh.remarks
     assert remark == "line 18 has MARKERTAG=, which is read as MARKER_TAG="
-    with given_mesh(path, None, lambda _: None, tmp_path) as given:
+    with open_read_only(path, None, lambda _: None, tmp_path) as given:
         assert given.skin(lambda _: None).remarks == mesh.remarks
     assert b"".join(su2_blocks(mesh)) == text.encode()
 

@@ -7,7 +7,7 @@ from qtpy.QtCore import QTimer
 
 from slideviz.errors import Cancelled
 from slideviz.gui.responsiveness.piece_runner import PieceRunner
-from slideviz.session.pieces import Beside
+from slideviz.session.pieces import InThread
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def test_what_draws_is_done_here_and_the_rest_beside(runner, qtbot):
 
     def work():
         threads.append(threading.current_thread())
-        other = yield Beside(lambda _: threading.current_thread())
+        other = yield InThread(lambda _: threading.current_thread())
         yield None
         threads.append(threading.current_thread())
         yield 7
@@ -74,7 +74,7 @@ def test_what_goes_wrong_is_told_once(runner, qtbot, beside):
 
     def work():
         if beside:
-            yield Beside(fail)
+            yield InThread(fail)
         else:
             yield None
             fail()
@@ -90,7 +90,7 @@ def test_an_error_beside_can_be_caught_by_the_work(runner, qtbot):
 
     def work():
         try:
-            yield Beside(lambda _: 1 / 0)
+            yield InThread(lambda _: 1 / 0)
         except ZeroDivisionError:
             return "caught"
 
@@ -113,7 +113,7 @@ def test_stopping_ends_what_is_done_beside_and_tells_nothing(runner, qtbot):
 
     def work():
         try:
-            yield Beside(slow)
+            yield InThread(slow)
         finally:
             ends.append("work")
 

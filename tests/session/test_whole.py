@@ -9,7 +9,7 @@ from slideviz.samples.table import sample
 from slideviz.session.inspect import WORST, cell_info, worst_cells
 from slideviz.session.large import frame_of
 from slideviz.session.results import StepFrame
-from slideviz.session.whole import PartQuality, Tallying, measure_all, tally_of
+from slideviz.session.whole import PartQuality, QualityAccumulator, measure_all, totals_of
 from slideviz.streaming.skin import read_skin
 
 
@@ -31,7 +31,7 @@ def test_numbers_of_all_cells(folded):
     mesh, moved, _ = folded
     found = quality(moved, mesh)
     assert found.inverted > 3
-    part = PartQuality.of(quality(mesh), tally_of(found))
+    part = PartQuality.of(quality(mesh), totals_of(found))
     for name in ("cells", "inverted", "unproven", "valid", "min"):
         assert getattr(part, name) == getattr(found, name), name
     assert part.mean == pytest.approx(found.mean, rel=1e-14)
@@ -44,21 +44,21 @@ def test_numbers_of_all_cells(folded):
 def test_blocks_in_any_order_give_the_same(folded, size):
     mesh, moved, _ = folded
     found = quality(moved, mesh)
-    made = Tallying()
+    made = QualityAccumulator()
     starts = list(range(0, len(found), size))
     for first in np.random.default_rng(2).permutation(starts):
         part = slice(first, first + size)
         made.add(np.arange(len(found))[part], found.values[part], found.status[part])
-    np.testing.assert_array_equal(made.tally().worst, found.worst(WORST))
-    assert made.tally().mean == pytest.approx(found.mean, rel=1e-13)
-    np.testing.assert_array_equal(made.tally().counts, tally_of(found).counts)
+    np.testing.assert_array_equal(made.totals().worst, found.worst(WORST))
+    assert made.totals().mean == pytest.approx(found.mean, rel=1e-13)
+    np.testing.assert_array_equal(made.totals().counts, totals_of(found).counts)
 
 
 def test_an_undeformed_mesh_is_measured_in_its_file(folded):
     mesh, _, folder = folded
     told = []
-    found, tally = quality(mesh), measure_all(folder / "mesh.su2b", None, "knupp", told.append)
-    assert (tally.cells, tally.min) == (found.cells, found.min)
+    found, totals = quality(mesh), measure_all(folder / "mesh.su2b", None, "knupp", told.append)
+    assert (totals.cells, totals.min) == (found.cells, found.min)
     assert told[-1] == 1.0
 
 
@@ -67,8 +67,8 @@ def test_the_worst_cells_are_those_of_the_mesh_in_memory(folded):
     found = quality(moved, mesh)
     skin = read_skin(folder / "mesh.su2b", None)
     now = skin.with_points(moved.points[skin.part.points])
-    first = frame_of(skin, skin, folder / "mesh.su2b", tally_of(quality(mesh)), "knupp")
-    frame = frame_of(now, skin, folder / "moved.su2b", tally_of(found), "knupp")
+    first = frame_of(skin, skin, folder / "mesh.su2b", totals_of(quality(mesh)), "knupp")
+    frame = frame_of(now, skin, folder / "moved.su2b", totals_of(found), "knupp")
     there = worst_cells([StepFrame(mesh, quality(mesh)), StepFrame(moved, found)], 1, "size-skew")
     here = worst_cells([first, frame], 1, "skew")
     np.testing.assert_array_equal(here.known_as, there.cells)

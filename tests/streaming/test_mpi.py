@@ -134,7 +134,7 @@ def test_a_text_is_that_of_a_run_in_memory(tmp_path):
     assert [path.name for path in tmp_path.glob(".*")] == [".out.su2.finished"]
 
 
-class Sent(ranks.Alone):
+class Sent(ranks.SerialPool):
     """One process that sends itself all that ranks send each other."""
 
     size = 3
@@ -349,7 +349,7 @@ def working(seen):
 
 def test_parts_come_in_order_and_none_is_begun_after_an_error():
     seen = []
-    with ranks.ALONE.sharing(working, seen) as do:
+    with ranks.SERIAL.sharing(working, seen) as do:
         assert list(do(range(7))) == list(range(0, 70, 10))
         assert list(do([])) == []
         come = do(range(5, 1000))

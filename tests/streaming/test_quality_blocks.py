@@ -185,7 +185,7 @@ def test_numbers_of_cells_are_in_files_that_end(small):
     from contextlib import ExitStack
 
     with ExitStack() as stack:
-        whole = quality_blocks.rated_whole(stack, Path("scratch"), (Path("mesh.su2b"), None))
+        whole = quality_blocks.measure_mesh(stack, Path("scratch"), (Path("mesh.su2b"), None))
         assert len(list(Path("scratch").glob(f"{PREFIX}*"))) == 2
         assert whole.types == {9: 16}
     assert not list(Path("scratch").iterdir())

@@ -291,7 +291,7 @@ def test_an_early_end_tells_of_what_an_earlier_run_has_done(tmp_path, monkeypatc
     assert cleanup.left() == cleanup.NOTHING_LEFT  # as in a new process
     told = []
     with monkeypatch.context() as patch:
-        patch.setattr(streamed_run, "given_for", lambda *_, **__: told.append(cleanup.left()))
+        patch.setattr(streamed_run, "open_for_run", lambda *_, **__: told.append(cleanup.left()))
         with pytest.raises(TypeError):
             stream(case, out)
     assert told == [f"what an earlier run has done is kept in {ours}; go on with --resume"]
@@ -713,7 +713,7 @@ def test_what_is_left_is_of_all_stages(monkeypatch, stages):
     """On a machine of half the speed, all is known from the first stage on."""
     now, told = 0.0, []
     monkeypatch.setattr(remaining_time, "monotonic", lambda: now)
-    one = remaining_time.Course(told.append, *stages)
+    one = remaining_time.RemainingTime(told.append, *stages)
     total = 2.0 * sum(SECONDS[stage] for stage in stages)
     for k, stage in enumerate(stages):
         if k:
@@ -734,7 +734,7 @@ def test_what_is_left_is_of_all_stages(monkeypatch, stages):
 def test_steps_tell_how_long_the_boundary_takes(monkeypatch):
     now, told = 0.0, []
     monkeypatch.setattr(remaining_time, "monotonic", lambda: now)
-    one = remaining_time.Course(told.append, "read", "solve", "quality")
+    one = remaining_time.RemainingTime(told.append, "read", "solve", "quality")
     now = SECONDS["read"]
     one.next()
     now += 7.0

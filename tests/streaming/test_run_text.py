@@ -346,8 +346,8 @@ def late(what):
 output.CHUNK, scan.BLOCK_BYTES, binary_copy.PIECES = 60, 2000, 3
 output.move = late(output.move)
 binary_copy._put_cells = late(binary_copy._put_cells)
-from slideviz.streaming import stream_input as given_mesh
-given_mesh.moved_rows = late(given_mesh.moved_rows)
+from slideviz.streaming import stream_input
+stream_input.moved_rows = late(stream_input.moved_rows)
 run.stream(sv.Case.read(sys.argv[1]), Path(sys.argv[2]), resume=sys.argv[3] == "resume")
 """
 

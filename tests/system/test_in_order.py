@@ -7,7 +7,7 @@ import pytest
 from su2_samples import SOLID, save
 
 from slideviz.formats.files import read, write
-from slideviz.system.in_order import in_order
+from slideviz.system.in_order import ordered_map
 
 
 @pytest.fixture(params=[1, 2, 5], autouse=True)
@@ -25,8 +25,8 @@ def test_results_come_in_order_whichever_is_done_first():
         time.sleep(0.01 * (task % 3 == 0))
         return task * task
 
-    assert list(in_order(work, range(20))) == [task * task for task in range(20)]
-    assert list(in_order(work, [])) == []
+    assert list(ordered_map(work, range(20))) == [task * task for task in range(20)]
+    assert list(ordered_map(work, [])) == []
     assert block_threads() == 0
 
 
@@ -39,8 +39,8 @@ def test_the_first_error_in_order_is_raised_after_the_results_before_it():
 
     seen = []
     with pytest.raises(ValueError, match="3"):
-        seen += in_order(work, range(9))
-    results = in_order(work, range(9))
+        seen += ordered_map(work, range(9))
+    results = ordered_map(work, range(9))
     assert [next(results) for _ in range(3)] == [0, 1, 2]
     with pytest.raises(ValueError, match="3"):
         next(results)
@@ -49,7 +49,7 @@ def test_the_first_error_in_order_is_raised_after_the_results_before_it():
 
 def test_only_some_tasks_are_done_ahead(threads):
     begun = []
-    results = in_order(begun.append, range(1000))
+    results = ordered_map(begun.append, range(1000))
     next(results)
     time.sleep(0.05)
     assert len(begun) <= 2 * threads + 1
@@ -59,7 +59,7 @@ def test_only_some_tasks_are_done_ahead(threads):
 
 def test_all_threads_work_at_once(threads):
     together = threading.Barrier(threads)
-    assert len(list(in_order(lambda _: together.wait(10), range(2 * threads)))) == 2 * threads
+    assert len(list(ordered_map(lambda _: together.wait(10), range(2 * threads)))) == 2 * threads
 
 
 @pytest.mark.parametrize("calls", [1, 2, 7])

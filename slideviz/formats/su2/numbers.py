@@ -17,7 +17,7 @@ from slideviz.formats.su2.scan import Progress
 from slideviz.mesh.check import first_fault, no_node
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, IntArray
-from slideviz.system.in_order import in_order
+from slideviz.system.in_order import ordered_map
 
 _SUPPORTED = ", ".join(str(vtk) for vtk, row in ELEMENTS.items() if row.dim > 0)
 """The element types, for messages."""
@@ -93,7 +93,7 @@ def fill_cells(
 
 def _each(work: Callable[[Piece], None], rows: Rows, progress: Progress) -> None:
     """Call ``work`` with each piece, on all cores."""
-    for piece, _ in zip(rows, in_order(work, rows), strict=True):
+    for piece, _ in zip(rows, ordered_map(work, rows), strict=True):
         progress((piece.row + piece.rows) / number_of(rows))
 
 

@@ -10,7 +10,7 @@ from slideviz.errors import MeshError, printable
 from slideviz.formats.source import Source
 from slideviz.formats.su2.lines import Lines, line_end, text_of
 from slideviz.mesh.model import IntArray
-from slideviz.system.in_order import in_order
+from slideviz.system.in_order import ordered_map
 
 BLOCK_BYTES = 1 << 20
 """About how many bytes a block has: whole lines that are scanned together."""
@@ -49,7 +49,7 @@ def scan(raw: Source, progress: Progress) -> Lines:
 
     found, line, blank = [], 0, True
     blocks = _blocks(raw)
-    for (_, end), (runs, n_lines, empty) in zip(blocks, in_order(scanned, blocks), strict=True):
+    for (_, end), (runs, n_lines, empty) in zip(blocks, ordered_map(scanned, blocks), strict=True):
         runs[:, 1] += line
         found.append(runs)
         line += n_lines

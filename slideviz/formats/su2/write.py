@@ -20,7 +20,7 @@ from slideviz.formats.su2.scan import BLOCK_BYTES
 from slideviz.formats.su2.zone import SEND_RECEIVE
 from slideviz.mesh.check import check_mesh, check_points
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
-from slideviz.system.in_order import in_order
+from slideviz.system.in_order import ordered_map
 
 _BLOCK_ROWS = 20_000
 """Most elements or points in a block of text."""
@@ -114,7 +114,7 @@ def patched_blocks(
             return task
         return raw[slice(*task)] if isinstance(task, tuple) else rows_text(task)
 
-    yield from in_order(text, [*tasks, *_around(edits, done, raw.size + 1)])
+    yield from ordered_map(text, [*tasks, *_around(edits, done, raw.size + 1)])
     raw.require_same()
 
 
@@ -241,7 +241,7 @@ def _zone(dim: int, cells: tuple[int, CellsOf], points: tuple[int, PointsOf]) ->
     yield f"NDIME= {dim}\nNELEM= {cells[0]}\n".encode()
     yield from _elements(*cells, numbered=True)
     yield f"NPOIN= {points[0]}\n".encode()
-    yield from in_order(partial(_point_rows, points[1]), _blocks(points[0]))
+    yield from ordered_map(partial(_point_rows, points[1]), _blocks(points[0]))
 
 
 def _whole_zone(mesh: Mesh) -> Iterator[bytes]:
@@ -284,7 +284,7 @@ def _markers(markers: Sequence[Marker], sends: int) -> Iterator[bytes]:
 
 def _elements(count: int, cells: CellsOf, *, numbered: bool) -> Iterator[bytes]:
     """Yield a line for each element: type, nodes, and its index where asked for."""
-    yield from in_order(partial(_cell_rows, cells, numbered), _blocks(count))
+    yield from ordered_map(partial(_cell_rows, cells, numbered), _blocks(count))
 
 
 def _cell_rows(cells: CellsOf, numbered: bool, block: tuple[int, int]) -> bytes:

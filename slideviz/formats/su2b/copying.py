@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 from slideviz.errors import MeshError
 from slideviz.system.cleanup import open_temporary
-from slideviz.system.ranks import ALONE, Alone, Make
+from slideviz.system.ranks import SERIAL, SerialPool, WorkerFactory
 from slideviz.system.threads import Tick
 
 _PIECE = 1 << 26
@@ -29,7 +29,7 @@ Piece = tuple[int, int]
 
 
 def copying(
-    source: Path, ours: Path, parts: Sequence[Piece], ranks: Alone, *, is_left: bool
+    source: Path, ours: Path, parts: Sequence[Piece], ranks: SerialPool, *, is_left: bool
 ) -> AbstractContextManager[Callable[[Tick], None]]:
     """Return a context with a function that waits until parts of a file are copied to another one.
 
@@ -39,7 +39,7 @@ def copying(
         The file to copy from, and the existing one to copy to.
     parts : sequence of Piece
         The ranges of bytes to copy.
-    ranks : Alone or Ranks
+    ranks : SerialPool or Ranks
         The processes that copy.
     is_left : bool
         Whether they were copied before, by a stopped process: then only bytes that differ are
@@ -50,7 +50,7 @@ def copying(
     return way(_mending if is_left else _copying, (source, ours), tasks, ranks)
 
 
-def checksums(path: Path, tick: Tick, ranks: Alone = ALONE) -> list[int]:
+def checksums(path: Path, tick: Tick, ranks: SerialPool = SERIAL) -> list[int]:
     """Return the CRC-32 of each piece of a file."""
     found: list[int] = []
     tasks = _pieces(0, path.stat().st_size)
@@ -69,7 +69,10 @@ def _pieces(begin: int, end: int) -> list[Piece]:
 
 @contextmanager
 def _together(
-    make: Make[Piece, None], files: tuple[Path, Path], tasks: list[Piece], ranks: Alone
+    make: WorkerFactory[Piece, None],
+    files: tuple[Path, Path],
+    tasks: list[Piece],
+    ranks: SerialPool,
 ) -> Iterator[Callable[[Tick], None]]:
     """Context with a function in which all ranks do the ``tasks``, by ``make(*files)``."""
 
@@ -83,7 +86,7 @@ def _together(
 
 @contextmanager
 def _beside(
-    make: Make[Piece, None], files: tuple[Path, Path], tasks: list[Piece], _: Alone
+    make: WorkerFactory[Piece, None], files: tuple[Path, Path], tasks: list[Piece], _: SerialPool
 ) -> Iterator[Callable[[Tick], None]]:
     """Context in which a thread does the ``tasks``, with a function that waits for it.
 

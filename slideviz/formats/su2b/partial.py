@@ -23,7 +23,7 @@ from slideviz.formats.su2b.copying import Piece, copying
 from slideviz.system.atomic import mode_of, reason_of
 from slideviz.system.cleanup import keep, open_temporary, removed_at_stop
 from slideviz.system.file_checks import read_json, require_no_input
-from slideviz.system.ranks import ALONE, Alone
+from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import Tick
 
 BINARY = ".binary"
@@ -146,7 +146,7 @@ def partial_copy(
     *,
     resume: bool,
     replaces: Path | None,
-    ranks: Alone = ALONE,
+    ranks: SerialPool = SERIAL,
 ) -> Iterator[Partial]:
     """Context with a partial file that is a copy of ``source``, which replaces ``path`` at the end.
 
@@ -162,7 +162,7 @@ def partial_copy(
         As of `partial_file`.
     changed : tuple of int
         The first of the bytes that the caller changes, and the one after the last.
-    ranks : Alone or Ranks
+    ranks : SerialPool or Ranks
         The processes that copy.
 
     Raises

@@ -12,18 +12,18 @@ from slideviz.gui.responsiveness.settings import TURN_MS
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.session.jobs import raise_if_cancelled
-from slideviz.session.pieces import Beside
+from slideviz.session.pieces import InThread
 
 
 class PieceRunner(QObject):
     """Advances a generator (see `slideviz.session.pieces`) by one piece per turn of the event loop.
 
-    A piece that it yields as a `Beside` is run in a thread first, and its result sent back.
+    A piece that it yields as a `InThread` is run in a thread first, and its result sent back.
 
     Signals
     -------
     came(object)
-        A value that the generator yielded, if neither None nor a `Beside`.
+        A value that the generator yielded, if neither None nor a `InThread`.
     done(object)
         The generator's return value. Nothing is emitted for one that was stopped.
     failed(Exception)
@@ -80,7 +80,7 @@ class PieceRunner(QObject):
             self._pieces = None
             self.failed.emit(error)
         else:
-            if isinstance(piece, Beside):
+            if isinstance(piece, InThread):
                 self._runner.start(_call, piece)
                 return
             self._timer.start()
@@ -93,5 +93,5 @@ def raise_again(error: Exception) -> None:
     raise error
 
 
-def _call(piece: Beside, _report: object, stopped: Callable[[], bool]) -> Any:
+def _call(piece: InThread, _report: object, stopped: Callable[[], bool]) -> Any:
     return piece.call(partial(raise_if_cancelled, stopped))
