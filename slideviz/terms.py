@@ -23,13 +23,13 @@ class Term:
     """Its meaning, as a tip."""
     color: str = ""
     """The color it is drawn in, ``#rrggbb``; empty for none."""
-    alone: str = ""
+    standalone: str = ""
     """Its words without a heading, where they differ from ``label``."""
 
     @property
     def name(self) -> str:
         """Return the words for the value without a heading."""
-        return self.alone or self.label
+        return self.standalone or self.label
 
 
 def labels(terms: Mapping[Any, Term]) -> dict[str, str]:
@@ -172,7 +172,9 @@ FFD_SYSTEMS: dict[FfdSystem, Term] = {
 
 Sliding = Literal["none", "ps", "ds"]
 SLIDING: dict[Sliding, Term] = {
-    "none": Term("none", "Nodes of sliding boundaries stay where they are.", alone="no sliding"),
+    "none": Term(
+        "none", "Nodes of sliding boundaries stay where they are.", standalone="no sliding"
+    ),
     "ps": Term(
         "pseudo sliding",
         "Sliding nodes follow as inner nodes do and are put back on their boundary, in stages: "
@@ -199,8 +201,8 @@ class MethodTerm(Term):
 
 METHODS: dict[Method, MethodTerm] = {
     "rbf": MethodTerm("RBF interpolation"),
-    "idw": MethodTerm("Inverse distance weighting", alone="inverse distance"),
-    "elastic": MethodTerm("Linear elasticity", alone="linear elasticity", slides_by="ds"),
+    "idw": MethodTerm("Inverse distance weighting", standalone="inverse distance"),
+    "elastic": MethodTerm("Linear elasticity", standalone="linear elasticity", slides_by="ds"),
 }
 
 
@@ -272,7 +274,7 @@ PERIODIC_MODES: dict[PeriodicMode, Term] = {
     "none": Term(
         "none",
         "Periodic boundaries are treated as sliding ones; distances do not repeat.",
-        alone="not periodic",
+        standalone="not periodic",
     ),
     "periodic": Term(
         "periodic distance",
@@ -412,7 +414,7 @@ SHOWN: dict[Shown, ShownTerm] = {
     "undeformed": ShownTerm(
         "Undeformed",
         "Draw the undeformed boundaries as a ghost.",
-        alone="Undeformed boundaries",
+        standalone="Undeformed boundaries",
         shortcut="U",
     ),
     "motion_ghost": ShownTerm(
@@ -434,7 +436,7 @@ SHOWN: dict[Shown, ShownTerm] = {
     "inverted": ShownTerm(
         "Inverted cells",
         "Mark inverted cells with rings of the same size at any zoom, in front of everything.",
-        alone="Rings at inverted cells",
+        standalone="Rings at inverted cells",
         shortcut="I",
         at_first=True,
         in_bar=False,

@@ -221,12 +221,12 @@ def embedding(box: Box, mesh: Mesh, marker: str) -> tuple[Embedding, float]:
 def off_points(box: Box, mesh: Mesh, marker: str) -> list[str]:
     """Return a warning where the nodes of a marker in a box are off (`embedding`); else []."""
     _, off = embedding(box, mesh, marker)
-    said = (
+    sentence = (
         f"{mesh.name}: the surface points of the FFD box {box.name!r} on {marker} are not those of "
         f"the mesh, by up to {off:.1g} of the box; was the mesh moved without it? Then define the "
         "box anew; or is it in other coordinates? Then set FFD_COORD_SYSTEM"
     )
-    return [said] if off > OFF else []
+    return [sentence] if off > OFF else []
 
 
 def ffd_displacements(case: Case, mesh: Mesh, names: Iterable[str]) -> dict[object, Displacements]:

@@ -290,7 +290,7 @@ def idle_settings(case: Case) -> tuple[str, ...]:
     found += [
         f"{key.name} is without effect: DATA_REDUCTION= AUTO finds the tolerance, YES takes it"
         for key in KEYS.values()
-        if key.unless is why_no_tolerance
+        if key.idle_reason is why_no_tolerance
         and case.reduction is not None
         and case.reduction.auto
         and key.get(case) != key.get(usual)

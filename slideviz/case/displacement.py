@@ -172,8 +172,8 @@ def _table(path: Path, lines: list[str], dim: int, columns: Columns) -> FloatArr
         kinds: dict[str, list[Problem]] = {}
         for line, sentence in problems:
             kinds.setdefault(sentence.rpartition("' ")[2], []).append((line, sentence))
-        told = [(kind[0][0], _with_count(kind[0][1], len(kind))) for kind in kinds.values()]
-        raise CaseError(listed(path, told))
+        messages = [(kind[0][0], _with_count(kind[0][1], len(kind))) for kind in kinds.values()]
+        raise CaseError(listed(path, messages))
     return np.array(rows, np.float64)
 
 
@@ -229,14 +229,14 @@ def _table_problems(
     ):
         if wrong.any():
             k = int(np.argmax(wrong))
-            said = f"{begin}{index[k]:.15g} {end}"
-            problems.append((row_line[k], _with_count(said, int(np.count_nonzero(wrong)))))
+            sentence = f"{begin}{index[k]:.15g} {end}"
+            problems.append((row_line[k], _with_count(sentence, int(np.count_nonzero(wrong)))))
     if differ.any():
         k = int(np.argmax(differ))
         before, after = row_line[order[k]], row_line[order[k + 1]]
-        said = f"node {int(index[order[k]])} has another {what} in line {before}"
-        said += "; keep one of the two"
-        problems.append((after, _with_count(said, int(np.count_nonzero(differ)))))
+        sentence = f"node {int(index[order[k]])} has another {what} in line {before}"
+        sentence += "; keep one of the two"
+        problems.append((after, _with_count(sentence, int(np.count_nonzero(differ)))))
     return problems
 
 

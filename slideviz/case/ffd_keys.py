@@ -70,8 +70,8 @@ def _write_definition(boxes: tuple[Definition, ...]) -> str:
 def _whole(words: list[Word], least: int) -> Degrees:
     values = [number(word.text) for word in words]
     if len(values) != 3 or any(value != int(value) or value < least for value in values):
-        said = ", ".join(word.text for word in words)
-        raise CaseError(f"({said}) is not three whole numbers from {least}")
+        listed = ", ".join(word.text for word in words)
+        raise CaseError(f"({listed}) is not three whole numbers from {least}")
     i, j, k = (int(value) for value in values)
     return i, j, k
 
@@ -91,7 +91,7 @@ def _write_orders(orders: Degrees) -> str:
 def _said_where_needed(row: Key) -> Key:
     """Return the row of a key, changed so that a file has the key only where it has an effect."""
     usual = getattr(Case(), row.field)
-    needs_boxes = row.unless is without_definition
+    needs_boxes = row.idle_reason is without_definition
 
     def get(case: Case) -> Any:
         value = getattr(case, row.field)
@@ -115,9 +115,9 @@ def ffd_contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
     boxes, degrees = len(case.ffd_boxes), len(case.ffd_degrees)
     if boxes == degrees or not boxes:
         return []
-    said = f"FFD_DEFINITION has {boxes} and FFD_DEGREE {degrees}" if degrees else ""
-    said = f"{said or 'FFD_DEGREE is missing'}; give a degree (i, j, k) for each box"
-    return [(("FFD_DEFINITION", "FFD_DEGREE"), said)]
+    sentence = f"FFD_DEFINITION has {boxes} and FFD_DEGREE {degrees}" if degrees else ""
+    sentence = f"{sentence or 'FFD_DEGREE is missing'}; give a degree (i, j, k) for each box"
+    return [(("FFD_DEFINITION", "FFD_DEGREE"), sentence)]
 
 
 DEFINITION = Kind("(NAME, 8 corners x, y, z) ; ...", _read_definition, _write_definition)
@@ -140,7 +140,7 @@ _ROWS = (
         "ffd_degrees",
         "The degrees of each box of FFD_DEFINITION: control points of each direction, less one.",
         label="FFD degrees",
-        unless=without_definition,
+        idle_reason=without_definition,
     ),
     setting(
         "FFD_BLENDING",
@@ -149,7 +149,7 @@ _ROWS = (
         "ffd_blending",
         "How control points of these boxes move what is inside.",
         label="FFD blending",
-        unless=without_definition,
+        idle_reason=without_definition,
     ),
     setting(
         "FFD_BSPLINE_ORDER",
@@ -158,7 +158,7 @@ _ROWS = (
         "ffd_orders",
         "With FFD_BLENDING= BSPLINE_UNIFORM, the orders of the splines, 2 or more.",
         label="FFD orders",
-        unless=without_definition,
+        idle_reason=without_definition,
     ),
     setting(
         "FFD_COORD_SYSTEM",
@@ -176,7 +176,7 @@ _ROWS = (
         "ffd_axis",
         "A point on that axis.",
         label="FFD axis",
-        unless=without_axis,
+        idle_reason=without_axis,
     ),
 )
 FFD_ROWS = tuple(_said_where_needed(row) for row in _ROWS)

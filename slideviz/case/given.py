@@ -78,5 +78,5 @@ def _read_file(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Displacement
     """
     if mesh.part is None:
         return read_displacements(path, nodes, mesh.points.shape, of)
-    whole = mesh.part.n_points, mesh.dim
-    return replace(read_displacements(path, mesh.part.points[nodes], whole, of), nodes=nodes)
+    shape = mesh.part.n_points, mesh.dim
+    return replace(read_displacements(path, mesh.part.points[nodes], shape, of), nodes=nodes)

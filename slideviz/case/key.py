@@ -51,12 +51,12 @@ class Key:
     not."""
     tip: str = ""
     """The tip of that field; empty: ``meaning``."""
-    said: str | None = None
+    run_label: str | None = None
     """Words in the label of a run whose value differs from those of other runs, with ``{}`` for the
     value. None: the key's label and the value; empty: no words."""
     method: Method | None = None
     """The only method that uses it."""
-    unless: Callable[[Case], str] = lambda _: ""
+    idle_reason: Callable[[Case], str] = lambda _: ""
     """Returns why the key has no effect in a case with that method; empty where it has one."""
     no_effect: str = ""
     """Why it never changes a result: for keys that are read only because RBF-SliDe has them."""
@@ -68,7 +68,7 @@ class Key:
 
     def idle(self, case: Case) -> str:
         """Return why the key has no effect in a case; "" where it has one."""
-        return other_method(case, self.method) or self.unless(case)
+        return other_method(case, self.method) or self.idle_reason(case)
 
 
 def other_method(case: Case, method: Method | None) -> str:

@@ -33,8 +33,8 @@ def _leading_file(case: Case) -> tuple[Motion, ...]:
 
 def put_file(case: Case, path: Path | None) -> Case:
     """Return the case with ``path`` as the leading displacement file, or None: without one."""
-    rest = case.motions[len(_leading_file(case)) :]
-    return case.change(motions=rest if path is None else (FromFile(path), *rest))
+    remaining = case.motions[len(_leading_file(case)) :]
+    return case.change(motions=remaining if path is None else (FromFile(path), *remaining))
 
 
 def get_file(case: Case) -> Path | None:
@@ -119,7 +119,7 @@ _ROWS = (
         YES_NO,
         "generate_quality",
         "Write the quality of the deformed mesh too.",
-        said="",
+        run_label="",
     ),
     setting(
         "QUALITY_METRIC",

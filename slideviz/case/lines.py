@@ -110,10 +110,10 @@ def require_some_key(
 ) -> None:
     """Raise CaseError with one sentence where a file of many wrong lines has no ``known`` key."""
     if len(problems) > _FEW and not any(entry.key in known for entry in entries):
-        line, said = min(problems)
+        line, sentence = min(problems)
         raise CaseError(
             f"{path}: is no case file, for it has no line with a key of slideviz (line {line}: "
-            f"{said}); a mesh is named in MESH_FILENAME="
+            f"{sentence}); a mesh is named in MESH_FILENAME="
         )
 
 

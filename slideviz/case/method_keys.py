@@ -67,7 +67,7 @@ METHOD_ROWS = (
         tip="How the inner nodes follow: by radial basis functions, or to compare with them, as "
         "means weighted with the inverse distance to the boundary, or as an elastic body whose "
         "cells are the stiffer the smaller they are (as SU2 deforms by default).",
-        said="",
+        run_label="",
     ),
     setting(
         "SLIDING_MODE",
@@ -79,8 +79,8 @@ METHOD_ROWS = (
         form="main",
         tip="Whether the nodes of sliding boundaries stay (none), slide and are put back on the "
         "boundary in stages (pseudo), or slide as part of the system itself (direct).",
-        said="",
-        unless=nothing_slides,
+        run_label="",
+        idle_reason=nothing_slides,
     ),
     setting(
         "STEPS",
@@ -93,7 +93,7 @@ METHOD_ROWS = (
         form="main",
         tip="Into how many equal parts the motion is divided: more keep large motions valid and "
         "take longer; automatic (0) takes as few as give no inverted cell.",
-        said="",
+        run_label="",
     ),
     setting(
         "STEPS_GAIN",
@@ -102,7 +102,7 @@ METHOD_ROWS = (
         "steps_gain",
         "With STEPS= auto, enough is when more steps raise the minimum quality by less than "
         "this part.",
-        said="gain {}",
+        run_label="gain {}",
     ),
     replace(
         setting(
@@ -117,7 +117,7 @@ METHOD_ROWS = (
             form="more",
             tip="Support radius: how far a boundary node reaches into the mesh, as a multiple of "
             "the mesh's largest extent. Automatic: as far as the motion needs.",
-            said="radius × {}",
+            run_label="radius × {}",
             method="rbf",
         ),
         put=put_factor,
@@ -129,7 +129,7 @@ METHOD_ROWS = (
         "support_radius",
         "Support radius in the mesh's length unit, instead of INFLUENCE_FACTOR.",
         label="Support radius as a length",
-        said="radius {}",
+        run_label="radius {}",
         method="rbf",
     ),
     setting(
@@ -147,7 +147,7 @@ METHOD_ROWS = (
         form="more",
         tip="The radial function; a global one reaches through the whole mesh whatever the "
         "radius, and wants a smaller support radius.",
-        said="{}",
+        run_label="{}",
         method="rbf",
     ),
     setting(
@@ -157,7 +157,7 @@ METHOD_ROWS = (
         "idw_power",
         "With METHOD= idw, the power of the inverse distance; the number of dimensions if not "
         "given.",
-        said="power {}",
+        run_label="power {}",
         method="idw",
     ),
     setting(
@@ -166,7 +166,7 @@ METHOD_ROWS = (
         real(1e-12, 1e12),
         "idw_fixed_weight",
         "With METHOD= idw, what a boundary node that stays counts, where one that moves counts 1.",
-        said="fixed weight {}",
+        run_label="fixed weight {}",
         method="idw",
     ),
     setting(
@@ -175,7 +175,7 @@ METHOD_ROWS = (
         YES_NO,
         "curved",
         "Without effect: curved boundaries, RBF-SliDe's switch, are found and followed anyway.",
-        said="",
+        run_label="",
         no_effect="curved boundaries are found and followed anyway",
     ),
     setting(

@@ -136,25 +136,25 @@ def _read_motion(group: list[Word]) -> Motion:
         raise CaseError(f"needed are a marker and one of {', '.join(VERBS)}")
     marker, items = _read_target(items)
     word = items[0].text if items else ""
-    verb, rest = word.lower(), items[1:]
+    verb, remaining = word.lower(), items[1:]
     if verb not in VERBS:
         hint = nearest(verb, VERBS)
         raise CaseError(f"{shown(word)} is not one of {', '.join(VERBS)}{hint}")
     if verb == "file":
-        return _read_file(marker, rest)
+        return _read_file(marker, remaining)
     if verb == "ffd":
-        return _read_ffd(marker, rest)
+        return _read_ffd(marker, remaining)
     if verb in _BUMPS:
-        return _read_bump(marker, verb, rest)
+        return _read_bump(marker, verb, remaining)
     if verb == "ffd-twist":
-        return _read_twist(marker, rest)
+        return _read_twist(marker, remaining)
     if verb in ("ffd-camber", "ffd-thickness"):
-        return _read_column(FfdCamber if verb == "ffd-camber" else FfdThickness, marker, rest)
+        return _read_column(FfdCamber if verb == "ffd-camber" else FfdThickness, marker, remaining)
     if verb == "translate":
-        return Translate(marker, read_vector(_flat(rest), "the shift"))
+        return Translate(marker, read_vector(_flat(remaining), "the shift"))
     if verb == "rotate":
-        return _read_rotate(marker, rest)
-    return _read_scale(marker, rest) if verb == "scale" else _read_radial(marker, rest)
+        return _read_rotate(marker, remaining)
+    return _read_scale(marker, remaining) if verb == "scale" else _read_radial(marker, remaining)
 
 
 def _read_target(items: list[Word]) -> tuple[Target, list[Word]]:

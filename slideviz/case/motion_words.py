@@ -265,9 +265,9 @@ def _along(axis: Sequence[float]) -> str:
 
 def direction_words(direction: Sequence[float]) -> str:
     """Return ``x``, ``-x`` and so on for a direction along an axis, else the vector as text."""
-    whole = (*direction, 0.0)[:3]
-    least = (1.0 - ALONG) * math.hypot(*whole)
-    for name, value in zip(AXES, whole, strict=True):
+    spatial = (*direction, 0.0)[:3]
+    least = (1.0 - ALONG) * math.hypot(*spatial)
+    for name, value in zip(AXES, spatial, strict=True):
         if abs(value) > least > 0.0:
             return name if value > 0.0 else f"-{name}"
     return vector_words(direction)

@@ -49,8 +49,8 @@ PERIODIC_ROWS = (
         tip="What the periodic boundaries do: nothing special (none), only the distance repeats "
         "(periodic), or both sides deform alike with the corners of the domain held (fixed "
         "vertices) or sliding along (moving vertices).",
-        said="",
-        unless=no_pair,
+        run_label="",
+        idle_reason=no_pair,
     ),
     setting(
         "PERIODIC_TYPE",
@@ -61,8 +61,8 @@ PERIODIC_ROWS = (
         label="Type",
         form="main",
         tip="Whether one side is the other one shifted or turned; automatic takes what matches.",
-        said="{} type",
-        unless=no_pair,
+        run_label="{} type",
+        idle_reason=no_pair,
     ),
     Key(
         "PERIODIC_DIRECTION",
@@ -73,7 +73,7 @@ PERIODIC_ROWS = (
         put_direction,
         get_direction,
         field="direction",
-        said="",
+        run_label="",
         no_effect="matching the periodic markers finds the direction",
     ),
     setting(
@@ -85,7 +85,7 @@ PERIODIC_ROWS = (
         label="Axis",
         form="main",
         tip="The axis that the mesh repeats about, for rotational periodicity.",
-        unless=no_pair,
+        idle_reason=no_pair,
     ),
     setting(
         "PERIODIC_ORIGIN",
@@ -95,7 +95,7 @@ PERIODIC_ROWS = (
         "A point on that axis.",
         label="Through",
         form="main",
-        said="axis through {}",
-        unless=no_pair,
+        run_label="axis through {}",
+        idle_reason=no_pair,
     ),
 )

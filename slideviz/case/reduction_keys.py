@@ -48,7 +48,7 @@ def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Ke
 
     usual = getattr(Reduction(), field)
     default = NO_DEFAULT if usual is None else kind.write(usual)
-    window = {"unless": why_no_reduction, **window}
+    window = {"idle_reason": why_no_reduction, **window}
 
     def get(case: Case) -> Any:
         given = case.reduction
@@ -56,7 +56,7 @@ def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Ke
             return None
         value = getattr(given, field)
         # A tolerance without effect is written to a file only where it is not the default.
-        idle = given.auto and window["unless"] is why_no_tolerance and value == usual
+        idle = given.auto and window["idle_reason"] is why_no_tolerance and value == usual
         return None if idle else value
 
     return Key(name, REDUCTION, kind, meaning, put, get, default, field=field, **window)
@@ -113,8 +113,8 @@ REDUCTION_ROWS = (
         form="main",
         tip="The largest error at the boundary that the control nodes may leave to the "
         "correction, in the mesh's length unit.",
-        said="",
-        unless=why_no_tolerance,
+        run_label="",
+        idle_reason=why_no_tolerance,
     ),
     greedy(
         "DATA_RED_RELATIVE",
@@ -122,8 +122,8 @@ REDUCTION_ROWS = (
         "relative",
         "The tolerance as a part of the mesh's largest extent, instead of DATA_RED_TOLERANCE.",
         label="a relative tolerance of a case file,",
-        said="",
-        unless=why_no_tolerance,
+        run_label="",
+        idle_reason=why_no_tolerance,
     ),
     greedy(
         "MULTILEVEL",
@@ -134,23 +134,23 @@ REDUCTION_ROWS = (
         form="more",
         tip="Whether data reduction selects in levels, each on what the ones before left, and "
         "what ends a level.",
-        said="",
+        run_label="",
     ),
     greedy(
         "MULTI_CRIT",
         one_of(LEVEL_CRITERIA),
         "criterion",
         "What ends a level: its number of nodes, or the fall of its error.",
-        said="levels by {}",
-        unless=why_no_levels,
+        run_label="levels by {}",
+        idle_reason=why_no_levels,
     ),
     greedy(
         "LVL_TOL_CRIT",
         real(0.0, 1.0),
         "level_tolerance",
         "Fall of the error that ends a level.",
-        said="a level ends at {}",
-        unless=why_no_levels,
+        run_label="a level ends at {}",
+        idle_reason=why_no_levels,
     ),
     greedy(
         "LVL_SIZE",
@@ -160,7 +160,7 @@ REDUCTION_ROWS = (
         label="A level ends at",
         form="more",
         tip="Number of control nodes of a level, or the part of its error at which it ends.",
-        unless=why_no_levels,
+        idle_reason=why_no_levels,
     ),
     Key(
         "DOUBLE_EDGE",
@@ -186,7 +186,7 @@ REDUCTION_ROWS = (
         whole(1),
         "max_nodes",
         "Stop at so many control nodes in any case.",
-        said="",
+        run_label="",
     ),
     greedy(
         "GAMMA",

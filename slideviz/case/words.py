@@ -178,8 +178,8 @@ def counted(number: int, what: str) -> str:
 def not_one_of(value: object, known: Iterable[str]) -> str:
     """Return the message that a value is none of the known ones, and which is most similar."""
     words = list(known)
-    said = shown(value) if isinstance(value, str) else repr(value)
-    return f"{said} is not one of {' | '.join(words)}{nearest(str(value), words)}"
+    quoted = shown(value) if isinstance(value, str) else repr(value)
+    return f"{quoted} is not one of {' | '.join(words)}{nearest(str(value), words)}"
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -14,7 +14,13 @@ from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.problem import Lag, Levels, Problem, Solution, Watch
 from slideviz.solver.deform import Progress, all_steps, free_memory, require_memory
 from slideviz.solver.setup import Setup, elastic_body, idw_weights
-from slideviz.solver.stepping import Stepping, cartesian, followed, moved_by, one_step
+from slideviz.solver.stepping import (
+    Stepping,
+    cartesian,
+    displaced_coords,
+    one_step,
+    with_halo_copies,
+)
 
 Tell = Callable[[Progress], None]
 
@@ -134,8 +140,8 @@ def _further(
             one_step(begun, coords, goal, watch, replace(solution, control=control, lag=lag))
         )
         lag = made[-1].lag
-        coords = moved_by(setup, coords, made[-1].displacement, goal)
+        coords = displaced_coords(setup, coords, made[-1].displacement, goal)
         if mesh.halo is not None:
             points = cartesian(setup.frame, mesh.points, setup.coords, coords)
-            coords = followed(setup, mesh, mesh.halo, points, coords)[1]
+            coords = with_halo_copies(setup, mesh, mesh.halo, points, coords)[1]
     return made

@@ -210,8 +210,8 @@ class BoxDeformation:
         if before is not None:
             rates.change[drive.box] = before = drive.move.pushed(points, amount, before)
         if rate:
-            own = rate * drive.move.slope(points, amount)
-            rates.change[drive.box] = own if before is None else before + own
+            mine = rate * drive.move.slope(points, amount)
+            rates.change[drive.box] = mine if before is None else before + mine
 
     def _place(self, box: Box) -> None:
         """Displace the nodes of a box to where its control points take them now."""
@@ -284,16 +284,16 @@ class BoxDeformation:
         self._tape.append(rates_of)
         self._apply(box, 1.0)
         self._place(box)
-        said = (
+        text = (
             f"OPT_LINE_SEARCH_BOUND: the FFD box {box.name!r} would move a node by {largest:.6g}; "
             f"its variables are scaled back to {bound:g}"
         )
         mine = [drive for drive in self.drives if drive.box == box.name]
         if not all(drive.relaxed for drive in mine):
-            said += ", but those of several values are applied twice, as in SU2"
+            text += ", but those of several values are applied twice, as in SU2"
         if after := self._after(box, relaxed=True):
-            said += f"; as in SU2, those of {after} get {self._relax:.6g} for OPT_RELAX_FACTOR"
-        self.notes.append(said)
+            text += f"; as in SU2, those of {after} get {self._relax:.6g} for OPT_RELAX_FACTOR"
+        self.notes.append(text)
 
     def _after(self, box: Box, *, relaxed: bool = False) -> str:
         """Return the boxes with moves that are deformed after a box, in words; "" if none is."""
@@ -330,8 +330,8 @@ class BoxDeformation:
                 step = abs(step) / (-2.0 if folded else 2.0)
                 total += step
         self._factor *= step
-        said = f"FFD_INTPREV: the FFD box {box.name!r} is deformed by {100.0 * total:g} % only"
-        said += ", and still intersects itself" if folded else ", as it intersected itself"
+        text = f"FFD_INTPREV: the FFD box {box.name!r} is deformed by {100.0 * total:g} % only"
+        text += ", and still intersects itself" if folded else ", as it intersected itself"
         if after := self._after(box):
-            said += f"; as in SU2, the variables of {after} get {self._factor:g} times their values"
-        self.notes.append(said)
+            text += f"; as in SU2, the variables of {after} get {self._factor:g} times their values"
+        self.notes.append(text)

@@ -45,22 +45,22 @@ def parametric(box: Box, points: FloatArray) -> tuple[FloatArray, np.ndarray]:
         In [0, 1]; NaN outside of the box.
     inside : (m,) bool
     """
-    whole = np.zeros((len(points), 3))
-    whole[:, : points.shape[1]] = points
+    spatial = np.zeros((len(points), 3))
+    spatial[:, : points.shape[1]] = points
     if box.system.kind != "CARTESIAN":
         straight = replace(box, points=box.q, system=CARTESIAN)
-        return parametric(straight, box.system.q_of(whole))
+        return parametric(straight, box.system.q_of(spatial))
     control = box.points.reshape(-1, 3)
     low, high = control.min(axis=0), control.max(axis=0)
     # A point of the box is a mean of control points, with weights that are not negative.
     size = high - low
     slack = INSIDE * size
-    near = ((whole >= low - slack) & (whole <= high + slack)).all(axis=1)
-    uvw = np.full(whole.shape, np.nan)
+    near = ((spatial >= low - slack) & (spatial <= high + slack)).all(axis=1)
+    uvw = np.full(spatial.shape, np.nan)
     chosen = np.flatnonzero(near)
     for first in range(0, len(chosen), CHUNK):
         rows = chosen[first : first + CHUNK]
-        uvw[rows] = _solved(box, whole[rows], size)
+        uvw[rows] = _solved(box, spatial[rows], size)
     inside = np.asarray(((uvw >= -INSIDE) & (uvw <= 1.0 + INSIDE)).all(axis=1))
     uvw[~inside] = np.nan
     return np.clip(uvw, 0.0, 1.0), inside
@@ -120,13 +120,13 @@ def _newton(
     Distances are scaled to a box of size 1 along each axis, since boxes can be thin.
     """
     uvw = uvw.copy()
-    rest = points - box.at(uvw)
-    gap = np.linalg.norm(rest / size, axis=1)
+    remaining = points - box.at(uvw)
+    gap = np.linalg.norm(remaining / size, axis=1)
     going = np.flatnonzero(gap > MET)
     for _ in range(STEPS):
         if not len(going):
             break
-        step = uvw_step(box.slopes(uvw[going]), rest[going])
+        step = uvw_step(box.slopes(uvw[going]), remaining[going])
         scale = np.ones(len(going))
         better = np.zeros(len(going), bool)
         for _ in range(HALVINGS):
@@ -135,7 +135,7 @@ def _newton(
             there = points[rows] - box.at(trial)
             left = np.linalg.norm(there / size, axis=1)
             good = left < gap[rows]
-            uvw[rows[good]], rest[rows[good]] = trial[good], there[good]
+            uvw[rows[good]], remaining[rows[good]] = trial[good], there[good]
             gap[rows[good]] = left[good]
             better[np.flatnonzero(~better)[good]] = True
             if better.all():

@@ -77,11 +77,11 @@ def _require_count(mesh: Mesh, lines: list[str], names: list[str]) -> None:
         )
 
 
-def _error(mesh: Mesh, line: int, sentence: str) -> MeshError:
+def _error(mesh: Mesh, line: int, why: str) -> MeshError:
     """Return the error about a line of the section, with its place in the file if it is known."""
     at = next(islice(chain.from_iterable(mesh.origin.ffd_at), line, None), None)
     place = mesh.name if at is None else f"{mesh.name}:{at + 1}"
-    return MeshError(f"{place}: {sentence}")
+    return MeshError(f"{place}: {why}")
 
 
 def key_of(line: str) -> str:
@@ -167,19 +167,19 @@ class _Reader:
         by_name = {each.name: each for each in boxes}
         parents = self.tags("FFD_PARENTS")
         if len(parents) > 1:
-            said = f"FFD_PARENTS is {len(parents)}; supported is one parent"
-            raise self.error(said, "FFD_PARENTS")
+            why = f"FFD_PARENTS is {len(parents)}; supported is one parent"
+            raise self.error(why, "FFD_PARENTS")
         if box.level >= levels:
-            said = f"FFD_LEVEL is {box.level}; FFD_NLEVEL must be larger, and is {levels}"
-            raise self.error(said, "FFD_LEVEL")
+            why = f"FFD_LEVEL is {box.level}; FFD_NLEVEL must be larger, and is {levels}"
+            raise self.error(why, "FFD_LEVEL")
         if parents and box.level <= by_name[box.parent].level:
-            said = f"FFD_LEVEL is {box.level}, as low as that of its parent {box.parent!r}"
-            raise self.error(f"{said}; make it larger", "FFD_LEVEL")
+            why = f"FFD_LEVEL is {box.level}, as low as that of its parent {box.parent!r}"
+            raise self.error(f"{why}; make it larger", "FFD_LEVEL")
         inner = {each.name for each in boxes if each.parent == box.name}
         if inner != set(self.tags("FFD_CHILDREN")):
             named = ", ".join(sorted(inner)) or "none"
-            said = f"FFD_CHILDREN must list the boxes that have it for a parent, which are {named}"
-            raise self.error(said)
+            why = f"FFD_CHILDREN must list the boxes that have it for a parent, which are {named}"
+            raise self.error(why)
 
     def orders(self, letters: str) -> Index | None:
         """Return the orders of the B-splines; None for a Bézier box."""
@@ -202,8 +202,8 @@ class _Reader:
         rows = self.numbers("FFD_CONTROL_POINTS", int(np.prod(shape)), 6)
         index = rows[:, :3]
         points = np.full((*shape, 3), np.nan)
-        whole = (index == np.floor(index)) & (index >= 0) & (index <= degrees)
-        if whole.all():
+        entire = (index == np.floor(index)) & (index >= 0) & (index <= degrees)
+        if entire.all():
             points[tuple(index.astype(int).T)] = rows[:, 3:]
         if np.isnan(points).any():
             limits = ", ".join(map(str, degrees))
@@ -273,8 +273,8 @@ class _Reader:
             except ValueError:
                 numbers = []
             if len(numbers) != width or not all(map(isfinite, numbers)):
-                said = f"the row '{' '.join(words)[:60]}' of {key} needs {width} finite numbers"
-                raise self.error(said, line)
+                why = f"the row '{' '.join(words)[:60]}' of {key} needs {width} finite numbers"
+                raise self.error(why, line)
             table[k] = numbers
         return table
 
@@ -284,7 +284,7 @@ class _Reader:
             raise self.error(f"{key}= is missing")
         return self.entries[key]
 
-    def error(self, sentence: str, at: str | int = "FFD_TAG") -> MeshError:
+    def error(self, why: str, at: str | int = "FFD_TAG") -> MeshError:
         """Return the error about the box, at the line of a key or at another line."""
         line = self.entries[at].line if isinstance(at, str) else at
-        return _error(self.mesh, line, f"FFD box {self.name!r}: {sentence}")
+        return _error(self.mesh, line, f"FFD box {self.name!r}: {why}")

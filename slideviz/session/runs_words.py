@@ -75,7 +75,7 @@ def control_nodes(run: Run) -> int | None:
 
 SETTINGS: tuple[Key, ...] = tuple(
     sorted(
-        (key for key in BY_WEIGHT if key.group in WORDED and key.said != ""),
+        (key for key in BY_WEIGHT if key.group in WORDED and key.run_label != ""),
         key=lambda key: WORDED[key.group],
     )
 )
@@ -94,7 +94,7 @@ def _setting_words(key: Key, case: Case) -> str:
         text = f"({', '.join(map(_number_words, value))})"
     elif key.kind.entry == "real":
         text = _number_words(value)
-    said = key.said or f"{key.label or key.name.replace('_', ' ')} {{}}".lower()
+    said = key.run_label or f"{key.label or key.name.replace('_', ' ')} {{}}".lower()
     return said.format(text + key.unit)
 
 

@@ -22,17 +22,17 @@ def roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
     """
     roles, notes = dict(case.roles), []
     for copy, origin in mesh.halo.sides if mesh.halo is not None else ():
-        own, other = (case.roles.get(name, "fixed") for name in (copy, origin))
+        role, other = (case.roles.get(name, "fixed") for name in (copy, origin))
         roles[copy] = other
-        if own == other == "periodic" and case.periodic == "none":
+        if role == other == "periodic" and case.periodic == "none":
             notes.append(
                 f"{copy} follows {origin} all the same, whose copy it is by the mesh's "
                 "SEND_RECEIVE markers"
             )
-        if own != other:
+        if role != other:
             notes.append(
                 f"{copy} follows {origin}, whose copy it is by the mesh's SEND_RECEIVE markers; "
-                f"its own role ({own}) has no effect"
+                f"its own role ({role}) has no effect"
             )
     return case.change(roles=roles), tuple(notes)
 

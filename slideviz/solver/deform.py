@@ -83,13 +83,13 @@ def deform(
     ...     print(step.index, step.mesh.points[:3, 0].round(2))
     1 [0.   1.28 2.5 ]
     """
-    tell = progress or (lambda _: None)
-    watch = Watch(lambda phase, fraction: tell(Progress(1, max(1, case.steps), phase, fraction)))
+    report = progress or (lambda _: None)
+    watch = Watch(lambda phase, fraction: report(Progress(1, max(1, case.steps), phase, fraction)))
     if setup is None:
         with watch.phase("classify"):
             setup = make_setup(case, mesh)
     require_memory(setup, case)
-    stepping = Stepping(case, mesh, setup, tell, watch.seconds)
+    stepping = Stepping(case, mesh, setup, report, watch.seconds)
     yield from all_steps(stepping)
 
 

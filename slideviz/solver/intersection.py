@@ -208,13 +208,13 @@ def _outside(case: Case, mesh: Mesh, nodes: IntArray, after: FloatArray) -> str 
     """
     boundary = boundary_of(mesh)
     for name in case.markers_with("moving"):
-        mine = boundary.facets[boundary.marker == boundary.names.index(name)]
-        mine = mine[np.isin(mine, nodes).all(axis=1)]
-        found, here = np.unique(mine, return_inverse=True)
-        here = here.reshape(mine.shape)
+        facets = boundary.facets[boundary.marker == boundary.names.index(name)]
+        facets = facets[np.isin(facets, nodes).all(axis=1)]
+        found, here = np.unique(facets, return_inverse=True)
+        here = here.reshape(facets.shape)
         label = components(len(found), here[:, :-1].ravel(), here[:, 1:].ravel())[here[:, 0]]
         for body in np.unique(label):
-            if not _is_lost(case, mesh, after, mine[label == body]):
+            if not _is_lost(case, mesh, after, facets[label == body]):
                 continue
             others = _others(case, mesh, name)
             hit = swept_crossing(mesh.points, after, mesh.marker(name).cells, others)
@@ -232,16 +232,16 @@ def _is_lost(case: Case, mesh: Mesh, after: FloatArray, facets: IntArray) -> boo
     """Return whether a moved body, of facets (k, c), is out of the mesh and its periodic images."""
     some = facets[np.linspace(0, len(facets) - 1, LOOKED_AT).astype(np.int64)]
     before, there = (_beside(points, some) for points in (mesh.points, after))
-    whole = boundary_of(mesh).facets
+    shell = boundary_of(mesh).facets
     # The markers have holes, so that they have no inside: take all sides of one cell alone.
-    if abs(winding(mesh.points, whole, before[:1])[0] - 1.0) > OPEN:
-        whole = shell_of(mesh)
+    if abs(winding(mesh.points, shell, before[:1])[0] - 1.0) > OPEN:
+        shell = shell_of(mesh)
     # Beside twisted facets, which are taken for triangles, a point may be on the wrong side.
-    there = there[[not _is_out(whole, mesh.points, point[None]) for point in before]]
-    if not len(there) or not _is_out(whole, after, there):
+    there = there[[not _is_out(shell, mesh.points, point[None]) for point in before]]
+    if not len(there) or not _is_out(shell, after, there):
         return False
-    others = np.setdiff1d(whole, facets)
-    return all(_is_out(whole, after, image) for image in _images(case, mesh, there, after[others]))
+    others = np.setdiff1d(shell, facets)
+    return all(_is_out(shell, after, image) for image in _images(case, mesh, there, after[others]))
 
 
 def _beside(points: FloatArray, facets: IntArray) -> FloatArray:
@@ -289,14 +289,14 @@ def _others(case: Case, mesh: Mesh, moved: str) -> list[tuple[str, Cells]]:
 
     These share no node with it, and do not give way (`intersection_message`).
     """
-    own = mesh.marker(moved).nodes
+    nodes = mesh.marker(moved).nodes
     passable = ("internal", "periodic") if case.periodic in ("fixed", "moving") else ("internal",)
     return [
         (marker.name, marker.cells)
         for marker in mesh.markers
         if marker.name != moved
         and case.roles.get(marker.name, "fixed") not in passable
-        and not np.isin(marker.nodes, own).any()
+        and not np.isin(marker.nodes, nodes).any()
     ]
 
 

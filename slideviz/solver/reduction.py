@@ -111,10 +111,10 @@ def loose_warnings(
         return [sentence]
     if reduction.tolerance <= LOOSE * largest:
         return []
-    whole, part = f"{largest / 100:.2g}", f"{largest / extent / 100:.2g}"
-    remedy = f"use DATA_RED_RELATIVE= {part} or less"
+    absolute, relative = f"{largest / 100:.2g}", f"{largest / extent / 100:.2g}"
+    remedy = f"use DATA_RED_RELATIVE= {relative} or less"
     if not case.reduction.relative:
-        remedy = f"use DATA_RED_TOLERANCE= {whole} or less (or DATA_RED_RELATIVE= {part})"
+        remedy = f"use DATA_RED_TOLERANCE= {absolute} or less (or DATA_RED_RELATIVE= {relative})"
     is_, so = "not below", "no control node is needed to meet it, and only the cells"
     if reduction.tolerance < largest:
         is_, so = "more than a tenth of", "control nodes follow the motion roughly, and the cells"

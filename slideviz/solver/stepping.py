@@ -39,7 +39,7 @@ class Stepping:
     mesh: Mesh
     setup: Setup
     """`case`, `mesh`, `setup`: what is asked, the undeformed mesh, and the arrays made of both."""
-    tell: Callable[[Progress], None]
+    report: Callable[[Progress], None]
     """Called with each ``Progress``; an exception it raises ends the run."""
     seconds: dict[str, float]
     """Spent before the first step, by phase; added to those of the first step."""
@@ -74,13 +74,13 @@ class Stepping:
         while ahead:
             part, halvings = ahead[0]
             total = index + len(ahead)
-            watch = Watch(self._report(index + 1, total), seconds)
+            watch = Watch(self._phase_report(index + 1, total), seconds)
             goal = setup.coords[setup.known] + setup.target * part
             solution = one_step(setup, coords, goal, watch, before)
-            moved = moved_by(setup, coords, solution.displacement, goal)
+            moved = displaced_coords(setup, coords, solution.displacement, goal)
             points = cartesian(setup.frame, mesh.points, setup.coords, moved)
             if mesh.halo is not None:
-                points, moved = followed(setup, mesh, mesh.halo, points, moved)
+                points, moved = with_halo_copies(setup, mesh, mesh.halo, points, moved)
             if not within(points, np.finfo(float).max):
                 raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
             step = self._made(index + 1, total, points, solution, watch, part)
@@ -153,8 +153,8 @@ class Stepping:
                 raise
             return float(misfits(*state).max()), [f"step {step.index}: {problem}"]
 
-    def _report(self, index: int, total: int) -> Callable[[str, float], None]:
-        return lambda phase, fraction: self.tell(Progress(index, total, phase, fraction))
+    def _phase_report(self, index: int, total: int) -> Callable[[str, float], None]:
+        return lambda phase, fraction: self.report(Progress(index, total, phase, fraction))
 
     def _made(
         self,
@@ -245,7 +245,7 @@ def problem_at(
     )
 
 
-def moved_by(
+def displaced_coords(
     setup: Setup, coords: FloatArray, displacement: FloatArray, goal: FloatArray
 ) -> FloatArray:
     """Return the coordinates (n, d) after a displacement, which they overwrite.
@@ -288,14 +288,14 @@ def cartesian(
     out = np.empty_like(points)
 
     def fill(part: slice) -> None:
-        rest = np.all(coords[part] == start[part], axis=1, keepdims=True)
-        out[part] = np.where(rest, points[part], frame.points(coords[part]))
+        unmoved = np.all(coords[part] == start[part], axis=1, keepdims=True)
+        out[part] = np.where(unmoved, points[part], frame.points(coords[part]))
 
     in_parts(fill, len(points))
     return out
 
 
-def followed(
+def with_halo_copies(
     setup: Setup, mesh: Mesh, halo: Halo, points: FloatArray, moved: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return Cartesian ``points`` and coordinates ``moved`` (n, d), with halo copies moved, too."""

@@ -191,8 +191,8 @@ def _foot(figure: Any, facets: Any, colors: Any, inverted: bool, notes: Sequence
 
     if notes:
         width = figure.get_size_inches()[0]
-        said = fitted("\n".join(notes), width - 0.2, SMALLEST)[0]
-        figure.supxlabel(said, x=0.1 / width, ha="left", fontsize=SMALLEST)
+        sentence = fitted("\n".join(notes), width - 0.2, SMALLEST)[0]
+        figure.supxlabel(sentence, x=0.1 / width, ha="left", fontsize=SMALLEST)
     place, _ = make_axes(facets.ravel().tolist(), location="bottom", shrink=0.6, aspect=30)
     color_bar(place, colors, "size-skew quality [-]", SMALLEST, inverted=inverted, upright=False)
     trim(figure, [*facets, [place]])

@@ -142,7 +142,7 @@ def _too_far(run: Run, one: str, other: str) -> Iterator[str]:
     reach = np.linalg.norm(np.array(list(where.values())) - run.mesh.points[nodes], axis=1).max()
     sides = simplices(run.mesh, [run.mesh.marker(other)], run.mesh.points)
     gap = distance(run.mesh.points[run.mesh.marker(one).nodes], sides).min()
-    own = simplices(run.mesh, [run.mesh.marker(one)], run.mesh.points)
-    back = distance(run.mesh.points[run.mesh.marker(other).nodes], own).min()
+    mine = simplices(run.mesh, [run.mesh.marker(one)], run.mesh.points)
+    back = distance(run.mesh.points[run.mesh.marker(other).nodes], mine).min()
     if reach < min(gap, back) - 1e-9 * run.mesh.extent:
         yield f"{one} moves {reach:.3g}, {other} is {min(gap, back):.3g} away"

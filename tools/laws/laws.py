@@ -121,11 +121,11 @@ def growth_is_bounded(run: Run, steps: list[Step]) -> Iterator[str]:
     length = np.linalg.norm(made, axis=1)
     moving = nodes_with(run.case, mesh, "moving")
     reach = [float(length[moving].max())]
-    rest = np.setdiff1d(np.arange(len(at)), moving)
-    slid = np.intersect1d(rest, nodes_with(run.case, mesh, "sliding"))
-    for nodes in (slid, rest):
+    remaining = np.setdiff1d(np.arange(len(at)), moving)
+    slid = np.intersect1d(remaining, nodes_with(run.case, mesh, "sliding"))
+    for nodes in (slid, remaining):
         for marker in mesh.markers:
-            mine = np.setdiff1d(marker.nodes, rest if nodes is slid else [])
+            mine = np.setdiff1d(marker.nodes, remaining if nodes is slid else [])
             if len(mine) > 1 and length[mine].max() <= TAKEN * reach[0]:
                 size = np.linalg.norm(at[mine] - at[mine].mean(axis=0), axis=1).max()
                 unlike = np.linalg.norm(made[mine] - made[mine].mean(axis=0), axis=1).max()

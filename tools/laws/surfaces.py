@@ -46,8 +46,8 @@ def off_surface(run: Run, points: FloatArray, rounding: float) -> Iterator[str]:
         if not len(nodes):
             continue
         turns = [turn * _shift(run, frame) for turn in ((0, -1, 1) if free else (0,))]
-        rest = [m for m in slide if m is not marker]
-        near = [m for m in rest if any(_smooth(run, marker, m, before, by) for by in turns)]
+        remaining = [m for m in slide if m is not marker]
+        near = [m for m in remaining if any(_smooth(run, marker, m, before, by) for by in turns)]
         near.insert(0, marker)
         sides = frame.opened(simplices(mesh, near, before))
         flat = _flat(sides, rounding)

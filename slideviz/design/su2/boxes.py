@@ -225,16 +225,18 @@ def problems_of_boxes(config: Su2Config, mesh: Mesh) -> list[str]:
     problems = []
     for place, variable in enumerate(config.variables, start=1):
         if variable.box not in known:
-            said = missing_box(mesh, variable.box, known, "define it with FFD_DEFINITION")
-            problems.append(f"variable {place}: {said}")
+            sentence = missing_box(mesh, variable.box, known, "define it with FFD_DEFINITION")
+            problems.append(f"variable {place}: {sentence}")
             continue
         box = known[variable.box]
         request = request_of(config, variable)
         if wrong := variable_problem(box, request, mesh.dim, variable.values):
             problems.append(f"variable {place}: {wrong}")
         if box.level and config.case.ffd_system != "CARTESIAN":
-            said = f"the FFD box {box.name!r} is nested, which needs FFD_COORD_SYSTEM= CARTESIAN"
-            problems.append(f"variable {place}: {said}")
+            sentence = (
+                f"the FFD box {box.name!r} is nested, which needs FFD_COORD_SYSTEM= CARTESIAN"
+            )
+            problems.append(f"variable {place}: {sentence}")
     return [f"{config.source}: {text}" for text in problems]
 
 

@@ -322,15 +322,15 @@ class _Reader:
         ):
             if words[key].upper() not in allowed:
                 listed = ", ".join(filter(None, allowed))
-                said = f"{shown(words[key])} is not supported; supported: {listed}"
-                self.note(self.rows[key], said)
+                sentence = f"{shown(words[key])} is not supported; supported: {listed}"
+                self.note(self.rows[key], sentence)
         if self.word("DEFORM_MESH", "NO").upper() == "YES":
-            said = "DEFORM_MESH= YES: SU2 would pass over the design variables; here they move"
-            self.warnings.append(f"{said} DV_MARKER")
+            sentence = "DEFORM_MESH= YES: SU2 would pass over the design variables; here they move"
+            self.warnings.append(f"{sentence} DV_MARKER")
         for key in ELSEWHERE:
             if key in self.rows:
-                said = "belongs into a case file (slideviz run); here DV_KIND says what moves"
-                self.note(self.rows[key], said)
+                sentence = "belongs into a case file (slideviz run); here DV_KIND says what moves"
+                self.note(self.rows[key], sentence)
         for key in ("FFD_FIX_I", "FFD_FIX_J", "FFD_FIX_K"):
             if any(not word.text.isdecimal() for word in list_of(words[key])):
                 self.note(self.rows[key], f"{shown(words[key])} is no list of whole numbers")
@@ -338,15 +338,15 @@ class _Reader:
             try:
                 value = number(words[key])
                 if value <= least or (key.endswith(COUNTS) and value != int(value)):
-                    whole = "whole number" if key.endswith(COUNTS) else "number"
-                    raise CaseError(f"{shown(words[key])} is no {whole} above {least:g}")
+                    needed = "whole number" if key.endswith(COUNTS) else "number"
+                    raise CaseError(f"{shown(words[key])} is no {needed} above {least:g}")
             except CaseError as problem:
                 self.note(self.rows[key], str(problem))
         if "DV_KIND" not in self.rows:
-            said = (
+            sentence = (
                 f"DV_KIND is missing: which design variables there are ({', '.join(supported())})"
             )
             close = misspelt("DV_KIND", self.rows)
             self.problems.append(
-                (max((e.line for e in self.rows.values()), default=1), said + close)
+                (max((e.line for e in self.rows.values()), default=1), sentence + close)
             )

@@ -26,8 +26,9 @@ def scaled(config: Su2Config, part: float) -> Su2Config:
 
 
 def _scaled(variable: DesignVariable, part: float) -> DesignVariable:
-    rest = 1.0 if variable.kind in ("SCALE", "SCALE_GRID") else 0.0  # the value that moves nothing
-    return replace(variable, values=tuple(rest + part * (v - rest) for v in variable.values))
+    # The value that moves nothing.
+    neutral = 1.0 if variable.kind in ("SCALE", "SCALE_GRID") else 0.0
+    return replace(variable, values=tuple(neutral + part * (v - neutral) for v in variable.values))
 
 
 def convex_part(
@@ -64,12 +65,12 @@ def convex_part(
             return None, 1
         return found, max(0, quality(deformed(found), reference=mesh).inverted - least)
 
-    whole, first = tried(config)
-    if whole is not None and not first:
-        return 1.0, whole, ()
-    if kind.group in WITHOUT_VALUE and whole is not None:
-        said = f"CONVEXITY_CHECK scales values, which {kind.kind} has none of: all of it is done"
-        return 1.0, whole, (said,)
+    full, first = tried(config)
+    if full is not None and not first:
+        return 1.0, full, ()
+    if kind.group in WITHOUT_VALUE and full is not None:
+        note = f"CONVEXITY_CHECK scales values, which {kind.kind} has none of: all of it is done"
+        return 1.0, full, (note,)
     best: tuple[float, Attempt] | None = None
     part, step, depth, valid = 1.0, 1.0, 0, False
     for _ in range(_count(config, "ITER")):
@@ -81,14 +82,14 @@ def convex_part(
             best, depth = (part, found), depth + 1
         if depth == _count(config, "DEPTH"):
             break
-    said = f"CONVEXITY_CHECK: all of the design would invert {first} more cells"
-    said = f"CONVEXITY_CHECK: {impossible[0]}" if whole is None else said
-    if best is None and whole is None:
+    note = f"CONVEXITY_CHECK: all of the design would invert {first} more cells"
+    note = f"CONVEXITY_CHECK: {impossible[0]}" if full is None else note
+    if best is None and full is None:
         raise impossible[0]
     if best is None:
-        assert whole is not None
-        return 1.0, whole, (f"{said}, and so does the smallest part that was tried, {part:g}",)
-    return *best, (f"{said}; {best[0]:g} of it is done: its values times {best[0]:g}",)
+        assert full is not None
+        return 1.0, full, (f"{note}, and so does the smallest part that was tried, {part:g}",)
+    return *best, (f"{note}; {best[0]:g} of it is done: its values times {best[0]:g}",)
 
 
 def _count(config: Su2Config, name: str) -> int:

@@ -74,10 +74,10 @@ def design_gradients(
         *_, last = deform(surface.case(), mesh, progress)
         return surface, last.mesh
 
-    part, (surface, _), said = convex_part(config, mesh, attempt, lambda each: each[1])
+    part, (surface, _), messages = convex_part(config, mesh, attempt, lambda each: each[1])
     found = find_gradients(surface, progress)
     variables = part * found.variables if found.at_design else found.variables
-    return surface, replace(found, variables=variables, warnings=(*found.warnings, *said))
+    return surface, replace(found, variables=variables, warnings=(*found.warnings, *messages))
 
 
 def find_gradients(
@@ -100,8 +100,8 @@ def find_gradients(
     if surface.whole:
         matched = match(found, mesh, surface.nodes, lambda: surface.moved().points)
         moved = displacement if matched.at_design else np.zeros_like(displacement)
-        told = (*surface.case().warnings, *matched.warnings)
-        return _gradients(surface, found, matched, matched.values, moved, told)
+        warnings = (*surface.case().warnings, *matched.warnings)
+        return _gradients(surface, found, matched, matched.values, moved, warnings)
     moves = bool(displacement.any())
     prepared: list[Deformer] = []
     written: list[FloatArray] = []
@@ -115,18 +115,18 @@ def find_gradients(
         written.append(points)
         return points
 
-    said: list[str] = []
-    with _heard(said):
+    messages: list[str] = []
+    with _heard(messages):
         matched = match(found, mesh, surface.nodes, design if moves else None)
         if moves and not matched.at_design:
             displacement = np.zeros_like(displacement)
             prepared.clear()
         deformer = (prepared or [_deformer(surface, displacement, progress)])[0]
         if written and matched.at_design:
-            said += _difference(deformer.deform(displacement), written[0])
+            messages += _difference(deformer.deform(displacement), written[0])
         pulled = deformer.vjp(displacement, matched.values)
-    said = [*deformer.warnings, *matched.warnings, *dict.fromkeys(said)]
-    return _gradients(surface, found, matched, pulled, displacement, said)
+    messages = [*deformer.warnings, *matched.warnings, *dict.fromkeys(messages)]
+    return _gradients(surface, found, matched, pulled, displacement, messages)
 
 
 def _gradients(
@@ -177,12 +177,12 @@ def _heard(said: list[str]) -> Iterator[None]:
 
 
 def _difference(found: FloatArray, written: FloatArray) -> list[str]:
-    """Return a sentence if ``found`` (n, d) is not what ``slideviz def`` writes; else none."""
+    """Return a messages if ``found`` (n, d) is not what ``slideviz def`` writes; else none."""
     gap = float(np.abs(found - written).max(initial=0.0))
     if gap <= CLOSE * largest_coordinate(written):
         return []
-    said = f"the gradient is that of a deformation whose points differ by up to {gap:.2g} from"
-    return [f"{said} those that `slideviz def` writes"]
+    messages = f"the gradient is that of a deformation whose points differ by up to {gap:.2g} from"
+    return [f"{messages} those that `slideviz def` writes"]
 
 
 def _deformer(

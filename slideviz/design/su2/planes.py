@@ -139,8 +139,8 @@ def held_by_continuity(
             partly += [place] * (0 < left < free)
         effects = [(stuck, "do nothing"), (partly, "leave the control points there")]
         if asked:
-            said = f"FFD_CONTINUITY= {asked} holds {_words(held)} of the box {name}: "
-            warnings += [f"{said}{places_words(at)} will {effect}" for at, effect in effects if at]
+            note = f"FFD_CONTINUITY= {asked} holds {_words(held)} of the box {name}: "
+            warnings += [f"{note}{places_words(at)} will {effect}" for at, effect in effects if at]
         elif stuck or partly:
             done = " and ".join(
                 f"{places_words(at)} would {effect}" for at, effect in effects if at

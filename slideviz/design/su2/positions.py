@@ -99,6 +99,6 @@ def read_positions(
     positions = mesh.points[nodes]
     positions[np.searchsorted(nodes, listed[moving])] = table[moving, 1:]
     if others:
-        said = f"{path}: {others} of {len(listed)} nodes are not on {of}; they are passed over"
-        warnings = (*warnings, said)
+        sentence = f"{path}: {others} of {len(listed)} nodes are not on {of}; they are passed over"
+        warnings = (*warnings, sentence)
     return positions, warnings

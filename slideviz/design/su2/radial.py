@@ -45,14 +45,14 @@ def radial_settings(
 ) -> Case:
     """Return the case with SU2's settings of radial functions, where slideviz's own are not given.
 
-    ``note`` takes a key with a wrong value, and a sentence about it.
+    ``note`` takes a key with a wrong value, and a why about it.
     """
     kind = _word(rows, "DEFORM_KIND")
     if kind not in ("", "ELASTIC", "RBF"):
         note(rows["DEFORM_KIND"], not_one_of(kind, ("ELASTIC", "RBF")))
     if kind == "ELASTIC" and "METHOD" not in rows:
-        said = "DEFORM_KIND= ELASTIC: radial functions move the mesh all the same; write METHOD="
-        warnings.append(Note(f"{said} elastic for elasticity"))
+        why = "DEFORM_KIND= ELASTIC: radial functions move the mesh all the same; write METHOD="
+        warnings.append(Note(f"{why} elastic for elasticity"))
     given: dict[str, Any] = {}
     for name, form in {**READ_ALWAYS, **(READ_WITH_RBF if kind == "RBF" else {})}.items():
         if name in rows:

@@ -170,8 +170,8 @@ def match(
         The points in the file are neither, or several rows are at one point.
     """
     if found.points is None:
-        said = f"{found.path} has no coordinates: taken as those of this design"
-        return Matched(found.values, True, (said,))
+        sentence = f"{found.path} has no coordinates: taken as those of this design"
+        return Matched(found.values, True, (sentence,))
     unit = largest_coordinate(mesh.points)
     gap, rows = _nearest(found, mesh.points)
     at_design = design is None
@@ -200,8 +200,8 @@ def match(
     if missing:
         lost = len(np.setdiff1d(moving, index))
         of = f", {lost} of the {len(moving)} moving nodes among them" if lost else ""
-        said = f"{found.path}: {missing} points of the mesh are not in it{of}; taken as 0"
-        notes.append(Note(said) if np.array_equal(index, moving) else said)
+        sentence = f"{found.path}: {missing} points of the mesh are not in it{of}; taken as 0"
+        notes.append(Note(sentence) if np.array_equal(index, moving) else sentence)
     return Matched(values, at_design, tuple(notes))
 
 

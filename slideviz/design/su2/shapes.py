@@ -74,10 +74,10 @@ class MovedNodes:
 
     def chord_notes(self, kinds: set[str]) -> list[str]:
         """Return warnings where the chord is not that which variables of some kinds expect."""
-        x, said = self.points[:, 0], []
+        x, notes = self.points[:, 0], []
         unit = [kind for kind in UNIT_CHORD if kind in kinds]
         if unit and max(abs(x.min()), abs(x.max() - 1.0)) > OFF_CHORD:
-            said.append(
+            notes.append(
                 f"{', '.join(unit)}: the chord is x from 0 to 1, as in SU2, and DV_MARKER goes "
                 f"from {x.min():.4g} to {x.max():.4g}"
             )
@@ -86,12 +86,12 @@ class MovedNodes:
             length = (x.max() - leading[0]) / max(np.cos(angle), OFF_CHORD)
             if abs(length - 1.0) > OFF_CHORD or leading[0] - x.min() > OFF_CHORD:
                 at = ", ".join(f"{value:.4g}" for value in leading)
-                said.append(
+                notes.append(
                     "HICKS_HENNE_CAMBER: the chord is 1 long from the leading edge, as in SU2, "
                     f"which takes ({at}) for it, and DV_MARKER goes from {x.min():.4g} to "
                     f"{x.max():.4g} in x; it begins its search at the first node of the marker"
                 )
-        return said
+        return notes
 
 
 @dataclass(frozen=True)
@@ -241,15 +241,15 @@ class Shapes:
     def warnings(self) -> tuple[str, ...]:
         """Return what a variable does to the flow only, and where SU2 would do otherwise."""
         variables = self.config.variables
-        said = angle_notes(variables, self.config.relaxation)
+        notes = angle_notes(variables, self.config.relaxation)
         heights = {each.numbers[2] for each in variables if each.kind == "ROTATION"}
         if self.mesh.dim == 3 and heights - {*variables[0].numbers[2:3]}:
-            said.append(
+            notes.append(
                 "SU2 turns all ROTATION about lines through the z0 of the first variable; here "
                 "each has its own"
             )
         kinds = {each.kind for each in variables if not each.ignored}
-        return (*said, *(self._surface.chord_notes(kinds) if len(self.nodes) else ()))
+        return (*notes, *(self._surface.chord_notes(kinds) if len(self.nodes) else ()))
 
     @property
     def inside(self) -> dict[str, int]:

@@ -144,7 +144,7 @@ class MovingSurface:
         ):
             # All boundaries move as a body does, or grow: this kernel has that exactly inside.
             case = case.change(kernel="thin-plate")
-        nodes, vectors, said = self.nodes, self.displacement, self.warnings
+        nodes, vectors, warnings = self.nodes, self.displacement, self.warnings
         if self.whole or not self.config.markers:
             every = dict.fromkeys(self.mesh.marker_names, "moving")
             case = case.change(roles=every, sliding="none", periodic="none")
@@ -152,9 +152,9 @@ class MovingSurface:
             listed = [marker.nodes for marker in self.mesh.markers]
             nodes = np.unique(np.concatenate([np.empty(0, np.int64), *listed]))
             vectors = np.zeros((len(nodes), self.mesh.dim))
-            said = (*said, *torn_interfaces(self.mesh, self.moved().points))
+            warnings = (*warnings, *torn_interfaces(self.mesh, self.moved().points))
         motions = (Prescribed(nodes, vectors),)
-        return case.change(motions=motions, warnings=(*case.warnings, *said))
+        return case.change(motions=motions, warnings=(*case.warnings, *warnings))
 
 
 @contextmanager
@@ -190,8 +190,8 @@ def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
         displacer = DISPLACERS[group](config, mesh, nodes)
     left = [] if group == "ffd" else _left_behind(config, mesh)
     if group == "grid" and mesh.halo is not None:
-        said = f"the transformations of the halo in {mesh.name} (SEND_RECEIVE) stay as they are"
-        left.append(f"{said}; they do not fit where the axis or the vector of its period moves")
+        sentence = f"the transformations of the halo in {mesh.name} (SEND_RECEIVE) stay as they are"
+        left.append(f"{sentence}; they do not fit where the axis or the vector of its period moves")
     return MovingSurface(config, mesh, nodes, displacer, (*displacer.warnings, *left))
 
 
@@ -219,9 +219,9 @@ def _left_behind(config: Su2Config, mesh: Mesh) -> list[str]:
     kinds = sorted({each.kind for each in moving})
     with suppress(SlidevizError):  # a mesh whose boxes cannot be read has none that could be used
         if kinds and boxes_of(mesh):
-            said = (
+            sentence = (
                 f"the FFD boxes in {config.case.mesh_out} follow their control points only, and "
                 f"not {', '.join(kinds)}; set them anew to use them with that mesh"
             )
-            return [Note(said)]
+            return [Note(sentence)]
     return []

@@ -203,8 +203,8 @@ def _groups(
     if entry is None:
         if any(KINDS[kind].form for kind in kinds):
             needed = ", ".join(f"{kind} needs {form(kind)}" for kind in dict.fromkeys(kinds))
-            said = f"DV_PARAM is missing: {needed}{misspelt('DV_PARAM', rows)}"
-            problems.append((rows["DV_KIND"].line, said))
+            sentence = f"DV_PARAM is missing: {needed}{misspelt('DV_PARAM', rows)}"
+            problems.append((rows["DV_KIND"].line, sentence))
             return []
         return [[] for _ in kinds]
     try:
@@ -214,12 +214,12 @@ def _groups(
         return []
     if len(groups) != len(kinds):  # SU2 takes several semicolons for one
         groups = [group for group in groups if group]
-    said = f"{counted(len(groups), 'group')} for {counted(len(kinds), 'variable')}"
+    sentence = f"{counted(len(groups), 'group')} for {counted(len(kinds), 'variable')}"
     if len(groups) > len(kinds) or not groups:
-        problems.append((entry.line, f"DV_PARAM has {said}; give one each"))
+        problems.append((entry.line, f"DV_PARAM has {sentence}; give one each"))
         return []
     if len(groups) < len(kinds):
-        warnings.append(f"DV_PARAM has {said}: as in SU2, the last ones of DV_KIND do nothing")
+        warnings.append(f"DV_PARAM has {sentence}: as in SU2, the last ones of DV_KIND do nothing")
     last, most = groups[-1], len(KINDS[kinds[len(groups) - 1]].parameters)
     if most and len(last) > most:
         extra = ", ".join(word.text for word in last[most:])
@@ -260,8 +260,8 @@ def _with_values(
     needless = not variables or variables[0].group in WITHOUT_VALUE
     if entry is None:
         if not needless:
-            said = f"DV_VALUE is missing: a value for each variable{misspelt('DV_VALUE', rows)}"
-            problems.append((rows["DV_KIND"].line, said))
+            sentence = f"DV_VALUE is missing: a value for each variable{misspelt('DV_VALUE', rows)}"
+            problems.append((rows["DV_KIND"].line, sentence))
         return variables
     try:
         words = [word.text for word in list_of(entry.value)]
@@ -270,17 +270,17 @@ def _with_values(
         problems.append((entry.line, f"DV_VALUE: {problem}"))
         return variables
     needed = sum(len(each.values) for each in variables)
-    said = f"{counted(len(values), 'value')} for {counted(len(variables), 'variable')}"
+    sentence = f"{counted(len(values), 'value')} for {counted(len(variables), 'variable')}"
     if len(variables) < needed:
-        said += f", which need {needed}"
+        sentence += f", which need {needed}"
     if len(values) < needed and not needless:
-        problems.append((entry.line, f"DV_VALUE has {said}; give one each"))
-    whole = (*(word.lstrip("+-") for word in words[::2]), *words[1::2])  # as in 0,01 -0,02
-    comma = len(values) == 2 * needed and any(values) and all(map(str.isdecimal, whole))
+        problems.append((entry.line, f"DV_VALUE has {sentence}; give one each"))
+    numbers = (*(word.lstrip("+-") for word in words[::2]), *words[1::2])  # as in 0,01 -0,02
+    comma = len(values) == 2 * needed and any(values) and all(map(str.isdecimal, numbers))
     if comma and not needless:
-        problems.append((entry.line, f"DV_VALUE has {said}; decimals are written with a point"))
+        problems.append((entry.line, f"DV_VALUE has {sentence}; decimals are written with a point"))
     elif len(values) > needed:
-        warnings.append(f"DV_VALUE has {said}: as in SU2, the last ones mean nothing")
+        warnings.append(f"DV_VALUE has {sentence}: as in SU2, the last ones mean nothing")
     left = iter(values + [0.0] * needed)
     return [replace(each, values=tuple(next(left) for _ in each.values)) for each in variables]
 
@@ -294,8 +294,8 @@ def _contradictions(variables: list[DesignVariable]) -> list[str]:
         return [f"{first.kind} must stand alone; make two runs"]
     others = {each.kind: None for each in variables if each.group != first.group}
     if first.group == "ffd" and others:
-        said = f"{', '.join(others)} cannot stand in a list that begins with {first.kind}"
-        return [f"{said}: it has no FFD box; make two runs"]
+        sentence = f"{', '.join(others)} cannot stand in a list that begins with {first.kind}"
+        return [f"{sentence}: it has no FFD box; make two runs"]
     alike = all(each.kind == first.kind for each in variables)
     if first.kind == "HICKS_HENNE_CAMBER" and not alike:
         return ["HICKS_HENNE_CAMBER stands with variables of its kind only; make two runs"]
@@ -313,8 +313,8 @@ def _dispatched(variables: list[DesignVariable], warnings: list[str]) -> tuple[D
             reasons.setdefault(reason, []).append(f"{place} ({each.kind})")
     for reason, places in reasons.items():
         more = f" and {len(places) - 6} more" if len(places) > 6 else ""
-        said = f"variable{'s' * (len(places) > 1)} {', '.join(places[:6])}{more} of DV_KIND"
-        warnings.append(f"{said} will do nothing, as in SU2: {reason}; make two runs")
+        sentence = f"variable{'s' * (len(places) > 1)} {', '.join(places[:6])}{more} of DV_KIND"
+        warnings.append(f"{sentence} will do nothing, as in SU2: {reason}; make two runs")
     return tuple(found)
 
 
