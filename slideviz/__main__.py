@@ -79,12 +79,12 @@ def _wait(read: int) -> None:
     try:
         # As long as this module is not loaded, there is nothing to clean up.
         cleanup = sys.modules.get("slideviz.system.cleanup")
-        left = "it leaves nothing half-written"
-        if cleanup is not None and hasattr(cleanup, "left"):  # it may be being loaded
-            left = cleanup.left()
+        message = "it leaves nothing half-written"
+        if cleanup is not None and hasattr(cleanup, "leftover_message"):  # it may be being loaded
+            message = cleanup.leftover_message()
             cleanup.clean_up()
         wipe = "\r\033[K" if os.isatty(2) else ""  # there may be a progress bar
-        words = f"{wipe}slideviz: {_ENDS[signal.Signals(number)]}; {left}\n"
+        words = f"{wipe}slideviz: {_ENDS[signal.Signals(number)]}; {message}\n"
         # Not by Python's streams, which another thread may have locked.
         os.write(2, words.encode())
     finally:

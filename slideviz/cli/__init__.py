@@ -62,9 +62,9 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
     except SystemExit as stop:  # argparse: --help is 0, wrong usage 2
         return int(stop.code or 0)
     except (KeyboardInterrupt, Cancelled):
-        from slideviz.system.cleanup import left
+        from slideviz.system.cleanup import leftover_message
 
-        return _fail(f"cancelled; {left()}", CANCELLED)
+        return _fail(f"cancelled; {leftover_message()}", CANCELLED)
     except SlidevizError as problem:
         return _fail(str(problem), WRONG_INPUT)
     except MemoryError:

@@ -168,7 +168,7 @@ def _pulled(
 ) -> list[DesignRow]:
     """Run all designs and return their rows, with a progress bar."""
     from slideviz.case.words import counted
-    from slideviz.system.cleanup import keep
+    from slideviz.system.cleanup import keep_partial
 
     found: list[DesignRow] = []
     begin, earlier = time.monotonic(), 0
@@ -178,7 +178,7 @@ def _pulled(
             found.append(row)
             earlier += row.earlier
             so_far = f"{len(found)} of {counted(total, 'design')}"
-            keep(results, f"{results} has {so_far}, and --resume goes on")
+            keep_partial(results, f"{results} has {so_far}, and --resume goes on")
             fresh = len(found) - earlier
             left = (time.monotonic() - begin) / fresh * (total - len(found)) if fresh else None
             bar.count(len(found), total, "designs:", left)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slideviz.case.motion import ROUNDING
-from slideviz.design.doubt import largest_condition
+from slideviz.design.accuracy_warnings import largest_condition
 from slideviz.design.frozen.loops import farthest
 from slideviz.design.frozen.operations import flat
 from slideviz.design.frozen.step import FrozenStep, StepState

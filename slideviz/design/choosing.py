@@ -22,14 +22,14 @@ from slideviz.solver.stepping import (
     with_halo_copies,
 )
 
-Tell = Callable[[Progress], None]
+Report = Callable[[Progress], None]
 
 BYTES = 64
 """Free memory for each entry of a factor, above which factors are kept for further calls."""
 
 
 def choose_steps(
-    case: Case, mesh: Mesh, setup: Setup, targets: Sequence[FloatArray], tell: Tell
+    case: Case, mesh: Mesh, setup: Setup, targets: Sequence[FloatArray], report: Report
 ) -> tuple[tuple[FrozenStep, ...], FloatArray]:
     """Return steps with control nodes that suffice for all ``targets``, and the first run's points.
 
@@ -48,14 +48,14 @@ def choose_steps(
     """
     require_memory(setup, case, lasting=True)
     kept = setup
-    setup = replace(setup, solve=lambda problem, watch: kept.solve(_lasting(problem), watch))
-    parts, solutions, points = _reference(case, mesh, replace(setup, target=targets[0]), tell)
+    setup = replace(setup, solve=lambda problem, watch: kept.solve(_for_any_data(problem), watch))
+    parts, solutions, points = _reference(case, mesh, replace(setup, target=targets[0]), report)
     # The other methods choose nothing but the number of steps.
     others = list(targets[1:]) if case.method == "rbf" else []
     if others and setup.reduction is not None and setup.reduction.level != "none":
         others += targets[:-1]  # a further level can raise errors of those before
     for target in others:
-        further = _further(mesh, replace(setup, target=target), parts, solutions, tell)
+        further = _further(mesh, replace(setup, target=target), parts, solutions, report)
         # A system that was solved with more rows and digits for one is so for all.
         solutions = [
             replace(new if new.refined >= old.refined else old, doubt=max(old.doubt, new.doubt))
@@ -91,13 +91,13 @@ def _begun(setup: Setup, stages: tuple[Levels, ...], problem: Problem, watch: Wa
     return setup.solve(replace(problem, stages=stages), watch)
 
 
-def _lasting(problem: Problem) -> Problem:
+def _for_any_data(problem: Problem) -> Problem:
     """Return the problem with its system to be tested for other data, too."""
     return replace(problem, lasting=True)
 
 
 def _reference(
-    case: Case, mesh: Mesh, setup: Setup, tell: Tell
+    case: Case, mesh: Mesh, setup: Setup, report: Report
 ) -> tuple[list[float], list[Solution], FloatArray]:
     """Run the solver; return the part of the displacement at each step, solutions, and points."""
     made: list[Solution] = []
@@ -106,19 +106,19 @@ def _reference(
         made.append(setup.solve(problem, watch))
         return made[-1]
 
-    steps = list(all_steps(Stepping(case, mesh, replace(setup, solve=solve), tell, {})))
+    steps = list(all_steps(Stepping(case, mesh, replace(setup, solve=solve), report, {})))
     # Of steps that were tried, those that are in the run: each has the control nodes it found.
     found = [next(s for s in made if s.control is step.control) for step in steps]
     return [step.part for step in steps], found, steps[-1].mesh.points
 
 
-def _told(tell: Tell, step: int, total: int, phase: str, fraction: float) -> None:
+def _report(report: Report, step: int, total: int, phase: str, fraction: float) -> None:
     """Report progress."""
-    tell(Progress(step, total, phase, fraction))
+    report(Progress(step, total, phase, fraction))
 
 
 def _further(
-    mesh: Mesh, setup: Setup, parts: Sequence[float], chosen: Sequence[Solution], tell: Tell
+    mesh: Mesh, setup: Setup, parts: Sequence[float], chosen: Sequence[Solution], report: Report
 ) -> list[Solution]:
     """Run the steps for ``setup.target``; return their solutions.
 
@@ -133,7 +133,7 @@ def _further(
         if made:
             more = made[-1].control
             control = np.concatenate([control, more[~np.isin(more, control)]])
-        watch = Watch(partial(_told, tell, k + 1, total))
+        watch = Watch(partial(_report, report, k + 1, total))
         goal = setup.coords[setup.known] + setup.target * part
         begun = replace(setup, solve=partial(_begun, setup, solution.stages))
         made.append(

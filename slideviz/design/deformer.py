@@ -11,18 +11,18 @@ from slideviz.case import motion
 from slideviz.case.displacement import Displacements
 from slideviz.case.method_keys import automatic_radius
 from slideviz.case.model import Case, Translate
-from slideviz.design.checks import Checks, facets_of, usual_edge
-from slideviz.design.choosing import choose_steps
-from slideviz.design.doubt import (
+from slideviz.design.accuracy_warnings import (
     note_of_refinement,
     warn_of_condition,
-    warn_of_doubt,
+    warn_of_error_estimate,
     warn_of_errors,
 )
+from slideviz.design.checks import Checks, facets_of, usual_edge
+from slideviz.design.choosing import choose_steps
 from slideviz.design.frozen.loops import to_points
 from slideviz.design.frozen.step import FrozenStep, StepState
 from slideviz.design.frozen.tape import Array, Tape, Variable, value
-from slideviz.design.given import given_input
+from slideviz.design.known_nodes import known_node_map
 from slideviz.errors import CaseError, DeformError
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
@@ -35,7 +35,7 @@ from slideviz.solver.setup import make_setup
 TOGETHER = 128
 """Designs that are deformed together, so that each radial function is computed once for all."""
 
-Tell = Callable[[Progress], None]
+Report = Callable[[Progress], None]
 
 
 class Deformer:
@@ -93,7 +93,7 @@ class Deformer:
         mesh: Mesh,
         case: Case,
         displacements: FloatArray | None = None,
-        progress: Tell | None = None,
+        progress: Report | None = None,
     ) -> None:
         """Run the solver at the reference, and keep its choices.
 
@@ -145,15 +145,15 @@ class Deformer:
                 "no displacement is given by which control nodes could be chosen: all are zero; "
                 "give `displacements` as large as the designs to come, or use DATA_REDUCTION= NO"
             )
-        self._setup, self._input = setup, given_input(mesh, setup, asked)
+        self._setup, self._input = setup, known_node_map(mesh, setup, asked)
         self._references = references
         self.warnings = (*case.warnings, *setup.warnings)
         """About case and mesh, zones that no longer fit at the reference, and systems that are
         solved with twice the digits (a note)."""
         targets = [value(self._input.target(reference)) for reference in references]
-        tell = progress or (lambda _: None)
+        report = progress or (lambda _: None)
         self._steps: tuple[FrozenStep, ...]
-        self._steps, points = choose_steps(case, mesh, setup, targets, tell)
+        self._steps, points = choose_steps(case, mesh, setup, targets, report)
         refined = any(step.refined for step in self._steps)
         self._as_run = None if refined else points
         # What is discrete is chosen at the first design, and kept.
@@ -162,7 +162,9 @@ class Deformer:
         least = max(float(sizes.max()), usual_edge(setup))
         self._checks = Checks(mesh, setup, self._steps, facets, least)
         self.warnings += (*note_of_refinement(self._steps), *torn_interfaces(mesh, points))
-        if not warn_of_doubt(self._steps, np.max([state.doubt for state in states], axis=0)):
+        if not warn_of_error_estimate(
+            self._steps, np.max([state.doubt for state in states], axis=0)
+        ):
             warn_of_condition(self._steps)
 
     @check_types
@@ -191,7 +193,7 @@ class Deformer:
         given = self.displacement if displacement is None else displacement
         given = self._checked(given, "displacement")
         points, errors, doubt = self._deformed(given)
-        warn_of_doubt(self._steps, doubt)
+        warn_of_error_estimate(self._steps, doubt)
         reduced = self._setup.reduction is not None
         same = given[..., None, :, :] == self._references
         reference = same.all(axis=(-1, -2)).any(axis=-1)
@@ -305,21 +307,21 @@ class Deformer:
         errors, doubt = np.concatenate([np.empty((2, 0)), *found], axis=1)
         return points, errors, doubt
 
-    def _together(self, displacement: FloatArray, room: FloatArray) -> FloatArray:
-        """Write the points of k designs (k, m, d) to ``room`` (k, n, d), deformed in one step.
+    def _together(self, displacement: FloatArray, out: FloatArray) -> FloatArray:
+        """Write the points of k designs (k, m, d) to ``out`` (k, n, d), deformed in one step.
 
         Returns their errors and doubts, (2, k). Raises as `_deformed`.
         """
         setup, (step,) = self._setup, self._steps
         targets = value(self._input.target(displacement))
-        state = step.moved(StepState(setup.coords), targets, room)
-        errors = np.maximum(self._checks.off_track(room), state.max_error)
+        state = step.moved(StepState(setup.coords), targets, out)
+        errors = np.maximum(self._checks.off_track(out), state.max_error)
         self._checks.require_sound(1, 1.0, targets, state)
         one, two = setup.images.T
-        apart = (room[:, two] - room[:, one]) - (setup.coords[two] - setup.coords[one])
+        apart = (out[:, two] - out[:, one]) - (setup.coords[two] - setup.coords[one])
         alike = np.abs(apart).max(initial=0.0) <= FAR * largest_coordinate(self.mesh.points)
-        to_points(setup.frame, room, setup.coords, self.mesh.points)
-        for points in room[:0] if alike else room:
+        to_points(setup.frame, out, setup.coords, self.mesh.points)
+        for points in out[:0] if alike else out:
             self._checks.require_alike(points)
         return np.stack([errors, np.broadcast_to(state.doubt, errors.shape)])
 

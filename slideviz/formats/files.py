@@ -20,7 +20,7 @@ from slideviz.formats.su2b.write import su2b_blocks
 from slideviz.mesh.check import check_mesh, check_size
 from slideviz.mesh.model import Mesh
 from slideviz.system.atomic import atomic_write
-from slideviz.system.file_checks import require_ordinary
+from slideviz.system.file_checks import require_regular_file
 from slideviz.terms import FILE_FORMATS, FileFormat
 
 _SNIFFED_BYTES = 1 << 16
@@ -99,7 +99,7 @@ def format_of(path: Path, given: FileFormat | None) -> FileFormat | None:
     """
     ending = path.suffix.lower()
     try:
-        require_ordinary(path, MeshError)
+        require_regular_file(path, MeshError)
         if given is None and ending not in (".su2", ".su2b", *_UNSURE):
             return None
         binary = is_su2b(path)

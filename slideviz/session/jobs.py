@@ -28,7 +28,7 @@ from slideviz.session.large import first_frame, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.passages import find_period
 from slideviz.session.state import Session, StepFrame
-from slideviz.system.file_checks import require_ordinary
+from slideviz.system.file_checks import require_regular_file
 from slideviz.system.private import private_folder
 
 Report = Callable[[object], None]
@@ -73,7 +73,7 @@ class Opened:
 def require_openable(path: Path) -> None:
     """Raise SlidevizError where a path is no ordinary file, before any question about it."""
     try:
-        require_ordinary(path, MeshError)
+        require_regular_file(path, MeshError)
     except (OSError, ValueError) as problem:
         raise unreadable(path, problem) from problem
 

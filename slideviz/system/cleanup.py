@@ -33,7 +33,7 @@ class Process(Protocol):
 
 
 NOTHING_LEFT = "it leaves nothing half-written"
-"""The answer of `left` where no partial file is kept."""
+"""The answer of `leftover_message` where no partial file is kept."""
 _drafts: set[Path] = set()
 """Files and folders to remove when the program ends early."""
 _processes: set[Process] = set()
@@ -118,7 +118,7 @@ def clean_up() -> None:
 
 @contextmanager
 def removed_at_stop(path: Path) -> Iterator[None]:
-    """Context in which a file is removed if the program ends, unless `keep` is called in it."""
+    """Context in which a file is removed if the program ends, unless `keep_partial` is called."""
     _drafts.add(path)
     _kept.pop(path, None)
     try:
@@ -128,14 +128,14 @@ def removed_at_stop(path: Path) -> Iterator[None]:
         _kept.pop(path, None)
 
 
-def keep(path: Path, words: str) -> None:
-    """Let a partial file stay if the program ends; `left` returns these ``words`` for the user."""
+def keep_partial(path: Path, words: str) -> None:
+    """Let a partial file stay if the program ends; ``words`` tell the user so."""
     _drafts.discard(path)
     _kept[path] = words
 
 
-def left() -> str:
-    """Return the words of `keep` on the latest partial file that stays, else `NOTHING_LEFT`."""
+def leftover_message() -> str:
+    """Return the words of `keep_partial` on the latest file that stays, else `NOTHING_LEFT`."""
     kept = (words for path, words in reversed(_kept.items()) if path.exists())
     return next(kept, NOTHING_LEFT)
 

@@ -76,7 +76,7 @@ def same_file(path: Path, other: Path) -> bool:
         return False
 
 
-def require_ordinary(path: Path, error: type[SlidevizError]) -> int:
+def require_regular_file(path: Path, error: type[SlidevizError]) -> int:
     """Return the size in bytes of an ordinary file, without opening it: some devices react to that.
 
     Raises
@@ -109,11 +109,11 @@ def read_json(path: Path) -> Any:
 
 
 def require_length(path: Path, error: type[SlidevizError], what: str, most: int) -> None:
-    """Raise as `require_ordinary`, or ``error`` if a file has more than ``most`` bytes.
+    """Raise as `require_regular_file`, or ``error`` if a file has more than ``most`` bytes.
 
     ``what`` is the kind of file, for the message: ``case file``.
     """
-    size = require_ordinary(path, error)
+    size = require_regular_file(path, error)
     if size > most:
         raise error(
             f"{printable(path)}: has {size / 1e6:,.0f} MB, and no {what} has more than "

@@ -15,7 +15,7 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Scale, Translate
 from slideviz.case.reduction import Reduction
-from slideviz.design.doubt import warn_of_condition, warn_of_doubt
+from slideviz.design.accuracy_warnings import warn_of_condition, warn_of_error_estimate
 from slideviz.design.frozen.solve import whole
 from slideviz.errors import ConditionWarning, DeformError, Note, ToleranceWarning
 from slideviz.samples.table import sample
@@ -102,7 +102,7 @@ def test_a_small_error_is_a_note(doubt, little):
     with pytest.warns(ConditionWarning) as told:
         warn_of_condition([step])
     with pytest.warns(ConditionWarning) as more:
-        warn_of_doubt([step], np.array(doubt))
+        warn_of_error_estimate([step], np.array(doubt))
     said = [each.message.args[0] for each in (*told, *more)] + _doubt_warning(doubt, 0.0, 1, 1e12)
     assert [isinstance(each, Note) for each in said] == [little] * 3
 

@@ -16,7 +16,7 @@ from slideviz.design.sweeps.columns import columns_of, numbers_of, own_values
 from slideviz.design.sweeps.designs import read_designs
 from slideviz.design.sweeps.lock import FolderLock
 from slideviz.design.sweeps.row import DesignRow
-from slideviz.design.sweeps.worker import Answer, Packed, Task, hold, packed, work
+from slideviz.design.sweeps.worker import Packed, Task, TaskResult, cache_mesh, packed, run_task
 from slideviz.errors import CaseError, DeformError
 from slideviz.samples.table import sample
 from slideviz.session.design_files import read_results
@@ -322,15 +322,15 @@ def test_asked_in_vain(passage):
 
 def test_the_mesh_is_sent_to_who_needs_it(passage):
     task = Task(1, passage.case, "no such mesh")
-    assert work(task).row is None
+    assert run_task(task).row is None
     mesh = packed(passage.mesh)
-    assert work(replace(task, mesh=mesh.name, packed=mesh)).row.problem == ""
-    assert work(replace(task, mesh=mesh.name)).row.problem == ""
-    other = work(replace(task, version="0.0.0")).row
+    assert run_task(replace(task, mesh=mesh.name, packed=mesh)).row.problem == ""
+    assert run_task(replace(task, mesh=mesh.name)).row.problem == ""
+    other = run_task(replace(task, version="0.0.0")).row
     assert "install the same version" in other.problem
     for name in "ab":  # another sweep uses the same processes
-        hold(Packed(name, mesh.content))
-    assert work(replace(task, mesh=mesh.name)).row is None
+        cache_mesh(Packed(name, mesh.content))
+    assert run_task(replace(task, mesh=mesh.name)).row is None
 
 
 class Losing(Executor):
@@ -344,12 +344,12 @@ class Losing(Executor):
         self.calls += 1
         self.sent += task.packed is not None
         if self.calls <= 2:
-            future.set_result(Answer(f"worker {self.calls}"))
+            future.set_result(TaskResult(f"worker {self.calls}"))
         elif task.design in self._losses:
             self._losses.remove(task.design)
             future.set_exception(BrokenExecutor("killed"))
         else:
-            future.set_result(Answer("worker 1", DesignRow(task.design, min=0.5)))
+            future.set_result(TaskResult("worker 1", DesignRow(task.design, min=0.5)))
         return future
 
 
@@ -410,9 +410,9 @@ def test_a_design_has_one_thread(passage, monkeypatch):
 
     monkeypatch.setattr(worker, "deform", watched)
     mesh = packed(passage.mesh)
-    work(Task(1, passage.case, mesh.name, packed=mesh))  # libraries are loaded by the first
+    run_task(Task(1, passage.case, mesh.name, packed=mesh))  # libraries are loaded by the first
     before = threads()
-    assert work(Task(1, passage.case, mesh.name, packed=mesh)).row.problem == ""
+    assert run_task(Task(1, passage.case, mesh.name, packed=mesh)).row.problem == ""
     assert set(found[-1]) == {1}
     assert threads() == before
 

@@ -288,15 +288,17 @@ def test_an_early_end_tells_of_what_an_earlier_run_has_done(tmp_path, monkeypatc
         with pytest.raises(KilledError):
             stream(case, out)
     ours, _ = names_of(out)
-    assert cleanup.left() == cleanup.NOTHING_LEFT  # as in a new process
+    assert cleanup.leftover_message() == cleanup.NOTHING_LEFT  # as in a new process
     told = []
     with monkeypatch.context() as patch:
-        patch.setattr(streamed_run, "open_for_run", lambda *_, **__: told.append(cleanup.left()))
+        patch.setattr(
+            streamed_run, "open_for_run", lambda *_, **__: told.append(cleanup.leftover_message())
+        )
         with pytest.raises(TypeError):
             stream(case, out)
     assert told == [f"what an earlier run has done is kept in {ours}; go on with --resume"]
     stream(case, out, resume=True)
-    assert cleanup.left() == cleanup.NOTHING_LEFT
+    assert cleanup.leftover_message() == cleanup.NOTHING_LEFT
 
 
 @pytest.mark.parametrize("made_by", ["su2b", "su2", "note", "finished", "pipe"])

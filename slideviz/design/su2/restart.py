@@ -9,7 +9,7 @@ import numpy as np
 from slideviz.case.lines import read_text
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray
-from slideviz.system.file_checks import require_ordinary
+from slideviz.system.file_checks import require_regular_file
 
 MAGIC = 535532
 """The first number of SU2's binary restart files."""
@@ -25,7 +25,7 @@ def read_restart(path: Path) -> tuple[list[str], FloatArray]:
     CaseError
         The file is cut off, or has a value that is not a number.
     """
-    require_ordinary(path, CaseError)
+    require_regular_file(path, CaseError)
     with path.open("rb") as file:
         binary = file.read(4) == np.int32(MAGIC).tobytes()
     return _binary(path) if binary else _csv(path)

@@ -18,7 +18,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing import get_context, parent_process, resource_tracker
 from typing import Any, NamedTuple, NoReturn
 
-from slideviz.design.sweeps.worker import Packed, hold
+from slideviz.design.sweeps.worker import Packed, cache_mesh
 from slideviz.system.cleanup import clean_up
 
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -100,7 +100,7 @@ class Processes(Executor):
         future: Future = Future()
         with self._lock:
             self._asked.append(_Call(future, fn, args, kwargs))
-        self._give()
+        self._dispatch()
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -115,7 +115,7 @@ class Processes(Executor):
         for one in self._all:
             one.end(wait, kill=cancel_futures)
 
-    def _give(self) -> None:
+    def _dispatch(self) -> None:
         """Give queued calls to processes, as many as these take."""
         while True:
             with self._lock:
@@ -165,7 +165,7 @@ class Processes(Executor):
             call.future.set_result(inner.result())
         elif not again:
             call.future.set_exception(problem)
-        self._give()
+        self._dispatch()
 
 
 class _Process:
@@ -206,7 +206,7 @@ class _Process:
         def done(inner: Future) -> None:
             broken = inner.cancelled() or isinstance(inner.exception(), BrokenProcessPool)
             # It does its calls in their order, and they are told so.
-            lost = broken and self._forget(pool)
+            lost = broken and self._discard(pool)
             began = begun is not None and _succeeded(begun)
             if lost and not began:
                 ended = (getattr(pool, "_processes", None) or {}).values()
@@ -221,9 +221,9 @@ class _Process:
         """Start the process and send it the mesh."""
         with _settings_of_workers():
             self._pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_begin)
-            self._begun = self._pool.submit(hold, self._owner._mesh)
+            self._begun = self._pool.submit(cache_mesh, self._owner._mesh)
 
-    def _forget(self, pool: ProcessPoolExecutor | None) -> bool:
+    def _discard(self, pool: ProcessPoolExecutor | None) -> bool:
         """Drop a broken pool, so that the next call starts another; False if dropped before."""
         with self._owner._lock:
             if pool is None:

@@ -15,7 +15,7 @@ from slideviz.design.sweeps.designs import Design, Table, read_designs
 from slideviz.design.sweeps.processes import Processes, usable_cores
 from slideviz.design.sweeps.results import SweepResults, sources_of
 from slideviz.design.sweeps.row import DesignRow
-from slideviz.design.sweeps.worker import Answer, Packed, Task, packed, work
+from slideviz.design.sweeps.worker import Packed, Task, TaskResult, packed, run_task
 from slideviz.errors import CaseError, DeformError
 from slideviz.formats.files import read, usual_ending
 from slideviz.mesh.model import Mesh, Origin
@@ -202,7 +202,7 @@ class _Loop:
     ) -> None:
         self._executor, self._tasks, self._waiting = executor, tasks, waiting
         self._going_on = going_on
-        self._flying: dict[Future[Answer], tuple[Design, bool]] = {}
+        self._flying: dict[Future[TaskResult], tuple[Design, bool]] = {}
         self._tries: dict[int, int] = {}
         self.holding: set[str] = set()
         """`holding`, `lacking`: workers that have the mesh, and workers that answered that they
@@ -243,7 +243,7 @@ class _Loop:
             design = self._waiting.popleft()
             sent += with_mesh
             try:
-                future = self._executor.submit(work, self._tasks.of(design, with_mesh))
+                future = self._executor.submit(run_task, self._tasks.of(design, with_mesh))
             except (BrokenExecutor, RuntimeError) as problem:
                 raise DeformError(
                     f"the executor takes no more work: {problem}; without an executor, processes "
@@ -252,7 +252,7 @@ class _Loop:
                 ) from problem
             self._flying[future] = design, with_mesh
 
-    def _row(self, future: Future[Answer], design: Design) -> DesignRow | None:
+    def _row(self, future: Future[TaskResult], design: Design) -> DesignRow | None:
         """Return the row of a design; None where it is to be done again."""
         try:
             answer = future.result()

@@ -66,7 +66,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Answer:
+class TaskResult:
     """The result of a task, and the name of the worker; no row where the worker lacks the mesh."""
 
     worker: str
@@ -79,7 +79,7 @@ def packed(mesh: Mesh) -> Packed:
     return Packed(blake2b(content, digest_size=16).hexdigest(), content)
 
 
-def hold(mesh: Packed) -> str:
+def cache_mesh(mesh: Packed) -> str:
     """Keep a mesh in this process; return the name of the process."""
     if mesh.name not in _held:
         while len(_held) >= _KEPT:
@@ -88,19 +88,19 @@ def hold(mesh: Packed) -> str:
     return _myself()
 
 
-def work(task: Task) -> Answer:
+def run_task(task: Task) -> TaskResult:
     """Deform the mesh by a design; return its row. An exception becomes a row with the reason."""
     if task.version != __version__:
         reason = f"the worker {_myself()} has slideviz {__version__}, this is {task.version}"
-        return Answer(
+        return TaskResult(
             _myself(), DesignRow(task.design, problem=f"{reason}; install the same version")
         )
     with _one_at_a_time:
         if task.packed is not None:
-            hold(task.packed)
+            cache_mesh(task.packed)
         mesh = _held.get(task.mesh)
         if mesh is None:
-            return Answer(_myself())
+            return TaskResult(_myself())
         begin = time.perf_counter()
         try:
             with _one_thread():
@@ -113,7 +113,7 @@ def work(task: Task) -> Answer:
             row = DesignRow(
                 task.design, problem=f"internal error ({type(problem).__name__}: {problem})"
             )
-        return Answer(_myself(), row)
+        return TaskResult(_myself(), row)
 
 
 def _result(task: Task, mesh: Mesh, begin: float) -> DesignRow:

@@ -21,7 +21,7 @@ from typing import BinaryIO
 from slideviz.errors import MeshError
 from slideviz.formats.su2b.copying import Piece, copying
 from slideviz.system.atomic import mode_of, reason_of
-from slideviz.system.cleanup import keep, open_temporary, removed_at_stop
+from slideviz.system.cleanup import keep_partial, open_temporary, removed_at_stop
 from slideviz.system.file_checks import read_json, require_no_input
 from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import Tick
@@ -68,7 +68,7 @@ class Partial:
             json.dump({"about": self._about, "sums": self.sums}, file)
         fresh.replace(self._note)
         if self.sums:
-            keep(self.path, _kept_words(self.path))
+            keep_partial(self.path, _kept_words(self.path))
 
 
 def names_of(path: Path, more: str = "") -> tuple[Path, Path]:
@@ -82,7 +82,9 @@ def keep_earlier(path: Path) -> None:
     """Let it be said at an early end that partial files of an earlier run are there, if any are."""
     for ours, note in (names_of(path), names_of(path, BINARY)):
         if ours.exists() and note.exists():
-            keep(ours, f"what an earlier run has done is kept in {ours}; go on with --resume")
+            keep_partial(
+                ours, f"what an earlier run has done is kept in {ours}; go on with --resume"
+            )
 
 
 @contextmanager
@@ -121,7 +123,7 @@ def partial_file(
             with removed_at_stop(ours):
                 try:
                     if sums and os.fstat(file.fileno()).st_size == size:
-                        keep(ours, _kept_words(ours))
+                        keep_partial(ours, _kept_words(ours))
                     else:
                         sums = []
                         note.unlink(missing_ok=True)

@@ -59,7 +59,7 @@ def warn_of_condition(steps: Sequence[FrozenStep]) -> None:
     warnings.warn(Note(said) if little else said, ConditionWarning, stacklevel=3)
 
 
-def warn_of_doubt(steps: Sequence[FrozenStep], doubt: FloatArray) -> bool:
+def warn_of_error_estimate(steps: Sequence[FrozenStep], doubt: FloatArray) -> bool:
     """Warn if the doubt (...,) of a design is above `TRUSTED`; return whether it is."""
     worst = float(doubt.max(initial=0.0))
     if worst <= TRUSTED:

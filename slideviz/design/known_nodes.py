@@ -19,7 +19,7 @@ from slideviz.solver.setup import Setup
 
 
 @dataclass(frozen=True, eq=False)
-class Input:
+class KnownNodeMap:
     """The map from the displacement of the moving nodes to that of the known nodes."""
 
     mesh: Mesh
@@ -88,7 +88,7 @@ class Input:
             Spread(moved.nodes, there, setup.classes.stands).require_alike(allowed)
 
 
-def given_input(mesh: Mesh, setup: Setup, asked: Displacements) -> Input:
+def known_node_map(mesh: Mesh, setup: Setup, asked: Displacements) -> KnownNodeMap:
     """Return the map from the displacement of the moving nodes to that of the known nodes.
 
     Raises
@@ -118,7 +118,7 @@ def given_input(mesh: Mesh, setup: Setup, asked: Displacements) -> Input:
         )
     lead = spread.source(moved.nodes)
     others = np.flatnonzero(lead != moved.nodes)
-    return Input(
+    return KnownNodeMap(
         mesh,
         setup,
         asked.nodes,
