@@ -8,7 +8,7 @@ from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample, write_sample
 from slideviz.scene.scene import Scene
-from slideviz.session.changes import open_mesh
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 
 

@@ -22,6 +22,7 @@ from slideviz.rbf.images import misfits
 from slideviz.rbf.problem import Solution
 from slideviz.session import changes
 from slideviz.session.node_types import NodeTypes
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.solver import stepping
 from slideviz.solver.setup import make_setup
@@ -387,7 +388,7 @@ def test_the_view_has_the_same_types_as_a_run():
         sliding="ps",
     )
     plain = replace(mesh, name="m")
-    session = changes.open_mesh(StepFrame(plain, sv.quality(plain)), None, (), case)
+    session = open_mesh(StepFrame(plain, sv.quality(plain)), None, (), case)
     types = NodeTypes()
     found = types.of(changes.set_view(session, points="types"))
     fixed = found.nodes[found.kinds == list(NODE_TYPES).index("fixed")]
@@ -396,7 +397,7 @@ def test_the_view_has_the_same_types_as_a_run():
     points = mesh.points.copy()
     points[mesh.marker("y_p").nodes[2], 0] += 0.03
     wrong = plain.with_points(points)
-    session = changes.open_mesh(StepFrame(wrong, sv.quality(wrong)), None, (), case)
+    session = open_mesh(StepFrame(wrong, sv.quality(wrong)), None, (), case)
     found = types.of(changes.set_view(session, points="types"))
     assert np.sum(found.kinds == list(NODE_TYPES).index("fixed")) == len(fixed) - 1
 

@@ -35,7 +35,7 @@ from slideviz.gui.widgets.command import (
 from slideviz.gui.widgets.icons import STROKES
 from slideviz.gui.widgets.runs_menu import fill_compare
 from slideviz.session import changes
-from slideviz.session.colors import usual_range
+from slideviz.session.colors import fit_colors, usual_range
 from slideviz.terms import SHOWN, Shown, ShownTerm
 
 if TYPE_CHECKING:
@@ -170,14 +170,14 @@ _COLORS = Menu("colors", "&Colors", "From which value to which the colors range.
     Command("fit_colors", "Fit to this step",
             "Let the colors range over the values of the step that is shown, and of the other "
             "one in a comparison.",
-            lambda window: window.store.change(changes.fit_colors, every=False),
+            lambda window: window.store.change(fit_colors, every=False),
             ("R",), enabled=colored_by_value,
             button_tip="From the lowest to the highest value of what is shown now (R); of all "
             "steps: Shift+R."),
     Command("fit_all_colors", "Fit to all steps",
             "Let the colors range over the values of all steps, so that they say the same in a "
             "film.",
-            lambda window: window.store.change(changes.fit_colors, every=True),
+            lambda window: window.store.change(fit_colors, every=True),
             ("Shift+R",), enabled=colored_by_value),
     Command("usual_colors", "As ever", "Let the colors range as they do at first.",
             lambda window: window.store.change(changes.set_view, color_range=None),

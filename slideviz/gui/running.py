@@ -22,6 +22,7 @@ from slideviz.session.run_messages import (
     in_window_words,
     inverted_words,
     notes_of,
+    run_requirements,
     warnings_of,
 )
 from slideviz.session.runs_words import method_words
@@ -101,7 +102,7 @@ class Running(QObject):
 
         ``output`` is the file of the deformed mesh, needed if the mesh stays in its file.
         """
-        if not self.runner.busy and not changes.run_requirements(self.store.session):
+        if not self.runner.busy and not run_requirements(self.store.session):
             self._start_run(self.store.session.case, output=output)
 
     def show_design(self, case: Case, name: str) -> bool:

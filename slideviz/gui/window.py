@@ -51,7 +51,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.scene.scene import Scene
 from slideviz.session import changes, jobs
 from slideviz.session.motions import boxes_hint
-from slideviz.session.run_messages import Requirement
+from slideviz.session.run_messages import Requirement, run_requirements
 from slideviz.session.store import Store
 from slideviz.session.unsaved import title_of
 from slideviz.system.file_checks import protected
@@ -277,7 +277,7 @@ class MainWindow(Services):
         session = self.store.session
         if isinstance(self.focusWidget(), QLineEdit | QSpinBox):
             self.view.setFocus()  # a field would keep Home, End and Space from the player
-        if not session.in_file or self.runner.busy or changes.run_requirements(session):
+        if not session.in_file or self.runner.busy or run_requirements(session):
             self.running.start_run()
             return
         # The deformed mesh would not fit into memory either.

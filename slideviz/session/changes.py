@@ -1,93 +1,493 @@
-"""All changes of a session, imported from one place: functions from one session to the next."""
+"""All changes of a session: functions from one session to the next.
+
+A change with `undoable` above it can be undone, and the menu names it so.
+"""
 
 from __future__ import annotations
 
-from slideviz.session.changes_case import (
-    add_motion,
-    confirm,
-    move_motion,
-    moved_files,
-    remove_motion,
-    replace_motion,
-    saved_case,
-    set_case,
-    set_invalid,
-    set_role,
-)
-from slideviz.session.changes_runs import (
-    UNDEFORMED,
-    add_frames,
-    end_run,
-    remove_run,
-    rename_run,
-    saved_mesh,
-    second_view,
-    show_beside,
-    show_design,
-    show_run,
-    start_run,
-    take_settings,
-)
-from slideviz.session.changes_view import (
-    add_section,
-    choose_section,
-    flat_one,
-    fresh_view,
-    isolate,
-    lay_flat,
-    mark_cell,
-    remove_section,
-    replace_section,
-    select,
-    set_view,
-    show,
-    show_frame,
-    show_handle,
-)
-from slideviz.session.colors import fit_colors
-from slideviz.session.opening import open_mesh, suggested_reduction
-from slideviz.session.run_messages import Requirement, run_requirements
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-__all__ = [
-    "UNDEFORMED",
-    "Requirement",
-    "add_frames",
-    "add_motion",
-    "add_section",
-    "choose_section",
-    "confirm",
-    "end_run",
-    "fit_colors",
-    "flat_one",
-    "fresh_view",
-    "isolate",
-    "lay_flat",
-    "mark_cell",
-    "move_motion",
-    "moved_files",
-    "open_mesh",
-    "remove_motion",
-    "remove_run",
-    "remove_section",
-    "rename_run",
-    "replace_motion",
-    "replace_section",
-    "run_requirements",
-    "saved_case",
-    "saved_mesh",
-    "second_view",
-    "select",
-    "set_case",
-    "set_invalid",
-    "set_role",
-    "set_view",
-    "show",
-    "show_beside",
-    "show_design",
-    "show_frame",
-    "show_handle",
-    "show_run",
-    "start_run",
-    "suggested_reduction",
-    "take_settings",
-]
+from slideviz.case.model import Case, FromFile, Motion, named
+from slideviz.sections.threshold import ONLY_INVERTED
+from slideviz.session.opening import guess_by_name, has_ffd, with_periodicity
+from slideviz.session.state import PanelPlace, Run, Session, StepFrame, ViewState
+from slideviz.terms import SHOWN, ColorBy, Role
+
+if TYPE_CHECKING:
+    from slideviz.sections.model import Section
+
+UNDEFORMED = 0
+"""The number of the undeformed mesh where a run's number is asked for; those begin with 1."""
+MOST_REMOVED = 2
+"""Removed runs that undo can bring back: each may take hundreds of megabytes."""
+
+Change = TypeVar("Change", bound=Callable[..., Any])
+Row = TypeVar("Row")
+Words = str | Callable[[Mapping[str, Any]], str | None]
+
+_WORDS: dict[Callable[..., Any], Words] = {}
+
+
+def undoable(words: Words) -> Callable[[Change], Change]:
+    """Return a decorator that lets `slideviz.session.store.Store` undo a change.
+
+    Parameters
+    ----------
+    words : str or callable
+        The words after "Undo" in the menu; or a function that returns them for the change's
+        keyword arguments, or None if such a change is not to be undone.
+    """
+
+    def mark(change: Change) -> Change:
+        _WORDS[change] = words
+        return change
+
+    return mark
+
+
+def undo_words(change: Callable[..., Any], named: Mapping[str, Any]) -> str | None:
+    """Return the words in the menu for a change with keyword arguments ``named``; None: no undo."""
+    words = _WORDS.get(change)
+    return words if words is None or isinstance(words, str) else words(named)
+
+
+def _replaced(rows: tuple[Row, ...], index: int, row: Row) -> tuple[Row, ...]:
+    """Return the rows with another one at the place ``index``."""
+    changed = list(rows)
+    changed[index] = row
+    return tuple(changed)
+
+
+def _without(rows: tuple[Row, ...], index: int) -> tuple[Row, ...]:
+    """Return the rows without the one at the place ``index``."""
+    return rows[:index] + rows[index + 1 :]
+
+
+# The view --------------------------------------------------------------------------------
+
+
+UNDO_WORDS: dict[str, str] = {
+    "color_range": "color range",
+    "color_map": "colors",
+    "threshold": "range of cells",
+    "points": "points",
+    "sections": "sections",
+    "passages": "neighbours",
+    "hidden": "hidden boundaries",
+    **{name: term.name.lower() for name, term in SHOWN.items()},
+}
+"""Words after "Undo" for a change of one value of the view, by its name; for others "view"."""
+
+
+def _undo_words(values: Mapping[str, Any]) -> str | None:
+    if "color_by" in values:
+        return None  # the quantity that the view is colored by is not undone
+    return UNDO_WORDS.get(next(iter(values)), "view") if len(values) == 1 else "view"
+
+
+@undoable(_undo_words)
+def set_view(session: Session, **values: Any) -> Session:
+    """Return the session with other values of fields of `ViewState`, or of names in `SHOWN`.
+
+    Each quantity that the view is colored by has its own color range, which comes back with it.
+    """
+    old = session.view
+    what: ColorBy = values.get("color_by", old.color_by)
+    if what != old.color_by:
+        ranges = dict(old.ranges)
+        if old.color_range is not None:
+            ranges[old.color_by] = old.color_range
+        values = {"color_range": ranges.pop(what, None)} | values
+        values["ranges"] = tuple(sorted(ranges.items()))
+        # A threshold for a quality means nothing for a displacement, and the other way round.
+        if "displacement" in (what, old.color_by) and old.threshold != ONLY_INVERTED:
+            values.setdefault("threshold", None)
+    if "sections" in values:
+        index = selection_after(old.section_index, old.sections, values["sections"])
+        values.setdefault("section_index", index)
+    if session.in_file:
+        values.pop("threshold", None)  # needs the values of all cells
+    drawn = {name: values.pop(name) for name in SHOWN if name in values}
+    return replace(session, view=replace(old.with_drawn(drawn), **values))
+
+
+def select(session: Session, names: Iterable[str]) -> Session:
+    """Return the session with the boundaries ``names`` highlighted, and no others."""
+    return set_view(session, selected=tuple(names))
+
+
+@undoable("hidden boundaries")
+def show(session: Session, names: Iterable[str], shown: bool = True) -> Session:
+    """Return the session with the boundaries ``names`` shown, or hidden."""
+    hidden = session.view.hidden
+    change = frozenset(names)
+    return set_view(session, hidden=hidden - change if shown else hidden | change)
+
+
+@undoable("hidden boundaries")
+def isolate(session: Session, names: Iterable[str]) -> Session:
+    """Return the session with only the boundaries ``names`` shown."""
+    every = session.mesh.marker_names if session.mesh else ()
+    return set_view(session, hidden=frozenset(every) - frozenset(names))
+
+
+def show_frame(session: Session, index: int) -> Session:
+    """Return the session with the frame ``index`` shown, or the nearest there is."""
+    return set_view(session, frame=min(max(index, 0), max(len(session.frames) - 1, 0)))
+
+
+@undoable("new section")
+def add_section(session: Session, section: Section) -> Session:
+    """Return the session with one more section, which is selected."""
+    return set_view(session, sections=(*session.view.sections, section))
+
+
+@undoable("section")
+def replace_section(session: Session, index: int, section: Section) -> Session:
+    """Return the session with another section at the place ``index``."""
+    return set_view(session, sections=_replaced(session.view.sections, index, section))
+
+
+@undoable("removing a section")
+def remove_section(session: Session, index: int) -> Session:
+    """Return the session without the section at the place ``index``."""
+    return set_view(session, sections=_without(session.view.sections, index))
+
+
+@undoable("flat view")
+def lay_flat(session: Session, index: int | None) -> Session:
+    """Return the session with a flat view of the section at the place ``index``; None: of none."""
+    laid = (replace(one, flat=i == index) for i, one in enumerate(session.view.sections))
+    return set_view(session, sections=tuple(laid))
+
+
+@undoable("choice of a section")
+def choose_section(session: Session, index: int | None) -> Session:
+    """Return the session with the section at the place ``index`` selected; None: none."""
+    return set_view(session, section_index=index)
+
+
+@undoable("handle")
+def show_handle(session: Session, shown: bool) -> Session:
+    """Return the session with the handle of the selected section shown, or not."""
+    return set_view(session, handle=shown)
+
+
+def selection_after(
+    index: int | None, old: Sequence[Section], new: Sequence[Section]
+) -> int | None:
+    """Return the place of the selected section after one was added, removed or changed.
+
+    ``index`` is its place among ``old``. A section that was added is selected; where the selected
+    one was removed, its neighbour is.
+    """
+    if not new:
+        return None
+    if len(new) == len(old) and index is not None:
+        return index
+    first = next(
+        (i for i, (a, b) in enumerate(zip(old, new, strict=False)) if a != b),
+        min(len(old), len(new)),
+    )
+    if len(new) > len(old) or index is None:
+        return min(first, len(new) - 1)
+    return min(index - (index > first), len(new) - 1)
+
+
+def mark_cell(session: Session, cell: int | None) -> Session:
+    """Return the session with a cell marked; None: none."""
+    return set_view(session, marked_cell=cell, marked_in=session.shown)
+
+
+def fresh_view(session: Session, old: ViewState) -> Session:
+    """Return a session just opened, with the things drawn and the color map of the view ``old``.
+
+    FFD boxes are drawn as ``session`` has them: if it has FFD motions.
+    """
+    drawn = old.with_drawn({"ffd": "ffd" in session.view.drawn}).drawn
+    return set_view(session, drawn=drawn, color_map=old.color_map)
+
+
+# Roles, motions and settings -------------------------------------------------------------
+
+
+@undoable("role")
+def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
+    """Return the session with boundaries in a role, which is no longer a guess.
+
+    Motions lose boundaries that no longer move. Boundaries guessed periodic only because they match
+    one of these become fixed. The first periodic boundary turns periodicity on, the last one off;
+    the first sliding one turns pseudo sliding on where nothing slides.
+    """
+    changed = tuple(names)
+    roles = dict(session.case.roles) | dict.fromkeys(changed, role)
+    guesses = {name: guess for name, guess in session.guesses.items() if name not in changed}
+    for name in _left_alone(session, changed, role):
+        if name in guesses:
+            del guesses[name]
+            roles[name] = "fixed"
+    still = (_of_moving(motion, roles) for motion in session.case.motions)
+    motions = tuple(motion for motion in still if motion is not None)
+    case = session.case.change(roles=roles, motions=motions)
+    first_sliding = "sliding" in roles.values() and "sliding" not in session.case.roles.values()
+    if first_sliding and case.sliding == "none":
+        case = case.change(sliding="ps")
+    if "periodic" not in roles.values():
+        case = case.change(periodic="none")
+    elif case.periodic == "none" and "periodic" not in session.case.roles.values():
+        mine = (p for p in session.pairs if {p.first, p.second} & set(changed))
+        case = with_periodicity(case, next(mine, None))
+    return replace(session, case=case, guesses=guesses)
+
+
+def _left_alone(session: Session, changed: Sequence[str], role: Role) -> Iterator[str]:
+    """Yield the boundaries that match one of ``changed``, and whose names hint at no role.
+
+    None where ``role`` is periodic.
+    """
+    for pair in session.pairs if role != "periodic" else ():
+        for name, other in ((pair.first, pair.second), (pair.second, pair.first)):
+            if other in changed and guess_by_name(name) is None:
+                yield name
+
+
+def _of_moving(motion: Motion, roles: Mapping[str, Role]) -> Motion | None:
+    """Return the motion for those of its boundaries that move; None where none does."""
+    names = named(motion.marker)
+    moving = tuple(name for name in names if roles.get(name) == "moving")
+    if moving == names:
+        return motion
+    return replace(motion, marker=moving if len(moving) > 1 else moving[0]) if moving else None
+
+
+@undoable("confirming guesses")
+def confirm(session: Session, names: Iterable[str] | None = None) -> Session:
+    """Return the session with the guesses for some boundaries (default: all) confirmed."""
+    gone = set(session.guesses if names is None else names)
+    kept = {name: guess for name, guess in session.guesses.items() if name not in gone}
+    return replace(session, guesses=kept)
+
+
+@undoable("settings")
+def set_case(session: Session, **values: Any) -> Session:
+    """Return the session with other values of fields of its case."""
+    return replace(session, case=session.case.change(**values))
+
+
+def set_invalid(session: Session, place: PanelPlace, sentences: tuple[str, ...]) -> Session:
+    """Return the session with ``sentences`` on the invalid fields of the panel ``place``."""
+    # The order of the panels does not count: two of them would change it in turns, for ever.
+    if tuple(said for where, said in session.invalid if where == place) == sentences:
+        return session
+    others = tuple(each for each in session.invalid if each[0] != place)
+    return replace(session, invalid=(*others, *((place, sentence) for sentence in sentences)))
+
+
+@undoable("new motion")
+def add_motion(session: Session, motion: Motion, index: int | None = None) -> Session:
+    """Return the session with one more motion, performed last, or at the place ``index``."""
+    motions = list(session.case.motions)
+    motions.insert(len(motions) if index is None else index, motion)
+    return _with_motions(session, motions)
+
+
+def _with_motions(session: Session, motions: Sequence[Motion]) -> Session:
+    """Return the session with other motions; FFD boxes are drawn from the first FFD motion on."""
+    found = set_case(session, motions=tuple(motions))
+    if has_ffd(found.case) and not has_ffd(session.case):
+        return replace(found, view=found.view.with_drawn({"ffd": True}))
+    return found
+
+
+@undoable("motion")
+def replace_motion(session: Session, index: int, motion: Motion) -> Session:
+    """Return the session with another motion at the place ``index``."""
+    return _with_motions(session, _replaced(session.case.motions, index, motion))
+
+
+@undoable("removing a motion")
+def remove_motion(session: Session, index: int) -> Session:
+    """Return the session without the motion at the place ``index``."""
+    return set_case(session, motions=_without(session.case.motions, index))
+
+
+@undoable("order of motions")
+def move_motion(session: Session, index: int, by: int) -> Session:
+    """Return the session with a motion performed ``by`` places later (negative: earlier)."""
+    motions = list(session.case.motions)
+    motion = motions.pop(index)
+    motions.insert(max(0, index + by), motion)
+    return set_case(session, motions=tuple(motions))
+
+
+def moved_files(session: Session, moved: Mapping[Path, Path]) -> Session:
+    """Return the session after mesh or displacement files were moved: new paths by old ones."""
+
+    def there(case: Case) -> Case:
+        motions = tuple(
+            replace(m, path=moved.get(m.path, m.path)) if isinstance(m, FromFile) else m
+            for m in case.motions
+        )
+        file, out = case.mesh_file, case.mesh_out
+        if file is None or file not in moved:
+            return case.change(motions=motions)
+        new = moved[file]
+        if out is not None and out.parent == file.parent:
+            out = new.with_name(f"{new.stem}_deformed{out.suffix}")
+        return case.change(motions=motions, mesh_file=new, mesh_out=out)
+
+    return replace(
+        session,
+        path=moved.get(session.path, session.path) if session.path else None,
+        case=there(session.case),
+        # The files are the same, so that runs stay those of the case.
+        runs=tuple(replace(run, case=there(run.case)) for run in session.runs),
+    )
+
+
+def saved_case(session: Session, case: Case) -> Session:
+    """Return the session after ``case`` was written to disk, with its sections."""
+    return replace(session, case=case, saved=case, saved_sections=session.view.sections)
+
+
+# Runs ------------------------------------------------------------------------------------
+
+
+def start_run(session: Session, case: Case | None = None, name: str = "") -> Session:
+    """Return the session with a new run, which is shown: of ``case``, or of the session's case.
+
+    With a ``name`` it is the run of a design. Earlier runs without any step are removed. No cell is
+    marked: one that was bad need not be of interest in another run.
+    """
+    kept = tuple(run for run in session.runs if run.frames)
+    number = 1 + max((session.newest, *(run.number for run in session.runs)))
+    panels = session.case if name else None
+    runs = (*kept, Run(number, case or session.case, name=name, panels=panels))
+    session = replace(session, runs=runs, shown=number, newest=number)
+    return show_frame(set_view(session, marked_cell=None), 0)
+
+
+def add_frames(session: Session, frames: Sequence[StepFrame]) -> Session:
+    """Return the session with further steps of the newest run, the last shown if that run is."""
+    newest = session.runs[-1]
+    grown = replace(newest, frames=(*newest.frames, *frames), saved=False)
+    session = replace(session, runs=(*session.runs[:-1], grown))
+    if session.shown != grown.number:
+        return session  # the user looks at another run meanwhile
+    return show_frame(session, len(grown.frames))
+
+
+def end_run(session: Session, end: Literal["done", "cancelled", "failed"]) -> Session:
+    """Return the session with ``end`` as the end of the newest run, if that had none."""
+    if not session.runs or session.runs[-1].end:
+        return session
+    ended = replace(session.runs[-1], end=end)
+    return replace(session, runs=(*session.runs[:-1], ended))
+
+
+def show_run(session: Session, number: int) -> Session:
+    """Return the session with the last step of a run shown, if there is the run."""
+    run = session.run(number)
+    if run is None:
+        return session
+    beside = None if session.view.beside == number else session.view.beside
+    session = set_view(replace(session, shown=number), beside=beside)
+    return show_frame(session, len(run.frames))
+
+
+def show_design(session: Session, number: int) -> Session:
+    """Return the session with the last step of a design's run shown, as asked for in this case."""
+    asked = (
+        replace(one, panels=session.case) if one.number == number else one for one in session.runs
+    )
+    return show_run(replace(session, runs=tuple(asked)), number)
+
+
+def show_beside(session: Session, number: int | None) -> Session:
+    """Return the session with another run in a second view; None for no second view.
+
+    ``UNDEFORMED`` is the number of the undeformed mesh.
+    """
+    known = number == UNDEFORMED or session.run(number) is not None
+    if number == session.shown or not known:
+        number = None
+    return set_view(session, beside=number, swapped=False)
+
+
+@undoable("removing a run")
+def remove_run(session: Session, number: int) -> Session:
+    """Return the session without a run, which undo can bring back; unchanged while it goes on."""
+    run = session.run(number)
+    if run is None or not run.end:
+        return session
+    rest = tuple(other for other in session.runs if other.number != number)
+    beside = None if session.view.beside == number else session.view.beside
+    removed = (*session.removed, run)[-MOST_REMOVED:]
+    newest = max(session.newest, *(other.number for other in session.runs))
+    session = replace(session, runs=rest, removed=removed, newest=newest)
+    session = set_view(session, beside=beside)
+    if session.shown != number:
+        return session
+    if not rest:
+        return show_frame(set_view(replace(session, shown=None), beside=None), 0)
+    return show_run(session, rest[-1].number)
+
+
+def bring_back(session: Session, number: int) -> Session:
+    """Return the session with a removed run back at its place, if it is still in ``removed``."""
+    back = [run for run in session.removed if run.number == number]
+    if not back:
+        return session
+    runs = tuple(sorted((*session.runs, *back), key=lambda run: run.number))
+    return replace(
+        session, runs=runs, removed=tuple(run for run in session.removed if run not in back)
+    )
+
+
+def rename_run(session: Session, number: int, name: str) -> Session:
+    """Return the session with another name for a run; "" takes its name away."""
+    name = " ".join(name.split())
+    run = session.run(number)
+    if run is None or run.name == name:
+        return session
+    runs = tuple(replace(one, name=name) if one is run else one for one in session.runs)
+    return replace(session, runs=runs)
+
+
+@undoable("settings of a run")
+def take_settings(session: Session, number: int) -> Session:
+    """Return the session with the case of a run as its own, and no guesses."""
+    run = session.run(number)
+    if run is None:
+        return session
+    return replace(session, case=run.case, guesses={})
+
+
+def second_view(session: Session) -> Session:
+    """Return the session that the second view shows: the other run, at the matching step.
+
+    Unchanged where there is no second view.
+    """
+    if session.view.beside == UNDEFORMED:
+        return show_frame(session, 0)
+    run, other = session.run_shown, session.run(session.view.beside)
+    if other is None:
+        return session
+    last = len(run.frames) if run is not None else 0
+    at = session.view.frame
+    # The step at about the same part of the displacement, where numbers of steps differ.
+    frame = round(at * len(other.frames) / last) if last else 0
+    if at:
+        frame = max(frame, 1)
+    return show_frame(replace(session, shown=other.number), frame)
+
+
+def saved_mesh(session: Session) -> Session:
+    """Return the session after the deformed mesh of the run that is shown was written to disk."""
+    runs = tuple(
+        replace(run, saved=True) if run.number == session.shown else run for run in session.runs
+    )
+    return replace(session, runs=runs)

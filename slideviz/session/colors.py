@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.quality import INVERTED
-from slideviz.session.changes_runs import second_view
-from slideviz.session.changes_view import set_view
+from slideviz.session.changes import second_view, set_view, undoable
 from slideviz.session.results import StepFrame
 from slideviz.session.state import Session
-from slideviz.session.undoable import undoable
 
 _PARTS = 100.0
 """A color range is rounded outwards to a power of ten, about its length over this number."""

@@ -13,7 +13,6 @@ from slideviz.case.model import BoxMotion, Case
 from slideviz.case.reduction import Reduction
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
-from slideviz.session.changes_view import flat_one
 from slideviz.session.keep import view_from_case
 from slideviz.session.state import Guess, Run, Session, StepFrame, ViewState
 from slideviz.terms import ColorBy, Role
@@ -51,7 +50,7 @@ def open_mesh(
     view = view_from_case(chosen, ViewState(), mesh.marker_names)
     if has_ffd(chosen) and "VIEW_SHOW" not in chosen.view:
         view = view.with_drawn({"ffd": True})
-    flat = flat_one(view.sections)
+    flat = view.flat_index
     if mesh.part is not None:
         view = replace(view, threshold=None)  # needs the values of all cells
     view = replace(view, section_index=flat if flat is not None else 0 if view.sections else None)

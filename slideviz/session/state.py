@@ -65,6 +65,12 @@ class ViewState:
     """Whether the selected section has its handle drawn."""
 
     @property
+    def flat_index(self) -> int | None:
+        """Return the place of the section that has a flat view and is drawn, or None."""
+        flat = (index for index, one in enumerate(self.sections) if one.flat and one.shown)
+        return next(flat, None)
+
+    @property
     def style(self) -> ViewState:
         """Return the view with defaults for step, selection, marked cell and second view."""
         return ViewState().in_style(self)

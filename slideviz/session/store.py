@@ -9,10 +9,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from slideviz.case.model import Case
-from slideviz.session.changes_runs import bring_back, remove_run, show_run
-from slideviz.session.changes_view import set_view
+from slideviz.session.changes import bring_back, remove_run, set_view, show_run, undo_words
 from slideviz.session.state import Guess, Session, ViewState
-from slideviz.session.undoable import undo_words
 
 Listener = Callable[[Session, Session], None]
 Failed = Callable[[Exception], None]

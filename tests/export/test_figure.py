@@ -30,6 +30,7 @@ from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import changes, jobs_export
 from slideviz.session.formats import MESH_FORMATS, formats_for, holds_quality, left_out
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.terms import ROLES
 
@@ -37,7 +38,7 @@ PLAIN = PictureOptions((400, 300), legend=False)
 
 
 def session_of(mesh):
-    return changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
+    return open_mesh(StepFrame(mesh, quality(mesh)), None)
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@ from slideviz.plots.section_picture import SectionInRun, SectionStyle, draw_sect
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from tests.scenes import square_mesh
 
@@ -40,7 +41,7 @@ def folded(base):
 
 
 def session_of(base, folded, **view):
-    found = changes.start_run(changes.open_mesh(StepFrame(base, quality(base)), None))
+    found = changes.start_run(open_mesh(StepFrame(base, quality(base)), None))
     found = changes.add_frames(found, [StepFrame(folded, quality(folded, base))])
     return changes.set_view(changes.end_run(found, "done"), color_by="size-skew", **view)
 

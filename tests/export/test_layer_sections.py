@@ -26,6 +26,7 @@ from slideviz.scene.pick import to_display
 from slideviz.scene.polygon_actor import plain_color
 from slideviz.sections.model import Section
 from slideviz.session import changes, section_start
+from slideviz.session.opening import open_mesh
 from slideviz.session.passages import find_period, moved
 from slideviz.session.section_cuts import KEPT, Cuts
 from slideviz.session.state import Session, StepFrame
@@ -46,7 +47,7 @@ def stator():
 
 
 def opened(scene, mesh, case=None, **view):
-    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None, (), case)
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None, (), case)
     session = changes.set_view(session, **view)
     scene.open(session, find_surfaces(mesh))
     return session
@@ -400,7 +401,7 @@ def test_cuts_are_remembered_for_the_frame_only(cube):
 
 def test_a_first_plane_cuts_the_longest_extent_in_the_middle(square):
     mesh = square.with_points(square.points * (3.0, 1.0))
-    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None)
     plane = section_start.first_section("plane", session)
     assert plane.direction == (1.0, 0.0, 0.0)
     assert plane.shape.position(plane) == 6.0
@@ -409,7 +410,7 @@ def test_a_first_plane_cuts_the_longest_extent_in_the_middle(square):
 
 def test_a_first_cylinder_has_the_axis_of_the_period(stator):
     mesh = stator.mesh
-    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None, (), stator.case)
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None, (), stator.case)
     pair = find_period(mesh, stator.case)
     cylinder = section_start.first_section("cylinder", session, pair)
     assert np.cross(cylinder.direction, (0, 0, 1)) == pytest.approx(0.0)
@@ -576,7 +577,7 @@ def test_a_fold_is_seen_in_the_flat_view(scene, flat_plotter, cube):
 
 
 def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
-    session = changes.open_mesh(StepFrame(stator.mesh, quality(stator.mesh)), None, (), stator.case)
+    session = open_mesh(StepFrame(stator.mesh, quality(stator.mesh)), None, (), stator.case)
     session = changes.set_view(session, passages=1, color_by="skew", color_range=(0.2, 0.9))
     section = Section("cylinder", radius=0.27)
     told = []
@@ -597,7 +598,7 @@ def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
 def test_the_picture_of_a_section_has_the_colors_of_the_view_and_says_which_run_it_is_of(
     cube, tmp_path, monkeypatch
 ):
-    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
+    session = open_mesh(StepFrame(cube, quality(cube)), None)
     section = Section("plane", (0.5, 0.5, 0.52))
     assert state_words(session) == "undeformed"
     moved = cube.with_points(cube.points * (1.0, 1.0, 1.2))
@@ -634,7 +635,7 @@ def test_the_picture_of_a_section_has_the_colors_of_the_view_and_says_which_run_
 
 def test_the_picture_of_a_section_has_the_cells_of_the_range(cube, tmp_path, monkeypatch):
     mesh = bent(cube)
-    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None)
     session = changes.set_view(session, color_by="size-skew")
     some, kept = halved(session)
     drawn = []
@@ -655,7 +656,7 @@ def test_the_picture_of_a_section_has_the_cells_of_the_range(cube, tmp_path, mon
 
 @pytest.mark.parametrize("whole", [False, True])
 def test_sections_of_a_drawing_have_the_cells_of_the_range(square, whole):
-    session = changes.open_mesh(StepFrame(square, quality(square)), None)
+    session = open_mesh(StepFrame(square, quality(square)), None)
     session = changes.set_view(
         session, color_by="size-skew", sections=(replace(LINE, whole=whole),)
     )

@@ -11,6 +11,7 @@ from slideviz.export.picture_options import PictureOptions
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.session import changes, pieces
+from slideviz.session.opening import open_mesh
 from slideviz.session.pieces import InThread, appearing, portions, run_inline, run_to_end
 from slideviz.session.state import StepFrame
 
@@ -107,7 +108,7 @@ def test_what_appears_part_by_part_is_all_there_in_the_end(plotter, monkeypatch,
 
 @pytest.fixture
 def session(square):
-    found = changes.open_mesh(StepFrame(square, quality(square)), None)
+    found = open_mesh(StepFrame(square, quality(square)), None)
     found = changes.start_run(found)
     moved = square.with_points(square.points * [1.2, 1.0])
     found = changes.add_frames(found, [StepFrame(moved, quality(moved, square))])

@@ -11,6 +11,7 @@ from slideviz.mesh.surfaces import find_surfaces
 from slideviz.scene.color_legend import OPACITY, STRIP
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 
 SIZE = (500, 400)
@@ -24,7 +25,7 @@ def window_size():
 def opened(plotter, mesh, scheme, **view):
     scene = Scene(plotter, scheme)
     scene.set_scheme(scheme)
-    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None)
     session = changes.set_view(session, edges=False, triad=False, **view)
     scene.open(session, find_surfaces(mesh))
     return scene, session
@@ -79,7 +80,7 @@ def test_a_plate_follows_the_size_of_the_view(plotter, square):
 
 
 def test_a_transparent_picture_has_no_plate(square):
-    session = changes.open_mesh(StepFrame(square, quality(square)), None)
+    session = open_mesh(StepFrame(square, quality(square)), None)
     session = changes.set_view(session, color_by="size-skew")
     with OffscreenRenderer(session, find_surfaces(square)) as renderer:
         clear = renderer.image(PictureOptions(SIZE, background="transparent"))

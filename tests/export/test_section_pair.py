@@ -14,6 +14,7 @@ from slideviz.plots import section_picture
 from slideviz.plots.section_layout import arranged
 from slideviz.sections.model import Section
 from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from tests.builders import cube, passage, square
 from tests.slow import one_of_each_fast
@@ -24,7 +25,7 @@ LEVEL = Section("plane", (0.5, 0.5, 0.4))
 
 def compared(mesh):
     """A session with two runs side by side, one of which deforms more."""
-    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None)
     for sliding, part in (("ps", 0.1), ("ds", 0.2)):
         session = changes.start_run(changes.set_case(session, sliding=sliding))
         push = part * np.prod(np.sin(np.pi * mesh.points), axis=1)

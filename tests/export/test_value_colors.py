@@ -14,6 +14,7 @@ from slideviz.scene.flat_scene import FlatScene
 from slideviz.scene.scene import Scene
 from slideviz.sections.model import Section
 from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import StepFrame
 
@@ -62,7 +63,7 @@ def test_cells_below_the_range_have_its_lowest_color_and_inverted_ones_are_red(p
 
 
 def test_so_it_is_in_the_flat_view(plotter, cube):
-    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
+    session = open_mesh(StepFrame(cube, quality(cube)), None)
     session = above_all(changes.set_view(session, color_by="size-skew", edges=False))
     scene = FlatScene(plotter, Cuts())
     scene.update(session, Section("plane", (0.5, 0.5, 0.52)))

@@ -13,6 +13,7 @@ from slideviz.gui.widgets import plot_canvas
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.sections.threshold import ONLY_INVERTED
 from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 
 
@@ -84,7 +85,7 @@ def test_it_follows_the_colors_of_the_view(full, qtbot):
 def good_session(mesh):
     """A session whose cells all are of about the same quality."""
     rng = np.random.default_rng(5)
-    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None)
     points = mesh.points + rng.uniform(-0.004, 0.004, mesh.points.shape)
     frame = StepFrame(mesh.with_points(points), quality(mesh.with_points(points), mesh))
     return changes.end_run(changes.add_frames(changes.start_run(session), [frame]), "done")

@@ -12,6 +12,7 @@ from slideviz.scene.actors import VALUES
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import changes, large
+from slideviz.session.run_messages import run_requirements
 from slideviz.session.state import IN_FILE
 from slideviz.solver.deform import deform
 
@@ -83,7 +84,7 @@ def test_only_the_boundary_is_in_memory_and_what_needs_all_cells_says_so(stator,
     panel.start()
     assert not panel.runner.busy
     stator.window.store.change(changes.set_case, method="elastic")
-    wanted = changes.run_requirements(stator.session)
+    wanted = run_requirements(stator.session)
     assert any("needs all of a mesh in memory" in one.text for one in wanted)
 
 

@@ -19,7 +19,7 @@ from slideviz.samples.table import write_sample
 from slideviz.scene.pick import to_display
 from slideviz.sections.model import Section
 from slideviz.session import changes
-from slideviz.session.changes_view import selection_after
+from slideviz.session.changes import selection_after
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 

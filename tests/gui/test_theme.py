@@ -10,7 +10,7 @@ from qtpy.QtWidgets import QApplication
 from slideviz.gui.viewport.player import result_parts
 from slideviz.gui.widgets import theme
 from slideviz.mesh.quality import quality
-from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from tests.builders import square
 
@@ -46,7 +46,7 @@ def test_words_about_inverted_cells_can_be_read(themed, name):
     mesh = square(4)
     points = mesh.points.copy()
     points[mesh.points.prod(axis=1).argmax()] = -3.0
-    session = changes.open_mesh(
+    session = open_mesh(
         StepFrame(mesh.with_points(points), quality(mesh.with_points(points))), None
     )
     assert session.frame.quality.inverted

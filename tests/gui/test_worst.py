@@ -29,6 +29,7 @@ from slideviz.samples.table import sample
 from slideviz.session import changes
 from slideviz.session.inspect import WorstCells, cell_info, worst_cells
 from slideviz.session.locate import nearest_boundary
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.session.store import Store
 
@@ -54,7 +55,7 @@ def with_runs(session):
 @cache
 def session_with_runs():
     mesh = sample("square", size=12).mesh
-    return with_runs(changes.open_mesh(StepFrame(mesh, quality(mesh)), None))
+    return with_runs(open_mesh(StepFrame(mesh, quality(mesh)), None))
 
 
 @pytest.fixture

@@ -8,8 +8,7 @@ import pytest
 import slideviz as sv
 from slideviz.cli import run as command
 from slideviz.formats.su2.write import su2_blocks
-from slideviz.session import changes
-from slideviz.session.opening import guess_roles
+from slideviz.session.opening import guess_roles, open_mesh
 from slideviz.session.state import StepFrame
 from tests.builders import grid, square
 
@@ -65,8 +64,8 @@ def test_interfaces_are_guessed_fixed(tmp_path):
     guess = guess_roles(mesh)["BLOCK"]
     assert (guess.role, guess.reason) == ("fixed", f"it is {mesh.interfaces[0].describe()}")
     frame = StepFrame(mesh, sv.quality(mesh))
-    assert changes.open_mesh(frame, None).case.roles["BLOCK"] == "fixed"
-    assert changes.open_mesh(frame, None, (), moved(None)).case.roles["BLOCK"] == "moving"
+    assert open_mesh(frame, None).case.roles["BLOCK"] == "fixed"
+    assert open_mesh(frame, None, (), moved(None)).case.roles["BLOCK"] == "moving"
 
 
 @pytest.mark.parametrize("stream", [False, True])

@@ -16,7 +16,7 @@ from slideviz.plots.figure_io import figure_bytes
 from slideviz.session import changes
 from slideviz.session.motions import found_text
 from slideviz.session.opening import guess_by_name, open_mesh
-from slideviz.session.run_messages import in_window_words
+from slideviz.session.run_messages import in_window_words, run_requirements
 from slideviz.session.runs_table import best
 from slideviz.session.state import Run, StepFrame
 
@@ -185,5 +185,5 @@ def test_what_is_missing_has_the_words_of_the_window(plain):
     session = changes.set_role(plain, ("left", "right", "bottom"), "periodic")
     session = changes.set_role(session, ("top",), "moving")
     session = changes.add_motion(session, Translate("top", (0.0, 0.1)))
-    (told,) = {m.text for m in changes.run_requirements(session)}
+    (told,) = {m.text for m in run_requirements(session)}
     assert told.startswith("The role “periodic” has an odd number of markers (bottom, right, left)")

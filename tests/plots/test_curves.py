@@ -11,6 +11,7 @@ from slideviz.mesh.quality import quality
 from slideviz.plots import curves
 from slideviz.plots.spanwise import along, along_radius
 from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 
 
@@ -106,7 +107,7 @@ def test_a_mesh_without_extent_that_way_is_refused(two_runs):
 def test_the_span_is_the_radius_where_a_mesh_repeats_about_an_axis(session, cube):
     assert curves.usual_coordinate(session) == "y"
     assert "z" not in curves.coordinates(session)
-    solid = changes.open_mesh(StepFrame(cube, quality(cube)), None)
+    solid = open_mesh(StepFrame(cube, quality(cube)), None)
     assert curves.usual_coordinate(solid) in ("x", "y", "z")
     assert list(curves.coordinates(solid)) == ["r", "z", "y", "x"]
     turned = replace(solid, pairs=(SimpleNamespace(kind="rotational"),))

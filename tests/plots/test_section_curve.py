@@ -26,6 +26,7 @@ from slideviz.plots.section_rows import CurveRows, colors_of, facts_of, labels_o
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import StepFrame
 from tests.builders import cube, square
@@ -161,7 +162,7 @@ def test_what_is_looked_at_is_solid_and_the_limits_hold_all():
 @pytest.fixture
 def session(mesh):
     base = square(8)
-    session = changes.open_mesh(StepFrame(base, quality(base)), None)
+    session = open_mesh(StepFrame(base, quality(base)), None)
     frames = [StepFrame(mesh, quality(mesh, base))]
     return changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
 

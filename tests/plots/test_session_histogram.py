@@ -10,13 +10,14 @@ from slideviz.mesh.quality import quality
 from slideviz.plots.draw import ON_LIGHT
 from slideviz.plots.session_histogram import MOST, FrameCounts, compared, draw_histogram
 from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import Run, StepFrame
 
 
 @pytest.fixture(scope="module")
 def many(square):
     """Seven runs of two motions by turns, the last of which is shown."""
-    session = changes.open_mesh(StepFrame(square, quality(square)), None)
+    session = open_mesh(StepFrame(square, quality(square)), None)
     roles = {"bottom": "moving"}
     motions = (Rotate("bottom", 1.0), Translate("bottom", (0.1, 0.0)))
     runs = tuple(

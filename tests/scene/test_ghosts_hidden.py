@@ -9,6 +9,7 @@ from slideviz.mesh.surfaces import find_surfaces
 from slideviz.scene.ghosts import WIRE
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 
 
@@ -21,7 +22,7 @@ def scene():
 
 def test_a_boundary_that_stays_in_its_surface_is_drawn_whole(scene, cube):
     names = cube.marker_names
-    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
+    session = open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_role(session, names, "fixed")
     scene.open(session, find_surfaces(cube))
     scene.look_from("iso")
@@ -62,7 +63,7 @@ def side_of(cube, normal):
 
 def test_a_boundary_that_slides_in_its_surface_keeps_its_color_within_the_rim(scene, cube):
     top = side_of(cube, (0, 0, 1))
-    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
+    session = open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_role(session, (top,), "moving")
     session = changes.set_view(session, edges=False, legend=False, triad=False)
     scene.open(session, find_surfaces(cube))
@@ -84,7 +85,7 @@ def test_a_boundary_that_slides_in_its_surface_keeps_its_color_within_the_rim(sc
 
 def test_the_undeformed_mesh_has_no_ghost_of_itself(scene, cube):
     top = side_of(cube, (0, 0, 1))
-    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
+    session = open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_role(session, (top,), "moving")
     scene.open(session, find_surfaces(cube))
     before = image(scene)
@@ -101,7 +102,7 @@ def test_the_undeformed_mesh_has_no_ghost_of_itself(scene, cube):
 
 def test_beside_a_run_the_undeformed_mesh_has_no_motion_ghost(scene, cube):
     top = side_of(cube, (0, 0, 1))
-    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
+    session = open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_role(session, (top,), "moving")
     scene.open(session, find_surfaces(cube))
     scene.set_motion_ghosts({top: slid(cube, top)})
@@ -123,7 +124,7 @@ def test_beside_a_run_the_undeformed_mesh_has_no_motion_ghost(scene, cube):
 def moving_top(cube, scene):
     """A session whose upper side moves, opened in the scene and seen from above."""
     top = side_of(cube, (0, 0, 1))
-    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
+    session = open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_role(session, (top,), "moving")
     session = changes.set_view(session, edges=False, legend=False, triad=False)
     scene.open(session, find_surfaces(cube))

@@ -10,6 +10,7 @@ from slideviz.mesh.surfaces import find_surfaces
 from slideviz.samples.table import sample
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 
 
@@ -25,7 +26,7 @@ def stator():
 
 def opened(plotter, made):
     scene = Scene(plotter)
-    session = changes.open_mesh(StepFrame(made.mesh, quality(made.mesh)), None, (), made.case)
+    session = open_mesh(StepFrame(made.mesh, quality(made.mesh)), None, (), made.case)
     surfaces = find_surfaces(made.mesh)
     scene.open(session, surfaces)
     return scene, session, {surface.name: surface for surface in surfaces}

@@ -25,6 +25,7 @@ from slideviz.scene.support import circles
 from slideviz.scene.threshold import ThresholdLayer
 from slideviz.session import changes
 from slideviz.session.inspect import middles
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.terms import NODE_TYPES, ROLES
 from tests.builders import far_field
@@ -48,7 +49,7 @@ def stator():
 
 
 def opened(scene, one, **view):
-    session = changes.open_mesh(StepFrame(one.mesh, quality(one.mesh)), None, (), one.case)
+    session = open_mesh(StepFrame(one.mesh, quality(one.mesh)), None, (), one.case)
     session = changes.set_view(session, **view)
     scene.open(session, find_surfaces(one.mesh))
     return session
@@ -133,7 +134,7 @@ def test_the_legend_names_the_points(scene, row):
 
 
 def test_neighbours_of_a_row_are_drawn_one_pitch_away(scene, row):
-    pitch = Period().of(changes.open_mesh(StepFrame(row.mesh, quality(row.mesh)), None)).vector
+    pitch = Period().of(open_mesh(StepFrame(row.mesh, quality(row.mesh)), None)).vector
     nodes = row.mesh.marker("BLADE").nodes
     at = row.mesh.points[nodes[len(nodes) // 3]]
     session = opened(scene, row, passages=1, edges=False, triad=False)
@@ -254,7 +255,7 @@ def test_a_mesh_that_does_not_repeat_has_no_neighbours(scene, session):
 
 
 def test_periodic_boundaries_that_do_not_match_have_no_neighbours(row):
-    session = changes.open_mesh(StepFrame(row.mesh, quality(row.mesh)), None, (), row.case)
+    session = open_mesh(StepFrame(row.mesh, quality(row.mesh)), None, (), row.case)
     assert Period().of(session) is not None
     wrong = changes.set_role(session, ("INFLOW", "BLADE"), "periodic")
     assert Period().of(wrong) is None
@@ -321,7 +322,7 @@ def boxed():
     low, high = mesh.bounds
     corners = low + CORNERS * (high - low)
     mesh = with_boxes(mesh, [regular_box("B", corners, (2, 2, 1), None)])
-    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None)
     name = mesh.marker_names[0]
     session = changes.set_role(changes.set_view(session, ffd=True), [name], "moving")
     return session, changes.add_motion(session, Ffd(name, "B", (1, 1, 1), (0.0, 0.0, 0.5)))
@@ -346,7 +347,7 @@ def test_of_a_box_only_what_moves_is_drawn_again(scene, boxed):
 
 def test_the_displacement_has_no_colors_before_a_run(scene, passage):
     frame = StepFrame(passage.mesh, quality(passage.mesh))
-    session = changes.open_mesh(frame, None, (), passage.case)
+    session = open_mesh(frame, None, (), passage.case)
     scene.open(session, find_surfaces(passage.mesh))
     session = changes.set_view(session, color_by="displacement")
     scene.update(session)
@@ -357,9 +358,7 @@ def test_the_displacement_has_no_colors_before_a_run(scene, passage):
 
 
 def test_some_boundaries_fill_the_view(scene, passage):
-    session = changes.open_mesh(
-        StepFrame(passage.mesh, quality(passage.mesh)), None, (), passage.case
-    )
+    session = open_mesh(StepFrame(passage.mesh, quality(passage.mesh)), None, (), passage.case)
     scene.open(session, find_surfaces(passage.mesh))
     whole = scene.plotter.camera.parallel_scale
     scene.fit(("inflow",))
@@ -371,7 +370,7 @@ def test_some_boundaries_fill_the_view(scene, passage):
 
 def test_the_support_radius_is_a_circle_around_what_moves(scene):
     mesh = far_field(60.0)
-    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None)
     session = changes.set_role(session, ["body"], "moving")
     moved = changes.add_motion(session, Rotate("body", 20.0))
     scene.open(moved, find_surfaces(mesh))

@@ -14,7 +14,7 @@ from slideviz.scene.mesh import GLASS
 from slideviz.scene.pick import to_display
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
-from slideviz.session.changes import open_mesh
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.terms import ROLES
 
@@ -172,7 +172,7 @@ def test_a_click_finds_the_nearest_boundary_of_a_2d_mesh(scene, session):
 
 
 def test_a_click_finds_the_front_boundary_of_a_3d_mesh(scene, cube):
-    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
+    session = open_mesh(StepFrame(cube, quality(cube)), None)
     opened(scene, session)
     for side, name in (("+x", "RIGHT"), ("-x", "LEFT"), ("+y", "UPPER"), ("-z", "FRONT")):
         scene.look_from(side)
@@ -248,7 +248,7 @@ def test_zooming_keeps_the_point_under_the_mouse(scene, session):
 def test_perspective_is_for_3d_only(scene, session, cube):
     opened(scene, changes.set_view(session, perspective=True))
     assert scene.plotter.camera.parallel_projection
-    solid = changes.open_mesh(StepFrame(cube, quality(cube)), None)
+    solid = open_mesh(StepFrame(cube, quality(cube)), None)
     opened(scene, solid)
     assert scene.plotter.camera.parallel_projection
     scene.update(changes.set_view(solid, perspective=True))
@@ -294,7 +294,7 @@ def test_the_title_of_the_bar_keeps_away_from_the_edge_in_a_view_of_any_size(sce
 
 def test_another_mesh_replaces_all_actors(scene, session, cube):
     opened(scene, session)
-    opened(scene, changes.open_mesh(StepFrame(cube, quality(cube)), None))
+    opened(scene, open_mesh(StepFrame(cube, quality(cube)), None))
     assert set(scene.drawn) == set(cube.marker_names)
     assert "marker:left" not in scene.plotter.actors
     scene.clear()
@@ -312,7 +312,7 @@ def test_a_3d_mesh_without_boundaries_shows_its_outside(scene, cube):
     from dataclasses import replace
 
     bare = replace(cube, markers=())
-    scene.open(changes.open_mesh(StepFrame(bare, quality(bare)), None), find_surfaces(bare))
+    scene.open(open_mesh(StepFrame(bare, quality(bare)), None), find_surfaces(bare))
     picture = image(scene)
     assert np.abs(picture[150, 160] - picture[-3, 3]).max() > 10
 
@@ -370,7 +370,7 @@ def legend_actors(plotter):
 
 @pytest.mark.parametrize("by", ["role", "size-skew"])
 def test_in_a_view_of_another_size_the_same_legend_is_where_a_new_one_would_be(cube, by):
-    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
+    session = open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_view(session, color_by=by, points="types")
     pictures = []
     for first, last in (((300, 260), (500, 420)), ((500, 420), (500, 420))):
@@ -434,7 +434,7 @@ def test_a_camera_comes_back(scene, session):
 
 @pytest.mark.parametrize("perspective", [False, True])
 def test_a_view_that_was_kept_is_not_cut_in_a_narrower_one(scene, session, cube, perspective):
-    solid = changes.open_mesh(StepFrame(cube, quality(cube)), None)
+    solid = open_mesh(StepFrame(cube, quality(cube)), None)
     opened(scene, changes.set_view(solid, perspective=True) if perspective else session)
     view, width = scene.camera.view, scene.plotter.window_size[0]
     scene.plotter.window_size = [260, scene.plotter.window_size[1]]
@@ -453,7 +453,7 @@ def culling(scene):
 
 
 def test_faces_that_look_away_are_left_out_and_nobody_sees_it(scene, cube):
-    session = opened(scene, changes.open_mesh(StepFrame(cube, quality(cube)), None))
+    session = opened(scene, open_mesh(StepFrame(cube, quality(cube)), None))
     for side in ("iso", "+x", "-z"):
         scene.look_from(side)
         assert culling(scene) == {"back"}
@@ -473,7 +473,7 @@ def test_faces_that_look_away_are_left_out_and_nobody_sees_it(scene, cube):
     ],
 )
 def test_where_the_inside_can_be_seen_all_faces_are_drawn(scene, cube, view):
-    session = opened(scene, changes.open_mesh(StepFrame(cube, quality(cube)), None))
+    session = opened(scene, open_mesh(StepFrame(cube, quality(cube)), None))
     assert culling(scene) == {"back"}
     scene.update(changes.set_view(session, **view))
     assert culling(scene) == {"none"}
@@ -487,14 +487,14 @@ def test_boundaries_with_a_hole_show_their_inside(scene, cube):
     for gone in ("FRONT", "BLOCK"):
         left = replace(cube, markers=tuple(m for m in cube.markers if m.name != gone))
         assert is_closed(find_surfaces(left)) == (gone == "BLOCK"), gone
-    opened(scene, changes.open_mesh(StepFrame(left, quality(left)), None))
+    opened(scene, open_mesh(StepFrame(left, quality(left)), None))
     holed = replace(cube, markers=tuple(m for m in cube.markers if m.name != "FRONT"))
-    opened(scene, changes.open_mesh(StepFrame(holed, quality(holed)), None))
+    opened(scene, open_mesh(StepFrame(holed, quality(holed)), None))
     assert culling(scene) == {"none"}
 
 
 def test_a_moving_boundary_inside_is_seen_and_clicked_through_those_around_it(scene, cube):
-    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
+    session = open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_role(session, ("BLOCK",), "fixed")
     opened(scene, session)
     scene.look_from("+x")

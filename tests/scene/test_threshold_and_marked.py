@@ -19,6 +19,7 @@ from slideviz.sections.model import Section
 from slideviz.sections.threshold import ONLY_INVERTED
 from slideviz.session import changes
 from slideviz.session.inspect import nodes_of
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 
 
@@ -32,7 +33,7 @@ def scene():
 @pytest.fixture(scope="module")
 def bent(cube):
     """A session of the cube with one step that shakes every node inside, at it, by quality."""
-    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
+    session = open_mesh(StepFrame(cube, quality(cube)), None)
     return stepped(session, 0.02)
 
 
@@ -135,7 +136,7 @@ def test_the_range_is_that_of_what_the_view_is_colored_by(scene, bent):
 
 
 def test_chosen_cells_follow_the_step(scene, cube):
-    session = stepped(changes.open_mesh(StepFrame(cube, quality(cube)), None), 0.01, 0.02)
+    session = stepped(open_mesh(StepFrame(cube, quality(cube)), None), 0.01, 0.02)
     session = opened(scene, changes.set_view(session, threshold=(0.0, 0.8)))
     for frame in (2, 1, 2):
         session = changes.show_frame(session, frame)
@@ -152,7 +153,7 @@ def test_chosen_cells_follow_the_step(scene, cube):
 
 
 def test_inverted_cells_alone_can_be_chosen(scene, cube):
-    session = stepped(changes.open_mesh(StepFrame(cube, quality(cube)), None), 0.12)
+    session = stepped(open_mesh(StepFrame(cube, quality(cube)), None), 0.12)
     assert session.frame.quality.inverted
     session = opened(scene, changes.set_view(session, threshold=ONLY_INVERTED))
     assert len(scene._threshold.cells) == session.frame.quality.inverted
@@ -164,7 +165,7 @@ def test_rings_are_at_all_inverted_cells_or_at_those_that_sections_cut(scene, cu
         actor = scene.plotter.actors.get("points:inverted")
         return 0 if actor is None else actor.mapper.dataset.n_points
 
-    session = stepped(changes.open_mesh(StepFrame(cube, quality(cube)), None), 0.12)
+    session = stepped(open_mesh(StepFrame(cube, quality(cube)), None), 0.12)
     session = opened(scene, session)
     inverted = session.frame.quality.inverted
     assert rings() == inverted

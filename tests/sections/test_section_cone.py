@@ -20,7 +20,7 @@ from slideviz.scene.flat_scene import flat_matrix
 from slideviz.sections.around_axis import patch_of
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
-from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.passages import keeps, passages
 from slideviz.session.section_start import first_section, span, turned
 from slideviz.session.state import StepFrame
@@ -244,7 +244,7 @@ def test_an_angle_that_makes_no_cone_is_told(angle, words):
 
 
 def session_of(mesh):
-    return changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
+    return open_mesh(StepFrame(mesh, quality(mesh)), None)
 
 
 @pytest.mark.parametrize("extent", [(0.5, 1.0, 1.0), (0.25, 0.325, 0.1), (0.0, 1.0, 1.0)])

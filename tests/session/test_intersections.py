@@ -7,6 +7,8 @@ from slideviz.case.model import Case, FromFile, Translate
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
 from slideviz.session.intersections import find_intersection, intersection_key, set_intersection
+from slideviz.session.opening import open_mesh
+from slideviz.session.run_messages import run_requirements
 from slideviz.session.state import StepFrame
 
 
@@ -72,13 +74,11 @@ def test_boundaries_that_disagree_about_a_node_are_told(square):
 def test_an_intersection_keeps_a_run_from_starting_and_an_old_answer_is_dropped(session):
     session = changes.set_role(session, ["bottom"], "moving")
     session = changes.add_motion(session, Translate("bottom", (0.0, 9.0)))
-    assert not changes.run_requirements(session)
+    assert not run_requirements(session)
     key = intersection_key(session)
     told = set_intersection(session, ("It clashes.", ""), key)
-    assert [(m.text, m.place) for m in changes.run_requirements(told)] == [
-        ("It clashes.", "motion")
-    ]
-    assert not changes.run_requirements(set_intersection(told, ("", ""), key))
+    assert [(m.text, m.place) for m in run_requirements(told)] == [("It clashes.", "motion")]
+    assert not run_requirements(set_intersection(told, ("", ""), key))
     later = changes.replace_motion(session, 0, Translate("bottom", (0.0, 0.1)))
     assert set_intersection(later, ("It clashes.", ""), key) is later
     assert intersection_key(changes.set_case(session, steps=7)) == key
@@ -98,7 +98,7 @@ def test_what_goes_through_itself_is_told_and_may_run(passage, tmp_path):
     text, folding = find_intersection(case, mesh, lambda _: None, lambda: False)
     assert text == ""
     assert folding.startswith("airfoil goes through itself near (")
-    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None, (), case)
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None, (), case)
     told = set_intersection(session, (text, folding), intersection_key(session))
     assert told.folding == folding
-    assert not changes.run_requirements(told)
+    assert not run_requirements(told)

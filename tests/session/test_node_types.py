@@ -12,13 +12,14 @@ from slideviz.mesh.surfaces import find_surfaces
 from slideviz.samples.table import sample
 from slideviz.session import changes
 from slideviz.session.node_types import NOTHING, NodeTypes
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.solver.deform import deform
 from slideviz.terms import NODE_TYPES
 
 
 def session_of(one, **view):
-    session = changes.open_mesh(StepFrame(one.mesh, quality(one.mesh)), None, (), one.case)
+    session = open_mesh(StepFrame(one.mesh, quality(one.mesh)), None, (), one.case)
     return changes.set_view(session, **view)
 
 
@@ -118,7 +119,7 @@ def test_the_boundary_is_found_once_for_a_mesh(passage, monkeypatch):
     mesh, found = replace(passage.mesh, name="another"), []
     real = kept.find_boundary
     monkeypatch.setattr(kept, "find_boundary", lambda m: found.append(m) or real(m))
-    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None, (), passage.case)
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None, (), passage.case)
     find_surfaces(mesh)
     NodeTypes().of(changes.set_view(session, points="types"))
     for _ in range(2):

@@ -7,6 +7,7 @@ import pytest
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
 from slideviz.session.changes import UNDEFORMED
+from slideviz.session.opening import open_mesh
 from slideviz.session.panes import choices, close_pane, panes, show_in
 from slideviz.session.state import Run, StepFrame
 
@@ -15,7 +16,7 @@ from slideviz.session.state import Run, StepFrame
 def session(passage):
     """Run 1 of two steps, run 2 of four, which is shown at its second."""
     frame = StepFrame(passage.mesh, quality(passage.mesh))
-    made = changes.open_mesh(frame, None, (), passage.case)
+    made = open_mesh(frame, None, (), passage.case)
     runs = tuple(
         Run(number, passage.case, (frame,) * steps, "done") for number, steps in ((1, 2), (2, 4))
     )

@@ -12,6 +12,7 @@ from slideviz.case.reduction import Reduction
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.runs_table import COLUMNS, best, described, table_text, write_table
 from slideviz.session.runs_words import (
     brief,
@@ -31,7 +32,7 @@ def runs(passage):
     second = passage.case.change(
         sliding="ds", periodic="fixed", steps=1, reduction=Reduction(tolerance=1e-2)
     )
-    session = changes.open_mesh(StepFrame(passage.mesh, quality(passage.mesh)), None, (), first)
+    session = open_mesh(StepFrame(passage.mesh, quality(passage.mesh)), None, (), first)
     for case in (first, second):
         session = changes.start_run(changes.set_case(session, **_settings(case)))
         for step in deform(case, passage.mesh):

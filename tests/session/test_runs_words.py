@@ -12,6 +12,7 @@ from slideviz.case.motion_words import describe, motion_labels
 from slideviz.case.reduction import Reduction
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.panes import choices
 from slideviz.session.runs_words import brief, run_words
 from slideviz.session.state import Run, Session, StepFrame
@@ -149,7 +150,7 @@ def test_a_run_can_have_a_name_of_its_own():
 
 
 def test_the_names_of_views_tell_runs_apart(square):
-    session = changes.open_mesh(StepFrame(square, quality(square)), None)
+    session = open_mesh(StepFrame(square, quality(square)), None)
     frames = (session.first,)
     runs = (
         Run(1, BASE, frames, "done"),

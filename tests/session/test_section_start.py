@@ -8,6 +8,7 @@ import pytest
 from slideviz.mesh.quality import quality
 from slideviz.sections.round_number import round_middle
 from slideviz.session import changes
+from slideviz.session.opening import open_mesh
 from slideviz.session.section_start import first_section
 from slideviz.session.state import StepFrame
 from tests.builders import grid, ring
@@ -42,7 +43,7 @@ def test_the_middle_is_round_and_between_layers(values, wanted):
 
 
 def session_of(mesh):
-    return changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
+    return open_mesh(StepFrame(mesh, quality(mesh)), None)
 
 
 def test_sections_start_in_the_middle_of_the_step_that_is_shown():

@@ -9,6 +9,7 @@ from slideviz.case.motion_words import describe, motion_labels
 from slideviz.session import changes
 from slideviz.session.motion_table import TableRows
 from slideviz.session.motions import Ghosts
+from slideviz.session.run_messages import run_requirements
 
 PAIR = ("bottom", "left")
 
@@ -54,11 +55,11 @@ def test_a_boundary_that_no_longer_moves_leaves_the_motion(session):
 
 def test_who_has_a_motion_is_not_asked_for_one(session):
     session = changes.set_role(session, PAIR, "moving")
-    assert sum("has no motion" in m.text for m in changes.run_requirements(session)) == 2
+    assert sum("has no motion" in m.text for m in run_requirements(session)) == 2
     one = changes.add_motion(session, Translate("left", (0.0, 0.1)))
-    assert [m.text for m in changes.run_requirements(one)] == ["“bottom” has no motion: add one."]
-    assert not changes.run_requirements(changes.add_motion(session, Translate(PAIR, (0.0, 0.1))))
-    assert not changes.run_requirements(changes.add_motion(session, Translate("", (0.0, 0.1))))
+    assert [m.text for m in run_requirements(one)] == ["“bottom” has no motion: add one."]
+    assert not run_requirements(changes.add_motion(session, Translate(PAIR, (0.0, 0.1))))
+    assert not run_requirements(changes.add_motion(session, Translate("", (0.0, 0.1))))
 
 
 def test_the_table_lists_the_nodes_of_all_of_them(square):

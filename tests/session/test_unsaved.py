@@ -9,6 +9,7 @@ from slideviz.mesh.quality import quality
 from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.keep import view_to_case
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import Run, StepFrame
 from slideviz.session.unsaved import Unsaved, title_of
 
@@ -17,7 +18,7 @@ from slideviz.session.unsaved import Unsaved, title_of
 def session(passage):
     """Runs 1 and 2 of the case as it was opened; the second is shown."""
     frame = StepFrame(passage.mesh, quality(passage.mesh))
-    opened = changes.open_mesh(frame, None, (), passage.case)
+    opened = open_mesh(frame, None, (), passage.case)
     runs = tuple(Run(number, opened.case, (frame,), "done") for number in (1, 2))
     return replace(opened, runs=runs, shown=2, saved=opened.case)
 
@@ -121,6 +122,6 @@ def test_sections_are_part_of_what_a_case_keeps(session):
     assert Unsaved.of(changes.set_view(written, sections=()), busy=False).can_save == ["case"]
     # A case that is opened with sections has them.
     kept = view_to_case(written)
-    again = changes.open_mesh(session.first, None, (), kept)
+    again = open_mesh(session.first, None, (), kept)
     assert len(again.view.sections) == 1
     assert not Unsaved.of(again, busy=False).lost

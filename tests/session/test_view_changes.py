@@ -10,6 +10,9 @@ from slideviz.mesh.quality import INVERTED, quality
 from slideviz.sections.model import Section
 from slideviz.sections.threshold import ONLY_INVERTED
 from slideviz.session import changes
+from slideviz.session.colors import fit_colors
+from slideviz.session.opening import open_mesh
+from slideviz.session.run_messages import run_requirements
 from slideviz.session.state import Session, StepFrame, essence
 from slideviz.session.store import Store
 
@@ -29,7 +32,7 @@ def test_a_mesh_opens_with_guessed_roles_for_every_boundary(session):
 
 def test_a_case_opens_with_its_roles_and_no_guesses(square):
     case = Case(roles={"left": "sliding"})
-    session = changes.open_mesh(StepFrame(square, quality(square)), Path("a.su2"), (), case)
+    session = open_mesh(StepFrame(square, quality(square)), Path("a.su2"), (), case)
     assert session.role("left") == "sliding"
     assert session.role("top") == "fixed"
     assert not session.guesses
@@ -132,7 +135,7 @@ def test_essence_takes_unnamed_boundaries_as_fixed():
 
 def test_what_is_missing_is_told_in_the_order_of_work(session, tmp_path):
     def first(state):
-        found = changes.run_requirements(state)
+        found = run_requirements(state)
         return (found[0].text, found[0].place) if found else None
 
     assert first(Session()) == ("Open a mesh first.", "open")
@@ -165,17 +168,17 @@ def test_what_is_missing_is_told_in_the_order_of_work(session, tmp_path):
 def test_motions_that_move_nothing_are_not_ready(session, still, moves):
     session = changes.set_role(session, ("left",), "moving")
     session = changes.add_motion(session, still)
-    (missing,) = changes.run_requirements(session)
+    (missing,) = run_requirements(session)
     assert missing.place == "motion"
     assert "Nothing moves yet" in missing.text
     # One of several may stay.
-    assert changes.run_requirements(changes.add_motion(session, moves)) == ()
+    assert run_requirements(changes.add_motion(session, moves)) == ()
 
 
 def test_what_the_case_finds_wrong_is_passed_on(session):
     session = changes.set_role(session, ("left",), "moving")
     session = changes.add_motion(session, Translate("left", (1.0, 0.0)))
-    (missing,) = changes.run_requirements(changes.set_case(session, steps=-1))
+    (missing,) = run_requirements(changes.set_case(session, steps=-1))
     assert "-1" in missing.text
 
 
@@ -232,11 +235,11 @@ def test_fresh_view_keeps_the_taste_but_not_the_boundaries(session):
 
 def test_a_mesh_opens_with_automatic_data_reduction_unless_its_case_says_otherwise(square):
     first = StepFrame(square, quality(square))
-    session = changes.open_mesh(first, None)
+    session = open_mesh(first, None)
     assert session.case.reduction == AUTO
     assert not session.unsaved_case
     exact = Case(reduction=None)
-    assert changes.open_mesh(first, None, case=exact).case.reduction is None
+    assert open_mesh(first, None, case=exact).case.reduction is None
 
 
 def test_store_tells_nobody_when_nothing_changed(session):
@@ -326,13 +329,10 @@ def test_the_section_that_is_chosen_and_its_handle_are_undone_with_the_rest(sess
 def test_a_mesh_opens_with_the_section_chosen_that_lies_flat(square):
     sections = (("plane", (1.0, 0, 0, 0.5, 0, 0), False, flat, True) for flat in (False, True))
     case = Case(view={"VIEW_SECTIONS": tuple(sections)})
-    session = changes.open_mesh(StepFrame(square, quality(square)), None, (), case)
+    session = open_mesh(StepFrame(square, quality(square)), None, (), case)
     assert (session.view.section_index, session.view.handle) == (1, False)
     case = Case(view={"VIEW_SECTIONS": (("plane", (1.0, 0, 0, 0.5, 0, 0), False, False, True),)})
-    assert (
-        changes.open_mesh(StepFrame(square, quality(square)), None, (), case).view.section_index
-        == 0
-    )
+    assert open_mesh(StepFrame(square, quality(square)), None, (), case).view.section_index == 0
 
 
 @pytest.fixture
@@ -346,19 +346,19 @@ def test_the_colors_fit_all_steps_whichever_is_shown(ran):
     session = changes.set_view(ran, color_by="size-skew", frame=0)
     values = [frame.quality.values for frame in session.frames]
     lowest, highest = (pick(values) for pick in (np.min, np.max))
-    fitted = changes.fit_colors(session)
+    fitted = fit_colors(session)
     low, high = fitted.view.color_range
     assert low <= lowest < highest <= high
     assert high - low < 1.03 * (highest - lowest)
     assert high <= 1.0
     for frame in range(len(session.frames)):
-        again = changes.fit_colors(changes.set_view(fitted, frame=frame))
+        again = fit_colors(changes.set_view(fitted, frame=frame))
         assert again.view.color_range == (low, high)
 
 
 def test_the_colors_fit_the_step_that_is_shown(ran):
     session = changes.set_view(ran, color_by="size-skew", frame=1)
-    low, high = changes.fit_colors(session, every=False).view.color_range
+    low, high = fit_colors(session, every=False).view.color_range
     values = session.frames[1].quality.values
     assert low <= values.min() < low + 0.02
     assert high - 0.02 < values.max() <= high
@@ -374,14 +374,14 @@ def test_inverted_cells_do_not_widen_the_colors(ran):
     folded = replace(last, quality=replace(last.quality, status=status))
     runs = (replace(session.run_shown, frames=(folded,)),)
     left = np.delete(last.quality.values, worst).min()
-    low, _ = changes.fit_colors(replace(session, runs=runs)).view.color_range
+    low, _ = fit_colors(replace(session, runs=runs)).view.color_range
     assert last.quality.values[worst] < low <= left
 
 
 def test_roles_and_equal_values_have_no_range(ran, session):
-    assert changes.fit_colors(ran) is ran, "roles"
+    assert fit_colors(ran) is ran, "roles"
     equal = changes.set_view(session, color_by="size")
-    assert changes.fit_colors(equal) is equal
+    assert fit_colors(equal) is equal
 
 
 def test_invalid_fields_of_two_panels_do_not_change_in_turns(session):

@@ -1,6 +1,7 @@
 """The store: what listeners hear, and what undo brings back."""
 
 from dataclasses import fields, replace
+from inspect import isfunction
 
 import numpy as np
 import pytest
@@ -10,10 +11,11 @@ from hypothesis import strategies as st
 from slideviz.case.model import Translate
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
-from slideviz.session.changes_view import UNDO_WORDS
+from slideviz.session.changes import UNDO_WORDS, undo_words
+from slideviz.session.colors import fit_colors
+from slideviz.session.opening import open_mesh
 from slideviz.session.state import Session, StepFrame, ViewState
 from slideviz.session.store import TOGETHER_S, Store, UndoState
-from slideviz.session.undoable import undo_words
 from slideviz.terms import COLOR_BY, ROLES, SHOWN
 
 
@@ -107,12 +109,13 @@ def test_saving_is_not_undone(store, clock, tmp_path):
 
 def test_another_mesh_cannot_be_undone(store, cube):
     store.change(changes.set_case, steps=4)
-    store.put(changes.open_mesh(StepFrame(cube, quality(cube)), None))
+    store.put(open_mesh(StepFrame(cube, quality(cube)), None))
     assert not store.can_undo
 
 
 def test_each_change_that_can_be_undone_has_words():
-    every = {name: undo_words(getattr(changes, name), {}) for name in changes.__all__}
+    functions = {**vars(changes), "fit_colors": fit_colors}
+    every = {name: undo_words(f, {}) for name, f in functions.items() if isfunction(f)}
     assert {name: words for name, words in every.items() if words} == {
         "add_motion": "new motion",
         "add_section": "new section",
@@ -243,7 +246,7 @@ def test_only_the_last_two_removed_runs_are_kept(store, clock):
 def test_another_mesh_forgets_removed_runs(store, cube):
     run_once(store)
     store.change(changes.remove_run, 1)
-    store.put(changes.open_mesh(StepFrame(cube, quality(cube)), None))
+    store.put(open_mesh(StepFrame(cube, quality(cube)), None))
     assert not store.session.removed
     assert not store.can_undo
 

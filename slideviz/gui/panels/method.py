@@ -33,6 +33,7 @@ from slideviz.gui.widgets.panel import Panel
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes
 from slideviz.session.motions import found_text, largest_prescribed, support_key, support_of
+from slideviz.session.opening import suggested_reduction
 from slideviz.session.run_messages import Requirement, loose_words
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -181,7 +182,7 @@ class MethodPanel(Panel):
         mesh = self.store.session.mesh
         first = self._reduction or AUTO
         if wanted == "YES" and first == AUTO and mesh is not None:
-            first = changes.suggested_reduction(mesh)
+            first = suggested_reduction(mesh)
         return put_reduction(case.change(reduction=first), wanted)
 
     def _tolerate(self, case: Case, value: float) -> Case:

@@ -16,7 +16,6 @@ from slideviz.gui.widgets.labels import LinkLabel, wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window
 from slideviz.session import changes
-from slideviz.session.changes import run_requirements
 from slideviz.session.jobs import JobProgress
 from slideviz.session.run_messages import (
     Requirement,
@@ -25,6 +24,7 @@ from slideviz.session.run_messages import (
     help_for,
     inverted_words,
     notes_of,
+    run_requirements,
 )
 from slideviz.session.state import Run, Session
 from slideviz.session.store import Store

@@ -134,7 +134,7 @@ class SectionViews(QSplitter):
             self.store.change(changes.replace_section, at, section)
 
     def _sync_flat(self, session: Session) -> None:
-        at = changes.flat_one(session.view.sections)
+        at = session.view.flat_index
         section = session.view.sections[at] if at is not None else None
         if section is None or session.frame is None or not can_cut(session.mesh, section):
             self._drop_flats()
