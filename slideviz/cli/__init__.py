@@ -48,7 +48,7 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
     logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
     try:  # also around the imports, which take long enough to be interrupted
         from slideviz.cli.parser import parse
-        from slideviz.cli.places import inputs_of
+        from slideviz.cli.output_paths import inputs_of
         from slideviz.cli.progress import note_compilation
         from slideviz.system.file_checks import protected
 

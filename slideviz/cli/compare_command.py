@@ -66,7 +66,7 @@ def compare(arguments: argparse.Namespace) -> int:
     """Deform a mesh by several methods, write table, plots and pictures; return the exit code."""
     from slideviz import read
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.places import OutputPath, make_folder, require_places
+    from slideviz.cli.output_paths import OutputPath, make_folder, require_places
     from slideviz.errors import CaseError
     from slideviz.study.combinations import COMPARED_METHODS, MODES, warm
     from slideviz.study.table import terminal_head

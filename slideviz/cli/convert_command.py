@@ -34,7 +34,7 @@ def _convert(arguments: argparse.Namespace) -> int:
 
     from slideviz import quality, read
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.places import OutputPath, require_places, tell_lost
+    from slideviz.cli.output_paths import OutputPath, require_places, tell_lost
     from slideviz.cli.report import cell_data
     from slideviz.formats.convert import convert as write_converted
     from slideviz.session.formats import holds_quality

@@ -43,7 +43,7 @@ def add_config(call: argparse.ArgumentParser) -> None:
 def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     """Return the configuration, with the changes of ``--set``, and its mesh, which it must fit."""
     from slideviz import read
-    from slideviz.cli.places import note_case
+    from slideviz.cli.output_paths import note_case
     from slideviz.design.su2.config import own_changes, read_config
     from slideviz.design.su2.markers import on_mesh
     from slideviz.errors import CaseError
@@ -83,7 +83,7 @@ def run_def(arguments: argparse.Namespace) -> int:
 
 def _run_def(arguments: argparse.Namespace) -> int:
     from slideviz import quality, write
-    from slideviz.cli.places import OutputPath, qualities_beside, require_places, tell_lost
+    from slideviz.cli.output_paths import OutputPath, qualities_beside, require_places, tell_lost
     from slideviz.cli.report import folded_cells, run_report
     from slideviz.cli.run_command import pull
     from slideviz.cli.run_outcome import CELLS, advice_for, tell, write_qualities
@@ -182,7 +182,7 @@ def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, beg
     """Write the undeformed mesh with the boxes that the configuration defines; return the code."""
     from slideviz import write
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.places import tell_lost
+    from slideviz.cli.output_paths import tell_lost
     from slideviz.cli.report import print_remarks, save_json
     from slideviz.design.su2.boxes import set_boxes
 

@@ -33,7 +33,7 @@ def run_dot(arguments: argparse.Namespace) -> int:
 
 def _run_dot(arguments: argparse.Namespace) -> int:
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.places import OutputPath, require_places
+    from slideviz.cli.output_paths import OutputPath, require_places
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import print_remarks, save_json
     from slideviz.design.su2.gradients import design_gradients

@@ -27,7 +27,7 @@ def add_info(calls: argparse._SubParsersAction) -> None:
 
 def info(arguments: argparse.Namespace) -> int:
     """Print what is in a mesh file, or write it as JSON; return the exit code."""
-    from slideviz.cli.places import OutputPath, require_places
+    from slideviz.cli.output_paths import OutputPath, require_places
 
     require_places(arguments, OutputPath(arguments.json, "--json"))
     if arguments.stream:

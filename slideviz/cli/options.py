@@ -112,7 +112,7 @@ def read_case(arguments: argparse.Namespace) -> Case:
     Its files are added to the inputs, which must not be written over.
     """
     from slideviz import Case
-    from slideviz.cli.places import note_case
+    from slideviz.cli.output_paths import note_case
 
     case = changed(Case.read(arguments.case), arguments.set)
     if getattr(arguments, "step_count", None) is not None:
@@ -140,7 +140,7 @@ def require_mesh_file(arguments: argparse.Namespace, case: Case) -> Path:
 def given_case(arguments: argparse.Namespace) -> Case | None:
     """Return the case of the option ``--case``, or None."""
     from slideviz import Case
-    from slideviz.cli.places import note_case
+    from slideviz.cli.output_paths import note_case
 
     if arguments.case is None:
         return None

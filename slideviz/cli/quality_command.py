@@ -46,7 +46,7 @@ def quality(arguments: argparse.Namespace) -> int:
     """
     from slideviz import quality as rate
     from slideviz import read, write
-    from slideviz.cli.places import OutputPath, require_places
+    from slideviz.cli.output_paths import OutputPath, require_places
     from slideviz.cli.report import cell_data, worst_cells
     from slideviz.cli.streamed import require_no_file, streamed_quality
 

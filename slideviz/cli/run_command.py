@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run(arguments: argparse.Namespace) -> int:
     from slideviz import quality, read, write
-    from slideviz.cli.places import qualities_beside, tell_lost
+    from slideviz.cli.output_paths import qualities_beside, tell_lost
     from slideviz.cli.report import cell_data, folded_cells, run_report
     from slideviz.scene.moved import require_detail
 
@@ -131,7 +131,7 @@ def _require_places(
     arguments: argparse.Namespace, case: Case, output: Path, qualities: Path | None
 ) -> None:
     """Raise where a result could not be written, before the work begins."""
-    from slideviz.cli.places import OutputPath, require_places
+    from slideviz.cli.output_paths import OutputPath, require_places
     from slideviz.system.file_checks import same_file
 
     assert case.mesh_file is not None

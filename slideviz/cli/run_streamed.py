@@ -89,7 +89,7 @@ def run_streamed(
 
     ``begin`` is the time of ``time.perf_counter`` when the command began.
     """
-    from slideviz.cli.places import REPLACED
+    from slideviz.cli.output_paths import REPLACED
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import LISTED, run_report
     from slideviz.cli.run_finished import finished, note_finished

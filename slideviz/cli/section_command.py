@@ -110,7 +110,7 @@ class _Scene:
 
 def section(arguments: argparse.Namespace) -> int:
     """Draw a section of a mesh to a file; return the exit code."""
-    from slideviz.cli.places import OutputPath, require_places
+    from slideviz.cli.output_paths import OutputPath, require_places
     from slideviz.errors import CaseError
     from slideviz.plots.around import surroundings
     from slideviz.plots.section_paint import paint

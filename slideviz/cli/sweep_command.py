@@ -67,7 +67,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     from slideviz import sweep as sweep_of
     from slideviz.case.words import counted
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.places import OutputPath, make_folder, require_places
+    from slideviz.cli.output_paths import OutputPath, make_folder, require_places
     from slideviz.cli.report import save_json
     from slideviz.design.sweeps.designs import read_designs
     from slideviz.design.sweeps.results import RESULTS

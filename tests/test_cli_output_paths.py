@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from slideviz.cli import parser, run
-from slideviz.cli.places import inputs_of
+from slideviz.cli.output_paths import inputs_of
 from slideviz.errors import MeshError
 from slideviz.samples.table import write_sample
 from slideviz.system.atomic import atomic_write, require_writable
