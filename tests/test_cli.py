@@ -156,7 +156,7 @@ def test_what_cannot_be_written_is_told_before_the_work(
         raise AssertionError("too late")
 
     monkeypatch.chdir(square)
-    monkeypatch.setattr("slideviz.cli.run_command.pull", never)
+    monkeypatch.setattr("slideviz.cli.run_command.run_steps", never)
     before = sorted(square.iterdir())
     assert run(["run", "square.cfg", *words]) == 1
     err = capsys.readouterr().err

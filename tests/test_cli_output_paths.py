@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from slideviz.cli import parser, run
-from slideviz.cli.output_paths import inputs_of
+from slideviz.cli.output_paths import input_paths
 from slideviz.errors import MeshError
 from slideviz.samples.table import write_sample
 from slideviz.system.atomic import atomic_write, require_writable
@@ -155,7 +155,7 @@ def path_options(name: str) -> set[str]:
 @pytest.mark.parametrize("name", parser.COMMANDS)
 def test_every_path_of_every_command_is_known_as_read_or_written(name):
     given = argparse.Namespace(**{option: Path(option) for option in path_options(name)})
-    read = {str(path) for path in inputs_of(given)}
+    read = {str(path) for path in input_paths(given)}
     assert path_options(name) - read <= {
         "output",
         "json",

@@ -12,7 +12,7 @@ import slideviz as sv
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.cli import run
 from slideviz.cli.parser import parse
-from slideviz.cli.section_options import about_axis, glued, plane
+from slideviz.cli.section_options import glued, plane, section_about_axis
 from slideviz.plots import section_picture
 from slideviz.terms import COLOR_MAPS, QUANTITIES
 from tests.builders import cube, passage, square
@@ -70,7 +70,7 @@ def test_planes(text, origin, direction):
     ],
 )
 def test_cylinders(text, origin, direction, given):
-    found = about_axis(SECTION_SHAPES["cylinder"], text)
+    found = section_about_axis(SECTION_SHAPES["cylinder"], text)
     section = found.section
     assert (section.kind, section.radius, found.axis) == ("cylinder", 0.25, given)
     assert (section.origin, section.direction) == (origin, direction)

@@ -47,13 +47,13 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
     # With a new cache, Matplotlib logs a line for each font that it replaces in formulas.
     logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
     try:  # also around the imports, which take long enough to be interrupted
+        from slideviz.cli.output_paths import input_paths
         from slideviz.cli.parser import parse
-        from slideviz.cli.output_paths import inputs_of
         from slideviz.cli.progress import note_compilation
         from slideviz.system.file_checks import protected
 
         arguments = parse(argv)
-        arguments.inputs, arguments.ranks = inputs_of(arguments), ranks
+        arguments.inputs, arguments.ranks = input_paths(arguments), ranks
         with (
             protected(lambda: arguments.inputs),
             note_compilation(getattr(arguments, "quiet", False)),

@@ -66,7 +66,7 @@ def compare(arguments: argparse.Namespace) -> int:
     """Deform a mesh by several methods, write table, plots and pictures; return the exit code."""
     from slideviz import read
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.output_paths import OutputPath, make_folder, require_places
+    from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
     from slideviz.errors import CaseError
     from slideviz.study.combinations import COMPARED_METHODS, MODES, warm
     from slideviz.study.table import terminal_head
@@ -79,7 +79,9 @@ def compare(arguments: argparse.Namespace) -> int:
     mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
     make_folder(folder)
     tables = [folder / TABLE, folder / HISTORY]
-    require_places(arguments, *(OutputPath(table, "compare", named=False) for table in tables))
+    require_output_paths(
+        arguments, *(OutputPath(table, "compare", named=False) for table in tables)
+    )
     cannot = refused(case, mesh, wanted)
 
     known = {"methods": tuple(COMPARED_METHODS), "periodic": tuple(MODES)}

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from slideviz.solver.steps import Step
 
 _OF_A_RUN = ("history", "picture", "steps_dir", "steps_file")
-"""Options of ``slideviz run`` that `tell` reads, and this command does not have: set to None."""
+"""Options of ``slideviz run`` that `report_outcome` reads; this command sets them to None."""
 
 
 def add_def(calls: argparse._SubParsersAction) -> None:
@@ -43,7 +43,7 @@ def add_config(call: argparse.ArgumentParser) -> None:
 def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     """Return the configuration, with the changes of ``--set``, and its mesh, which it must fit."""
     from slideviz import read
-    from slideviz.cli.output_paths import note_case
+    from slideviz.cli.output_paths import add_case_inputs
     from slideviz.design.su2.config import own_changes, read_config
     from slideviz.design.su2.markers import on_mesh
     from slideviz.errors import CaseError
@@ -51,7 +51,7 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     own, others = own_changes(arguments.set)
     config = read_config(arguments.case, own)
     config = replace(config, case=changed(config.case, others))
-    note_case(arguments, config.case)
+    add_case_inputs(arguments, config.case)
     if config.variables[0].kind == "SURFACE_FILE":
         arguments.inputs.setdefault(config.files["DV_FILENAME"], "the surface file")
     if not arguments.quiet and config.ignored:
@@ -83,10 +83,15 @@ def run_def(arguments: argparse.Namespace) -> int:
 
 def _run_def(arguments: argparse.Namespace) -> int:
     from slideviz import quality, write
-    from slideviz.cli.output_paths import OutputPath, qualities_beside, require_places, tell_lost
+    from slideviz.cli.output_paths import (
+        OutputPath,
+        qualities_path,
+        require_output_paths,
+        warn_of_losses,
+    )
     from slideviz.cli.report import folded_cells, run_report
-    from slideviz.cli.run_command import pull
-    from slideviz.cli.run_outcome import CELLS, advice_for, tell, write_qualities
+    from slideviz.cli.run_command import run_steps
+    from slideviz.cli.run_outcome import CELLS, advice_for, report_outcome, write_qualities
     from slideviz.design.su2.convexity import convex_part
     from slideviz.design.su2.surface import at_rest, make_surface
 
@@ -99,8 +104,8 @@ def _run_def(arguments: argparse.Namespace) -> int:
     place = OutputPath(
         output, "MESH_OUT_FILENAME", False, is_mesh=kind is None, replaces=replaces, remedy=remedy
     )
-    rated = qualities_beside(output) if config.case.generate_quality else None
-    require_places(
+    rated = qualities_path(output) if config.case.generate_quality else None
+    require_output_paths(
         arguments,
         place,
         OutputPath(rated, "GENERATE_QUALITY", False),
@@ -117,9 +122,9 @@ def _run_def(arguments: argparse.Namespace) -> int:
         moves, case = surface.displacement.any(), surface.case()
         if surface.whole or not moves:
             return surface, [at_rest(case, surface.moved() if moves else mesh)]
-        return surface, pull(arguments, case, mesh)
+        return surface, run_steps(arguments, case, mesh)
 
-    tell_lost(output, first.displacer.boxed(mesh), kind)
+    warn_of_losses(output, first.displacer.boxed(mesh), kind)
     with _relaxation_told(config):
         part, (surface, steps), said = convex_part(
             config, mesh, attempt, lambda each: each[1][-1].mesh
@@ -146,7 +151,7 @@ def _run_def(arguments: argparse.Namespace) -> int:
         "part": part,
         "ignored": list(config.ignored),
     }
-    return tell(
+    return report_outcome(
         arguments, report, {"mesh": output, CELLS: rated}, found, before, folded, advice=advice
     )
 
@@ -182,14 +187,14 @@ def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, beg
     """Write the undeformed mesh with the boxes that the configuration defines; return the code."""
     from slideviz import write
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.output_paths import tell_lost
+    from slideviz.cli.output_paths import warn_of_losses
     from slideviz.cli.report import print_remarks, save_json
     from slideviz.design.su2.boxes import set_boxes
 
     case: Case = config.case
     boxed, boxes = set_boxes(config, mesh)
     assert case.mesh_out is not None
-    tell_lost(case.mesh_out, boxed, case.mesh_out_format)
+    warn_of_losses(case.mesh_out, boxed, case.mesh_out_format)
     write(case.mesh_out, boxed, overwrite=arguments.force, file_format=case.mesh_out_format)
     counts = {box.name: sum(len(nodes) for nodes, _ in box.embedded.values()) for box in boxes}
     report = {

@@ -33,7 +33,7 @@ def run_dot(arguments: argparse.Namespace) -> int:
 
 def _run_dot(arguments: argparse.Namespace) -> int:
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.output_paths import OutputPath, require_places
+    from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import print_remarks, save_json
     from slideviz.design.su2.gradients import design_gradients
@@ -48,7 +48,7 @@ def _run_dot(arguments: argparse.Namespace) -> int:
     arguments.inputs.setdefault(sensitivity_file(config), "the file of the sensitivities")
     sensitivities = config.files["DV_SENS_FILENAME"]
     gradient = None if first.group == "file" else config.files["GRAD_OBJFUNC_FILENAME"]
-    require_places(
+    require_output_paths(
         arguments,
         OutputPath(sensitivities, "DV_SENS_FILENAME"),
         OutputPath(gradient, "GRAD_OBJFUNC_FILENAME"),

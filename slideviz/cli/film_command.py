@@ -87,7 +87,7 @@ def add_film(calls: argparse._SubParsersAction) -> None:
 def film(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, and write its steps as a film; return the exit code."""
     from slideviz.cli.exit_codes import DONE, INVERTED
-    from slideviz.cli.output_paths import OutputPath, require_places
+    from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.cli.progress import Bar
     from slideviz.export.encode import film_kind
     from slideviz.export.film import FilmOptions, check_film, require_pair
@@ -101,7 +101,7 @@ def film(arguments: argparse.Namespace) -> int:
         require_pair(film_options.pixels(file))
     case = read_case(arguments)
     if film_kind(file) != ".png":  # of pictures it is not known yet how many there will be
-        require_places(arguments, OutputPath(file, "-o"))
+        require_output_paths(arguments, OutputPath(file, "-o"))
     first, runs = _runs(arguments, case)
     session = of_runs(first, runs, arguments.color)
     drawing = draw(session, file, film_options, zoom=arguments.zoom, overwrite=arguments.force)

@@ -27,9 +27,9 @@ def add_info(calls: argparse._SubParsersAction) -> None:
 
 def info(arguments: argparse.Namespace) -> int:
     """Print what is in a mesh file, or write it as JSON; return the exit code."""
-    from slideviz.cli.output_paths import OutputPath, require_places
+    from slideviz.cli.output_paths import OutputPath, require_output_paths
 
-    require_places(arguments, OutputPath(arguments.json, "--json"))
+    require_output_paths(arguments, OutputPath(arguments.json, "--json"))
     if arguments.stream:
         from slideviz.cli.report import MeshCounts
         from slideviz.cli.streamed import streamed_quality

@@ -112,13 +112,13 @@ def read_case(arguments: argparse.Namespace) -> Case:
     Its files are added to the inputs, which must not be written over.
     """
     from slideviz import Case
-    from slideviz.cli.output_paths import note_case
+    from slideviz.cli.output_paths import add_case_inputs
 
     case = changed(Case.read(arguments.case), arguments.set)
     if getattr(arguments, "step_count", None) is not None:
         case = changed(case, [f"STEPS={arguments.step_count}"], "--steps, which is")
     case = case if arguments.zone is None else case.change(zone=arguments.zone)
-    note_case(arguments, case)
+    add_case_inputs(arguments, case)
     return case
 
 
@@ -140,12 +140,12 @@ def require_mesh_file(arguments: argparse.Namespace, case: Case) -> Path:
 def given_case(arguments: argparse.Namespace) -> Case | None:
     """Return the case of the option ``--case``, or None."""
     from slideviz import Case
-    from slideviz.cli.output_paths import note_case
+    from slideviz.cli.output_paths import add_case_inputs
 
     if arguments.case is None:
         return None
     case = Case.read(arguments.case)
-    note_case(arguments, case)
+    add_case_inputs(arguments, case)
     return case
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import Mesh
     from slideviz.terms import FileFormat
 
-_READ = {
+_INPUTS = {
     "mesh": "the input mesh",
     "case": "the case file",
     "reference": "the reference mesh",
@@ -52,13 +52,13 @@ class OutputPath:
     """The advice in the message where it is an input file."""
 
 
-def inputs_of(arguments: argparse.Namespace) -> dict[Path, str]:
+def input_paths(arguments: argparse.Namespace) -> dict[Path, str]:
     """Return the input files of a command line, with words for what each is."""
-    found = {what: getattr(arguments, name, None) for name, what in _READ.items()}
+    found = {what: getattr(arguments, name, None) for name, what in _INPUTS.items()}
     return {path: what for what, path in found.items() if path is not None}
 
 
-def qualities_beside(output: Path) -> Path:
+def qualities_path(output: Path) -> Path:
     """Return the path of the qualities of each cell, beside a mesh that is written.
 
     Raises
@@ -73,13 +73,13 @@ def qualities_beside(output: Path) -> Path:
     return output.with_name(f"{output.stem}_qual.txt")
 
 
-def note_case(arguments: argparse.Namespace, case: Case) -> None:
+def add_case_inputs(arguments: argparse.Namespace, case: Case) -> None:
     """Add the input files of a case to those of the command line, ``arguments.inputs``."""
     for path, what in case.inputs().items():
         arguments.inputs.setdefault(path, what)
 
 
-def require_places(arguments: argparse.Namespace, *outputs: OutputPath) -> None:
+def require_output_paths(arguments: argparse.Namespace, *outputs: OutputPath) -> None:
     """Raise where a result must not or cannot be written; print which older files are replaced.
 
     Folders for results are made where they are missing.
@@ -101,7 +101,7 @@ def require_places(arguments: argparse.Namespace, *outputs: OutputPath) -> None:
         for path in _paths(one):
             require_no_input(path, CaseError, one.replaces, one.remedy)
     for one, other in combinations(there, 2):
-        if _meet(one, other) or _meet(other, one):
+        if _overlap(one, other) or _overlap(other, one):
             file = one.path if other.files else other.path
             raise CaseError(
                 f"{one.option} and {other.option} both name {file}; give each a file of its own"
@@ -139,7 +139,7 @@ def _paths(one: OutputPath) -> Iterator[Path]:
         yield from sorted(path for path in one.path.iterdir() if re.fullmatch(one.files, path.name))
 
 
-def _meet(one: OutputPath, other: OutputPath) -> bool:
+def _overlap(one: OutputPath, other: OutputPath) -> bool:
     """Return whether ``other``, a file, is the same file as ``one`` or would be one in that folder.
 
     False where ``other`` is a folder.
@@ -164,7 +164,7 @@ def _require_mesh_ending(file: Path) -> None:
         formats_of(file)
 
 
-def tell_lost(
+def warn_of_losses(
     output: Path, mesh: Mesh, file_format: FileFormat | None = None, *, alone: bool = False
 ) -> None:
     """Print a warning on what a file will lack of a mesh.

@@ -46,7 +46,7 @@ def quality(arguments: argparse.Namespace) -> int:
     """
     from slideviz import quality as rate
     from slideviz import read, write
-    from slideviz.cli.output_paths import OutputPath, require_places
+    from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.cli.report import cell_data, worst_cells
     from slideviz.cli.streamed import require_no_file, streamed_quality
 
@@ -54,7 +54,7 @@ def quality(arguments: argparse.Namespace) -> int:
         require_no_file(arguments)
     is_table = arguments.output is not None and arguments.output.suffix.lower() == ".csv"
     case = given_case(arguments)
-    require_places(
+    require_output_paths(
         arguments,
         OutputPath(arguments.output, "-o", is_mesh=not is_table),
         OutputPath(arguments.json, "--json"),

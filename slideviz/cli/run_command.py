@@ -19,7 +19,7 @@ from slideviz.cli.options import (
     require_mesh_file,
     size,
 )
-from slideviz.cli.run_outcome import CELLS, advice_for, tell, write_qualities
+from slideviz.cli.run_outcome import CELLS, advice_for, report_outcome, write_qualities
 from slideviz.cli.run_streamed import is_to_be_streamed, require_streamable, run_streamed
 from slideviz.cli.terminal import holding
 
@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run(arguments: argparse.Namespace) -> int:
     from slideviz import quality, read, write
-    from slideviz.cli.output_paths import qualities_beside, tell_lost
+    from slideviz.cli.output_paths import qualities_path, warn_of_losses
     from slideviz.cli.report import cell_data, folded_cells, run_report
     from slideviz.scene.moved import require_detail
 
@@ -87,18 +87,18 @@ def _run(arguments: argparse.Namespace) -> int:
     mesh_file = require_mesh_file(arguments, case)
     output = arguments.output or case.mesh_out or _default_output(case)
     kind = _format_of(output, case)
-    qualities = qualities_beside(output) if case.generate_quality else None
+    qualities = qualities_path(output) if case.generate_quality else None
     require_streamable(arguments, case, output, kind)
-    _require_places(arguments, case, output, qualities)
+    _require_output_paths(arguments, case, output, qualities)
     if is_to_be_streamed(arguments, case, output, kind):
         return run_streamed(arguments, case, begin, output, qualities, kind)
     seconds = {"read": -time.perf_counter()}
     mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
-    tell_lost(output, mesh, kind)
+    warn_of_losses(output, mesh, kind)
     if arguments.picture:
         require_detail(arguments.zoom, mesh)
     seconds["read"] += time.perf_counter()
-    steps = pull(arguments, case, mesh)
+    steps = run_steps(arguments, case, mesh)
     last = steps[-1]
     seconds["quality"] = -time.perf_counter()
     found = quality(last.mesh, reference=mesh, metric=case.quality_metric)
@@ -124,14 +124,14 @@ def _run(arguments: argparse.Namespace) -> int:
     report = run_report(case, mesh, steps, seconds, quality=found, undeformed=before, folded=folded)
     advice = advice_for(case, steps[-1].layers, mesh, found)
     files = {"mesh": output, CELLS: qualities}
-    return tell(arguments, report, files, found, before, folded, advice=advice)
+    return report_outcome(arguments, report, files, found, before, folded, advice=advice)
 
 
-def _require_places(
+def _require_output_paths(
     arguments: argparse.Namespace, case: Case, output: Path, qualities: Path | None
 ) -> None:
     """Raise where a result could not be written, before the work begins."""
-    from slideviz.cli.output_paths import OutputPath, require_places
+    from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.system.file_checks import same_file
 
     assert case.mesh_file is not None
@@ -153,7 +153,7 @@ def _require_places(
 
         check_png(arguments.picture)
         check_size(arguments.picture_size or SIZE)
-    require_places(
+    require_output_paths(
         arguments,
         mesh,
         OutputPath(qualities, "GENERATE_QUALITY", named=False),
@@ -206,7 +206,7 @@ def _format_of(output: Path, case: Case) -> FileFormat | None:
     return kind
 
 
-def pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
+def run_steps(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
     """Deform a mesh, and return all steps; write each step's mesh where asked for.
 
     Once meshes take more than `KEPT_BYTES`, only the last step keeps its own; earlier steps have

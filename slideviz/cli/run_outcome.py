@@ -20,7 +20,7 @@ QUALITY_BYTES = 20
 _ROWS = 1 << 18
 
 
-def tell(
+def report_outcome(
     arguments: argparse.Namespace,
     report: dict,
     files: dict[str, Path | None],
@@ -48,7 +48,7 @@ def tell(
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
         files |= {"all steps": arguments.steps_file}
         _print_run(report, found, before, files)
-    return tell_warnings(report, folded, advice, quiet=arguments.quiet)
+    return report_warnings(report, folded, advice, quiet=arguments.quiet)
 
 
 def save_report(arguments: argparse.Namespace, report: dict) -> bool:
@@ -60,7 +60,7 @@ def save_report(arguments: argparse.Namespace, report: dict) -> bool:
     return save_json(arguments.json, report)
 
 
-def tell_warnings(
+def report_warnings(
     report: dict, folded: Mapping[int, tuple[int, int]], advice: str, *, quiet: bool
 ) -> int:
     """Print the warnings of a run and its inverted cells to stderr; return the exit code.
@@ -68,7 +68,7 @@ def tell_warnings(
     Parameters
     ----------
     report, folded, advice
-        As `tell` gets them.
+        As `report_outcome` gets them.
     quiet : bool
         Leave out notes; warnings stay.
     """

@@ -12,9 +12,9 @@ from slideviz.cli.run_outcome import (
     CELLS,
     QUALITY_BYTES,
     advice_for,
+    report_outcome,
+    report_warnings,
     save_report,
-    tell,
-    tell_warnings,
     write_qualities,
 )
 from slideviz.cli.terminal import say
@@ -103,7 +103,7 @@ def run_streamed(
         arguments.begun(REPLACED)
         note(f"{output}: is finished, of this case, mesh and version; nothing is done")
         save_report(arguments, known[0])
-        return tell_warnings(*known, quiet=arguments.quiet)
+        return report_warnings(*known, quiet=arguments.quiet)
     with Bar(not arguments.quiet, begun=arguments.begun) as bar:
         done = stream(
             case,
@@ -136,4 +136,6 @@ def run_streamed(
     advice = advice_for(case, done.steps[-1].layers)
     note_finished(about, made, report, done.folded, advice)
     files = {"mesh": output, CELLS: qualities}
-    return tell(arguments, report, files, done.quality, done.undeformed, done.folded, advice=advice)
+    return report_outcome(
+        arguments, report, files, done.quality, done.undeformed, done.folded, advice=advice
+    )

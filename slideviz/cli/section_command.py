@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.cli.options import NONE, add_reference, add_shared, given_case, reference_of, words_of
-from slideviz.cli.section_options import limits, neighbours, pixels, reader
+from slideviz.cli.section_options import limits, neighbours, pixels, section_reader
 from slideviz.terms import COLOR_MAPS, METRICS, QUANTITIES
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def add_section(calls: argparse._SubParsersAction) -> None:
     for name, row in SECTION_SHAPES.items():
         metavar = row.metavar or name.upper()
         where.add_argument(
-            f"--{name}", type=reader(row), dest="asked", metavar=metavar, help=row.option
+            f"--{name}", type=section_reader(row), dest="asked", metavar=metavar, help=row.option
         )
     add("-o", "--output", type=Path, metavar="FILE", required=True, help=".png, .svg or .pdf")
     add_reference(
@@ -110,7 +110,7 @@ class _Scene:
 
 def section(arguments: argparse.Namespace) -> int:
     """Draw a section of a mesh to a file; return the exit code."""
-    from slideviz.cli.output_paths import OutputPath, require_places
+    from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.errors import CaseError
     from slideviz.plots.around import surroundings
     from slideviz.plots.section_paint import paint
@@ -126,7 +126,7 @@ def section(arguments: argparse.Namespace) -> int:
     _check_usage(arguments)
     require_picture_name(arguments.output)
     case = given_case(arguments)
-    require_places(
+    require_output_paths(
         arguments, OutputPath(arguments.output, "-o"), OutputPath(arguments.json, "--json")
     )
     scene = (_streamed if arguments.stream else _in_memory)(arguments, case)

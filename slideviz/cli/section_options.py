@@ -40,19 +40,19 @@ def glued(argv: Sequence[str]) -> list[str]:
 
 
 @dataclass(frozen=True)
-class Asked:
+class SectionArgument:
     """The section of an option; ``axis`` is whether the option has its axis or normal."""
 
     section: Section
     axis: bool = True
 
 
-def reader(row: ShapeTerms) -> Callable[[str], Asked]:
+def section_reader(row: ShapeTerms) -> Callable[[str], SectionArgument]:
     """Return the function that reads the option's text for a shape."""
-    return partial(about_axis, row) if row.size is not None else plane
+    return partial(section_about_axis, row) if row.size is not None else plane
 
 
-def plane(text: str) -> Asked:
+def plane(text: str) -> SectionArgument:
     """Return the plane of a text like ``0,0,1,0,0,0.5`` (normal, point) or ``z=0.5``."""
     word, sign, value = text.partition("=")
     if sign:
@@ -62,13 +62,13 @@ def plane(text: str) -> Asked:
         if value.count(",") == 1:
             raise argparse.ArgumentTypeError(_comma(text, value.strip().replace(",", ".")))
         (at,) = _numbers(value, (1,), "a coordinate, as in z=0.5")
-        return Asked(_section("plane", [at * part for part in normal], normal))
+        return SectionArgument(_section("plane", [at * part for part in normal], normal))
     values = _numbers(text, (4, 6), "nx,ny,nz,x,y,z or an axis and a coordinate, as in z=0.5")
     half = len(values) // 2
-    return Asked(_section("plane", values[half:], values[:half]))
+    return SectionArgument(_section("plane", values[half:], values[:half]))
 
 
-def about_axis(row: ShapeTerms, text: str) -> Asked:
+def section_about_axis(row: ShapeTerms, text: str) -> SectionArgument:
     """Return the cylinder or cone of a text like ``0.25``, ``r=0.25,x`` or ``0.25,0,0,1``.
 
     That is its size, then its axis, if given, and a point on it; the axis is z where it is not.
@@ -85,13 +85,13 @@ def about_axis(row: ShapeTerms, text: str) -> Asked:
         raise argparse.ArgumentTypeError(_comma(text, f"{number.strip()}.{digits.strip()}"))
     (size,) = _numbers(number, (1,), row.size.example)
     if not axis:
-        return Asked(_section(row.value, (), AXES["z"], size), False)
+        return SectionArgument(_section(row.value, (), AXES["z"], size), False)
     word, _, point = axis.partition(",")
     if word.strip() in AXES:
         at = _numbers(point, (3,), "x, y or z, then cx,cy,cz") if point else ()
-        return Asked(_section(row.value, at, AXES[word.strip()], size))
+        return SectionArgument(_section(row.value, at, AXES[word.strip()], size))
     values = _numbers(axis, (3, 6), "x, y, z, ax,ay,az or ax,ay,az,cx,cy,cz")
-    return Asked(_section(row.value, values[3:], values[:3], size))
+    return SectionArgument(_section(row.value, values[3:], values[:3], size))
 
 
 def _comma(text: str, number: str) -> str:

@@ -67,7 +67,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     from slideviz import sweep as sweep_of
     from slideviz.case.words import counted
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.output_paths import OutputPath, make_folder, require_places
+    from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
     from slideviz.cli.report import save_json
     from slideviz.design.sweeps.designs import read_designs
     from slideviz.design.sweeps.results import RESULTS
@@ -83,7 +83,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     folder = arguments.output or Path(f"{arguments.case.stem}_swept")
     mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
     make_folder(folder)
-    require_places(arguments, OutputPath(arguments.json, "--json"))
+    require_output_paths(arguments, OutputPath(arguments.json, "--json"))
     with _executor(arguments) as executor:
         rows = sweep_of(
             case,

@@ -44,7 +44,7 @@ _Task = tuple[str, int, int]
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class BinaryLayout:
     """The layout of the binary form of a text mesh: at which byte each part begins.
 
     `slideviz.formats.su2b.layout` describes the format.
@@ -121,7 +121,9 @@ _WIDTHS = SIZES[list(SORTED)] + 2
 """How many numbers an element has in the list, by type in the order of ``SORTED``."""
 
 
-def planned(text: Text, *, is_result: bool, begin: int = HEAD, number: int = 1) -> Plan:
+def binary_layout(
+    text: Text, *, is_result: bool, begin: int = HEAD, number: int = 1
+) -> BinaryLayout:
     """Return the layout of the binary form of a text mesh.
 
     Parameters
@@ -139,7 +141,7 @@ def planned(text: Text, *, is_result: bool, begin: int = HEAD, number: int = 1) 
     np.cumsum(_counted(text), axis=0, out=before[1:])
     length = int(before[-1] @ _WIDTHS)
     short = not is_result and max(length, text.n_points) <= LARGEST_4
-    return Plan(text, 4 if short else 8, is_result, before, begin, number)
+    return BinaryLayout(text, 4 if short else 8, is_result, before, begin, number)
 
 
 def _counted(text: Text) -> IntArray:
@@ -163,7 +165,9 @@ def _counted(text: Text) -> IntArray:
     return out
 
 
-def fill(plan: Plan, path: Path, progress: Progress, ranks: SerialPool = SERIAL) -> bytes:
+def write_layout(
+    layout: BinaryLayout, path: Path, progress: Progress, ranks: SerialPool = SERIAL
+) -> bytes:
     """Write the binary form of a text into an existing file of its size, but for the file's head.
 
     Returns the head (``HEAD`` bytes) for a file with only this zone; the caller writes it.
@@ -173,7 +177,7 @@ def fill(plan: Plan, path: Path, progress: Progress, ranks: SerialPool = SERIAL)
     MeshError
         The text has a mistake; the message has its line.
     """
-    text, conn = plan.text, plan.conn
+    text, conn = layout.text, layout.conn
     zone, lines = text.zone, text.lines
     tasks: list[_Task] = [
         (kind, first, min(first + PIECES, len(pieces)))
@@ -181,7 +185,7 @@ def fill(plan: Plan, path: Path, progress: Progress, ranks: SerialPool = SERIAL)
         for first in range(0, len(pieces), PIECES)
     ]
     found: list[IntArray] = []
-    with ranks.sharing(_filling, plan, path, ranks.size > 1) as do:
+    with ranks.sharing(_layout_tasks, layout, path, ranks.size > 1) as do:
         for k, (task, lost) in enumerate(zip(tasks, do(tasks), strict=True)):
             if task[0] == "points":
                 found.append(lost)
@@ -189,20 +193,20 @@ def fill(plan: Plan, path: Path, progress: Progress, ranks: SerialPool = SERIAL)
     require_all_coordinates(lines, zone.points, zone.dim, np.concatenate(found))
     markers = [
         name + marker_table(parse_cells(lines, m.rows, zone.dim - 1, text.n_points, _silent), conn)
-        for name, m in zip(plan.names(), zone.markers, strict=True)
+        for name, m in zip(layout.names(), zone.markers, strict=True)
     ]
     lines.raw.require_same()
     with open_temporary(path) as file:
         for at, content in (
-            (plan.begin, np.array([plan.number, zone.dim], "<i4").tobytes()),
-            (plan.begin + 8, np.array(text.n_cells, conn).tobytes()),
-            (plan.entries - plan.width, np.array(plan.length, conn).tobytes()),
-            (plan.points - plan.width, np.array(text.n_points, conn).tobytes()),
-            (plan.markers, np.array(len(markers), "<i4").tobytes() + b"".join(markers)),
+            (layout.begin, np.array([layout.number, zone.dim], "<i4").tobytes()),
+            (layout.begin + 8, np.array(text.n_cells, conn).tobytes()),
+            (layout.entries - layout.width, np.array(layout.length, conn).tobytes()),
+            (layout.points - layout.width, np.array(text.n_points, conn).tobytes()),
+            (layout.markers, np.array(len(markers), "<i4").tobytes() + b"".join(markers)),
         ):
             file.seek(at)
             file.write(content)
-    return np.array([plan.width, 1], "<i4").tobytes()
+    return np.array([layout.width, 1], "<i4").tobytes()
 
 
 def _silent(_: float) -> None:
@@ -210,18 +214,20 @@ def _silent(_: float) -> None:
 
 
 @contextmanager
-def _filling(plan: Plan, path: Path, synced: bool) -> Iterator[Callable[[_Task], IntArray]]:
+def _layout_tasks(
+    layout: BinaryLayout, path: Path, synced: bool
+) -> Iterator[Callable[[_Task], IntArray]]:
     """Context with a function that writes the pieces of a task and returns their results.
 
-    These are the results of `_put_cells` or `_put_points`, (k, ...). ``synced``: the bytes are on
-    the disk when the function returns.
+    These are the results of `_write_cells` or `_write_points`, (k, ...). ``synced`` is whether the
+    bytes are on the disk when the function returns.
     """
     out = os.open(path, os.O_WRONLY | os.O_NOFOLLOW)
 
     def work(task: _Task) -> IntArray:
         kind, first, end = task
-        put = _put_cells if kind == "cells" else _put_points
-        found = list(ordered_map(partial(put, plan, out), range(first, end)))
+        put = _write_cells if kind == "cells" else _write_points
+        found = list(ordered_map(partial(put, layout, out), range(first, end)))
         if synced:
             os.fsync(out)
         return np.array(found)
@@ -232,48 +238,48 @@ def _filling(plan: Plan, path: Path, synced: bool) -> Iterator[Callable[[_Task],
         os.close(out)
 
 
-def _put_cells(plan: Plan, out: int, k: int) -> int:
+def _write_cells(layout: BinaryLayout, out: int, k: int) -> int:
     """Write the elements of piece ``k``, sorted by type, to file descriptor ``out``; return 0."""
-    text = plan.text
+    text = layout.text
     piece = text.zone.elements[k]
     types, nodes = np.empty(piece.rows, np.uint8), np.empty(piece.nodes, np.int64)
     fill_cells(text.lines, piece, types, nodes, dim=text.zone.dim, n_points=text.n_points)
     cells = Cells.from_types(types, nodes)
-    totals = plan.before[-1]
+    totals = layout.before[-1]
     for column, (vtk, width) in enumerate(zip(SORTED, _WIDTHS.tolist(), strict=True)):
         mine = np.flatnonzero(types == vtk)
         if not len(mine):
             continue
-        before = int(plan.before[k, column])
+        before = int(layout.before[k, column])
         row = int(totals[:column].sum()) + before
         start = int(totals[:column] @ _WIDTHS[:column]) + before * width
         some = cells if len(mine) == len(types) else cells.take(mine)
         table = rows_of(some.types, some.connectivity, piece.row + mine)
         offsets = start + width * np.arange(len(mine))
-        _put(out, plan.offsets + row * plan.width, offsets.astype(plan.conn))
-        _put(out, plan.entries + start * plan.width, table.astype(plan.conn))
+        _write_at(out, layout.offsets + row * layout.width, offsets.astype(layout.conn))
+        _write_at(out, layout.entries + start * layout.width, table.astype(layout.conn))
     return 0
 
 
-def _put_points(plan: Plan, out: int, k: int) -> IntArray:
+def _write_points(layout: BinaryLayout, out: int, k: int) -> IntArray:
     """Write the points of piece ``k`` to the file descriptor ``out``; return as `fill_points`.
 
     Raises MeshError if a coordinate is too large.
     """
-    text = plan.text
+    text = layout.text
     piece = text.zone.points[k]
     points = np.empty((piece.rows, text.zone.dim))
     found = fill_points(text.lines, piece, points)
     if not within(points, LARGEST):
         at = int(np.argmax((np.abs(points) > LARGEST).any(axis=1)))
         raise too_large(text.lines.name, piece.row + at, points[at])
-    block = np.empty(piece.rows, plan.point)
+    block = np.empty(piece.rows, layout.point)
     block["x"], block["i"] = points, np.arange(piece.row, piece.row + piece.rows)
-    _put(out, plan.points + piece.row * plan.point.itemsize, block)
+    _write_at(out, layout.points + piece.row * layout.point.itemsize, block)
     return found
 
 
-def _put(out: int, at: int, content: NDArray) -> None:
+def _write_at(out: int, at: int, content: NDArray) -> None:
     """Write the bytes of an array to the file descriptor ``out``, from byte ``at`` on."""
     left = content.view(np.uint8).data
     while left:

@@ -63,7 +63,7 @@ def read(
     >>> sv.read("square.su2")
     Mesh('square.su2', 2D, 4 points, Cells(1 quadrilateral), markers: none)
     """
-    mesh = _read(_named(path, file_format), zone, progress or (lambda _: None), file_format)
+    mesh = _read(_checked_path(path, file_format), zone, progress or (lambda _: None), file_format)
     check_size(mesh, printable(path))
     return mesh
 
@@ -166,7 +166,7 @@ def write(
     >>> sv.write("square.su2", square)
     >>> sv.write("square.vtu", square, cell_data={"quality": sv.quality(square).values})
     """
-    path = _named(path, file_format)
+    path = _checked_path(path, file_format)
     if not overwrite and is_source(path, mesh):
         raise path_error(
             path,
@@ -174,7 +174,7 @@ def write(
             "for overwriting",
         )
     replaces = path if overwrite else None
-    values = _checked(mesh, cell_data or {})
+    values = _cell_arrays(mesh, cell_data or {})
     kind = file_format or path.suffix.lower().removeprefix(".")
     if kind not in ("su2", "su2b"):
         moved = {} if base is None else {"displacement": mesh.points - base.points}
@@ -220,7 +220,7 @@ def _write_other(
         write_other_format(path, mesh, values, point_data, replaces)
 
 
-def _named(path: str | Path, file_format: FileFormat | None) -> Path:
+def _checked_path(path: str | Path, file_format: FileFormat | None) -> Path:
     """Return the path of a file whose format, where it is given, is one of SU2.
 
     Raises
@@ -243,7 +243,7 @@ def is_source(path: Path, mesh: Mesh) -> bool:
         return False
 
 
-def _checked(mesh: Mesh, cell_data: Mapping[str, ArrayLike]) -> dict[str, NDArray]:
+def _cell_arrays(mesh: Mesh, cell_data: Mapping[str, ArrayLike]) -> dict[str, NDArray]:
     """Return the cell data as arrays; raise MeshError if one does not fit the number of cells."""
     values = {name: np.asarray(given) for name, given in cell_data.items()}
     for name, array in values.items():

@@ -35,7 +35,7 @@ class Source:
         """Return what pickle makes a copy from: the bytes, or how to open a large file again."""
         if self._content is not None:
             return Source, (self.path, self._content)
-        return _again, (self.path.absolute(), self._stamp)
+        return _reopened, (self.path.absolute(), self._stamp)
 
     def __getitem__(self, part: slice) -> bytes:
         """Return a range of the bytes; may be called from several threads at once.
@@ -102,7 +102,7 @@ def open_source(path: Path) -> Source:
     return source
 
 
-def _again(path: Path, stamp: tuple[int, int]) -> Source:
+def _reopened(path: Path, stamp: tuple[int, int]) -> Source:
     """Return the source of a file that another process has open; raise MeshError if it changed.
 
     ``stamp`` has its size and time stamp when it was opened there.

@@ -42,7 +42,7 @@ def nearest(
     return np.asarray(distance), np.asarray(number)
 
 
-def crowded(points: FloatArray, apart: float) -> IntArray:
+def near_duplicates(points: FloatArray, apart: float) -> IntArray:
     """Return ascending indices (k,) of points that may have another within ``apart``.
 
     No other point has one. They are candidates for an exact search; most meshes have none.

@@ -19,7 +19,7 @@ from slideviz.mesh.check import check_size, within
 from slideviz.mesh.fans import Fans, components, fan_normals, find_fans
 from slideviz.mesh.halo import Halo, without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.nearest import crowded
+from slideviz.mesh.nearest import near_duplicates
 from slideviz.mesh.periodic import TOLERANCE, Pair
 from slideviz.mesh.topology import Boundary
 from slideviz.rbf.axis import corners as corners_of
@@ -302,7 +302,7 @@ def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntAr
         Pairs of periodic images, which are taken to coincide.
     """
     apart = COINCIDENT * mesh.extent
-    some, links = boundary_nodes[crowded(mesh.points[boundary_nodes], apart)], images
+    some, links = boundary_nodes[near_duplicates(mesh.points[boundary_nodes], apart)], images
     if len(some):
         from scipy.spatial import cKDTree  # takes long to load
 

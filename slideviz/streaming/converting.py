@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from slideviz.errors import printable
-from slideviz.formats.binary_copy import Plan, fill, planned
+from slideviz.formats.binary_copy import BinaryLayout, binary_layout, write_layout
 from slideviz.formats.files import format_of
 from slideviz.formats.su2.text import Text, find_text
 from slideviz.formats.su2.write import require_text_names
@@ -77,22 +77,22 @@ def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: T
     zones = texts[0].zone.bounds.zones
     if zone is None:
         texts += [find_text(source, number) for number in range(2, zones + 1)]
-    plans: list[Plan] = []
+    layouts: list[BinaryLayout] = []
     for number, text in enumerate(texts, 1):
         name = printable(source.name) + (f", zone {number}" if number > 1 else "")
         _require_binary(text, name)
         keys = (part.key for part in text.zone.unknown)
         lost = lost_of_text(keys, 1 if zone is None else zones)
         warn(sentence_of_lost(target, name, lost, alone=zone is not None and zones > 1))
-        begin = plans[-1].size if plans else 8
-        plans.append(planned(text, is_result=True, begin=begin, number=number))
-    require_disk_space(target, target, plans[-1].size)
+        begin = layouts[-1].size if layouts else 8
+        layouts.append(binary_layout(text, is_result=True, begin=begin, number=number))
+    require_disk_space(target, target, layouts[-1].size)
     with atomic_write(target) as file:
-        os.truncate(file.fileno(), plans[-1].size)
-        for k, plan in enumerate(plans):
-            share = part_of(tick, 0.1 + 0.9 * k / len(plans), 0.1 + 0.9 * (k + 1) / len(plans))
-            fill(plan, Path(file.name), share)
-        for block in file_head(len(plans)):
+        os.truncate(file.fileno(), layouts[-1].size)
+        for k, layout in enumerate(layouts):
+            share = part_of(tick, 0.1 + 0.9 * k / len(layouts), 0.1 + 0.9 * (k + 1) / len(layouts))
+            write_layout(layout, Path(file.name), share)
+        for block in file_head(len(layouts)):
             file.write(block)
     tick(1.0)
 

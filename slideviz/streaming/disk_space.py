@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 from slideviz.errors import MeshError
-from slideviz.formats.binary_copy import Plan
+from slideviz.formats.binary_copy import BinaryLayout
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.formats.su2b.partial import names_of
 from slideviz.system.atomic import reason_of
@@ -41,7 +41,7 @@ def text_size(place: ZonePlace) -> int:
     return 8 * (place.cells.length + (2 * place.dim + 1) * place.n_points)
 
 
-def bytes_of_text(plan: Plan, is_text: bool, later: int) -> int:
+def bytes_of_text(layout: BinaryLayout, is_text: bool, later: int) -> int:
     """Return the most bytes on the disk at a time in the run of a text mesh.
 
     Parameters
@@ -51,10 +51,10 @@ def bytes_of_text(plan: Plan, is_text: bool, later: int) -> int:
     later : int
         Bytes for each cell that the caller writes afterwards.
     """
-    result = plan.text.lines.raw.size if is_text else plan.size
-    points = plan.markers - plan.points if is_text else 0
-    cells = plan.text.n_cells
-    return result + CELL_BYTES * cells + max(plan.size + points, later * cells)
+    result = layout.text.lines.raw.size if is_text else layout.size
+    points = layout.markers - layout.points if is_text else 0
+    cells = layout.text.n_cells
+    return result + CELL_BYTES * cells + max(layout.size + points, later * cells)
 
 
 def bytes_of_binary(path: Path, zone: int | None, *, is_text: bool, later: int) -> int:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.errors import MeshError, printable
-from slideviz.formats.binary_copy import fill, planned
+from slideviz.formats.binary_copy import binary_layout, write_layout
 from slideviz.formats.files import format_of
 from slideviz.formats.su2.lines import Piece
 from slideviz.formats.su2.text import Text, find_text
@@ -141,13 +141,13 @@ def open_read_only(
     if require_su2(path, file_format) == "su2b":
         yield StreamInput(path, zone)
         return
-    plan = planned(_streamable(path, zone, tick), is_result=False)
+    layout = binary_layout(_streamable(path, zone, tick), is_result=False)
     with draft(folder) as ours:
         try:
             open_temporary(ours, new=True).close()
-            require_disk_space(ours, path, plan.size)
-            os.truncate(ours, plan.size)
-            head = fill(plan, ours, part_of(tick, SCANNED, COPIED))
+            require_disk_space(ours, path, layout.size)
+            os.truncate(ours, layout.size)
+            head = write_layout(layout, ours, part_of(tick, SCANNED, COPIED))
             with open_temporary(ours) as file:
                 file.write(head)
         except OSError as problem:
@@ -155,8 +155,8 @@ def open_read_only(
                 f"{path}: its binary copy cannot be written in {folder}: {reason_of(problem)} "
                 "(TMPDIR names another folder)"
             ) from problem
-        with naming_text(plan.text, ours):
-            yield StreamInput(ours, None, plan.text)
+        with naming_text(layout.text, ours):
+            yield StreamInput(ours, None, layout.text)
 
 
 @contextmanager
@@ -208,17 +208,17 @@ def open_for_run(
         require_binary_names(printable(path.name), (m.name for m in text.zone.markers))
         lost = lost_of_text((part.key for part in text.zone.unknown), text.zone.bounds.zones)
         warn(sentence_of_lost(output, printable(path.name), lost))
-    plan, left = planned(text, is_result=not is_text), reusable_bytes(output)
+    layout, left = binary_layout(text, is_result=not is_text), reusable_bytes(output)
     state = path.stat()
-    about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {plan.size}"
-    with partial_file(output, plan.size, about, resume=resume, more=BINARY) as copy:
+    about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {layout.size}"
+    with partial_file(output, layout.size, about, resume=resume, more=BINARY) as copy:
         is_reused = (
             copy.done > 0
             and checksums(copy.path, part_of(tick, SCANNED, COPIED), ranks) == copy.sums
         )
-        require_disk_space(output, output, bytes_of_text(plan, is_text, later) - left)
+        require_disk_space(output, output, bytes_of_text(layout, is_text, later) - left)
         if not is_reused:
-            head = fill(plan, copy.path, part_of(tick, SCANNED, FILLED), ranks)
+            head = write_layout(layout, copy.path, part_of(tick, SCANNED, FILLED), ranks)
             finish_head(copy.file, head)
             copy.note(checksums(copy.path, part_of(tick, FILLED, COPIED), ranks))
         with naming_text(text, copy.path):

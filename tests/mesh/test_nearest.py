@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from slideviz.mesh import nearest as module
-from slideviz.mesh.nearest import crowded, nearest
+from slideviz.mesh.nearest import near_duplicates, nearest
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -12,10 +12,10 @@ def test_no_point_that_has_another_beside_it_is_overlooked(dim):
     points = 1e3 + rng.random((400, dim))
     points[:50] = points[50:100] + 1e-12 * rng.random(dim)
     near = cKDTree(points).query_pairs(1e-9, output_type="ndarray")
-    found = crowded(points, 1e-9)
+    found = near_duplicates(points, 1e-9)
     assert set(np.unique(near)) <= set(found)
     assert len(found) < len(points) // 2
-    assert not len(crowded(points[1:2], 1e-9))
+    assert not len(near_duplicates(points[1:2], 1e-9))
 
 
 @pytest.mark.parametrize("dim", [2, 3])

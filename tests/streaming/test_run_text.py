@@ -242,7 +242,7 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, smal
     case = made(tmp_path, "square", 25, ("STEPS=2",))
     out = tmp_path / f"out.{ending}"
     stream(case, out)
-    whole, move, put = out.read_bytes(), output.move, binary_copy._put_points
+    whole, move, put = out.read_bytes(), output.move, binary_copy._write_points
     parts = -(-len(sv.read(case.mesh_file).points) // 60)
     out.write_bytes(b"older")
     for stop in (-1, 0, 3, parts - 1, *([parts] if ending == "su2" else [])):
@@ -260,7 +260,7 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, smal
         with monkeypatch.context() as patch:
             patch.setattr(output, "move", stopping)
             if stop == -1:
-                patch.setattr(binary_copy, "_put_points", killed)
+                patch.setattr(binary_copy, "_write_points", killed)
             if stop == parts:
                 patch.setattr(output, "atomic_write", killed)
             with pytest.raises(KilledError):
@@ -271,7 +271,7 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, smal
         made_again, moved = [], []
         with monkeypatch.context() as patch:
             patch.setattr(
-                binary_copy, "_put_points", lambda *a, s=made_again: s.append(1) or put(*a)
+                binary_copy, "_write_points", lambda *a, s=made_again: s.append(1) or put(*a)
             )
             patch.setattr(output, "move", lambda *a, seen=moved: seen.append(1) or move(*a))
             told: list[str] = []
@@ -345,7 +345,7 @@ def late(what):
     return slow
 output.CHUNK, scan.BLOCK_BYTES, binary_copy.PIECES = 60, 2000, 3
 output.move = late(output.move)
-binary_copy._put_cells = late(binary_copy._put_cells)
+binary_copy._write_cells = late(binary_copy._write_cells)
 from slideviz.streaming import stream_input
 stream_input.moved_rows = late(stream_input.moved_rows)
 run.stream(sv.Case.read(sys.argv[1]), Path(sys.argv[2]), resume=sys.argv[3] == "resume")

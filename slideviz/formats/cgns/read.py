@@ -18,7 +18,7 @@ from slideviz.errors import path_error, printable
 from slideviz.formats.cgns.join import Interface, Joined, join
 from slideviz.formats.cgns.tree import Node, cgns_file
 from slideviz.formats.cgns.zone import CgnsZone, conditions, facets_of, read_zone, region_of
-from slideviz.formats.meshio.bridge import flattened, require_own
+from slideviz.formats.meshio.bridge import flattened, require_own_folder
 from slideviz.formats.meshio.markers import in_node_sets
 from slideviz.mesh.cached_boundary import outer_facets, smooth_parts
 from slideviz.mesh.check import check_mesh
@@ -54,7 +54,7 @@ def read_cgns(path: Path) -> Mesh:
         It cannot be read, or has what slideviz cannot use: the node, the rule and the remedy.
     """
     with cgns_file(path) as root:
-        require_own(path)
+        require_own_folder(path)
         base = _base(root)
         dim, physical = base.whole(2).tolist()
         if dim not in (2, 3) or not dim <= physical <= 3:

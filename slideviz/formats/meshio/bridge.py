@@ -69,7 +69,7 @@ def read_with_meshio(path: Path, progress: Progress) -> Mesh:
     """
     progress(0.0)
     with meshio_errors(path, "read"):
-        require_own(path)
+        require_own_folder(path)
     data = load(path, formats_of(path))
     progress(0.5)
     with meshio_errors(path, "understood"):
@@ -148,7 +148,7 @@ def flattened(path: Path, points: FloatArray, cells: Cells) -> FloatArray:
     return points[:, :2]
 
 
-def require_own(path: Path) -> None:
+def require_own_folder(path: Path) -> None:
     """Raise if a file, or one that it names, names files that are not in its folder.
 
     Raises
@@ -163,7 +163,7 @@ def require_own(path: Path) -> None:
     while waiting and len(seen) < _MOST_FILES:
         one = waiting.pop()
         seen.add(one)
-        for name, found in _named(one):
+        for name, found in _named_files(one):
             if found.parent != Path(os.path.realpath(path.parent)):
                 raise path_error(
                     one,
@@ -174,7 +174,7 @@ def require_own(path: Path) -> None:
                 waiting.append(found)
 
 
-def _named(path: Path) -> Iterator[tuple[str, Path]]:
+def _named_files(path: Path) -> Iterator[tuple[str, Path]]:
     """Yield each name of another file in a file, and the path that meshio would read for it.
 
     Raises MeshError for an external link of HDF5.
@@ -184,15 +184,15 @@ def _named(path: Path) -> Iterator[tuple[str, Path]]:
     if is_hdf5:
         _require_no_links(path)
     elif path.suffix.lower() in (".xdmf", ".xmf"):
-        yield from _of_xdmf(path)
+        yield from _files_of_xdmf(path)
     elif path.suffix.lower() == ".inp":
         for match in _INCLUDE.finditer(path.read_bytes()):
             name = match[1].strip().decode("utf-8", "surrogateescape")
-            yield name, _place(Path(name) if Path(name).exists() else path.parent / name)
+            yield name, _resolved(Path(name) if Path(name).exists() else path.parent / name)
 
 
-def _of_xdmf(path: Path) -> Iterator[tuple[str, Path]]:
-    """Yield the same as `_named` for an XDMF file."""
+def _files_of_xdmf(path: Path) -> Iterator[tuple[str, Path]]:
+    """Yield the same as `_named_files` for an XDMF file."""
     try:
         items = [item for _, item in ET.iterparse(path) if item.tag == "DataItem"]
     except ET.ParseError:
@@ -201,12 +201,12 @@ def _of_xdmf(path: Path) -> Iterator[tuple[str, Path]]:
         text, kind = (item.text or "").strip(), item.get("Format")
         if kind == "HDF":
             name = text.rpartition(":")[0]
-            yield name, _place(path.parent / name)
+            yield name, _resolved(path.parent / name)
         elif kind == "Binary":
-            yield text, _place(Path(text))
+            yield text, _resolved(Path(text))
 
 
-def _place(path: Path) -> Path:
+def _resolved(path: Path) -> Path:
     """Return a path with its folder resolved (no ``..``, no links); its last part stays."""
     return Path(os.path.realpath(path.parent)) / path.name
 
@@ -225,8 +225,8 @@ def _require_no_links(path: Path) -> None:
                 other = link.filename if isinstance(link, h5py.ExternalLink) else None
                 thing = None if other else group.get(name)
                 if isinstance(thing, h5py.Dataset):
-                    other = _storage(thing)
-                    _require_stored(path, thing)
+                    other = _storage_file(thing)
+                    _require_stored_size(path, thing)
                 if other is not None:
                     raise path_error(
                         path,
@@ -240,7 +240,7 @@ def _require_no_links(path: Path) -> None:
                         groups.append(thing)
 
 
-def _require_stored(path: Path, data: h5py.Dataset) -> None:
+def _require_stored_size(path: Path, data: h5py.Dataset) -> None:
     """Raise MeshError if reading a dataset takes far more memory than the file has bytes for it."""
     stored = data.id.get_storage_size()
     needed = data.dtype.itemsize * max(data.size or 0, math.prod(data.chunks or (0,)))
@@ -252,7 +252,7 @@ def _require_stored(path: Path, data: h5py.Dataset) -> None:
         )
 
 
-def _storage(data: h5py.Dataset) -> str | None:
+def _storage_file(data: h5py.Dataset) -> str | None:
     """Return the other file that the numbers of a dataset are in, or None."""
     if data.external:
         return str(data.external[0][0])
