@@ -58,7 +58,7 @@ laws: setup ## hold random runs against the laws of deformation (RUNS=5000 SEED=
 	$(BIN)/python -m tools.laws --runs $(RUNS) --seed $(SEED) $(ARGS)
 
 shots: setup ## draw the pictures in screenshots/ again
-	$(BIN)/slideviz shots
+	$(BIN)/python -m tools.shots
 
 study: setup ## the thesis's cases into study/: tables, plots, pictures (ARGS=--quick: small ones)
 	$(BIN)/python -m tools.study $(ARGS)

@@ -275,23 +275,6 @@ def test_sample_lists_and_refuses_unknown(capsys, tmp_path):
     assert "square" in capsys.readouterr().err
 
 
-def test_shots_draws_into_a_checkout_or_a_folder_that_is_named(tmp_path, monkeypatch, capsys):
-    drawn = []
-    monkeypatch.setattr("slideviz.gui.shots.shots", lambda folder: drawn.append(folder) or [])
-    monkeypatch.chdir(tmp_path)
-    assert run(["shots"]) == 2
-    assert "is no checkout of slideviz" in capsys.readouterr().err
-    (tmp_path / "pyproject.toml").write_text('[project]\nname = "other"\n')
-    assert run(["shots"]) == 2
-    assert run(["shots", "-o", "there"]) == 0
-    assert "drawing into there/; pictures of the same names there are replaced" in (
-        capsys.readouterr().out
-    )
-    (tmp_path / "pyproject.toml").write_text('[project]\nname = "slideviz"\n')
-    assert run(["shots"]) == 0
-    assert drawn == [Path("there"), Path("screenshots")]
-
-
 def test_keys_lists_every_key(capsys):
     assert run(["keys"]) == 0
     text = capsys.readouterr().out

@@ -24,7 +24,6 @@ COMMANDS = {
     "dot": "dot_command",
     "sample": "sample_command",
     "keys": "keys_command",
-    "shots": "window_command",
 }
 """The module of each command, in the order of the help; its function ``add_NAME`` adds a parser."""
 

@@ -1,10 +1,9 @@
-"""``slideviz [FILE]`` opens the window; ``slideviz shots`` draws it in typical states."""
+"""``slideviz [FILE]`` opens the window."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 
 
 def window(arguments: argparse.Namespace) -> int:
@@ -25,43 +24,3 @@ def window(arguments: argparse.Namespace) -> int:
     from slideviz.gui.app import launch
 
     return launch(arguments.file, run=arguments.run)
-
-
-def add_shots(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``shots`` to the parser."""
-    call = calls.add_parser(
-        "shots",
-        help="for developers: draw the README's pictures of the window again",
-        description="Draw the window in typical states, as the README of slideviz shows it.",
-    )
-    call.add_argument(
-        "-o", "--output", type=Path, metavar="DIR", help="folder (in a checkout: screenshots)"
-    )
-    call.set_defaults(command=shots, wrong_usage=call.error)
-
-
-def shots(arguments: argparse.Namespace) -> int:
-    """Draw the window in typical states as pictures; return the exit code."""
-    from slideviz.cli.exit_codes import DONE
-    from slideviz.gui.shots import shots as draw
-
-    folder = arguments.output
-    if folder is None:
-        if not _is_checkout(Path.cwd()):
-            arguments.wrong_usage(
-                "this folder is no checkout of slideviz, whose screenshots/ are drawn again; "
-                "name another folder with -o DIR"
-            )
-        folder = Path("screenshots")
-    print(f"drawing into {folder}/; pictures of the same names there are replaced", flush=True)
-    for path in draw(folder):
-        print(path)
-    return DONE
-
-
-def _is_checkout(folder: Path) -> bool:
-    """Return whether a folder has slideviz's own sources, and so the pictures of its README."""
-    try:
-        return 'name = "slideviz"' in (folder / "pyproject.toml").read_text(encoding="utf-8")
-    except (OSError, ValueError):
-        return False

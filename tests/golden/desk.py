@@ -18,8 +18,8 @@ from PIL import Image
 
 import slideviz
 from slideviz.cli import run as command
-from slideviz.gui.shots import shrink
 from tests.golden.drawings import facts
+from tools.shots import shrink
 
 DIGITS = 12
 """Significant digits of the numbers that are kept."""

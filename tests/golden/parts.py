@@ -36,7 +36,6 @@ COMMANDS = (
     "convert",
     "sample",
     "keys",
-    "shots",
 )
 
 PERIODIC = tuple(PERIODIC_MODES)

@@ -30,13 +30,13 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.gui import shots, shots_states
-from slideviz.gui.shots_states import settle
 from slideviz.gui.widgets import questions
 from slideviz.samples.table import write_sample
 from slideviz.session import changes
 from tests.golden.desk import Desk, keep_picture
 from tests.golden.parts import FONT
+from tools import shots
+from tools.shots import settle
 
 SMALL = 0.45
 
@@ -46,11 +46,11 @@ ask_unsaved = questions.ask_unsaved
 
 def main(folder: Path) -> None:
     """Put all that the window shows into a folder."""
-    shots_states.STATOR_CELLS = 6_000
+    shots.STATOR_CELLS = 6_000
     desk = Desk(folder)
     with tempfile.TemporaryDirectory() as place, shots.display():
         write_sample("passage", Path(place) / "flat", 12)
-        for state in shots_states.STATES:
+        for state in shots.STATES:
             with shots.open_window(Path(place)) as window:
                 state.bring(window, Path(place))
                 photograph(desk, window, state.name)
@@ -88,7 +88,7 @@ def opened(desk: Desk, window, place: Path) -> None:
     settle(window)
     window.store.change(changes.set_case, steps=2)
     for sliding in ("none", "ds"):
-        shots_states._run(window, sliding=sliding, periodic="none")
+        shots._run(window, sliding=sliding, periodic="none")
     for left, right, lower in (
         ("motion", "histogram", "runs"),
         ("method", "worst", "display"),
@@ -251,7 +251,7 @@ def answered(desk: Desk) -> Iterator[None]:
 
 def keep_dialog(desk: Desk, dialog: QDialog) -> None:
     """Write down the words of a dialog, and keep its picture if it has fields."""
-    from slideviz.gui.shots_states import wait
+    from tools.shots import wait
 
     if isinstance(dialog, QMessageBox):
         desk.say(f"message {dialog.windowTitle()} | {dialog.text()} | {dialog.informativeText()}")

@@ -1,4 +1,4 @@
-"""The pictures of ``slideviz shots``: each state, as the screen shows it."""
+"""The pictures of ``make shots``: each state, as the screen shows it."""
 
 import shutil
 
@@ -7,12 +7,12 @@ import pytest
 from PIL import Image
 
 from slideviz.errors import SlidevizError
-from slideviz.gui import shots, shots_states
+from tools import shots
 
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
-    monkeypatch.setattr(shots_states, "STATOR_CELLS", 6_000)
+    monkeypatch.setattr(shots, "STATOR_CELLS", 6_000)
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def window(qapp, tmp_path):
 
 @pytest.mark.slow
 def test_roles_are_guesses_and_the_menu_is_in_the_picture(window, tmp_path):
-    shots_states.roles(window, tmp_path)
+    shots.roles(window, tmp_path)
     session = window.store.session
     assert session.role("BLADE") == "moving"
     assert "BLADE" not in session.guesses
@@ -43,7 +43,7 @@ def test_roles_are_guesses_and_the_menu_is_in_the_picture(window, tmp_path):
 
 @pytest.mark.slow
 def test_quality_shows_the_last_step_with_neighbours(window, tmp_path):
-    shots_states.quality(window, tmp_path)
+    shots.quality(window, tmp_path)
     session = window.store.session
     assert session.run_shown.end == "done"
     assert session.view.frame == 5
@@ -54,7 +54,7 @@ def test_quality_shows_the_last_step_with_neighbours(window, tmp_path):
 
 @pytest.mark.slow
 def test_section_is_a_cylinder_that_is_unrolled(window, tmp_path):
-    shots_states.section(window, tmp_path)
+    shots.section(window, tmp_path)
     (cut,) = window.store.session.view.sections
     assert cut.kind == "cylinder"
     assert cut.radius == pytest.approx(0.275, abs=5e-3)  # within a cell of mid-span
@@ -64,7 +64,7 @@ def test_section_is_a_cylinder_that_is_unrolled(window, tmp_path):
 
 @pytest.mark.slow
 def test_side_by_side_shows_what_sliding_is_good_for(window, tmp_path):
-    shots_states.beside(window, tmp_path)
+    shots.beside(window, tmp_path)
     session = window.store.session
     held, slid = (run.last.quality for run in session.runs)
     assert session.shown == 2
@@ -75,14 +75,14 @@ def test_side_by_side_shows_what_sliding_is_good_for(window, tmp_path):
 
 @pytest.mark.slow  # `test_window` has what themes change
 def test_dark_is_dark(window, tmp_path):
-    shots_states.dark(window, tmp_path)
+    shots.dark(window, tmp_path)
     with Image.open(shots.photograph(window, tmp_path / "dark.png")) as image:
         assert np.asarray(image.convert("L")).mean() < 90
 
 
 def test_all_pictures_of_a_folder_and_the_film_moves(tmp_path, qapp, monkeypatch):
-    start = shots_states.ShotState("start", lambda window, place: None)
-    monkeypatch.setattr(shots_states, "STATES", (start,))
+    start = shots.ShotState("start", lambda window, place: None)
+    monkeypatch.setattr(shots, "STATES", (start,))
     paths = shots.shots(tmp_path / "new" / "folder")
     assert [path.name for path in paths] == ["start.png", "passage.gif"]
     assert all(path.stat().st_size > 1_000 for path in paths)
@@ -125,9 +125,9 @@ def test_a_picture_that_cannot_be_written(window, tmp_path):
 
 
 def test_what_never_gets_ready(qapp, monkeypatch):
-    monkeypatch.setattr(shots_states, "PATIENCE", 0.05)
+    monkeypatch.setattr(shots, "PATIENCE", 0.05)
     with pytest.raises(SlidevizError, match="the window did not get ready within 0 s"):
-        shots_states.wait(lambda: False)
+        shots.wait(lambda: False)
 
 
 def test_no_display_and_no_xvfb(monkeypatch):

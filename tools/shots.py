@@ -1,9 +1,20 @@
-"""States of the window for the pictures in ``screenshots/``."""
+"""Draw the window in typical states, as the documentation shows it: ``python -m tools.shots``.
+
+The pictures are grabbed from the screen: a window rendered into a picture by Qt would have tab
+bars that are not visible.
+"""
 
 from __future__ import annotations
 
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,10 +26,16 @@ from slideviz.gui.widgets.plot_canvas import PlotCanvas
 from slideviz.samples.table import sample, write_sample
 from slideviz.sections.model import Section
 from slideviz.session import changes
+from slideviz.system.cleanup import draft, ended
 
 if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow
 
+SIZE = (1280, 800)
+"""Width and height of the window in pixels."""
+
+APART, MANY, EXACT = 192, 40, 24
+"""Numbers of colors in a picture's palette: mutually distant; of large areas; most frequent."""
 
 PATIENCE = 300.0
 """Longest time to wait for the window, in seconds."""
@@ -209,3 +226,143 @@ def film_of_passage(path: Path) -> Path:
     for _ in film(session, path, FilmOptions((480, 300), 5.0, 1.5, 1), overwrite=True):
         pass
     return path
+
+
+def shots(folder: Path) -> list[Path]:
+    """Write all pictures, and the film, into a folder, and return their paths.
+
+    Raises
+    ------
+    SlidevizError
+        The folder cannot be written to, there is no screen, or the window does not get ready.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise SlidevizError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
+    with draft(Path(tempfile.gettempdir()), is_folder=True) as place, display():
+        made = []
+        for state in STATES:
+            with open_window(place) as window:
+                state.bring(window, place)
+                made.append(photograph(window, folder / f"{state.name}.png"))
+        return [*made, film_of_passage(folder / "passage.gif")]
+
+
+@contextmanager
+def display() -> Iterator[None]:
+    """Provide a display within the context: an Xvfb of its own; without Xvfb the present one.
+
+    Raises
+    ------
+    SlidevizError
+        There is no screen and no Xvfb to make one.
+    """
+    from qtpy.QtWidgets import QApplication
+
+    program = shutil.which("Xvfb")
+    names = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
+    before = {name: os.environ[name] for name in names if name in os.environ}
+    there = before.get("DISPLAY") or before.get("WAYLAND_DISPLAY")
+    if QApplication.instance() is not None or (program is None and there):
+        yield
+        return
+    if program is None:
+        raise SlidevizError("there is no display and no Xvfb; install Debian's package xvfb")
+    read, write = os.pipe()
+    call = [program, "-displayfd", str(write), "-screen", "0", "1920x1080x24", "-nolisten", "tcp"]
+    server = subprocess.Popen(call, pass_fds=[write], stderr=subprocess.DEVNULL)
+    os.close(write)
+    with ended(server):
+        try:
+            with os.fdopen(read) as number:
+                os.environ["DISPLAY"] = f":{number.readline().strip()}"
+            os.environ.pop("WAYLAND_DISPLAY", None)
+            os.environ["QT_QPA_PLATFORM"] = "xcb"
+            yield
+        finally:
+            for name in names:
+                os.environ.pop(name, None)
+            os.environ.update(before)
+            server.terminate()
+            server.wait()
+
+
+@contextmanager
+def open_window(place: Path) -> Iterator[MainWindow]:
+    """Provide a window of `SIZE`, with settings of its own in a folder instead of the user's."""
+    from qtpy.QtCore import QSettings
+    from qtpy.QtWidgets import QApplication
+
+    from slideviz.gui.widgets import questions
+    from slideviz.gui.window import MainWindow
+
+    app = QApplication.instance() or QApplication(["slideviz"])
+    settings = QSettings(str(place / "settings.ini"), QSettings.Format.IniFormat)
+    settings.clear()
+    window = MainWindow(settings)
+    window.resize(*SIZE)
+    window.move(0, 0)
+    window.show()
+    questions.ask_unsaved, asked = (lambda *_: "discard"), questions.ask_unsaved
+    try:
+        yield window
+    finally:
+        window.close()
+        questions.ask_unsaved = asked
+        app.processEvents()
+
+
+def photograph(window: MainWindow, path: Path) -> Path:
+    """Write a picture of the part of the screen where the window is, and return its path.
+
+    Raises
+    ------
+    SlidevizError
+        The file cannot be written.
+    """
+    settle(window)
+    window.view.snapshot()
+    window.viewing.render()
+    settle(window)
+    frame = window.geometry()
+    shown = window.screen().grabWindow(0, frame.x(), frame.y(), frame.width(), frame.height())
+    if not shown.save(str(path)):
+        raise SlidevizError(f"{path}: the picture cannot be written; choose another folder")
+    shrink(path)
+    return path
+
+
+def shrink(path: Path) -> None:
+    """Reduce a PNG picture to a palette of 256 colors: a third of its size, hardly visible."""
+    import numpy as np
+    from PIL import Image
+    from scipy.spatial import KDTree
+
+    with Image.open(path) as image:
+        drawn = image.convert("RGB")
+    # A red cell keeps its red, a shaded background has no bands, and white stays white.
+    apart = drawn.quantize(APART, Image.Quantize.MAXCOVERAGE, kmeans=1).getpalette() or []
+    many = drawn.quantize(MANY, Image.Quantize.MEDIANCUT).getpalette() or []
+    counted = sorted(drawn.getcolors(drawn.width * drawn.height) or [], reverse=True)
+    exact = np.ravel([color for _, color in counted[:EXACT]]).tolist()
+    palette = apart[: 3 * APART] + many[: 3 * MANY] + exact
+    # Pillow's own search for the nearest color is coarse: it maps 255 to 250.
+    tree = KDTree(np.reshape(palette, (-1, 3)))
+    colors, where = np.unique(np.asarray(drawn).reshape(-1, 3), axis=0, return_inverse=True)
+    nearest = np.asarray(tree.query(colors)[1], np.uint8)[where.ravel()]
+    fewer = Image.fromarray(nearest.reshape(drawn.height, drawn.width), "P")
+    fewer.putpalette(palette)
+    fewer.save(path, optimize=True)
+
+
+def main() -> None:
+    """Draw the pictures into a folder, and print their paths."""
+    parser = argparse.ArgumentParser(prog="python -m tools.shots", description=__doc__)
+    parser.add_argument("-o", "--output", type=Path, default=Path("screenshots"), metavar="DIR")
+    for path in shots(parser.parse_args().output):
+        sys.stdout.write(f"{path}\n")
+
+
+if __name__ == "__main__":
+    main()
