@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from slideviz.cli import run
-from slideviz.gui.shots import shrink
+from tools.shots import shrink
 from tools.study.cases import CALLS, Call
 from tools.study.dense import dense
 from tools.study.sections import SECTIONS, draw_sections
