@@ -1,6 +1,7 @@
 """What the project says of itself agrees with the program."""
 
 import ast
+import re
 import tomllib
 from configparser import ConfigParser
 from importlib import import_module
@@ -12,6 +13,18 @@ import yaml
 import slideviz
 
 ROOT = Path(__file__).parents[1]
+PACKAGE = Path(slideviz.__file__).parent
+MADE = {
+    "x.py",
+    "index.md",
+    "demo/",
+    "study/",
+    "tests/golden/new/",
+    "build/docs/html",
+    "x_streamed.py",
+    "plot_N_name.py",
+}
+"""What CONTRIBUTING.md cites and a clean copy lacks: results, and names of no file."""
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 
@@ -68,3 +81,27 @@ def test_a_name_of_a_class_means_one_thing_in_its_package():
                 package = str(path.parent.relative_to(ROOT))
                 places.setdefault((package, part.name), []).append(path.name)
     assert {name: files for name, files in places.items() if len(files) > 1} == {}
+
+
+CITED = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+IN_FILE = re.compile(r"((?:`\w+`(?:, | and |, and )?)+) in `([\w/.]+\.py)`")
+
+
+def test_contributing_cites_files_that_exist():
+    cited = {
+        name
+        for name in re.findall(r"`([\w./-]+(?:\.(?:py|csv|md|toml|cff|txt)|/))`", CITED)
+        if name not in MADE
+    }
+    assert len(cited) > 60
+    lacking = {name for name in cited if not (ROOT / name).exists()}
+    assert {name for name in lacking if not (PACKAGE / name).exists()} == set()
+
+
+def test_contributing_cites_names_that_are_in_their_files():
+    rows = IN_FILE.findall(CITED)
+    assert len(rows) > 40
+    for names, file in rows:
+        path = ROOT / file if (ROOT / file).exists() else PACKAGE / file
+        words = set(re.findall(r"\w+", path.read_text(encoding="utf-8")))
+        assert set(re.findall(r"\w+", names.replace(" and ", " "))) <= words, file
