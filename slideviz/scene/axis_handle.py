@@ -1,6 +1,6 @@
 """The geometry of the handle of a section about an axis: its frame, and the size after a drag.
 
-The handle's widget is `slideviz.gui.viewport.round_handle.RoundHandle`; handles of 2D sections are
+The handle's widget is `slideviz.gui.viewport.point_handle.AxisHandle`; handles of 2D sections are
 in `slideviz.sections.handles`.
 """
 

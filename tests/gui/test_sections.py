@@ -11,7 +11,7 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
 from slideviz.gui.viewport.flats import stack
-from slideviz.gui.viewport.plane_handle import PlaneHandle
+from slideviz.gui.viewport.handles import PlaneHandle
 from slideviz.gui.viewport.section_views import place_for
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.ruler import Ruler, nice_ticks, tick_text
@@ -608,7 +608,7 @@ def test_a_line_is_dragged_by_its_middle_turned_by_its_end_and_its_handle_leaves
     (moved,) = sections(window)
     assert moved.origin[:2] == pytest.approx(tuple(start + shift), abs=0.01)
     assert moved.direction == line.direction
-    end = window.section_views.handles.of(window.view)._handle_parts.ends[1]
+    end = window.section_views.handles.of(window.view).in_view().ends[1]
     drag_in_view(window.view, end, np.array(moved.origin[:2]) + 0.5)
     (turned,) = sections(window)
     assert np.abs(turned.direction) == pytest.approx((0.7071, 0.7071, 0.0), abs=0.02)
@@ -627,13 +627,13 @@ def test_a_line_is_dragged_by_its_middle_turned_by_its_end_and_its_handle_leaves
     handle = window.section_views.handles.of(window.view)
     # What is dragged beside it moves the view, as ever.
     camera = window.scene.camera.place
-    beside = handle._handle_parts.ends[0] + 0.2
+    beside = handle.in_view().ends[0] + 0.2
     drag_in_view(window.view, beside, beside + 0.1)
     assert window.scene.camera.place != camera
     # Wherever one looks, it is in reach.
     (x, y, _), half = sections(window)[0].origin, 0.02
     window.scene.camera.aim((x, y + 0.3, 0.0), half, 1.0)
-    for point in (*handle._handle_parts.ends, *handle._handle_parts.middle):
+    for point in (*handle.in_view().ends, *handle.in_view().middle):
         assert abs(point[1] - y - 0.3) < half
     flat_panel.handle.click()
     assert not any(name.startswith("handle:") for name in window.view.actors)
@@ -650,7 +650,7 @@ def test_a_circle_is_dragged_to_another_radius(window, driver, flat_panel):
     centre = np.array(circle.origin[:2])
     drag_in_view(
         window.view,
-        window.section_views.handles.of(window.view)._handle_parts.ends[0],
+        window.section_views.handles.of(window.view).in_view().ends[0],
         centre + np.array([0.2, 0.0]),
     )
     assert sections(window)[0].radius == pytest.approx(0.2, abs=0.01)

@@ -1,25 +1,32 @@
-"""The handles of the selected section, one in each view."""
+"""The handles of the selected section, one in each view, by which the mouse drags it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pyvista as pv
+from vtkmodules.vtkInteractionWidgets import (
+    vtkImplicitPlaneRepresentation,
+    vtkImplicitPlaneWidget2,
+)
 
-from slideviz.color_scheme import ColorScheme
+from slideviz.color_scheme import SELECTED_COLOR, ColorScheme
+from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.line_handle import Handle2D
-from slideviz.gui.viewport.plane_handle import Bounds, PlaneHandle
-from slideviz.gui.viewport.round_handle import RoundHandle
+from slideviz.gui.viewport.point_handle import (
+    HANDLE_COLOR,
+    POINT_PX,
+    AxisHandle,
+    Dragging,
+    InPlaneHandle,
+    Moved,
+)
 from slideviz.mesh.model import Mesh
-from slideviz.scene.axis_handle import patch_in
 from slideviz.scene.scene import Scene
-from slideviz.sections.model import Section, Triple
+from slideviz.sections.model import Section
 
-Handle = PlaneHandle | Handle2D | RoundHandle
-
-_ROOM = 0.03
+_MARGIN = 0.03
 """Margin between the mesh and the frame of a plane handle, relative to the mesh's length."""
 
 
@@ -28,15 +35,12 @@ class Handles:
 
     Parameters
     ----------
-    moved : callable
-        Called with the new section while it is dragged.
-    dragging : callable
-        Called with True when a drag begins and with False when it ends.
+    moved, dragging : callable
+        See `Moved` and `Dragging`.
     """
 
-    def __init__(self, moved: Callable[[Section], None], dragging: Callable[[bool], None]) -> None:
+    def __init__(self, moved: Moved, dragging: Dragging) -> None:
         self._moved, self._dragging = moved, dragging
-        self._section: Section | None = None
         self._of: dict[View3D, Handle] = {}
 
     def of(self, view: View3D) -> Handle | None:
@@ -64,28 +68,13 @@ class Handles:
             The undeformed mesh.
         scheme : ColorScheme
         """
-        self._section = section
-        for view, scene, shown in views:
-            handle = self._of.get(view)
-            wanted = kind_of(section, mesh)
-            if handle is not None and not isinstance(handle, wanted):
+        kind = kind_of(section, mesh)
+        for view, scene, deformed in views:
+            if not isinstance(self._of.get(view), kind):
                 self.drop(view)
-                handle = None
-            if handle is None:
-                handle = self._of[view] = self._make(wanted, view, scene)
-            if isinstance(handle, Handle2D):
-                handle.show(section, scene.stage.lift(mesh), scheme)
-            elif isinstance(handle, RoundHandle):
-                handle.show(section, patch_in(section, shown, scene.sections.cuts), scheme)
-            else:
-                handle.show(section, _around(mesh), scheme)
+                self._of[view] = kind(view, scene, self._moved, self._dragging)
+            self._of[view].show(section, scheme, mesh, deformed)
             view.render_soon()
-
-    def _make(self, kind: type[Handle], view: View3D, scene: Scene) -> Handle:
-        if kind is PlaneHandle:
-            return PlaneHandle(view, self._dragged, self._dragging)
-        made = Handle2D if kind is Handle2D else RoundHandle
-        return made(view, scene.stage.strip, self._moved, self._dragging)
 
     def drop(self, view: View3D) -> None:
         """Remove the handle from a view."""
@@ -99,27 +88,111 @@ class Handles:
         for view in list(self._of):
             self.drop(view)
 
-    def _dragged(self, origin: Triple, normal: Triple) -> None:
-        section = self._section
+
+class PlaneHandle:
+    """The handle of a plane section: VTK's plane widget, with frame, normal arrow and ball.
+
+    Parameters
+    ----------
+    view : View3D
+    scene : Scene
+    moved, dragging : callable
+        See `Moved` and `Dragging`.
+    """
+
+    def __init__(self, view: View3D, scene: Scene, moved: Moved, dragging: Dragging) -> None:
+        self.view, self.scene = view, scene
+        self._moved, self._dragging = moved, dragging
+        self.section: Section | None = None
+        self.shape = vtkImplicitPlaneRepresentation()
+        self.shape.SetPlaceFactor(1.0)
+        self.shape.OutlineTranslationOff()
+        self.shape.ScaleEnabledOff()
+        self.shape.OutsideBoundsOff()
+        self.shape.SetDrawOutline(False)
+        self.shape.SetHandleSize(POINT_PX)
+        self.widget = vtkImplicitPlaneWidget2()
+        self.widget.SetRepresentation(self.shape)
+        self.widget.SetInteractor(view.iren.interactor)
+        self._bounds: list[float] = []
+        self.dragging = False
+        self._soon = later(None, self.report)
+        for event, call in (
+            ("StartInteractionEvent", lambda *_: self._grab(True)),
+            ("InteractionEvent", lambda *_: self._soon.start()),
+            ("EndInteractionEvent", lambda *_: self._grab(False)),
+        ):
+            self.widget.AddObserver(event, call)  # type: ignore[arg-type]  # a name is taken, too
+
+    def show(self, section: Section, scheme: ColorScheme, mesh: Mesh, _deformed: Mesh) -> None:
+        """Show the handle of a section, its frame around a mesh; during a drag the plane stays."""
+        self.section = section
+        self._color(scheme)
+        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+        margin = _MARGIN * (high - low).max()
+        bounds = np.stack([low - margin, high + margin], axis=1).ravel().tolist()
+        if bounds != self._bounds:
+            self._bounds = bounds
+            self.shape.PlaceWidget(bounds)
+        if not self.dragging:
+            self.shape.SetOrigin(*section.origin)
+            self.shape.SetNormal(*section.basis[2])
+        if not self.widget.GetEnabled():
+            self.widget.On()
+
+    def close(self) -> None:
+        """Remove the handle from the view for good."""
+        self._soon.stop()
+        self.dragging = False
+        self.widget.Off()
+        self.widget.RemoveAllObservers()
+        self.widget.SetInteractor(None)  # type: ignore[arg-type]  # None is taken, too
+
+    def report(self) -> None:
+        """Call ``moved`` with the section at origin and normal of the dragged plane."""
+        section = self.section
         if section is None:
             return
-        moved = replace(section, origin=origin, direction=normal)
+        # Nobody aims at more decimals, and they would fill the fields of the normal.
+        normal = np.array(self.shape.GetNormal()).round(4) + 0.0
+        origin = np.array(self.shape.GetOrigin())
+        moved = replace(section, origin=tuple(origin.tolist()), direction=tuple(normal.tolist()))
         if not np.allclose(moved.origin, section.origin) or not np.allclose(
             moved.basis[2], section.basis[2]
         ):
             self._moved(moved)
 
+    def _grab(self, dragging: bool) -> None:
+        self.dragging = dragging
+        if (
+            dragging
+            and self.shape.GetInteractionState() == vtkImplicitPlaneRepresentation.MovingOrigin
+        ):
+            # VTK drags the ball within the plane, which changes nothing visible: push instead.
+            self.shape.SetInteractionState(vtkImplicitPlaneRepresentation.Pushing)
+        if not dragging:
+            self._soon.stop()
+            self.report()
+        self._dragging(dragging)
+
+    def _color(self, scheme: ColorScheme) -> None:
+        strong, plain = (pv.Color(name).float_rgb for name in (SELECTED_COLOR, scheme.text))
+        shape = self.shape
+        shape.SetForegroundColor(*plain)
+        shape.SetEdgeColor(*plain)
+        shape.SetHandleColor(*pv.Color(HANDLE_COLOR).float_rgb)
+        shape.SetInteractionColor(*strong)
+        shape.GetPlaneProperty().SetColor(*plain)
+        shape.GetPlaneProperty().SetOpacity(0.06)
+        shape.GetSelectedPlaneProperty().SetColor(*strong)
+        shape.GetSelectedPlaneProperty().SetOpacity(0.12)
+
+
+Handle = PlaneHandle | InPlaneHandle | AxisHandle
+
 
 def kind_of(section: Section, mesh: Mesh) -> type[Handle]:
     """Return the class of the handle for a section: by the mesh's dimension, then by its shape."""
     if mesh.dim == 2:
-        return Handle2D
-    return {"push": PlaneHandle, "pull": RoundHandle}[section.shape.handle]
-
-
-def _around(mesh: Mesh) -> Bounds:
-    """Return the bounding box of a 3D mesh, with a margin."""
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    room = _ROOM * (high - low).max()
-    x, y, z = np.stack([low - room, high + room], axis=1).tolist()
-    return (*x, *y, *z)
+        return InPlaneHandle
+    return PlaneHandle if section.shape.handle == "push" else AxisHandle

@@ -6,8 +6,8 @@ from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.viewport.plane_handle import PlaneHandle
-from slideviz.gui.viewport.round_handle import RoundHandle
+from slideviz.gui.viewport.handles import PlaneHandle
+from slideviz.gui.viewport.point_handle import AxisHandle
 from slideviz.samples.table import write_sample
 from slideviz.scene.pick import to_display
 from slideviz.session import changes
@@ -193,7 +193,7 @@ def test_in_a_detail_it_is_in_reach_and_it_leaves_nothing(window, panel, driver)
     assert not marks(window.view)
     assert isinstance(window.section_views.handles.of(window.view), PlaneHandle)
     panel.list.setCurrentRow(0)
-    assert isinstance(window.section_views.handles.of(window.view), RoundHandle)
+    assert isinstance(window.section_views.handles.of(window.view), AxisHandle)
     assert marks(window.view)
     assert marks(window.view)
     frame = window.view.actors["handle:frame"].mapper.dataset
