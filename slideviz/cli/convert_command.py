@@ -74,7 +74,7 @@ def _is_to_be_streamed(arguments: argparse.Namespace) -> bool:
     """
     from slideviz.errors import CaseError
     from slideviz.streaming.converting import streamed_kind
-    from slideviz.streaming.memory import missing_memory_of
+    from slideviz.streaming.resources import missing_memory_of
 
     kind = streamed_kind(arguments.mesh, arguments.output)
     if arguments.stream:

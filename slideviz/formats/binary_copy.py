@@ -32,8 +32,8 @@ from slideviz.mesh.check import LARGEST, too_large, within
 from slideviz.mesh.elements import SIZES
 from slideviz.mesh.model import Cells, IntArray
 from slideviz.system.cleanup import open_temporary
-from slideviz.system.in_order import ordered_map
 from slideviz.system.ranks import SERIAL, SerialPool
+from slideviz.system.threads import ordered_map
 
 HEAD = 8
 """Bytes before the first zone."""

@@ -15,8 +15,7 @@ import numpy as np
 from slideviz.case.section_shapes import Size
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.sections.polygons import Polygons
-from slideviz.sections.round_number import round_middle
-from slideviz.sections.shape import Shape
+from slideviz.sections.shape import Shape, round_middle
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section

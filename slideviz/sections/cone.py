@@ -17,12 +17,13 @@ import numpy as np
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import FloatArray
 from slideviz.sections.around_axis import AboutAxis, Unrolled, patch_of
-from slideviz.sections.round_number import round_middle, roundest
 from slideviz.sections.shape import (
     DIGITS,
     FEW,
     Label,
     axis_word,
+    round_middle,
+    roundest,
     triple,
     triple_words,
 )

@@ -18,13 +18,13 @@ from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import FloatArray
 from slideviz.sections.line import LINE
 from slideviz.sections.polygons import Polygons
-from slideviz.sections.round_number import round_middle
 from slideviz.sections.shape import (
     FEW,
     Label,
     Shape,
     axis_word,
     direction_label,
+    round_middle,
     triple,
     triple_words,
 )

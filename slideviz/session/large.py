@@ -13,7 +13,7 @@ from slideviz.mesh.quality import quality
 from slideviz.session.results import StepFrame
 from slideviz.session.whole import PartQuality, QualityTotals, measure_all, worst_frame
 from slideviz.solver.deform import free_memory
-from slideviz.streaming.memory import NEEDED
+from slideviz.streaming.resources import NEEDED
 from slideviz.streaming.skin import read_skin
 from slideviz.terms import Metric
 

@@ -10,8 +10,7 @@ from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.surfaces import padded
 from slideviz.sections.model import SHAPES, Section, Triple
-from slideviz.sections.round_number import round_middle
-from slideviz.sections.shape import triple
+from slideviz.sections.shape import round_middle, triple
 from slideviz.session.state import Session
 from slideviz.system.threads import in_parts
 

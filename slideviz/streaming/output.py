@@ -22,11 +22,11 @@ from slideviz.formats.su2b.elements import element_block
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.formats.su2b.partial import Partial, partial_copy, partial_file
 from slideviz.rbf.problem import Watch
+from slideviz.streaming.converting import text_of_binary
 from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.measuring import MeasuredBlock, PointFiles, QualityCollector, measured
 from slideviz.streaming.orientation import facet_sums, require_consistent_orientation
 from slideviz.streaming.stream_input import StreamInput, text_blocks
-from slideviz.streaming.text_of_binary import text_of_binary
 from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_no_input
 from slideviz.system.ranks import SerialPool

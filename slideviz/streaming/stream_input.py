@@ -29,15 +29,14 @@ from slideviz.formats.su2b.write import (
     sentence_of_lost,
 )
 from slideviz.mesh.model import Mesh
-from slideviz.streaming.disk_space import (
+from slideviz.streaming.resources import (
     bytes_of_binary,
     bytes_of_text,
     require_disk_space,
     reusable_bytes,
     text_size,
 )
-from slideviz.streaming.skin import read_skin
-from slideviz.streaming.text_skin import naming_text, skin_of_text
+from slideviz.streaming.skin import naming_text, read_skin, skin_of_text
 from slideviz.system.atomic import reason_of
 from slideviz.system.cleanup import draft, open_temporary
 from slideviz.system.ranks import SERIAL, SerialPool

@@ -11,21 +11,18 @@ from __future__ import annotations
 import os
 import pickle
 import time
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from slideviz.errors import MeshError, SlidevizError
-from slideviz.system.threads import at_most, cores
+from slideviz.system.threads import Result, Task, at_most, cores, submit_ahead
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Comm, Intracomm
 
-Task = TypeVar("Task")
-Result = TypeVar("Result")
 WorkerFactory = Callable[..., AbstractContextManager[Callable[[Task], Result]]]
 """What makes a worker: a context manager with the function that does one task."""
 RunTasks = Callable[[Sequence[Task]], Iterator[Result]]
@@ -60,22 +57,9 @@ class SerialPool:
         threads = cores()
         with make(*given) as work, at_most(1), ThreadPoolExecutor(threads) as pool:
             try:
-                yield lambda tasks: _in_order(pool, work, tasks, threads)
+                yield lambda tasks: submit_ahead(pool, threads, work, tasks)
             finally:
                 pool.shutdown(cancel_futures=True)
-
-
-def _in_order(
-    pool: ThreadPoolExecutor, work: Callable[[Task], Result], tasks: Sequence[Task], threads: int
-) -> Iterator[Result]:
-    """Yield the results of tasks in order; up to two tasks for each thread are done ahead."""
-    ahead: deque[Future[Result]] = deque()
-    for task in tasks:
-        ahead.append(pool.submit(work, task))
-        if len(ahead) > 2 * threads:
-            yield ahead.popleft().result()
-    while ahead:
-        yield ahead.popleft().result()
 
 
 SERIAL = SerialPool()

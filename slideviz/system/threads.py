@@ -9,9 +9,14 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from typing import TypeVar
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
 
 Tick = Callable[[float], object]
 """A callback for progress, called with the fraction done; what it raises ends the work."""
@@ -73,6 +78,39 @@ def in_parts(
         rest(tick)
     for other in others:
         other.result()
+
+
+def ordered_map(work: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Result]:
+    """Yield what ``work`` returns for each task, in order; raise its error in place of a result.
+
+    Tasks are done in as many threads as `cores` (see `submit_ahead`).
+    """
+    threads = min(cores(), len(tasks))
+    if threads < 2:
+        yield from map(work, tasks)
+        return
+    with ThreadPoolExecutor(threads, "slideviz-blocks") as pool:
+        yield from submit_ahead(pool, threads, work, tasks)
+
+
+def submit_ahead(
+    pool: ThreadPoolExecutor, threads: int, work: Callable[[Task], Result], tasks: Sequence[Task]
+) -> Iterator[Result]:
+    """Yield the results of tasks in order, at most two tasks for each of the pool's threads ahead.
+
+    So results that nobody took yet do not fill the memory.
+    """
+    waiting: deque[Future[Result]] = deque()
+    try:
+        for task in tasks:
+            waiting.append(pool.submit(work, task))
+            if len(waiting) > 2 * threads:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        for future in waiting:
+            future.cancel()
 
 
 def give_back() -> None:

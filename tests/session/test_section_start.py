@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from slideviz.mesh.quality import quality
-from slideviz.sections.round_number import round_middle
+from slideviz.sections.shape import round_middle
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.section_start import first_section

@@ -10,7 +10,7 @@ import slideviz as sv
 from slideviz.cli import run
 from slideviz.formats import binary_copy
 from slideviz.formats.su2 import scan, write
-from slideviz.streaming import memory, text_of_binary
+from slideviz.streaming import converting, resources
 from tests.builders import grid
 from tests.formats.test_su2b import THREE_D, TWO_D, packed
 from tests.streaming.test_run_text import odd_mesh
@@ -25,7 +25,7 @@ def small(tmp_path, monkeypatch):
     monkeypatch.setattr(scan, "BLOCK_BYTES", 700)
     monkeypatch.setattr(binary_copy, "PIECES", 3)
     monkeypatch.setattr(write, "_BLOCK_ROWS", 17)
-    monkeypatch.setattr(text_of_binary, "NEAR", 5)
+    monkeypatch.setattr(converting, "NEAR", 5)
 
 
 def converted(capsys, source, ending, *more):
@@ -125,7 +125,7 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(monkeypatch, caps
     sv.write("mesh.su2", grid((4, 4)))
     expected = converted(capsys, "mesh.su2", ".su2b")
     size = Path("mesh.su2").stat().st_size
-    monkeypatch.setattr(memory, "free_memory", lambda: memory.NEEDED["su2"] * size - 1)
+    monkeypatch.setattr(resources, "free_memory", lambda: resources.NEEDED["su2"] * size - 1)
     found = converted(capsys, "mesh.su2", ".su2b")
     assert "mesh.su2 needs about 0 GB of memory, 0 GB are free; it is streamed" in found[2]
     assert found[3] == expected[3]

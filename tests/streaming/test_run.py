@@ -24,16 +24,9 @@ from slideviz.formats.su2b.partial import names_of
 from slideviz.samples.table import write_sample
 from slideviz.solver.deform import folded_at
 from slideviz.solver.steps import Progress
-from slideviz.streaming import (
-    interior,
-    memory,
-    output,
-    remaining_time,
-    stream_input,
-)
+from slideviz.streaming import interior, output, resources, stream_input
 from slideviz.streaming import run as streamed_run
-from slideviz.streaming.remaining_time import SECONDS
-from slideviz.streaming.run import stream
+from slideviz.streaming.run import SECONDS, stream
 from slideviz.streaming.skin import read_skin
 from slideviz.system import cleanup
 from tests.builders import grid
@@ -662,7 +655,7 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     case = made(tmp_path, "square", 8)
     size = case.mesh_file.stat().st_size
-    monkeypatch.setattr(memory, "free_memory", lambda: memory.NEEDED["su2b"] * size - 1)
+    monkeypatch.setattr(resources, "free_memory", lambda: resources.NEEDED["su2b"] * size - 1)
     call = ["run", "square.cfg", "--steps", "1"]
     assert run([*call, "-o", "out.su2b"]) == 0
     told = capsys.readouterr().err
@@ -674,9 +667,9 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     for more in (["-o", "out.vtu"], ["-o", "b.su2b", "--steps-dir", "steps"]):
         assert run([*call, *more, "-q"]) == 0
     assert run([*call, "-q", "-o", "c.su2b", "--set", "METHOD=elastic"]) == 3  # done, with folds
-    monkeypatch.setattr(memory, "free_memory", lambda: memory.NEEDED["su2b"] * size)
+    monkeypatch.setattr(resources, "free_memory", lambda: resources.NEEDED["su2b"] * size)
     assert run([*call, "-q", "-o", "d.su2b"]) == 0
-    assert memory.missing_memory(sv.Case()) == ""
+    assert resources.missing_memory(sv.Case()) == ""
 
 
 def test_the_bar_tells_the_phase_and_what_is_left_of_it(tmp_path, monkeypatch):
@@ -714,8 +707,8 @@ def progress_of(phase, fraction):
 def test_what_is_left_is_of_all_stages(monkeypatch, stages):
     """On a machine of half the speed, all is known from the first stage on."""
     now, told = 0.0, []
-    monkeypatch.setattr(remaining_time, "monotonic", lambda: now)
-    one = remaining_time.RemainingTime(told.append, *stages)
+    monkeypatch.setattr(streamed_run, "monotonic", lambda: now)
+    one = streamed_run.RemainingTime(told.append, *stages)
     total = 2.0 * sum(SECONDS[stage] for stage in stages)
     for k, stage in enumerate(stages):
         if k:
@@ -735,8 +728,8 @@ def test_what_is_left_is_of_all_stages(monkeypatch, stages):
 
 def test_steps_tell_how_long_the_boundary_takes(monkeypatch):
     now, told = 0.0, []
-    monkeypatch.setattr(remaining_time, "monotonic", lambda: now)
-    one = remaining_time.RemainingTime(told.append, "read", "solve", "quality")
+    monkeypatch.setattr(streamed_run, "monotonic", lambda: now)
+    one = streamed_run.RemainingTime(told.append, "read", "solve", "quality")
     now = SECONDS["read"]
     one.next()
     now += 7.0

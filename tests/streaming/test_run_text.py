@@ -22,7 +22,7 @@ from slideviz.formats.su2 import scan, write
 from slideviz.formats.su2b.layout import MAGIC
 from slideviz.formats.su2b.partial import names_of
 from slideviz.samples.table import write_sample
-from slideviz.streaming import memory, output, text_of_binary
+from slideviz.streaming import converting, output, resources
 from slideviz.streaming import run as streamed_run
 from slideviz.streaming.run import stream
 from tests.builders import grid
@@ -149,7 +149,7 @@ def test_all_else_of_the_file_stays(tmp_path, small, kind, zones):
 @pytest.mark.parametrize("kind", ["mixed", "prism", "turned"])
 def test_a_binary_mesh_becomes_the_text_that_memory_gives(tmp_path, monkeypatch, small, kind):
     monkeypatch.setattr(write, "_BLOCK_ROWS", 17)
-    monkeypatch.setattr(text_of_binary, "NEAR", 5)
+    monkeypatch.setattr(converting, "NEAR", 5)
     mesh = grid((5, 4, 4), kind="mixed" if kind == "turned" else kind)
     sv.write(tmp_path / "mesh.su2b", mesh)
     if kind == "turned":
@@ -335,7 +335,7 @@ SCRIPT = """
 import sys, time
 from pathlib import Path
 import slideviz as sv
-from slideviz.streaming import output, run, text_of_binary
+from slideviz.streaming import converting, output, run
 from slideviz.formats import binary_copy
 from slideviz.formats.su2 import scan
 def late(what):
@@ -441,7 +441,7 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     case = made(tmp_path, "square", 8)
     size = case.mesh_file.stat().st_size
-    monkeypatch.setattr(memory, "free_memory", lambda: memory.NEEDED["su2"] * size - 1)
+    monkeypatch.setattr(resources, "free_memory", lambda: resources.NEEDED["su2"] * size - 1)
     call = ["run", "square.cfg", "--steps", "1"]
     assert run([*call, "-o", "out.su2"]) == 0
     assert "note: mesh.su2 needs about 0 GB of memory" in capsys.readouterr().err
@@ -450,5 +450,5 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     halo = with_halo(case.mesh_file.read_text())
     Path("halo.su2").write_text(halo)
     assert run([*call, "-o", "out.su2", "-q", "--set", "MESH_FILENAME=halo.su2"]) == 0
-    monkeypatch.setattr(memory, "free_memory", lambda: memory.NEEDED["su2"] * size)
+    monkeypatch.setattr(resources, "free_memory", lambda: resources.NEEDED["su2"] * size)
     assert run([*call, "-o", "out.su2", "-q"]) == 0

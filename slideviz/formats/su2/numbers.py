@@ -17,7 +17,7 @@ from slideviz.formats.su2.scan import Progress
 from slideviz.mesh.check import first_fault, no_node
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, IntArray
-from slideviz.system.in_order import ordered_map
+from slideviz.system.threads import ordered_map
 
 _SUPPORTED = ", ".join(str(vtk) for vtk, row in ELEMENTS.items() if row.dim > 0)
 """The element types, for messages."""

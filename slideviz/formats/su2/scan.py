@@ -10,7 +10,7 @@ from slideviz.errors import MeshError, printable
 from slideviz.formats.source import Source
 from slideviz.formats.su2.lines import Lines, line_end, text_of
 from slideviz.mesh.model import IntArray
-from slideviz.system.in_order import ordered_map
+from slideviz.system.threads import ordered_map
 
 BLOCK_BYTES = 1 << 20
 """About how many bytes a block has: whole lines that are scanned together."""

@@ -20,7 +20,7 @@ from slideviz.formats.su2.scan import BLOCK_BYTES
 from slideviz.formats.su2.zone import SEND_RECEIVE
 from slideviz.mesh.check import check_mesh, check_points
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
-from slideviz.system.in_order import ordered_map
+from slideviz.system.threads import ordered_map
 
 _BLOCK_ROWS = 20_000
 """Most elements or points in a block of text."""

@@ -4,10 +4,10 @@ import threading
 import time
 
 import pytest
-from su2_samples import SOLID, save
 
 from slideviz.formats.files import read, write
-from slideviz.system.in_order import ordered_map
+from slideviz.system.threads import ordered_map
+from tests.formats.su2_samples import SOLID, save
 
 
 @pytest.fixture(params=[1, 2, 5], autouse=True)
