@@ -10,9 +10,9 @@ from qtpy.QtCore import QEvent, QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.viewport.flats import stack
+from slideviz.gui.viewport.flats import is_larger_stacked
 from slideviz.gui.viewport.handles import PlaneHandle
-from slideviz.gui.viewport.section_views import place_for
+from slideviz.gui.viewport.section_views import arrangement_for
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.ruler import Ruler, nice_ticks, tick_text
 from slideviz.samples.table import write_sample
@@ -448,9 +448,9 @@ def test_the_ball_of_the_handle_moves_the_plane_along_its_normal_and_a_tilt_is_u
 
 
 def test_two_strips_lie_one_above_the_other_where_they_are_larger_so():
-    assert stack((0.35, 0.01), (600, 400))
-    assert not stack((0.35, 0.3), (600, 400))
-    assert not stack((0.35, 0.01), (600, 200)), "no room for two titles"
+    assert is_larger_stacked((0.35, 0.01), (600, 400))
+    assert not is_larger_stacked((0.35, 0.3), (600, 400))
+    assert not is_larger_stacked((0.35, 0.01), (600, 200)), "no room for two titles"
 
 
 @pytest.mark.usefixtures("painted")
@@ -807,7 +807,7 @@ def test_the_chosen_section_stays_chosen(index, old, new, wanted):
     ],
 )
 def test_a_long_strip_lies_below_the_view_and_is_larger_there(extent, room, wide):
-    found, share = place_for(extent, room)
+    found, share = arrangement_for(extent, room)
     assert found == wide
     thin = extent[1] < 0.1 * extent[0]
     assert (share < 0.35) == thin, "what a strip does not need is left to the view"

@@ -7,7 +7,7 @@ from qtpy.QtWidgets import QHBoxLayout, QWidget
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.viewport.section_curve import CurveView
-from slideviz.gui.viewport.unrolled import FlatView
+from slideviz.gui.viewport.flat_views import FlatView
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.sections.model import Section
 from slideviz.session.changes import UNDEFORMED, second_view
@@ -18,7 +18,7 @@ FRAME_PX = 110
 """Height of the title, the ruler and the margins around a flat section, in pixels."""
 
 
-class Flats(QWidget):
+class FlatViews(QWidget):
     """The flat views of one section: one per 3D view, linked; of a 2D mesh, the curves along it.
 
     Parameters
@@ -48,7 +48,7 @@ class Flats(QWidget):
     def show_section(self, session: Session, section: Section) -> None:
         """Show a section of the mesh of each 3D view, the views made or dropped as needed."""
         assert session.mesh is not None
-        other = beside(session)
+        other = second_session(session)
         own = session, self.viewing.scene.sections.cuts
         theirs = None if other is None else (other, self.viewing.second_cuts)
         if session.mesh.dim == 2:
@@ -64,9 +64,9 @@ class Flats(QWidget):
         if theirs is None or self.second is None:
             self.first.show_section(session, section)
             return
-        self.first.show_section(session, section, called(session))
-        self.second.show_section(theirs[0], section, called(theirs[0]))
-        stacked = self.extent is not None and stack(self.extent, (self.width(), self.height()))
+        self.first.show_section(session, section, pane_name(session))
+        self.second.show_section(theirs[0], section, pane_name(theirs[0]))
+        stacked = self.extent is not None and is_larger_stacked(self.extent, (self.width(), self.height()))
         self._row.setDirection(_direction(session.view.swapped, stacked))
         self.first.refit()
 
@@ -120,7 +120,7 @@ class Flats(QWidget):
             self.first.close_view()
 
 
-def beside(session: Session) -> Session | None:
+def second_session(session: Session) -> Session | None:
     """Return the session as the second 3D view shows it; None while there is only one view."""
     other = session.view.beside
     if other is None or (other != UNDEFORMED and session.run(other) is None):
@@ -128,12 +128,12 @@ def beside(session: Session) -> Session | None:
     return second_view(session)
 
 
-def called(session: Session) -> str:
+def pane_name(session: Session) -> str:
     """Return the name of what a view shows: ``Run 3``, or ``Undeformed``."""
     return f"Run {session.shown}" if session.view.frame and session.shown else "Undeformed"
 
 
-def stack(extent: tuple[float, float], room: tuple[int, int]) -> bool:
+def is_larger_stacked(extent: tuple[float, float], room: tuple[int, int]) -> bool:
     """Return whether two equal flat sections are drawn larger one above the other than in a row.
 
     Parameters

@@ -11,7 +11,7 @@ from qtpy.QtWidgets import QWidget
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.panels.curves import CurveCanvas
-from slideviz.gui.viewport.beside import TitleBar
+from slideviz.gui.viewport.linked_views import TitleBar
 from slideviz.gui.widgets.build import in_column
 from slideviz.gui.widgets.labels import ElidedLabel
 from slideviz.gui.widgets.plot_canvas import PlotArea, ask_and_write_plot

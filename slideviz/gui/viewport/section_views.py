@@ -8,10 +8,10 @@ from qtpy.QtWidgets import QSplitter, QWidget
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.flats import FRAME_PX, Flats, beside
+from slideviz.gui.viewport.flats import FRAME_PX, FlatViews, second_session
 from slideviz.gui.viewport.handles import Handles
 from slideviz.gui.viewport.section_curve import CurveView
-from slideviz.gui.viewport.unrolled import FlatView
+from slideviz.gui.viewport.flat_views import FlatView
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.mesh.model import Mesh
 from slideviz.scene.axis_handle import points_near
@@ -42,7 +42,7 @@ class SectionViews(QSplitter):
         self._multi_samples = multi_samples
         self.handles = Handles(self._replaced, self.store.set_dragging)
         """The handles of the selected section, one in each 3D view while they are switched on."""
-        self.flats: Flats | None = None
+        self.flats: FlatViews | None = None
         """The flat views; None while no section is laid flat."""
         self._closed = False
         self._kind: tuple[object, ...] = ()
@@ -124,7 +124,7 @@ class SectionViews(QSplitter):
 
     def _shown(self, session: Session) -> list[tuple[View3D, Scene, Mesh]]:
         """Return the 3D views, each with its scene and the mesh of the frame it shows."""
-        sessions = (session, beside(session) or session)
+        sessions = (session, second_session(session) or session)
         pairs = zip(self.viewing.views_and_scenes(), sessions, strict=False)
         return [(view, scene, one.frame.mesh) for (view, scene), one in pairs if one.frame]
 
@@ -141,14 +141,14 @@ class SectionViews(QSplitter):
             return
         made = self.flats is None
         if self.flats is None:
-            self.flats = Flats(self.viewing, self.scheme, self._multi_samples)
+            self.flats = FlatViews(self.viewing, self.scheme, self._multi_samples)
             self.flats.closed.connect(lambda: self.want_flat(False))
         whole = self.viewing.scene.camera.sees_all()
         if made:
             self.addWidget(self.flats)
         self.flats.show_section(session, section)
         # A change of the radius must not rearrange the views.
-        compared = beside(session) is not None
+        compared = second_session(session) is not None
         kind = (session.mesh, compared, section.kind, section.direction, session.view.passages)
         if made or kind != self._kind:
             self._kind = kind
@@ -163,7 +163,7 @@ class SectionViews(QSplitter):
         """
         wide, share = False, _SHARE
         if extent is not None and not compared:
-            wide, share = place_for(extent, (self.width(), self.height()))
+            wide, share = arrangement_for(extent, (self.width(), self.height()))
         self.setOrientation(Qt.Orientation.Horizontal if wide else Qt.Orientation.Vertical)
         size = self.width() if wide else self.height()
         flat = round(share * size)
@@ -196,7 +196,7 @@ class SectionViews(QSplitter):
         self._closed = True
 
 
-def place_for(extent: tuple[float, float], room: tuple[int, int]) -> tuple[bool, float]:
+def arrangement_for(extent: tuple[float, float], room: tuple[int, int]) -> tuple[bool, float]:
     """Return whether a flat section goes beside the 3D view (else below), and its part of the room.
 
     Parameters

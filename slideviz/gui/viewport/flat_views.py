@@ -7,7 +7,7 @@ from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.responsiveness.timers import later
-from slideviz.gui.viewport.beside import TitleBar
+from slideviz.gui.viewport.linked_views import TitleBar
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.view_mouse import CellMouse
 from slideviz.gui.widgets.build import in_column
