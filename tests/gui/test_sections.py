@@ -10,7 +10,7 @@ from qtpy.QtCore import QEvent, QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.viewport.flats import is_larger_stacked
+from slideviz.gui.viewport.flat_views import is_larger_stacked
 from slideviz.gui.viewport.handles import PlaneHandle
 from slideviz.gui.viewport.section_views import arrangement_for
 from slideviz.gui.widgets import questions

@@ -1,23 +1,265 @@
-"""The flat view of a section beside the 3D view: unrolled, or seen along its normal."""
+"""The flat views of a section beside the 3D views: unrolled, along its normal, or as a curve."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
+
+from matplotlib.figure import Figure
 from qtpy.QtCore import QPoint, Signal
-from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
+from qtpy.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
 from slideviz.color_scheme import ColorScheme
+from slideviz.gui.panels.curves import CurveCanvas
 from slideviz.gui.responsiveness.timers import later
-from slideviz.gui.viewport.linked_views import TitleBar
 from slideviz.gui.viewport.canvas import View3D
+from slideviz.gui.viewport.linked_views import TitleBar
 from slideviz.gui.viewport.view_mouse import CellMouse
+from slideviz.gui.viewport.viewing import Viewing
 from slideviz.gui.widgets.build import in_column
 from slideviz.gui.widgets.labels import ElidedLabel
+from slideviz.gui.widgets.plot_canvas import PlotArea, ask_and_write_plot
+from slideviz.gui.widgets.plot_image import Draw
 from slideviz.gui.widgets.ruler import Ruler
+from slideviz.plots.section_curve import Colors, CurveRow, draw_curves
+from slideviz.plots.section_rows import CurveRows, colors_of, facts_of, labels_of
+from slideviz.plots.style import Style
 from slideviz.scene.flat_scene import FlatScene
 from slideviz.sections.model import Section
+from slideviz.session import changes
+from slideviz.session.changes import UNDEFORMED, second_view
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Session
 from slideviz.session.store import Store
+
+FRAME_PX = 110
+"""Height of the title, the ruler and the margins around a flat section, in pixels."""
+
+
+class FlatViews(QWidget):
+    """The flat views of one section: one per 3D view, linked; of a 2D mesh, the curves along it.
+
+    Parameters
+    ----------
+    viewing : Viewing
+        The 3D views, whose cuts are shown here too.
+    scheme : ColorScheme
+    multi_samples : int
+        Samples per pixel for antialiasing; 0 for none.
+    """
+
+    closed = Signal()
+
+    def __init__(self, viewing: Viewing, scheme: ColorScheme, multi_samples: int) -> None:
+        super().__init__()
+        self.setObjectName("flats")
+        self.viewing, self.scheme = viewing, scheme
+        self._multi_samples = multi_samples
+        self.first: FlatView | CurveView | None = None
+        """`first`, `second`: the flat views of the first and the second 3D view, each None if there
+        is none. The curves of a 2D mesh are one view, ``first``."""
+        self.second: FlatView | None = None
+        self._row = QHBoxLayout(self)
+        self._row.setContentsMargins(0, 0, 0, 0)
+        self._row.setSpacing(2)
+
+    def show_section(self, session: Session, section: Section) -> None:
+        """Show a section of the mesh of each 3D view, the views made or dropped as needed."""
+        assert session.mesh is not None
+        other = second_session(session)
+        own = session, self.viewing.scene.sections.cuts
+        theirs = None if other is None else (other, self.viewing.second_cuts)
+        if session.mesh.dim == 2:
+            self._show_curve([own] if theirs is None else [own, theirs], section)
+            return
+        if not isinstance(self.first, FlatView):
+            self.first = self._make(own[1])
+        if theirs is None:
+            self._drop_second()
+        elif self.second is None:
+            self.second = self._make(theirs[1])
+            self.first.link(self.second)
+        if theirs is None or self.second is None:
+            self.first.show_section(session, section)
+            return
+        self.first.show_section(session, section, pane_name(session))
+        self.second.show_section(theirs[0], section, pane_name(theirs[0]))
+        stacked = self.extent is not None and is_larger_stacked(
+            self.extent, (self.width(), self.height())
+        )
+        self._row.setDirection(_direction(session.view.swapped, stacked))
+        self.first.refit()
+
+    @property
+    def extent(self) -> tuple[float, float] | None:
+        """Return width and height of the flat section, in the mesh's length unit.
+
+        None for a curve, and where the section cuts no cell.
+        """
+        box = self.first.scene.bounds() if isinstance(self.first, FlatView) else None
+        if box is None:
+            return None
+        width, height = (box[1] - box[0]).tolist()
+        return width, height
+
+    def _show_curve(self, shown: list, section: Section) -> None:
+        if not isinstance(self.first, CurveView):
+            self.first = CurveView(self.viewing.store, self.scheme)
+            self.first.closed.connect(self.closed)
+            self._row.addWidget(self.first, 1)
+        self.first.show_section(shown, section)
+
+    def _make(self, cuts: Cuts) -> FlatView:
+        view = FlatView(self.viewing.store, cuts, self.scheme, self._multi_samples)
+        view.closed.connect(self.closed)
+        self._row.addWidget(view, 1)
+        view.show()
+        view.view.spare_software()
+        return view
+
+    def _drop_second(self) -> None:
+        second, self.second = self.second, None
+        if second is not None and isinstance(self.first, FlatView):
+            self.first.link(None)
+            second.close_view()
+            self._row.removeWidget(second)
+            second.setParent(None)
+            second.deleteLater()
+
+    def set_scheme(self, scheme: ColorScheme) -> None:
+        """Draw in another color scheme."""
+        self.scheme = scheme
+        for view in (self.first, self.second):
+            if view is not None:
+                view.set_scheme(scheme)
+
+    def close_views(self) -> None:
+        """Release the graphics resources of the flat views."""
+        self._drop_second()
+        if self.first is not None:
+            self.first.close_view()
+
+
+def second_session(session: Session) -> Session | None:
+    """Return the session as the second 3D view shows it; None while there is only one view."""
+    other = session.view.beside
+    if other is None or (other != UNDEFORMED and session.run(other) is None):
+        return None
+    return second_view(session)
+
+
+def pane_name(session: Session) -> str:
+    """Return the name of what a view shows: ``Run 3``, or ``Undeformed``."""
+    return f"Run {session.shown}" if session.view.frame and session.shown else "Undeformed"
+
+
+def is_larger_stacked(extent: tuple[float, float], room: tuple[int, int]) -> bool:
+    """Return whether two equal flat sections are drawn larger one above the other than in a row.
+
+    Parameters
+    ----------
+    extent : (float, float)
+        Width and height of one section, in the mesh's length unit.
+    room : (int, int)
+        Width and height of both views together, in pixels.
+    """
+    wide, high = (max(length, 1e-300) for length in extent)
+    width, height = room
+    beside = min(0.5 * width / wide, (height - FRAME_PX) / high)
+    above = min(width / wide, (0.5 * height - FRAME_PX) / high)
+    return above > beside
+
+
+def _direction(swapped: bool, stacked: bool) -> QHBoxLayout.Direction:
+    """Return the layout direction from the first flat view to the second."""
+    ways = QHBoxLayout.Direction
+    if stacked:
+        return ways.BottomToTop if swapped else ways.TopToBottom
+    return ways.RightToLeft if swapped else ways.LeftToRight
+
+
+NOTHING = "The section cuts no cell."
+"""Text shown instead of the plot."""
+
+
+class CurveView(QWidget):
+    """The plot of the curves along a section of a 2D mesh, one per mesh that is compared.
+
+    Parameters
+    ----------
+    store : Store
+    scheme : ColorScheme
+    """
+
+    closed = Signal()
+
+    def __init__(self, store: Store, scheme: ColorScheme) -> None:
+        super().__init__()
+        self.setObjectName("curve_view")
+        self.store = store
+        self.title = TitleBar("curve_title", "Close the curve")
+        self.title.closed.connect(self.closed)
+        self.title.show()
+        self.save_button = self.title.add_button(
+            "picture", "Save the curve as PNG, SVG or PDF…", self._save
+        )
+        self.facts = ElidedLabel()
+        self.facts.setObjectName("curve_facts")
+        canvas = CurveCanvas(self.drawing)
+        self.area = PlotArea(canvas)
+        canvas.picked = self._picked
+        canvas.setToolTip("Click to mark the cell at a place.")
+        in_column(self.title, self.facts, self.area, wide=[self.area], spacing=0, on=self)
+        self._made = CurveRows()
+        self.rows: tuple[CurveRow, ...] = ()
+        self._labels, self._colors = ("", ""), Colors()
+        self.set_scheme(scheme)
+
+    def show_section(self, shown: Sequence[tuple[Session, Cuts]], section: Section) -> None:
+        """Show the curves along a section, given each view's session and cuts, the first first."""
+        session, cuts = shown[0]
+        self.rows = self._made.of(shown, section)
+        self._labels, self._colors = labels_of(session, section), colors_of(session)
+        self.title.set_text(section.describe(2))
+        facts = facts_of(session, cuts, section)
+        self.facts.setText(facts)
+        self.facts.setToolTip(facts)
+        self.save_button.setEnabled(bool(self.rows))
+        if self.rows:
+            self.area.plot()
+        else:
+            self.area.say(NOTHING)
+
+    def drawing(self) -> Draw:
+        """Return a function that draws the present curves into a figure."""
+        return partial(_draw, self.rows, self._labels, self._colors)
+
+    def set_scheme(self, scheme: ColorScheme) -> None:
+        """Draw in another color scheme."""
+        self.area.canvas.set_scheme(scheme)
+
+    def close_view(self) -> None:
+        """Drop the curves."""
+        self.rows = ()
+
+    def _picked(self, position: float) -> None:
+        """Mark the cell at a position along the last curve, of the shown run; none beside it."""
+        if self.rows and not self.area.empty:
+            self.store.change(changes.mark_cell, self.rows[-1].curve.cell_at(position))
+
+    def _save(self) -> None:
+        ask_and_write_plot(self, "Save curve", "along_section", self.drawing())
+
+
+def _draw(
+    rows: Sequence[CurveRow],
+    labels: tuple[str, str],
+    colors: Colors,
+    figure: Figure,
+    style: Style,
+) -> None:
+    if rows:
+        draw_curves(figure.add_subplot(), rows, labels, style, colors)
 
 
 class FlatView(QWidget):

@@ -8,10 +8,14 @@ from qtpy.QtWidgets import QSplitter, QWidget
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.flats import FRAME_PX, FlatViews, second_session
+from slideviz.gui.viewport.flat_views import (
+    FRAME_PX,
+    CurveView,
+    FlatView,
+    FlatViews,
+    second_session,
+)
 from slideviz.gui.viewport.handles import Handles
-from slideviz.gui.viewport.section_curve import CurveView
-from slideviz.gui.viewport.flat_views import FlatView
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.mesh.model import Mesh
 from slideviz.scene.axis_handle import points_near

@@ -1,4 +1,7 @@
-"""The mouse over a view: tooltips and marks of cells, selection and menu of boundaries."""
+"""The mouse over a view: tooltips and marks of cells, selection and menu of boundaries.
+
+While it moves something whose drawing is slow, boundaries are drawn coarsely.
+"""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -10,11 +13,46 @@ from qtpy.QtWidgets import QToolTip
 
 from slideviz.gui.panels.boundaries import boundary_menu
 from slideviz.gui.panels.worst import info_text
+from slideviz.gui.responsiveness.settings import SLOW_FRAME_S, STILL_MS
+from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.scene.flat_scene import FlatScene
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
 from slideviz.session.store import Store
+
+
+class CoarseWhileMoving(QObject):
+    """Switches a slow scene to coarse boundaries while something is moved, and back afterwards.
+
+    The mouse may move the camera or, for example, the handle of a section.
+
+    Parameters
+    ----------
+    view : View3D
+    scene : Scene
+        The scene drawn in the view.
+    """
+
+    def __init__(self, view: View3D, scene: Scene) -> None:
+        super().__init__(view)
+        self.view, self.scene = view, scene
+        self._timer = later(self, self._rest, STILL_MS)
+        view.signals.moving.connect(self._moving)
+        view.signals.released.connect(self._rest)
+
+    def _moving(self) -> None:
+        """Draw coarse boundaries from now on, if the last frame in full detail was slow."""
+        if self.view.veiled or not (self.scene.coarse or self.view.frame_s > SLOW_FRAME_S):
+            return
+        self.scene.draw_coarse(True)
+        self._timer.start()
+
+    def _rest(self) -> None:
+        """Draw the boundaries in full detail again."""
+        self._timer.stop()
+        if self.scene.draw_coarse(False):
+            self.view.render_soon()
 
 
 class CellMouse(QObject):

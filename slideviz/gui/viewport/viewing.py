@@ -11,10 +11,9 @@ from qtpy.QtGui import QResizeEvent
 from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
 from slideviz.color_scheme import ColorScheme
-from slideviz.gui.viewport.linked_views import CameraLink, TitleBar
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.coarse_moving import CoarseWhileMoving
-from slideviz.gui.viewport.view_mouse import BoundaryMouse, CellMouse
+from slideviz.gui.viewport.linked_views import CameraLink, TitleBar
+from slideviz.gui.viewport.view_mouse import BoundaryMouse, CellMouse, CoarseWhileMoving
 from slideviz.gui.widgets.runs_menu import fill_pane
 from slideviz.scene.color_legend import STRIP
 from slideviz.scene.scene import Scene

@@ -5,7 +5,7 @@ import pytest
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 
-from slideviz.gui.viewport import coarse_moving
+from slideviz.gui.viewport import view_mouse
 from slideviz.mesh import coarse
 from slideviz.samples.table import write_sample
 from slideviz.scene.actors import VALUES
@@ -24,7 +24,7 @@ def stator_file(tmp_path_factory):
 def stator(driver, stator_file, monkeypatch, qtbot):
     monkeypatch.setattr(coarse, "LEAST", 0)
     monkeypatch.setattr(coarse, "CUBES", 10)
-    monkeypatch.setattr(coarse_moving, "SLOW_FRAME_S", -1.0)
+    monkeypatch.setattr(view_mouse, "SLOW_FRAME_S", -1.0)
     driver.open(stator_file)
     qtbot.waitUntil(lambda: not driver.window.view.veiled)
     return driver
@@ -68,7 +68,7 @@ def test_a_mouse_that_rests_shows_all_facets_and_a_quick_picture_is_never_made_c
     assert scene.coarse
     qtbot.waitUntil(lambda: not scene.coarse)
     QTest.mouseRelease(stator.window.view, Qt.MouseButton.LeftButton, pos=QPoint(210, 150))
-    monkeypatch.setattr(coarse_moving, "SLOW_FRAME_S", 1e9)
+    monkeypatch.setattr(view_mouse, "SLOW_FRAME_S", 1e9)
     press_and_move(stator.window.view)
     assert not stator.window.scene.coarse
     QTest.mouseRelease(stator.window.view, Qt.MouseButton.LeftButton, pos=QPoint(210, 150))
