@@ -11,7 +11,7 @@ import pytest
 import slideviz as sv
 from slideviz.argument_types import _annotations
 from slideviz.case.model import Motion
-from slideviz.design.sweeps.designs import read_designs
+from slideviz.design.sweeps.table import read_designs
 from slideviz.errors import ArgumentError, MeshError
 from tests import builders
 

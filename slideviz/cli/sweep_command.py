@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from concurrent.futures import Executor
 
-    from slideviz.design.sweeps.designs import Designs
-    from slideviz.design.sweeps.row import DesignRow
+    from slideviz.design.sweeps.table import DesignRow, Designs
 
 _LISTED = 5
 """Most designs that are listed in one line, and most reasons of failed designs that are printed."""
@@ -69,8 +68,8 @@ def sweep(arguments: argparse.Namespace) -> int:
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
     from slideviz.cli.report import save_json
-    from slideviz.design.sweeps.designs import read_designs
     from slideviz.design.sweeps.results import RESULTS
+    from slideviz.design.sweeps.table import read_designs
     from slideviz.errors import CaseError
 
     case = read_case(arguments)

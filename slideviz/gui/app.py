@@ -18,7 +18,7 @@ from slideviz.gui.responsiveness.warmup_thread import prepare_drawing
 from slideviz.gui.widgets.error_reporter import caught, crash_log
 from slideviz.gui.widgets.icons import logo
 from slideviz.gui.window import MainWindow
-from slideviz.system.private import private_file, private_folder
+from slideviz.system.cleanup import private_file, private_folder
 
 log = logging.getLogger("slideviz")
 

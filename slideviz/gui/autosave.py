@@ -26,12 +26,11 @@ from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.settings import AUTOSAVE_MS
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.worker import JobRunner
-from slideviz.session.design_files import read_results, write_results
-from slideviz.session.design_table import DesignTable
+from slideviz.session.design_table import DesignTable, read_results, write_results
 from slideviz.session.keep import Camera, view_to_case
 from slideviz.session.state import Session
 from slideviz.session.store import Store
-from slideviz.system.private import private_file, private_folder
+from slideviz.system.cleanup import private_file, private_folder
 
 HALF_WRITTEN_S = 60.0
 """Age in seconds from which a temporary file is not being written any more."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from slideviz.case.words import is_number
 from slideviz.color_scheme import SELECTED_COLOR
-from slideviz.design.sweeps.row import DesignRow
+from slideviz.design.sweeps.table import DesignRow
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.plots.style import PRINT, Style, add_legend, style_axes
 from slideviz.session.design_table import DesignTable

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -14,14 +16,25 @@ from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.case.words import counted, is_number
 from slideviz.design.sweeps.columns import columns_of, numbers_of, own_values
-from slideviz.design.sweeps.row import DesignRow
+from slideviz.design.sweeps.sweep import sweep
+from slideviz.design.sweeps.table import (
+    DesignRow,
+    cells_of,
+    head_of,
+    own_columns,
+    read_designs,
+    result_of,
+)
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Mesh
+from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
+from slideviz.system.csv_table import csv_rows, write_csv
 
 MOST = 100_000
 """Most designs of a table in the window."""
 FINE = 1e-5
 """Rounding error allowed for the values of a range, over the step between them."""
+_WORDS = ("problem",)
 _NAMED = 5
 """Most designs that are named of those that failed for the same reason."""
 _RANGE = re.compile(r"(\S+)\s*(?:to|\.\.)\s*(\S+)\s*(?:in|:)\s*(\d+)\Z", re.IGNORECASE)
@@ -234,3 +247,75 @@ def shown(value: str | float) -> str:
         return value
     short = format(value, ".12g")
     return short if float(short) == value else repr(value)
+
+
+def read_table(case: Case, path: Path) -> DesignTable:
+    """Return the table of designs in a CSV file, whose columns and values must fit the case.
+
+    Raises
+    ------
+    CaseError
+        The file cannot be read, has mistakes, or more designs than the window allows.
+    """
+    found = read_designs(case, path)
+    if len(found.rows) > MOST:
+        raise CaseError(f"{path}: has {len(found.rows):,} designs; use `slideviz sweep` for them")
+    columns = tuple(found.columns)
+    rows = tuple(tuple(shown(design.values[name]) for name in columns) for design in found.rows)
+    return DesignTable(columns, rows)
+
+
+def write_results(path: Path, table: DesignTable) -> None:
+    """Write designs and results as CSV, a row for each design.
+
+    Raises
+    ------
+    CaseError
+        The file cannot be written.
+    """
+    lines = [
+        cells_of(number, values, table.results.get(number), _WORDS)
+        for number, values in enumerate(table.rows, start=1)
+    ]
+    write_csv(path, [head_of(table.columns, _WORDS), *lines], CaseError)
+
+
+def read_results(path: Path) -> DesignTable:
+    """Return the table that `write_results` wrote, with its results.
+
+    Raises
+    ------
+    CaseError
+        The file cannot be read, or is no table of results.
+    """
+    try:
+        head, *lines = csv_rows(path.read_text(encoding="utf-8"))
+        results = [replace(result_of(head, c), design=k) for k, c in enumerate(lines, start=1)]
+    except (OSError, ValueError, KeyError) as problem:
+        raise CaseError(f"{path}: is no table of results ({problem})") from problem
+    own = own_columns(head)
+    done = [row for row in results if row.problem or row.steps]
+    return DesignTable(tuple(head[own]), tuple(tuple(c[own]) for c in lines)).with_results(done)
+
+
+def run_designs(
+    case: Case, mesh: Mesh, table: DesignTable, report: Report, stopped: Stopped
+) -> None:
+    """Run designs without a result; report each `DesignRow`, and the progress as `JobProgress`.
+
+    Raises
+    ------
+    SlidevizError
+        The table has mistakes, or no process can be started.
+    """
+    total = len(table.rows)
+    left = [at for at in range(1, total + 1) if at not in table.results]
+    wanted = [design for at, design in enumerate(table.designs(), start=1) if at in set(left)]
+    report(JobProgress(f"Starting with {counted(len(left), 'design')}"))
+    begin = time.monotonic()
+    rows = sweep(case, wanted, mesh=mesh, going_on=lambda: raise_if_cancelled(stopped))
+    for done, row in enumerate(rows, start=1):
+        report(replace(row, design=left[row.design - 1]))
+        rest = (time.monotonic() - begin) / done * (len(left) - done)
+        words = f"{total - len(left) + done} of {total}, {rest:.0f} s left"
+        report(JobProgress(words, done / len(left)))

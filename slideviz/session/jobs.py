@@ -28,8 +28,8 @@ from slideviz.session.motions import Ghosts
 from slideviz.session.opening import open_mesh
 from slideviz.session.passages import find_period
 from slideviz.session.state import Session, StepFrame
+from slideviz.system.cleanup import private_folder
 from slideviz.system.file_checks import require_regular_file
-from slideviz.system.private import private_folder
 
 Report = Callable[[object], None]
 Stopped = Callable[[], bool]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,14 +9,9 @@ from pathlib import Path
 from slideviz.case.motion_words import deformation, describe
 from slideviz.errors import SlidevizError
 from slideviz.session.run_messages import notes_of, warnings_of
-from slideviz.session.runs_words import (
-    control_nodes,
-    end_words,
-    method_words,
-    reduction_words,
-)
+from slideviz.session.runs_words import control_nodes, end_words, method_words, reduction_words
 from slideviz.session.state import Run
-from slideviz.system.atomic import atomic_write
+from slideviz.system.csv_table import csv_text, write_csv
 from slideviz.terms import KERNELS, PERIODIC_MODES
 
 DIGITS = 4
@@ -117,13 +110,7 @@ def described(run: Run) -> str:
 
 def table_text(runs: Sequence[Run], delimiter: str = ",") -> str:
     """Return the table as CSV, with a line of titles; numbers have all digits."""
-    out = io.StringIO()
-    rows = csv.writer(out, delimiter=delimiter, lineterminator="\n")
-    rows.writerow([column.title for column in COLUMNS])
-    for run in runs:
-        values = [column.value(run) for column in COLUMNS]
-        rows.writerow(["" if value is None else value for value in values])
-    return out.getvalue()
+    return csv_text(_rows(runs), delimiter)
 
 
 def write_table(path: Path, runs: Sequence[Run]) -> None:
@@ -134,5 +121,10 @@ def write_table(path: Path, runs: Sequence[Run]) -> None:
     SlidevizError
         The file cannot be written.
     """
-    with atomic_write(path, SlidevizError) as file:
-        file.write(table_text(runs).encode())
+    write_csv(path, _rows(runs), SlidevizError)
+
+
+def _rows(runs: Sequence[Run]) -> list[list[object]]:
+    """Return the cells of the table: a row of titles, and one for each run."""
+    rows: list[list[object]] = [[column.title for column in COLUMNS]]
+    return rows + [[column.value(run) for column in COLUMNS] for run in runs]

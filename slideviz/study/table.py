@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 
 from slideviz.errors import CaseError
 from slideviz.study.combinations import CombinationRow, Result
+from slideviz.system import csv_table
 from slideviz.system.atomic import atomic_write
 
 Value = str | int | float
@@ -66,31 +65,24 @@ KEY_COLUMNS = ("method", "periodic", "steps")
 
 def csv_text(rows: Sequence[CombinationRow]) -> str:
     """Return the table as CSV; numbers with all their digits, empty cells without a result."""
-    out = StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*KEY_COLUMNS, *COLUMNS, "problem"])
+    lines: list[list[object]] = [[*KEY_COLUMNS, *COLUMNS, "problem"]]
     for row in rows:
-        tried = row.combination
-        values: list[Value] = [""] * len(COLUMNS)
-        if row.result is not None:
-            found = [column.value(row.result) for column in COLUMNS.values()]
-            values = ["" if value != value else value for value in found]  # NaN is not itself
-        writer.writerow([tried.method, tried.periodic, tried.steps or "auto", *values, row.problem])
-    return out.getvalue()
+        tried, result = row.combination, row.result
+        values = [None if result is None else c.value(result) for c in COLUMNS.values()]
+        lines.append([tried.method, tried.periodic, tried.steps or "auto", *values, row.problem])
+    return csv_table.csv_text(lines)
 
 
 def history_text(rows: Sequence[CombinationRow]) -> str:
     """Return the convergence of the greedy selections as CSV, a line for each cycle."""
-    out = StringIO()
-    writer = csv.writer(out, lineterminator="\n")
     columns = ("step", "cycle", "level", "error", "control_nodes", "seconds")
-    writer.writerow([*KEY_COLUMNS, *columns])
+    lines: list[list[object]] = [[*KEY_COLUMNS, *columns]]
     for row in rows:
         tried = row.combination
         for step, cycle in row.result.history if row.result else ():
             values = [getattr(cycle, name) for name in columns[1:]]
-            writer.writerow([tried.method, tried.periodic, tried.steps or "auto", step, *values])
-    return out.getvalue()
+            lines.append([tried.method, tried.periodic, tried.steps or "auto", step, *values])
+    return csv_table.csv_text(lines)
 
 
 def save_text(path: Path, text: str) -> None:

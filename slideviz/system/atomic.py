@@ -28,6 +28,7 @@ _REMEDIES = {  # reason and remedy by errno
     errno.EDQUOT: "the disk quota is used up; free some space or choose another disk",
     errno.EFBIG: "the file is larger than the file system or the limit of the user allows",
     errno.ENAMETOOLONG: "the file name is too long; choose a shorter one",
+    errno.ELOOP: "it is a symbolic link, whose target would be overwritten; remove the link",
     errno.EISDIR: "it is a folder; give the name of a file",
 }
 

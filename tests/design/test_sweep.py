@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import csv
+import errno
+import fcntl
 import os
+import socket
+import subprocess
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from dataclasses import replace
 
@@ -13,13 +17,12 @@ import pytest
 import slideviz as sv
 from slideviz.design.sweeps import sweep as sweeping
 from slideviz.design.sweeps.columns import columns_of, numbers_of, own_values
-from slideviz.design.sweeps.designs import read_designs
-from slideviz.design.sweeps.lock import FolderLock
-from slideviz.design.sweeps.row import DesignRow
+from slideviz.design.sweeps.results import locked
+from slideviz.design.sweeps.table import DesignRow, read_designs
 from slideviz.design.sweeps.worker import Packed, Task, TaskResult, cache_mesh, packed, run_task
 from slideviz.errors import CaseError, DeformError
 from slideviz.samples.table import sample
-from slideviz.session.design_files import read_results
+from slideviz.session.design_table import read_results
 
 
 @pytest.fixture(scope="module")
@@ -440,13 +443,34 @@ def test_of_two_sweeps_in_a_folder_the_second_is_refused(passage, here, tmp_path
 def test_a_lock_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / "sweep.lock").mkdir()
     with pytest.raises(CaseError, match=r"sweep\.lock: cannot be written: .*folder"):
-        FolderLock(tmp_path)
+        locked(tmp_path)
     (tmp_path / "sweep.lock").rmdir()
     (tmp_path / "precious").write_text("precious")
     (tmp_path / "sweep.lock").symlink_to(tmp_path / "precious")
-    with pytest.raises(CaseError, match=r"sweep\.lock is a symbolic link, whose target would be"):
-        FolderLock(tmp_path)
+    with pytest.raises(CaseError, match=r"sweep\.lock: .* it is a symbolic link, whose"):
+        locked(tmp_path)
     assert (tmp_path / "precious").read_text() == "precious"
+    (tmp_path / "sweep.lock").unlink()
+    os.mkfifo(tmp_path / "sweep.lock")
+    with pytest.raises(CaseError, match=r"sweep\.lock: this is a device or pipe"):
+        locked(tmp_path)
+
+
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
+def test_without_locks_of_the_file_system_the_file_is_the_lock(tmp_path, monkeypatch, number):
+    def flock(*_):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(fcntl, "flock", flock)
+    lock = locked(tmp_path)
+    with pytest.raises(CaseError, match=rf"another sweep .* \(process {os.getpid()}\); wait"):
+        locked(tmp_path)
+    lock.release()
+    assert not (tmp_path / "sweep.lock").exists()
+    dead = subprocess.Popen(["true"])
+    dead.wait()
+    (tmp_path / "sweep.lock").write_text(f"{dead.pid}\n{socket.gethostname()}\n")
+    locked(tmp_path).release()
 
 
 def test_fields_of_endless_length_are_told(passage, here, tmp_path):

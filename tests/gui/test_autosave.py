@@ -9,7 +9,7 @@ import pytest
 from qtpy.QtWidgets import QMessageBox, QWidget
 
 from slideviz.case.model import Case
-from slideviz.design.sweeps.row import DesignRow
+from slideviz.design.sweeps.table import DesignRow
 from slideviz.gui import autosave
 from slideviz.gui.autosave import SOURCE, Autosave, find_sessions
 from slideviz.gui.panels.designs import DesignsPanel

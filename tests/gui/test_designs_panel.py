@@ -10,7 +10,7 @@ from qtpy.QtTest import QTest
 
 import slideviz as sv
 from slideviz.design.sweeps import sweep as sweeping
-from slideviz.design.sweeps.row import DesignRow
+from slideviz.design.sweeps.table import DesignRow
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import plot_canvas
 from slideviz.gui.widgets.plot_image import AxesPlace, PlotFormat, picture

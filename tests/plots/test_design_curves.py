@@ -4,13 +4,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from slideviz.design.sweeps.row import DesignRow
-from slideviz.plots.designs import (
-    against_designs,
-    design_curves,
-    failed_designs,
-    nearest_design,
-)
+from slideviz.design.sweeps.table import DesignRow
+from slideviz.plots.designs import against_designs, design_curves, failed_designs, nearest_design
 from slideviz.session.design_table import DesignTable
 
 

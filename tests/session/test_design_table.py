@@ -8,14 +8,20 @@ import pytest
 
 import slideviz as sv
 from slideviz.design.sweeps import sweep as sweeping
-from slideviz.design.sweeps.row import DesignRow
+from slideviz.design.sweeps.table import DesignRow
 from slideviz.errors import CaseError
 from slideviz.samples.table import sample
 from slideviz.session import design_table
-from slideviz.session.design_files import read_results, read_table, write_results
-from slideviz.session.design_table import DesignTable, column_choices, values_of
+from slideviz.session.design_table import (
+    DesignTable,
+    column_choices,
+    read_results,
+    read_table,
+    run_designs,
+    values_of,
+    write_results,
+)
 from slideviz.session.jobs import JobProgress
-from slideviz.session.jobs_designs import run_designs
 
 
 @pytest.mark.parametrize(

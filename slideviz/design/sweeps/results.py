@@ -5,17 +5,19 @@ A row is written as soon as a design is done, so that a stopped sweep can be res
 
 from __future__ import annotations
 
-import csv
+import errno
 import json
-import math
 import os
 import pickle
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from hashlib import blake2b
-from io import StringIO
 from itertools import chain
 from pathlib import Path
 from typing import Any
+
+from filelock import BaseFileLock, FileLock, SoftFileLock, Timeout
 
 from slideviz import __version__
 from slideviz.case.boxes import system_of
@@ -24,17 +26,25 @@ from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.model import BoxMotion, Case, FromFile, Prescribed
 from slideviz.design.sweeps.columns import Value
-from slideviz.design.sweeps.designs import Designs, own_columns
-from slideviz.design.sweeps.lock import FolderLock
-from slideviz.design.sweeps.row import NUMBERS, DesignRow
+from slideviz.design.sweeps.table import (
+    DesignRow,
+    Designs,
+    cells_of,
+    head_of,
+    own_columns,
+    result_of,
+)
 from slideviz.errors import CaseError
 from slideviz.ffd.section import boxes_of
 from slideviz.mesh.model import Mesh
 from slideviz.system.atomic import atomic_write, reason_of
-from slideviz.system.file_checks import read_json
+from slideviz.system.csv_table import csv_rows, csv_text, write_csv
+from slideviz.system.file_checks import read_json, require_regular_file
 
 RESULTS, SOURCES = "results.csv", "sweep.json"
-_WORDS = ("mesh", "warnings", "problem")
+LOCK = "sweep.lock"
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
+"""Errors of file systems without locks."""
 
 
 class SweepResults:
@@ -50,8 +60,8 @@ class SweepResults:
 
     def __init__(self, folder: Path, designs: Designs, sources: Mapping[str, str]) -> None:
         self._folder, self._designs, self._sources = folder, designs, sources
-        self._lock: FolderLock | None = None
-        self._head = ["design", *designs.columns, *NUMBERS, *_WORDS]
+        self._lock: BaseFileLock | None = None
+        self._head = head_of(designs.columns)
 
     @property
     def path(self) -> Path:
@@ -75,7 +85,7 @@ class SweepResults:
             raise CaseError(
                 f"{self._folder}: cannot be made a folder: {reason_of(problem)}"
             ) from problem
-        self._lock = FolderLock(self._folder)
+        self._lock = locked(self._folder)
         try:
             return self._started(resume, force, meshes)
         except BaseException:
@@ -83,8 +93,11 @@ class SweepResults:
             raise
 
     def close(self) -> None:
-        """Unlock the folder."""
-        if self._lock is not None:
+        """Unlock the folder, and remove the file of the lock."""
+        if self._lock is not None and self._lock.is_locked:
+            if isinstance(self._lock, FileLock):  # the other one removes its file by itself
+                with suppress(OSError):
+                    Path(self._lock.lock_file).unlink()
             self._lock.release()
 
     def _started(self, resume: bool, force: bool, meshes: bool) -> list[DesignRow]:
@@ -105,8 +118,7 @@ class SweepResults:
         text = json.dumps({"slideviz": __version__, **self._sources}, indent=2) + "\n"
         with atomic_write(self._folder / SOURCES, CaseError) as file:
             file.write(text.encode())
-        with atomic_write(self.path, CaseError) as file:
-            file.write(_line(self._head))
+        write_csv(self.path, [self._head], CaseError)
 
     def _go_on(self) -> list[DesignRow]:
         """Return the rows of the table; CaseError where they are of another sweep.
@@ -122,8 +134,8 @@ class SweepResults:
         except OSError as problem:
             raise CaseError(f"{self.path}: cannot be read: {reason_of(problem)}") from problem
         try:
-            head, *lines = [*csv.reader(StringIO(whole.decode("utf-8", "replace")))] or [[]]
-        except csv.Error as problem:
+            head, *lines = csv_rows(whole.decode("utf-8", "replace")) or [[]]
+        except ValueError as problem:
             raise CaseError(f"{self.path}: is no table of a sweep ({problem}); {_REMEDY}") from None
         if head != self._head:
             names = ", ".join(head[own_columns(head)])
@@ -143,68 +155,44 @@ class SweepResults:
         """
         try:
             with self.path.open("ab", buffering=0) as file:
-                file.write(_line(self._cells(row)))
+                file.write(csv_text([self._cells(row)]).encode())
         except OSError as problem:
             raise CaseError(f"{self.path}: cannot be written: {reason_of(problem)}") from problem
 
     def sort(self, rows: Iterable[DesignRow]) -> None:
         """Write the table anew, in the order of the designs, each once."""
         last = {row.design: row for row in rows}
-        with atomic_write(self.path, CaseError) as file:
-            file.write(_line(self._head))
-            for number in sorted(last):
-                file.write(_line(self._cells(last[number])))
+        rows_in_order = (self._cells(last[number]) for number in sorted(last))
+        write_csv(self.path, [self._head, *rows_in_order], CaseError)
 
-    def _cells(self, row: DesignRow) -> list[Any]:
-        """Return the cells of a row, in the order of the head."""
-        done = not row.problem
-        return [
-            row.design,
-            *(row.values[name] for name in self._designs.columns),
-            *(getattr(row, name) if done else "" for name in NUMBERS),
-            "" if row.mesh is None else os.path.relpath(row.mesh, self._folder),
-            "; ".join(" ".join(text.split()) for text in row.warnings),
-            " ".join(row.problem.split()),
-        ]
+    def _cells(self, row: DesignRow) -> list[object]:
+        values = [row.values[name] for name in self._designs.columns]
+        return cells_of(row.design, values, row, folder=self._folder)
 
     def _row(self, line: int, cells: Sequence[str]) -> DesignRow:
         """Return the row of a line; CaseError where the design of that number is another."""
         try:
-            if len(cells) != len(self._head):
-                raise ValueError
-            found = dict(zip(self._head, cells, strict=True))  # columns and results differ in name
-            number = int(cells[0])
-            numbers = {
-                name: read(found[name]) for name, (_, read) in NUMBERS.items() if found[name]
-            }
+            row = result_of(self._head, cells, self._folder)
         except ValueError:
             raise CaseError(
                 f"{self.path}:{line}: is no row of a sweep; take the line away, or {_REMEDY}"
             ) from None
         rows = self._designs.rows
         values = dict(zip(self._designs.columns, cells[1:], strict=False))
-        if not 1 <= number <= len(rows):
+        if not 1 <= row.design <= len(rows):
             raise CaseError(
-                f"{self.path}:{line}: has design {number}, and the table of designs has "
+                f"{self.path}:{line}: has design {row.design}, and the table of designs has "
                 f"{len(rows)}; {_REMEDY}"
             )
         for name, value in values.items():
-            now = rows[number - 1].values[name]
+            now = rows[row.design - 1].values[name]
             if not _same(value, now):
                 raise CaseError(
-                    f"{self.path}:{line}: design {number} was made with {name}= "
+                    f"{self.path}:{line}: design {row.design} was made with {name}= "
                     f"{value or '(that of the case)'}, and the table of designs has "
                     f"{now or '(that of the case)'} now; {_REMEDY}"
                 )
-        return DesignRow(
-            number,
-            rows[number - 1].values,
-            **numbers,  # type: ignore[arg-type]
-            mesh=self._folder / found["mesh"] if found["mesh"] else None,
-            warnings=tuple(found["warnings"].split("; ")) if found["warnings"] else (),
-            problem=found["problem"],
-            earlier=True,
-        )
+        return replace(row, values=rows[row.design - 1].values, earlier=True)
 
     def _require_same_sources(self) -> None:
         """Raise CaseError where the results in the folder depend on something else."""
@@ -233,6 +221,46 @@ class SweepResults:
 
 
 _REMEDY = "choose another folder, or begin anew with --force (force=True)"
+
+
+def locked(folder: Path) -> BaseFileLock:
+    """Return the lock of a folder, held: two sweeps would write over each other's results.
+
+    The system frees it however the process ends; where a network's file system has no locks, the
+    file itself is the lock, and counts for nothing once its process has ended.
+
+    Raises
+    ------
+    CaseError
+        Another sweep has the lock, or its file cannot be written.
+    """
+    path = folder / LOCK
+    try:
+        with suppress(FileNotFoundError):
+            require_regular_file(path, CaseError)
+        try:
+            lock: BaseFileLock = FileLock(path, thread_local=False, fallback_to_soft=False)
+            lock.acquire(blocking=False)
+            path.write_text(f"{os.getpid()}\n")
+        except OSError as problem:
+            if problem.errno not in _NO_LOCKS:
+                raise
+            if not path.stat().st_size:  # made just now, by the attempt
+                path.unlink()
+            lock = SoftFileLock(path, thread_local=False)
+            lock.acquire(blocking=False)
+    except Timeout:
+        number = ""
+        with suppress(OSError):
+            number = path.read_text(errors="replace").partition("\n")[0]
+        who = f"process {number}" if number else "another process"
+        raise CaseError(
+            f"{folder}: another sweep writes its results here ({who}); wait for its end, or "
+            "choose another folder"
+        ) from None
+    except OSError as problem:
+        raise CaseError(f"{path}: cannot be written: {reason_of(problem)}") from problem
+    return lock
 
 
 def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
@@ -276,14 +304,6 @@ def _digest(*parts: Any) -> str:
     for part in parts:
         digest.update(part)
     return digest.hexdigest()
-
-
-def _line(cells: Sequence[Any]) -> bytes:
-    """Return a line of CSV; NaN is an empty cell."""
-    out = StringIO()
-    plain = ["" if isinstance(c, float) and math.isnan(c) else c for c in cells]
-    csv.writer(out, lineterminator="\n").writerow(plain)
-    return out.getvalue().encode()
 
 
 def _same(text: str, value: Value) -> bool:

@@ -21,7 +21,7 @@ from typing import Any
 
 from slideviz import __version__
 from slideviz.case.model import Case
-from slideviz.design.sweeps.row import DesignRow
+from slideviz.design.sweeps.table import DesignRow
 from slideviz.errors import Note, SlidevizError
 from slideviz.formats.files import write
 from slideviz.mesh.model import Mesh

@@ -12,8 +12,7 @@ from qtpy.QtWidgets import QHBoxLayout, QSplitter
 
 from slideviz.case.model import Case
 from slideviz.case.words import counted
-from slideviz.design.sweeps.designs import read_designs
-from slideviz.design.sweeps.row import DesignRow
+from slideviz.design.sweeps.table import DesignRow, read_designs
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.gui.panels.designs_job import DesignsJob
 from slideviz.gui.panels.designs_plot import DesignPlot
@@ -24,8 +23,7 @@ from slideviz.gui.widgets.labels import WideLabel
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import Services
 from slideviz.mesh.model import Mesh
-from slideviz.session.design_files import read_table, write_results
-from slideviz.session.design_table import DesignTable, values_of
+from slideviz.session.design_table import DesignTable, read_table, values_of, write_results
 from slideviz.session.state import Session
 
 RUN = "Run the designs that have no result yet, or failed."

@@ -7,14 +7,13 @@ from collections.abc import Callable
 from qtpy.QtCore import QObject, Signal
 
 from slideviz.case.model import Case
-from slideviz.design.sweeps.row import DesignRow
+from slideviz.design.sweeps.table import DesignRow
 from slideviz.gui.responsiveness.settings import ROWS_MS
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.mesh.model import Mesh
-from slideviz.session.design_table import DesignTable
+from slideviz.session.design_table import DesignTable, run_designs
 from slideviz.session.jobs import JobProgress
-from slideviz.session.jobs_designs import run_designs
 
 
 class DesignsJob(QObject):

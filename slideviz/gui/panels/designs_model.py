@@ -10,7 +10,7 @@ from typing import Any
 from qtpy.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
 from qtpy.QtGui import QBrush, QColor
 
-from slideviz.design.sweeps.row import NUMBERS, DesignRow
+from slideviz.design.sweeps.table import NUMBERS, DesignRow
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.theme import alarm
 from slideviz.session.design_table import DesignTable

@@ -24,8 +24,7 @@ from qtpy.QtWidgets import QApplication
 
 from slideviz.gui.responsiveness.settings import COUNTING_MS
 from slideviz.gui.responsiveness.timers import later
-from slideviz.system.cleanup import is_alive
-from slideviz.system.private import private_file, private_folder
+from slideviz.system.cleanup import is_alive, private_file, private_folder
 
 REST_S = 5.0
 """Seconds without an error after which the same error is shown anew rather than counted."""

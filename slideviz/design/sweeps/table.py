@@ -1,21 +1,69 @@
-"""The designs of a sweep: a table, read from CSV or given as values; each row becomes a case."""
+"""The table of a sweep: designs, each of which becomes a case, and their results.
+
+It is given as values, or read from CSV; with results it is written as CSV.
+"""
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Iterable, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from io import StringIO
+from dataclasses import dataclass, field
+from math import nan
 from pathlib import Path
 from typing import Annotated, Any
 
 from slideviz.case.lines import listed, read_text
 from slideviz.case.model import Case
 from slideviz.design.sweeps.columns import NumberPlace, Value, applied, column_name, columns_of
-from slideviz.design.sweeps.row import NUMBERS
 from slideviz.errors import CaseError
+from slideviz.system.csv_table import csv_rows
 
+
+@dataclass(frozen=True)
+class DesignRow:
+    """The result of a design, or the reason why there is none."""
+
+    design: int
+    """Its number in the table of designs, from 1."""
+    values: Mapping[str, Value] = field(default_factory=dict)
+    """Its values, by column of that table."""
+    min: float = nan
+    mean: float = nan
+    """`min`, `mean`: quality of the deformed mesh; NaN where there is none."""
+    inverted: int = 0
+    """Inverted cells."""
+    max_error: float = nan
+    """Largest error of a boundary node before it is corrected, of all steps, in the mesh's length
+    unit."""
+    control_nodes: int = 0
+    steps: int = 0
+    """`control_nodes`, `steps`: control nodes in the last step, and steps made."""
+    seconds: float = 0.0
+    """Time that the worker spent on it."""
+    mesh: Path | None = None
+    """The file of the deformed mesh, where it was written."""
+    warnings: tuple[str, ...] = ()
+    problem: str = ""
+    """Why there is no result; empty where there is one."""
+    lost: int = 0
+    """How often its worker was lost, so that it was done again."""
+    earlier: bool = False
+    """Whether it was done before the sweep was stopped and resumed."""
+
+
+NUMBERS: Mapping[str, tuple[str, Callable[[str], float]]] = {
+    "min": ("lowest quality", float),
+    "mean": ("mean quality", float),
+    "inverted": ("inverted cells", int),
+    "max_error": ("largest error of the boundary before it is corrected", float),
+    "control_nodes": ("control nodes in the last step", int),
+    "steps": ("steps made", int),
+    "seconds": ("seconds that the worker spent", float),
+}
+"""The numbers of a result, in the order of their columns: meaning, and how a cell is read."""
+WORDS = ("mesh", "warnings", "problem")
+"""The columns of texts after the numbers of a result."""
 _SEPARATORS = (",", ";", "\t")
 
 
@@ -139,6 +187,54 @@ def _read_csv(case: Case, path: Path) -> Designs:
     return Designs(columns, tuple(designs))
 
 
+def head_of(columns: Iterable[str], words: Sequence[str] = WORDS) -> list[str]:
+    """Return the head of a table of results: the design's number and columns, and its results."""
+    return ["design", *columns, *NUMBERS, *words]
+
+
+def cells_of(
+    number: int,
+    values: Iterable[Value],
+    row: DesignRow | None,
+    words: Sequence[str] = WORDS,
+    folder: Path = Path(),
+) -> list[object]:
+    """Return the cells of a design, as `head_of` names them; those of results empty without any.
+
+    Its mesh is relative to ``folder``.
+    """
+    result = row or DesignRow(number)
+    texts = {
+        "mesh": result.mesh and os.path.relpath(result.mesh, folder),
+        "warnings": "; ".join(" ".join(text.split()) for text in result.warnings),
+        "problem": " ".join(result.problem.split()),
+    }
+    done = row is not None and not row.problem
+    numbers = [getattr(result, name) if done else None for name in NUMBERS]
+    return [number, *values, *numbers, *(texts[name] for name in words)]
+
+
+def result_of(head: Sequence[str], cells: Sequence[str], folder: Path = Path()) -> DesignRow:
+    """Return the result in a line of a table, without the design's values.
+
+    Raises
+    ------
+    ValueError
+        The line has other columns than ``head``, or a number is wrong.
+    """
+    found = dict(zip(head, cells, strict=True))  # columns and results differ in name
+    numbers: dict[str, Any] = {
+        name: read(found[name]) for name, (_, read) in NUMBERS.items() if found[name]
+    }
+    return DesignRow(
+        int(found["design"]),
+        **numbers,
+        mesh=folder / found["mesh"] if found.get("mesh") else None,
+        warnings=tuple(found["warnings"].split("; ")) if found.get("warnings") else (),
+        problem=found["problem"],
+    )
+
+
 def own_columns(head: Sequence[str]) -> slice:
     """Return the slice of the columns of designs; a table of results has others around them."""
     at = len(head) - 1
@@ -180,6 +276,6 @@ def _filled(text: str) -> list[tuple[int, str]]:
 def _split(line: str, separator: str) -> list[str]:
     """Return the cells of a line of CSV; raise CaseError if it cannot be one."""
     try:
-        return next(csv.reader(StringIO(line), delimiter=separator, skipinitialspace=True))
-    except csv.Error as problem:
+        return csv_rows(line, separator)[0]
+    except ValueError as problem:
         raise CaseError(f"is no line of values ({problem}); check its quotation marks") from problem
