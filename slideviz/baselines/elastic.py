@@ -17,7 +17,7 @@ from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import AGREE, merge
 from slideviz.rbf.methods import within
-from slideviz.rbf.problem import Problem, Solution, Watch
+from slideviz.rbf.problem import PhaseTimer, Problem, Solution
 
 HOPELESS = 1e-3
 """Largest residual ratio of a usable solution; above ``multigrid.TOLERANCE`` there is a warning."""
@@ -26,7 +26,7 @@ ASSEMBLING = 0.2
 """The part of the phase ``solve`` that the matrix takes."""
 
 
-def deform_elastic(problem: Problem, watch: Watch, body: Body) -> Solution:
+def deform_elastic(problem: Problem, timer: PhaseTimer, body: Body) -> Solution:
     """Return the solution of one step as an elastic body.
 
     Sliding nodes move in the tangent planes of their boundary. Where a boundary is curved, or a
@@ -40,16 +40,16 @@ def deform_elastic(problem: Problem, watch: Watch, body: Body) -> Solution:
         move differently.
     """
     nodes, values = problem.known, problem.values
-    displacement, warnings = _equilibrium(problem, watch, body, nodes, values)
+    displacement, warnings = _equilibrium(problem, timer, body, nodes, values)
     sliding = np.concatenate([problem.edge, problem.surface])
     if len(sliding):
         free = within(problem, sliding, displacement[sliding])
-        with watch.phase("project"):
+        with timer.phase("project"):
             slid = problem.project(sliding, free)
         nodes, values = np.concatenate([nodes, sliding]), np.concatenate([values, slid])
         if np.abs(slid - free).max() > AGREE * problem.basis.radius:
             start = displacement
-            displacement, warnings = _equilibrium(problem, watch, body, nodes, values, start)
+            displacement, warnings = _equilibrium(problem, timer, body, nodes, values, start)
     displacement[nodes] = values
     return Solution(
         displacement,
@@ -63,7 +63,7 @@ def deform_elastic(problem: Problem, watch: Watch, body: Body) -> Solution:
 
 def _equilibrium(
     problem: Problem,
-    watch: Watch,
+    timer: PhaseTimer,
     body: Body,
     nodes: IntArray,
     values: FloatArray,
@@ -78,7 +78,7 @@ def _equilibrium(
     start : (n, d), optional
         A guess of the displacement, in the frame.
     """
-    with watch.phase("solve") as tick:
+    with timer.phase("solve") as tick:
         points = body.frame.points(problem.coords)
         given = conditions(problem, body, nodes, values)
         matrix, right = assemble(points, body.parts, given, lambda f: tick(ASSEMBLING * f))

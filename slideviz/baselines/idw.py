@@ -23,7 +23,7 @@ from slideviz.rbf.compiled import BLOCK, OPTIONS, TARGETS_PER_TASK, one_minus_co
 from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.evaluate import CHUNK, Basis, Tick, no_tick, padded_rows
 from slideviz.rbf.methods import within
-from slideviz.rbf.problem import Problem, Solution, Watch
+from slideviz.rbf.problem import PhaseTimer, Problem, Solution
 from slideviz.rbf.slopes import TINY
 from slideviz.system.jit_cache import njit
 
@@ -90,7 +90,7 @@ def weighted_means(
     return np.ascontiguousarray(out[: values.shape[1]].T)
 
 
-def deform_idw(problem: Problem, watch: Watch, weights: Weights) -> Solution:
+def deform_idw(problem: Problem, timer: PhaseTimer, weights: Weights) -> Solution:
     """Return the solution of one step: displacements are weighted means of those of the boundary.
 
     Raises
@@ -102,14 +102,14 @@ def deform_idw(problem: Problem, watch: Watch, weights: Weights) -> Solution:
     for level in (problem.edge, problem.surface):
         if not len(level):
             continue
-        free = _at(problem, watch, nodes, values, level, weights)
+        free = _at(problem, timer, nodes, values, level, weights)
         if problem.curved:
             free = within(problem, level, free)
-        with watch.phase("project"):
+        with timer.phase("project"):
             slid = problem.project(level, free)
         nodes, values = np.concatenate([nodes, level]), np.concatenate([values, slid])
     field = _field(problem, nodes, values, weights)
-    with watch.phase("evaluate") as tick:
+    with timer.phase("evaluate") as tick:
         displacement = field.at(problem.features, problem.coords, tick)
     errors = np.linalg.norm(displacement[nodes] - values, axis=1)
     displacement[nodes] = values
@@ -151,7 +151,7 @@ class WeightedField:
 
 def _at(
     problem: Problem,
-    watch: Watch,
+    timer: PhaseTimer,
     known: IntArray,
     values: FloatArray,
     targets: IntArray,
@@ -159,7 +159,7 @@ def _at(
 ) -> FloatArray:
     """Return the displacements (m, d) of ``targets`` (m,), from ``values`` at ``known`` nodes."""
     field = _field(problem, known, values, weights)
-    with watch.phase("evaluate") as tick:
+    with timer.phase("evaluate") as tick:
         return field.at(problem.features[:, targets], problem.coords[targets], tick)
 
 

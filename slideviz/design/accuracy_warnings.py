@@ -42,10 +42,10 @@ def note_of_refinement(steps: Sequence[FrozenStep]) -> tuple[str, ...]:
 def warn_of_condition(steps: Sequence[FrozenStep]) -> None:
     """Warn where designs that are less smooth than the reference may have few digits."""
     worst = max((step.condition for step in steps if not step.refined), default=0.0)
-    doubt = max((step.doubt for step in steps), default=0.0)
-    if doubt > TRUSTED:
+    error_estimate = max((step.error_estimate for step in steps), default=0.0)
+    if error_estimate > TRUSTED:
         worst = largest_condition(steps)
-        amount = f"may be wrong by {wrong_by(doubt, bounded=False)}"
+        amount = f"may be wrong by {wrong_by(error_estimate, bounded=False)}"
     elif worst > BADLY_CONDITIONED:  # that of a method without a system is NaN
         amount = "may have few correct digits"
     else:
@@ -55,16 +55,20 @@ def warn_of_condition(steps: Sequence[FrozenStep]) -> None:
         "nodes, and displacements between the boundary nodes where neighbours move very "
         f"differently, {amount}; {REMEDY}"
     )
-    little = TRUSTED < doubt <= NOTED
+    little = TRUSTED < error_estimate <= NOTED
     warnings.warn(Note(said) if little else said, ConditionWarning, stacklevel=3)
 
 
-def warn_of_error_estimate(steps: Sequence[FrozenStep], doubt: FloatArray) -> bool:
+def warn_of_error_estimate(steps: Sequence[FrozenStep], error_estimate: FloatArray) -> bool:
     """Warn if the doubt (...,) of a design is above `TRUSTED`; return whether it is."""
-    worst = float(doubt.max(initial=0.0))
+    worst = float(error_estimate.max(initial=0.0))
     if worst <= TRUSTED:
         return False
-    of = "" if doubt.ndim == 0 else f" of {counted(int((doubt > TRUSTED).sum()), 'design')}"
+    of = (
+        ""
+        if error_estimate.ndim == 0
+        else f" of {counted(int((error_estimate > TRUSTED).sum()), 'design')}"
+    )
     said = (
         f"the condition number of the system is {largest_condition(steps):.0e}: derivatives may "
         f"have few correct digits, and displacements{of} between the boundary nodes may be wrong "

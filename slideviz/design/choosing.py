@@ -11,7 +11,7 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.design.frozen.step import FrozenStep
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.rbf.problem import Lag, Levels, Problem, Solution, Watch
+from slideviz.rbf.problem import CarriedError, Levels, PhaseTimer, Problem, Solution
 from slideviz.solver.deform import Progress, all_steps, free_memory, require_memory
 from slideviz.solver.setup import Setup, elastic_body, idw_weights
 from slideviz.solver.stepping import (
@@ -48,7 +48,7 @@ def choose_steps(
     """
     require_memory(setup, case, lasting=True)
     kept = setup
-    setup = replace(setup, solve=lambda problem, watch: kept.solve(_for_any_data(problem), watch))
+    setup = replace(setup, solve=lambda problem, timer: kept.solve(_for_any_data(problem), timer))
     parts, solutions, points = _reference(case, mesh, replace(setup, target=targets[0]), report)
     # The other methods choose nothing but the number of steps.
     others = list(targets[1:]) if case.method == "rbf" else []
@@ -58,7 +58,10 @@ def choose_steps(
         further = _further(mesh, replace(setup, target=target), parts, solutions, report)
         # A system that was solved with more rows and digits for one is so for all.
         solutions = [
-            replace(new if new.refined >= old.refined else old, doubt=max(old.doubt, new.doubt))
+            replace(
+                new if new.refined >= old.refined else old,
+                error_estimate=max(old.error_estimate, new.error_estimate),
+            )
             for old, new in zip(solutions, further, strict=True)
         ]
     weights = idw_weights(case, mesh.dim) if case.method == "idw" else None
@@ -76,7 +79,7 @@ def choose_steps(
             dropped=solution.dropped,
             condition=solution.condition,
             refined=solution.refined,
-            doubt=solution.doubt,
+            error_estimate=solution.error_estimate,
             weights=weights,
             body=body,
             reuse=reuse,
@@ -86,9 +89,11 @@ def choose_steps(
     return steps, points
 
 
-def _begun(setup: Setup, stages: tuple[Levels, ...], problem: Problem, watch: Watch) -> Solution:
+def _begun(
+    setup: Setup, stages: tuple[Levels, ...], problem: Problem, timer: PhaseTimer
+) -> Solution:
     """Solve a problem whose selection begins with the rows ``stages``."""
-    return setup.solve(replace(problem, stages=stages), watch)
+    return setup.solve(replace(problem, stages=stages), timer)
 
 
 def _for_any_data(problem: Problem) -> Problem:
@@ -102,8 +107,8 @@ def _reference(
     """Run the solver; return the part of the displacement at each step, solutions, and points."""
     made: list[Solution] = []
 
-    def solve(problem: Problem, watch: Watch) -> Solution:
-        made.append(setup.solve(problem, watch))
+    def solve(problem: Problem, timer: PhaseTimer) -> Solution:
+        made.append(setup.solve(problem, timer))
         return made[-1]
 
     steps = list(all_steps(Stepping(case, mesh, replace(setup, solve=solve), report, {})))
@@ -127,19 +132,21 @@ def _further(
     """
     coords, total = setup.coords, len(parts)
     made: list[Solution] = []
-    lag: Lag | None = None
+    carried: CarriedError | None = None
     for k, (part, solution) in enumerate(zip(parts, chosen, strict=True)):
         control = solution.control
         if made:
             more = made[-1].control
             control = np.concatenate([control, more[~np.isin(more, control)]])
-        watch = Watch(partial(_report, report, k + 1, total))
+        timer = PhaseTimer(partial(_report, report, k + 1, total))
         goal = setup.coords[setup.known] + setup.target * part
         begun = replace(setup, solve=partial(_begun, setup, solution.stages))
         made.append(
-            one_step(begun, coords, goal, watch, replace(solution, control=control, lag=lag))
+            one_step(
+                begun, coords, goal, timer, replace(solution, control=control, carried=carried)
+            )
         )
-        lag = made[-1].lag
+        carried = made[-1].carried
         coords = displaced_coords(setup, coords, made[-1].displacement, goal)
         if mesh.halo is not None:
             points = cartesian(setup.frame, mesh.points, setup.coords, coords)

@@ -163,7 +163,7 @@ class Deformer:
         self._checks = Checks(mesh, setup, self._steps, facets, least)
         self.warnings += (*note_of_refinement(self._steps), *torn_interfaces(mesh, points))
         if not warn_of_error_estimate(
-            self._steps, np.max([state.doubt for state in states], axis=0)
+            self._steps, np.max([state.error_estimate for state in states], axis=0)
         ):
             warn_of_condition(self._steps)
 
@@ -192,8 +192,8 @@ class Deformer:
         """
         given = self.displacement if displacement is None else displacement
         given = self._checked(given, "displacement")
-        points, errors, doubt = self._deformed(given)
-        warn_of_error_estimate(self._steps, doubt)
+        points, errors, error_estimate = self._deformed(given)
+        warn_of_error_estimate(self._steps, error_estimate)
         reduced = self._setup.reduction is not None
         same = given[..., None, :, :] == self._references
         reference = same.all(axis=(-1, -2)).any(axis=-1)
@@ -292,20 +292,20 @@ class Deformer:
         if displacement.ndim == 2:
             target = value(self._input.target(displacement))
             states = self._run(target)
-            doubt = np.max([state.doubt for state in states], axis=0)
-            return value(states[-1].points), self._checks.errors(target, states), doubt
+            error_estimate = np.max([state.error_estimate for state in states], axis=0)
+            return value(states[-1].points), self._checks.errors(target, states), error_estimate
         points = np.empty((len(displacement), *self.mesh.points.shape))
         if len(self._steps) > 1 or self.mesh.halo is not None:
-            errors, doubt = np.empty((2, len(points)))
+            errors, error_estimate = np.empty((2, len(points)))
             for k, each in enumerate(displacement):
-                points[k], errors[k], doubt[k] = self._deformed(each)
-            return points, errors, doubt
+                points[k], errors[k], error_estimate[k] = self._deformed(each)
+            return points, errors, error_estimate
         found = [
             self._together(displacement[first : first + TOGETHER], points[first : first + TOGETHER])
             for first in range(0, len(points), TOGETHER)
         ]
-        errors, doubt = np.concatenate([np.empty((2, 0)), *found], axis=1)
-        return points, errors, doubt
+        errors, error_estimate = np.concatenate([np.empty((2, 0)), *found], axis=1)
+        return points, errors, error_estimate
 
     def _together(self, displacement: FloatArray, out: FloatArray) -> FloatArray:
         """Write the points of k designs (k, m, d) to ``out`` (k, n, d), deformed in one step.
@@ -323,7 +323,7 @@ class Deformer:
         to_points(setup.frame, out, setup.coords, self.mesh.points)
         for points in out[:0] if alike else out:
             self._checks.require_alike(points)
-        return np.stack([errors, np.broadcast_to(state.doubt, errors.shape)])
+        return np.stack([errors, np.broadcast_to(state.error_estimate, errors.shape)])
 
     def _taped(self, displacement: FloatArray) -> tuple[list[StepState], Variable, Variable]:
         """Return the states of a design (m, d), and its input and points as variables of a tape."""

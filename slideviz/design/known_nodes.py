@@ -13,7 +13,7 @@ from slideviz.design.frozen.tape import Array, put, take, transform, value
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE
-from slideviz.rbf.images import Spread
+from slideviz.rbf.images import ImageDisplacements
 from slideviz.solver.prescribed import displaced
 from slideviz.solver.setup import Setup
 
@@ -49,10 +49,10 @@ class KnownNodeMap:
         images, or copies in a halo and their originals, are displaced differently.
         """
         setup = self.setup
-        own = take(vectors, self.rows)
+        overwrite = take(vectors, self.rows)
         if self.turn is not None:
-            own = transform(self.turn, own)
-        moved = difference(setup.frame, self.points, own)
+            overwrite = transform(self.turn, overwrite)
+        moved = difference(setup.frame, self.points, overwrite)
         self._require_alike(value(vectors), value(moved))
         shape = (len(setup.known), self.mesh.dim)
         return put(np.zeros(shape), self.known, take(moved, self.source))
@@ -67,8 +67,8 @@ class KnownNodeMap:
         """
         setup, mesh = self.setup, self.mesh
         if len(self.others):
-            own = vectors[..., self.others, :]
-            follow = difference(setup.frame, mesh.points[self.nodes[self.others]], own)
+            overwrite = vectors[..., self.others, :]
+            follow = difference(setup.frame, mesh.points[self.nodes[self.others]], overwrite)
             gap = np.abs(value(follow) - moved[..., self.followed, :])
             largest = np.linalg.norm(moved, axis=-1).max(axis=-1, initial=0.0)
             allowed = TOLERANCE * largest + ROUNDING * largest_coordinate(self.mesh.points)
@@ -85,7 +85,9 @@ class KnownNodeMap:
             there = setup.frame.difference(mesh.points[moved.nodes], moved.vectors)
             largest = float(np.linalg.norm(there, axis=1).max(initial=0.0))
             allowed = TOLERANCE * largest + ROUNDING * largest_coordinate(self.mesh.points)
-            Spread(moved.nodes, there, setup.classes.stands).require_alike(allowed)
+            ImageDisplacements(moved.nodes, there, setup.classes.representative).require_alike(
+                allowed
+            )
 
 
 def known_node_map(mesh: Mesh, setup: Setup, asked: Displacements) -> KnownNodeMap:
@@ -97,7 +99,7 @@ def known_node_map(mesh: Mesh, setup: Setup, asked: Displacements) -> KnownNodeM
         A moving node in a halo is a copy of a node that does not move.
     """
     moved = displaced(asked, mesh)
-    spread = Spread(moved.nodes, moved.vectors, setup.classes.stands)
+    spread = ImageDisplacements(moved.nodes, moved.vectors, setup.classes.representative)
     of_known = spread.source(setup.known)
     known = np.flatnonzero(of_known >= 0)
     nodes, place = np.unique(of_known[known], return_inverse=True)

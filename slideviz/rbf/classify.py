@@ -44,7 +44,7 @@ class Classes:
     row_fan: IntArray
     row_cluster: IntArray
     """`row_fan`, `row_cluster` (p,): pairs of a fan and the cluster that it belongs to."""
-    stands: IntArray
+    representative: IntArray
     """(n,): for each node of the mesh, the number of the periodic image that represents it (itself,
     if it has none)."""
     beyond: int = 0
@@ -53,7 +53,7 @@ class Classes:
     @property
     def total(self) -> int:
         """Return the number of all nodes of the mesh."""
-        return len(self.stands)
+        return len(self.representative)
 
     @property
     def sliding(self) -> IntArray:
@@ -81,7 +81,7 @@ def classify(
     fans: Fans,
     fan_role: np.ndarray,
     normals: FloatArray,
-    stands: IntArray,
+    representative: IntArray,
     *,
     sliding: str,
     periodic: str,
@@ -96,16 +96,16 @@ def classify(
     normals : (m, d)
         Unit normals of the undeformed fans, turned about the axis so that those of a node and of
         its images can be compared (``Frame.turned_back``).
-    stands : (n,)
+    representative : (n,)
         For each node, the number of the periodic image that represents it.
     sliding
         ``none``, ``ps`` or ``ds``.
     periodic
         ``none``, ``periodic``, ``fixed`` or ``moving``.
     """
-    at = stands[fans.fan_node]
+    at = representative[fans.fan_node]
     effect = _effects(fan_role, at, sliding, periodic)
-    total = len(stands)
+    total = len(representative)
     moving = nodes_with(at, effect == "moving", total)
     fixed = nodes_with(at, effect == "fixed", total) & ~moving
     active = (effect == "slide") & ~(moving | fixed)[at]
@@ -120,7 +120,14 @@ def classify(
         extra = np.concatenate([extra, held[touched[held]]])
     fixed[extra] = True
     keep = ~fixed[at[rows[:, 0]]]
-    return _collect(moving[stands], fixed[stands], rows[keep], at, stands, normals.shape[1])
+    return _collect(
+        moving[representative],
+        fixed[representative],
+        rows[keep],
+        at,
+        representative,
+        normals.shape[1],
+    )
 
 
 def _effects(fan_role: np.ndarray, at: IntArray, sliding: str, periodic: str) -> np.ndarray:
@@ -145,7 +152,7 @@ def _collect(
     fixed: np.ndarray,
     rows: IntArray,
     at: IntArray,
-    stands: IntArray,
+    representative: IntArray,
     dim: int,
 ) -> Classes:
     """Return the classes, with clusters numbered over all sliding nodes, images included.
@@ -157,16 +164,16 @@ def _collect(
         What `slide_rows` returns: fan, and cluster within its node.
     at : (m,)
         The node of each fan, with images as their representative.
-    stands : (n,)
+    representative : (n,)
     """
     order = np.argsort(at[rows[:, 0]], kind="stable")
     rows = rows[order]
     # Every image has the rows of the node that stands for it.
-    active = np.zeros(len(stands), bool)
+    active = np.zeros(len(representative), bool)
     active[at[rows[:, 0]]] = True
-    slid = np.flatnonzero(active[stands])
+    slid = np.flatnonzero(active[representative])
     start, stop = (
-        np.searchsorted(at[rows[:, 0]], stands[slid], side) for side in ("left", "right")
+        np.searchsorted(at[rows[:, 0]], representative[slid], side) for side in ("left", "right")
     )
     node = np.repeat(slid, stop - start)
     row = np.arange(len(node)) - np.repeat(np.cumsum(stop - start) - stop, stop - start)
@@ -186,7 +193,7 @@ def _collect(
         cluster_node=cluster_node,
         row_fan=rows[:, 0],
         row_cluster=np.cumsum(new) - 1,
-        stands=stands,
+        representative=representative,
     )
 
 

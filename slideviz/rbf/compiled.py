@@ -217,7 +217,7 @@ def distances(x, c, start, count, period_over_pi, scale, q):  # type: ignore[no-
 
     With a rotational period the square of the distance is (r - r')^2 + (z - z')^2 +
     2 r r' (1 - cos g), g = theta_p / pi sin(pi (theta - theta') / theta_p) (Eq. 2.15), the sine by
-    the addition theorem. The same formula is in ``sum_rotational``, ``twofold._distances``,
+    the addition theorem. The same formula is in ``sum_rotational``, ``double_double._distances``,
     ``slopes`` and ``idw._squares``.
     """
     c0, c1 = c[0, start : start + count], c[1, start : start + count]

@@ -57,7 +57,7 @@ def full_rows(problem: Problem, nodes: IntArray, values: FloatArray) -> Constrai
 
     What the interpolants of earlier steps lack there is added to ``values``.
     """
-    merged, data = merge(problem, nodes, values + problem.behind(nodes))
+    merged, data = merge(problem, nodes, values + problem.carried_error(nodes))
     return ConstraintRows(merged, None, data)
 
 
@@ -69,20 +69,20 @@ def sliding_rows(problem: Problem) -> ConstraintRows:
     d = problem.values.shape[1]
     nodes = np.concatenate([np.repeat(problem.known, d), problem.normal_nodes])
     normals = np.concatenate([np.tile(np.eye(d), (len(problem.known), 1)), problem.normals])
-    values = problem.values + problem.behind(problem.known)
-    across = np.einsum("qd,qd->q", problem.behind(problem.normal_nodes), problem.normals)
+    values = problem.values + problem.carried_error(problem.known)
+    across = np.einsum("qd,qd->q", problem.carried_error(problem.normal_nodes), problem.normals)
     right = np.concatenate([values.ravel(), across])
     order = np.argsort(problem.same_as[nodes], kind="stable")
     nodes, normals, right = nodes[order], normals[order], right[order]
-    stands = problem.same_as[nodes]
-    starts = np.flatnonzero(np.r_[True, stands[1:] != stands[:-1]])
+    representative = problem.same_as[nodes]
+    starts = np.flatnonzero(np.r_[True, representative[1:] != representative[:-1]])
     count = np.diff(np.r_[starts, len(nodes)])
     mixed = np.maximum.reduceat(nodes, starts) != np.minimum.reduceat(nodes, starts)
     keep = np.ones(len(nodes), bool)
     for size in np.unique(count[mixed]):
         rows = starts[mixed & (count == size), None] + np.arange(size)
         _orthonormalise(problem, nodes, normals, right, rows, keep)
-    return ConstraintRows(stands[keep], normals[keep], right[keep, None])
+    return ConstraintRows(representative[keep], normals[keep], right[keep, None])
 
 
 def blocks(rows: ConstraintRows) -> IntArray:

@@ -6,14 +6,14 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
+from slideviz.rbf.double_double import supports
 from slideviz.rbf.evaluate import Tick, matrix
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
-from slideviz.rbf.problem import Cycle, Interpolant, Levels, Problem, Watch
-from slideviz.rbf.refine import TRUSTED, System, between
+from slideviz.rbf.problem import Cycle, Interpolant, Levels, PhaseTimer, Problem
+from slideviz.rbf.refine import TRUSTED, System, check_points
 from slideviz.rbf.saddle import saddle_condition, solve_saddle
 from slideviz.rbf.solve import NOTHING, Factor, condition, enough_threads, extend
-from slideviz.rbf.twofold import usable
 
 
 class ExactFit:
@@ -28,15 +28,15 @@ class ExactFit:
     ----------
     short : str
         Empty: there is no tolerance that it could miss.
-    doubt, refined : float
+    error_estimate, refined : float
         As of a ``Solution``.
     """
 
     short = ""
 
-    def __init__(self, problem: Problem, watch: Watch) -> None:
+    def __init__(self, problem: Problem, timer: PhaseTimer) -> None:
         d = problem.values.shape[1]
-        self._problem, self._watch = problem, watch
+        self._problem, self._timer = problem, timer
         self._rows: ConstraintRows | None = None
         self._factors: dict[int, Factor] = {}
         self.history: tuple[Cycle, ...] = ()
@@ -46,7 +46,7 @@ class ExactFit:
         """(m,): nodes of which the pivot guard left out a constraint."""
         self.stages: tuple[Levels, ...] = ()
         """The rows in the system after each call of ``add``."""
-        self.doubt = self.refined = 0.0
+        self.error_estimate = self.refined = 0.0
 
     def add(self, rows: ConstraintRows) -> None:
         """Add rows, solve with all rows added so far, and set ``found``."""
@@ -54,16 +54,18 @@ class ExactFit:
         if self._rows is not None:
             rows = self._rows.followed_by(rows)
         self._rows = rows
-        with self._watch.phase("solve") as tick:
+        with self._timer.phase("solve") as tick:
             if KERNELS[problem.basis.kernel].polynomial:
                 self.found, deficient = saddle_fit(problem, rows)
                 self.dropped = np.unique(rows.nodes) if deficient else np.empty(0, np.int64)
-                self.doubt = max(self.doubt, saddle_doubt(problem, rows, self.found))
-                self.stages += ((row_names(rows),),)
+                self.error_estimate = max(
+                    self.error_estimate, saddle_error_estimate(problem, rows, self.found)
+                )
+                self.stages += ((row_keys(rows),),)
                 return
             weights = np.zeros_like(rows.right)
             label, moves = problem.reach
-            active, names = moves[label[rows.nodes]], row_names(rows)
+            active, names = moves[label[rows.nodes]], row_keys(rows)
             solved = [
                 part[label[rows.nodes[part]] == each]
                 for part in parts(rows)
@@ -110,8 +112,8 @@ class ExactFit:
     ) -> tuple[FloatArray, bool]:
         """Return ``found``, or refined weights where they are much better, and whether refined.
 
-        Refined weights meet all rows, also those that the pivot guard left out. Sets ``doubt`` and
-        ``refined``.
+        Refined weights meet all rows, also those that the pivot guard left out. Sets
+        ``error_estimate`` and ``refined``.
 
         Parameters
         ----------
@@ -124,21 +126,24 @@ class ExactFit:
         if self._problem.lasting:
             rough = system.rough_data()
             trials.append((rough, system.factor.solve(rough), 1.0))
-        wrong = [
-            float(system.wrong(data, first).max(initial=0.0)) / (size or 1.0)
+        field_error = [
+            float(system.field_error(data, first).max(initial=0.0)) / (size or 1.0)
             for data, first, size in trials
         ]
-        if max(wrong) > TRUSTED and usable(system.basis):
+        if max(field_error) > TRUSTED and supports(system.basis):
             refined = [
                 system.refined(data, np.full(data.shape[1], size), first, lambda _: tick(1.0))
                 for data, first, size in trials
             ]
-            doubt = max(float(each.doubt.max(initial=0.0)) for each in refined)
-            if refined[0].exact or doubt < max(wrong):
+            error_estimate = max(float(each.error_estimate.max(initial=0.0)) for each in refined)
+            if refined[0].exact or error_estimate < max(field_error):
                 first = max(float(each.before.max(initial=0.0)) for each in refined)
-                self.refined, self.doubt = max(self.refined, *wrong, first), max(self.doubt, doubt)
+                self.refined, self.error_estimate = (
+                    max(self.refined, *field_error, first),
+                    max(self.error_estimate, error_estimate),
+                )
                 return refined[0].weights, True
-        self.doubt = max(self.doubt, *wrong)
+        self.error_estimate = max(self.error_estimate, *field_error)
         return found, False
 
     def condition(self) -> float:
@@ -156,7 +161,7 @@ def parts(rows: ConstraintRows) -> list[IntArray]:
     return [np.flatnonzero(block == k) for k in np.unique(block)]
 
 
-def row_names(rows: ConstraintRows) -> IntArray:
+def row_keys(rows: ConstraintRows) -> IntArray:
     """Return a name for each row, (r, 2), that no reordering of nodes changes.
 
     The row's node, and its place among the rows of that node, from 0.
@@ -207,7 +212,7 @@ def condition_with_terms(problem: Problem, rows: ConstraintRows) -> float:
     return saddle_condition(matrix(problem.basis, place), row_terms(problem, rows))
 
 
-def saddle_doubt(problem: Problem, rows: ConstraintRows, found: Interpolant) -> float:
+def saddle_error_estimate(problem: Problem, rows: ConstraintRows, found: Interpolant) -> float:
     """Return the error of the field of a system with polynomial between control nodes (`refine`).
 
     As a part of the largest displacement; 0 where it is below `TRUSTED`.
@@ -218,5 +223,7 @@ def saddle_doubt(problem: Problem, rows: ConstraintRows, found: Interpolant) -> 
         met = np.einsum("rd,rd->r", met, rows.normals)[:, None]
     lacking = ConstraintRows(rows.nodes, rows.normals, rows.right - met)
     field = saddle_fit(problem, lacking)[0].field(problem)
-    wrong = np.abs(field.interpolated(between(problem.features[:, rows.nodes]))).max(initial=0.0)
-    return float(wrong / largest) if wrong > TRUSTED * largest else 0.0
+    field_error = np.abs(field.interpolated(check_points(problem.features[:, rows.nodes]))).max(
+        initial=0.0
+    )
+    return float(field_error / largest) if field_error > TRUSTED * largest else 0.0

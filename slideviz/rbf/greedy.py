@@ -10,13 +10,13 @@ is also the exact error. So nothing is factorised twice and no candidates-by-con
 exists; picking one or two nodes in a cycle, as the thesis does, is the same with a small pool.
 
 Steps after the first begin with the control nodes of the step before, and have to make up for
-the errors that it left (``Problem.behind``), so that the tolerance holds for the whole
+the errors that it left (``Problem.carried_error``), so that the tolerance holds for the whole
 displacement.
 
 Candidates are sorted by position, and the error of each depends on nothing but the candidate and
 the order of the control nodes: neither numbering nor threads change the selection. Where errors are
-equal but for rounding, as on symmetric meshes, the position decides (`selection.favour`), so that
-another processor chooses the same nodes.
+equal but for rounding, as on symmetric meshes, the position decides (`selection.tie_breaker`), so
+that another processor chooses the same nodes.
 
 Every selection ends: a cycle without a new row is the last, and levels, which may choose the
 same rows again, are given up when the error no longer falls from one to the next, or when they
@@ -33,10 +33,10 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows
-from slideviz.rbf.exact import row_names
+from slideviz.rbf.exact import row_keys
 from slideviz.rbf.kernels import PLAIN
 from slideviz.rbf.level import Candidates, GreedyLevel
-from slideviz.rbf.problem import Cycle, Interpolant, Levels, Problem, Watch
+from slideviz.rbf.problem import Cycle, Interpolant, Levels, PhaseTimer, Problem
 from slideviz.rbf.selection import LevelLimit, pool
 from slideviz.rbf.solve import enough_threads
 
@@ -59,7 +59,7 @@ class GreedyFit:
     """
 
     def __init__(
-        self, problem: Problem, watch: Watch, history: tuple[Cycle, ...] = (), *, done: int = 0
+        self, problem: Problem, timer: PhaseTimer, history: tuple[Cycle, ...] = (), *, done: int = 0
     ) -> None:
         """Begin without rows; ``problem`` must have a reduction.
 
@@ -70,7 +70,7 @@ class GreedyFit:
             of the two of direct sliding).
         """
         assert problem.reduction is not None
-        self._problem, self._watch, self._settings = problem, watch, problem.reduction
+        self._problem, self._timer, self._settings = problem, timer, problem.reduction
         d = problem.values.shape[1]
         self.history, self.short = history, ""
         self.found = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
@@ -80,7 +80,7 @@ class GreedyFit:
         """(m,): nodes left out by the pivot guard although their error is above the tolerance."""
         self.stages: tuple[Levels, ...] = ()
         """The rows chosen after each call of ``add``."""
-        self.doubt = self.refined = 0.0
+        self.error_estimate = self.refined = 0.0
         self._start = perf_counter() - (history[-1].seconds if history else 0.0)
         self._number = history[-1].level if history else 1
         none = np.empty(0, np.int64)
@@ -102,8 +102,8 @@ class GreedyFit:
         if first:
             self._new_level()
         else:
-            self._level.go_on_with(self._among)
-        with self._watch.phase("select"):
+            self._level.extend_candidates(self._among)
+        with self._timer.phase("select"):
             self._select()
         self.stages += (self.found.levels,)
 
@@ -114,12 +114,12 @@ class GreedyFit:
         residual, errors = self._misfit(target)
         goal = self._level_goal(errors)
         known = np.isin(self._among.rows.nodes, self._known)
-        again = np.flatnonzero(known & ~self._level.barred)
+        again = np.flatnonzero(known & ~self._level.excluded)
         if len(again) and (errors.max(initial=0.0) > settings.tolerance or self._given):
             self._record(errors)
-            self._take(again, target)
+            self._append(again, target)
             residual, errors = self._misfit(target)
-        if self._take_given():
+        if self._append_given_levels():
             target = self._level.targets()
             residual, errors = self._misfit(target)
             goal = self._level_goal(errors)
@@ -141,7 +141,7 @@ class GreedyFit:
             residual, errors = self._misfit(target)
             if errors.max() < best[0].max():
                 best = errors, self.found
-            self._watch.report("select", self._fraction(errors))
+            self._timer.report("select", self._fraction(errors))
         self._note_dropped(errors)
         self.short = self._shortfall(errors)
         if self.short and not self._full() and errors.max() > WORSE * best[0].max():
@@ -151,7 +151,7 @@ class GreedyFit:
 
     def _misfit(self, target: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what the level lacks of its target (r, m), and the error of each node, (c,)."""
-        residual = target - self._among.values(self._problem, self._level.now)
+        residual = target - self._among.values(self._problem, self._level.increment)
         return residual, self._among.errors(residual)
 
     def _shortfall(self, errors: FloatArray) -> str:
@@ -210,11 +210,11 @@ class GreedyFit:
     def _note_dropped(self, errors: FloatArray) -> None:
         """Set ``dropped``: nodes the guard left out although their error is above the tolerance."""
         level, among = self._level, self._among
-        chosen = np.zeros(len(level.barred), bool)
+        chosen = np.zeros(len(level.excluded), bool)
         chosen[level.chosen] = True
-        barred = (among.has_row(level.barred) & ~among.has_row(chosen)) | level.singular
+        excluded = (among.has_row(level.excluded) & ~among.has_row(chosen)) | level.singular
         over = errors > self._settings.tolerance
-        self.dropped = np.unique(among.rows.nodes[among.first[over & barred]])
+        self.dropped = np.unique(among.rows.nodes[among.first[over & excluded]])
 
     def _grow(self, target: FloatArray, residual: FloatArray, errors: FloatArray) -> bool:
         """Pick nodes and solve with them, which sets ``found``; tell whether any could be picked.
@@ -227,15 +227,15 @@ class GreedyFit:
             Error of each candidate.
         """
         level, among = self._level, self._among
-        open_ = among.has_row(~level.barred)
-        favoured, largest = errors * among.favour, float(errors.max())
+        open_ = among.has_row(~level.excluded)
+        weighted, largest = errors * among.tie_breaker, float(errors.max())
         floor = 0.0 if self._settings.pick != "block" else STALE * largest
         floor = max(floor, self._settings.tolerance)
         while True:
-            count, pooled = self._pool(np.where(open_, favoured, -1.0), residual)
+            count, pooled = self._pool(np.where(open_, weighted, -1.0), residual)
             if not len(pooled):
                 return False
-            rows = np.flatnonzero(np.isin(among.candidate, pooled) & ~level.barred)
+            rows = np.flatnonzero(np.isin(among.candidate, pooled) & ~level.excluded)
             done = level.depth
             with enough_threads(4.0 * (done + count) * len(rows) * done):
                 if level.pick(rows, residual[rows], count=count, floor=floor, target=target):
@@ -248,7 +248,7 @@ class GreedyFit:
     def _pool(self, errors: FloatArray, residual: FloatArray) -> tuple[int, IntArray]:
         """Return how many nodes to pick, and the candidates to pick them from (`selection.pool`).
 
-        ``errors`` (c,) are multiplied with the candidates' ``favour``, and negative where one
+        ``errors`` (c,) are multiplied with the candidates' ``tie_breaker``, and negative where one
         cannot be picked; ``residual`` (r, m).
         """
         among, d = self._among, self._problem.values.shape[1]
@@ -265,12 +265,12 @@ class GreedyFit:
             per_node=max(1, len(among.candidate) // max(1, len(errors))),
         )
 
-    def _take(self, rows: IntArray, target: FloatArray) -> None:
+    def _append(self, rows: IntArray, target: FloatArray) -> None:
         """Add rows that were chosen in the step before, or for other data, to the level."""
-        self._level.take(rows, target)
+        self._level.append_rows(rows, target)
         self.found = self._level.found
 
-    def _take_given(self) -> bool:
+    def _append_given_levels(self) -> bool:
         """Add the levels that were chosen for other data (``Problem.stages``) to the fit.
 
         Returns whether any row was added; never for a single level.
@@ -278,7 +278,7 @@ class GreedyFit:
         stage = len(self.stages)
         if self._one_level or stage >= len(self._given):
             return False
-        place = {tuple(name): k for k, name in enumerate(row_names(self._among.rows).tolist())}
+        place = {tuple(name): k for k, name in enumerate(row_keys(self._among.rows).tolist())}
         taken = False
         for level, names in enumerate(self._given[stage]):
             used = self._used[level] if level < len(self._used) else 0
@@ -291,9 +291,9 @@ class GreedyFit:
                     self._number += 1
                 self._used.append(0)
             self._used[level] = len(names)
-            rows = rows[~self._level.barred[rows]]
+            rows = rows[~self._level.excluded[rows]]
             if len(rows):
-                self._take(rows, self._level.targets())
+                self._append(rows, self._level.targets())
                 taken = True
         return taken
 

@@ -63,42 +63,42 @@ def find_images(
     # Nearly all nodes have no image, which a search without bound takes long to find out.
     gap, at = nearest(coords[nodes], coords[nodes] + frame.shift(), 2.0 * near, 2.0 * near)
     found = np.flatnonzero(gap <= near)
-    twins = np.stack([nodes[found], nodes[at[found]]], axis=1)
-    links = np.concatenate([links, twins[~paired[twins].all(axis=1)]])
+    coincident_pairs = np.stack([nodes[found], nodes[at[found]]], axis=1)
+    links = np.concatenate([links, coincident_pairs[~paired[coincident_pairs].all(axis=1)]])
     linked, ends = np.unique(links, return_inverse=True)
     label = components(len(linked), *ends.reshape(links.shape).T)
     order = np.lexsort((coords[linked] @ frame.shift(), ~paired[linked], label))
-    stands = np.arange(count)
-    stands[linked] = linked[order[np.searchsorted(label[order], label)]]
-    return stands
+    representative = np.arange(count)
+    representative[linked] = linked[order[np.searchsorted(label[order], label)]]
+    return representative
 
 
 @dataclass(frozen=True, eq=False)
-class Spread:
+class ImageDisplacements:
     """Copies the displacements of given nodes to their periodic images."""
 
     given: IntArray
     """(k,): sorted, each once."""
     vectors: FloatArray
     """(k, d): the displacements of the given nodes in the frame."""
-    stands: IntArray
+    representative: IntArray
     """(n,): for each node, the number of the periodic image that represents it."""
 
     @cached_property
     def _row(self) -> IntArray:
         """For each representative (n,) the place of its first image in ``given``, from 1; or 0."""
         # Memory for zeros is taken only where something is written.
-        row = np.zeros(len(self.stands), np.int64)
-        row[self.stands[self.given[::-1]]] = np.arange(len(self.given), 0, -1)
+        row = np.zeros(len(self.representative), np.int64)
+        row[self.representative[self.given[::-1]]] = np.arange(len(self.given), 0, -1)
         return row
 
     def source(self, nodes: IntArray) -> IntArray:
         """Return the given node whose displacement each of nodes (m,) has, (m,); -1 if none."""
-        return np.r_[-1, self.given][self._row[self.stands[nodes]]]
+        return np.r_[-1, self.given][self._row[self.representative[nodes]]]
 
     def at(self, nodes: IntArray) -> FloatArray:
         """Return the displacements (m, d) of nodes (m,); zero for nodes without a given image."""
-        row = self._row[self.stands[nodes]]
+        row = self._row[self.representative[nodes]]
         return np.concatenate([np.zeros((1, self.vectors.shape[1])), self.vectors])[row]
 
     def require_alike(self, allowed: float) -> None:
@@ -114,7 +114,7 @@ class Spread:
 
 
 def require_free(
-    spread: Spread,
+    spread: ImageDisplacements,
     nodes: IntArray,
     classes: Classes,
     normals: FloatArray,

@@ -12,10 +12,10 @@ import numpy as np
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import matrix
-from slideviz.rbf.exact import condition_with_terms, gathered, row_names, saddle_fit
+from slideviz.rbf.exact import condition_with_terms, gathered, row_keys, saddle_fit
 from slideviz.rbf.kernels import KERNELS, PLAIN
 from slideviz.rbf.problem import Interpolant, Problem
-from slideviz.rbf.selection import favour, newton
+from slideviz.rbf.selection import newton, tie_breaker
 from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise, solve_lower
 
 
@@ -31,16 +31,16 @@ class Candidates:
     """(r,): the candidate, from 0 to c - 1, that each row belongs to."""
     first: IntArray
     """(c,): the first row of each candidate."""
-    favour: FloatArray
+    tie_breaker: FloatArray
     """(c,): factor of each candidate's error, which decides between equal errors
-    (`selection.favour`)."""
+    (`selection.tie_breaker`)."""
 
     @classmethod
     def of(cls, problem: Problem, rows: ConstraintRows) -> Candidates:
         """Return the candidates of ``rows``, which must be sorted by position."""
         new = np.r_[True, rows.nodes[1:] != rows.nodes[:-1]] if len(rows.nodes) else []
         first = np.flatnonzero(new)
-        ranked = favour(problem.coords[rows.nodes[first]])
+        ranked = tie_breaker(problem.coords[rows.nodes[first]])
         return cls(rows, blocks(rows), np.cumsum(new, dtype=np.int64) - 1, first, ranked)
 
     def with_rows(self, problem: Problem, more: ConstraintRows) -> Candidates:
@@ -117,23 +117,25 @@ class GreedyLevel:
 
     Attributes
     ----------
-    settled, now : Interpolant
+    previous_levels, increment : Interpolant
         The sum of the levels before, and what this level adds to it.
     singular : bool
         The system with a polynomial has no solution.
     """
 
-    def __init__(self, problem: Problem, candidates: Candidates, settled: Interpolant) -> None:
-        """Begin without rows, after levels whose sum is ``settled``."""
-        self._problem, self._among, self.settled = problem, candidates, settled
+    def __init__(
+        self, problem: Problem, candidates: Candidates, previous_levels: Interpolant
+    ) -> None:
+        """Begin without rows, after levels whose sum is ``previous_levels``."""
+        self._problem, self._among, self.previous_levels = problem, candidates, previous_levels
         # Only positive definite functions have pivots. For the others the default one tells
         # which nodes add most, and the weights come from the system with the polynomial.
         self._tailed, self.singular = KERNELS[problem.basis.kernel].polynomial, False
         self._basis = replace(problem.basis, kernel=PLAIN) if self._tailed else problem.basis
-        self.now = Interpolant(np.empty(0, np.int64), settled.weights[:0])
+        self.increment = Interpolant(np.empty(0, np.int64), previous_levels.weights[:0])
         self.chosen: IntArray = np.empty(0, np.int64)
         """(k,): the chosen rows, in the order of their choice."""
-        self.barred = np.zeros(len(candidates.rows.nodes), bool)
+        self.excluded = np.zeros(len(candidates.rows.nodes), bool)
         """(r,): rows that cannot be chosen any more: they are, or would make the system
         singular."""
         count = int(candidates.block.max(initial=0)) + 1
@@ -142,7 +144,7 @@ class GreedyLevel:
     @property
     def found(self) -> Interpolant:
         """The sum of all levels so far."""
-        return self.settled.plus(self.now)
+        return self.previous_levels.plus(self.increment)
 
     @property
     def nodes(self) -> int:
@@ -154,17 +156,17 @@ class GreedyLevel:
         """How many rows each block of the system has, on average."""
         return len(self.chosen) / len(self._grown)
 
-    def go_on_with(self, candidates: Candidates) -> None:
+    def extend_candidates(self, candidates: Candidates) -> None:
         """Choose among ``candidates`` from here on, which begin with those there were before."""
-        more = np.zeros(len(candidates.rows.nodes) - len(self.barred), bool)
-        self._among, self.barred = candidates, np.concatenate([self.barred, more])
+        more = np.zeros(len(candidates.rows.nodes) - len(self.excluded), bool)
+        self._among, self.excluded = candidates, np.concatenate([self.excluded, more])
 
     def targets(self) -> FloatArray:
         """Return what this level has to meet: the data less the levels before, (r, m)."""
         right = self._among.rows.right
-        if not len(self.settled.nodes):
+        if not len(self.previous_levels.nodes):
             return right
-        return right - self._among.values(self._problem, self.settled)
+        return right - self._among.values(self._problem, self.previous_levels)
 
     def _rows(self, target: FloatArray) -> ConstraintRows:
         """Return the chosen rows, with their data from the target (r, m)."""
@@ -173,7 +175,7 @@ class GreedyLevel:
         return ConstraintRows(all_.nodes[chosen], normals, target[chosen])
 
     def solve(self, target: FloatArray) -> None:
-        """Make ``now`` meet the target (r, m) in the chosen rows."""
+        """Make ``increment`` meet the target (r, m) in the chosen rows."""
         rows = self._rows(target)
         if self._tailed:
             found, self.singular = saddle_fit(self._problem, rows)
@@ -182,7 +184,7 @@ class GreedyLevel:
             for factor in self._grown:
                 weights[factor.turn] = factor.weights()
             found = gathered(rows, weights)
-        self.now = replace(found, levels=(row_names(self._among.rows)[self.chosen],))
+        self.increment = replace(found, levels=(row_keys(self._among.rows)[self.chosen],))
 
     def pick(
         self,
@@ -208,7 +210,7 @@ class GreedyLevel:
         Returns
         -------
         bool
-            Whether any was picked. ``now`` is not solved for yet: call `solve`.
+            Whether any was picked. ``increment`` is not solved for yet: call `solve`.
         """
         among = self._among
         order = np.argsort(among.block[rows], kind="stable")
@@ -224,12 +226,12 @@ class GreedyLevel:
             schur,
             residual,
             nodes=candidate,
-            factor=among.favour[candidate],
+            factor=among.tie_breaker[candidate],
             count=count,
             floor=floor,
         )
         diagonal = np.concatenate([np.diag(s) for s in schur])
-        self.barred[rows[diagonal <= PIVOT_GUARD]] = True
+        self.excluded[rows[diagonal <= PIVOT_GUARD]] = True
         turn, start = len(self.chosen) + np.arange(len(picked)), 0
         for k, factor in enumerate(self._grown):
             mine = (picked >= start) & (picked < start + len(parts[k]))
@@ -238,10 +240,10 @@ class GreedyLevel:
             factor.follow(target)
             start += len(parts[k])
         self.chosen = np.concatenate([self.chosen, rows[picked]])
-        self.barred[rows[picked]] = True
+        self.excluded[rows[picked]] = True
         return len(picked) > 0
 
-    def take(self, rows: IntArray, target: FloatArray) -> None:
+    def append_rows(self, rows: IntArray, target: FloatArray) -> None:
         """Append ``rows``, chosen before (as by the step before), and solve for the target (r, m).
 
         Rows that the pivot guard leaves out are barred.
@@ -255,7 +257,7 @@ class GreedyLevel:
                 factor.append(part[made.kept], turn, beside=left[:, made.kept].T, corner=made.lower)
                 factor.follow(target)
                 self.chosen = np.concatenate([self.chosen, part[made.kept]])
-            self.barred[rows] = True
+            self.excluded[rows] = True
             self.solve(target)
 
     def _remaining(self, factor: GrowingFactor, rows: IntArray) -> tuple[FloatArray, FloatArray]:

@@ -22,7 +22,16 @@ from slideviz.rbf.evaluate import Tick
 from slideviz.rbf.exact import ExactFit
 from slideviz.rbf.field import Correction
 from slideviz.rbf.greedy import GreedyFit
-from slideviz.rbf.problem import GAMMA, Cycle, Interpolant, Lag, Levels, Problem, Solution, Watch
+from slideviz.rbf.problem import (
+    GAMMA,
+    CarriedError,
+    Cycle,
+    Interpolant,
+    Levels,
+    PhaseTimer,
+    Problem,
+    Solution,
+)
 from slideviz.system.threads import in_parts
 
 ROUNDING = 1e-14
@@ -45,7 +54,7 @@ class Fit(Protocol):
     short: str
     history: tuple[Cycle, ...]
     stages: tuple[Levels, ...]
-    doubt: float
+    error_estimate: float
     refined: float
 
     def add(self, rows: ConstraintRows) -> None:
@@ -55,63 +64,63 @@ class Fit(Protocol):
         """Return an estimate of the condition number of the system."""
 
 
-def regular(problem: Problem, watch: Watch) -> Solution:
+def regular(problem: Problem, timer: PhaseTimer) -> Solution:
     """Interpolate the known displacements (thesis section 2.1)."""
-    fit = _fit(problem, watch)
+    fit = _fit(problem, timer)
     fit.add(full_rows(problem, problem.known, problem.values))
-    return _finish(problem, watch, fit, problem.known, problem.values)
+    return _finish(problem, timer, fit, problem.known, problem.values)
 
 
-def pseudo_sliding(problem: Problem, watch: Watch) -> Solution:
+def pseudo_sliding(problem: Problem, timer: PhaseTimer) -> Solution:
     """Displace sliding nodes by interpolation, project them, and add them to the known nodes.
 
     Edges first, then surfaces; then interpolate with all of them (section 2.4.2).
     """
-    fit = _fit(problem, watch)
+    fit = _fit(problem, timer)
     fit.add(full_rows(problem, problem.known, problem.values))
     nodes, values = problem.known, problem.values
     for level in (problem.edge, problem.surface):
         if len(level):
-            slid = _slide(problem, watch, fit, level)
+            slid = _slide(problem, timer, fit, level)
             # A node that coincides with one of an earlier level is in the system already.
             new = ~np.isin(problem.same_as[level], problem.same_as[nodes])
             nodes, values = np.concatenate([nodes, level]), np.concatenate([values, slid])
             merge(problem, nodes, values)
             fit.add(full_rows(problem, level[new], slid[new]))
-    return _finish(problem, watch, fit, nodes, values)
+    return _finish(problem, timer, fit, nodes, values)
 
 
-def direct_sliding(problem: Problem, watch: Watch) -> Solution:
+def direct_sliding(problem: Problem, timer: PhaseTimer) -> Solution:
     """Let sliding nodes move within their boundary by the system itself (section 2.4.1).
 
     Where the boundary is curved, or a node slid past the end of its piece, the slid nodes are
     projected, and a second system interpolates with them as known nodes.
     """
     if not len(problem.normal_nodes):
-        return regular(problem, watch)
-    fit = _fit(problem, watch)
+        return regular(problem, timer)
+    fit = _fit(problem, timer)
     fit.add(sliding_rows(problem))
     sliding = np.concatenate([problem.edge, problem.surface])
     nodes = np.concatenate([problem.known, sliding])
-    free = _at(problem, watch, fit, sliding) - problem.behind(sliding)
+    free = _at(problem, timer, fit, sliding) - problem.carried_error(sliding)
     if not problem.curved:
         free = within(problem, sliding, free)
-    with watch.phase("project"):
+    with timer.phase("project"):
         slid = problem.project(sliding, free)
     gap = np.abs(slid - free).max(axis=1, initial=0.0)
     if not problem.curved and gap.max(initial=0.0) <= AGREE * problem.basis.radius:
         # A straight edge of a curved surface: its nodes leave it a little along the normals.
         off = gap[:, None] > ROUNDING * largest_coordinate(problem.coords)
         slid = np.where(off, slid, free)
-        return _finish(problem, watch, fit, nodes, np.concatenate([problem.values, slid]))
+        return _finish(problem, timer, fit, nodes, np.concatenate([problem.values, slid]))
     values = np.concatenate([problem.values, slid])
-    second = _fit(problem, watch, fit)
+    second = _fit(problem, timer, fit)
     second.add(full_rows(problem, nodes, values))
-    found = _finish(problem, watch, second, nodes, values)
+    found = _finish(problem, timer, second, nodes, values)
     return replace(
         found,
         stages=(*fit.stages, *found.stages),
-        doubt=max(fit.doubt, found.doubt),
+        error_estimate=max(fit.error_estimate, found.error_estimate),
         refined=max(fit.refined, found.refined),
     )
 
@@ -128,7 +137,7 @@ def within(problem: Problem, nodes: IntArray, free: FloatArray) -> FloatArray:
     return within
 
 
-SLIDING_METHODS: dict[str, Callable[[Problem, Watch], Solution]] = {
+SLIDING_METHODS: dict[str, Callable[[Problem, PhaseTimer], Solution]] = {
     "none": regular,
     "ps": pseudo_sliding,
     "ds": direct_sliding,
@@ -136,47 +145,47 @@ SLIDING_METHODS: dict[str, Callable[[Problem, Watch], Solution]] = {
 """Method by the value of SLIDING_MODE."""
 
 
-def _fit(problem: Problem, watch: Watch, first: Fit | None = None) -> Fit:
+def _fit(problem: Problem, timer: PhaseTimer, first: Fit | None = None) -> Fit:
     """Return a fit without rows, greedy with data reduction; ``first``: the fit before, if any."""
     if problem.reduction is None:
-        return ExactFit(problem, watch)
+        return ExactFit(problem, timer)
     if first is None:
-        return GreedyFit(problem, watch)
-    return GreedyFit(problem, watch, first.history, done=len(first.stages))
+        return GreedyFit(problem, timer)
+    return GreedyFit(problem, timer, first.history, done=len(first.stages))
 
 
-def _at(problem: Problem, watch: Watch, fit: Fit, nodes: IntArray | slice) -> FloatArray:
+def _at(problem: Problem, timer: PhaseTimer, fit: Fit, nodes: IntArray | slice) -> FloatArray:
     """Return the interpolated displacements (m, d) of nodes."""
-    with watch.phase("evaluate") as tick:
+    with timer.phase("evaluate") as tick:
         return fit.found.at(problem, nodes, tick)
 
 
-def _slide(problem: Problem, watch: Watch, fit: Fit, level: IntArray) -> FloatArray:
+def _slide(problem: Problem, timer: PhaseTimer, fit: Fit, level: IntArray) -> FloatArray:
     """Return the interpolated displacements (m, d) of sliding nodes ``level`` (m,), projected.
 
     On curved boundaries the part along the normals is removed before the projection: the point
     closest to a node that was pushed through a thin profile is on the profile's other side.
     """
-    free = _at(problem, watch, fit, level) - problem.behind(level)
+    free = _at(problem, timer, fit, level) - problem.carried_error(level)
     if problem.curved:
         free = within(problem, level, free)
-    with watch.phase("project"):
+    with timer.phase("project"):
         return problem.project(level, free)
 
 
 def _finish(
-    problem: Problem, watch: Watch, fit: Fit, nodes: IntArray, values: FloatArray
+    problem: Problem, timer: PhaseTimer, fit: Fit, nodes: IntArray, values: FloatArray
 ) -> Solution:
     """Return the solution: evaluate at all nodes, set boundary nodes exactly, spread their errors.
 
     ``values`` (b, d) are the exact displacements of the boundary nodes ``nodes`` (b,).
     """
-    displacement = _at(problem, watch, fit, slice(None))
+    displacement = _at(problem, timer, fit, slice(None))
     errors = values - displacement[nodes]
-    total, lag = problem.behind(nodes) + errors, None
+    total, carried = problem.carried_error(nodes) + errors, None
     if problem.reduction is not None:
         order = np.argsort(nodes)
-        lag = Lag(nodes[order], total[order])
+        carried = CarriedError(nodes[order], total[order])
     left_out = np.isin(problem.same_as[nodes], fit.dropped)
     lost = 0.0
     if problem.reduction is None:
@@ -186,7 +195,7 @@ def _finish(
     if problem.reduction is not None or len(fit.dropped) or off:
         correction = correction_of(problem, nodes, errors)
     if correction is not None:
-        with watch.phase("correct") as tick:
+        with timer.phase("correct") as tick:
             correct(problem, displacement, nodes, correction, tick)
     displacement[nodes] = values
     control = _in_system(fit)
@@ -198,11 +207,11 @@ def _finish(
         fit.condition(),
         fit.history,
         control=control,
-        lag=lag,
+        carried=carried,
         dropped_error=float(np.linalg.norm(errors[left_out], axis=1).max(initial=0.0)),
         short=fit.short,
         lost=lost,
-        doubt=fit.doubt,
+        error_estimate=fit.error_estimate,
         refined=fit.refined,
         field=replace(fit.found.field(problem), correction=correction),
         stages=fit.stages,
@@ -219,7 +228,7 @@ def correction_of(problem: Problem, nodes: IntArray, errors: FloatArray) -> Corr
     """Return the correction that spreads errors at boundary nodes; None where they are rounding.
 
     Its radius is ``gamma`` times the largest error (Eq. 2.31), as in
-    ``slideviz.design.frozen.spread.chosen_spread``.
+    ``slideviz.design.frozen.spread.chosen_correction``.
 
     Parameters
     ----------

@@ -26,12 +26,12 @@ Project = Callable[[IntArray, FloatArray], FloatArray]
 boundary, (m, d)."""
 
 Levels = tuple[IntArray, ...]
-"""The rows of each level of an interpolant, (r, 2), as ``exact.row_names`` gives them: the node,
+"""The rows of each level of an interpolant, (r, 2), as ``exact.row_keys`` gives them: the node,
 and the row's place among the rows of that node."""
 
 
 @dataclass(eq=False)
-class Watch:
+class PhaseTimer:
     """Seconds spent in each phase, and the progress callback of the step."""
 
     report: Callable[[str, float], None]
@@ -144,11 +144,11 @@ class Problem:
         moves[label[self.same_as[self.known[self.values.any(axis=1)]]]] = True
         return label, moves if moves.any() else ~moves
 
-    def behind(self, nodes: IntArray) -> FloatArray:
+    def carried_error(self, nodes: IntArray) -> FloatArray:
         """Return the errors (m, d) that the interpolants of all steps before left at nodes (m,)."""
-        if self.before is None or self.before.lag is None:
+        if self.before is None or self.before.carried is None:
             return np.zeros((len(nodes), self.values.shape[1]))
-        return self.before.lag.at(nodes)
+        return self.before.carried.at(nodes)
 
     def beginning(self) -> IntArray:
         """Return the control nodes (c,) with which the selection of this step begins.
@@ -164,7 +164,7 @@ class Problem:
 
 
 @dataclass(frozen=True, eq=False)
-class Lag:
+class CarriedError:
     """The errors that the interpolants of all steps so far left at boundary nodes."""
 
     nodes: IntArray
@@ -199,7 +199,7 @@ class Solution:
     """What the user should know."""
     control: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
     """(c,): the nodes in the final system; empty where a method has no such system."""
-    lag: Lag | None = None
+    carried: CarriedError | None = None
     """The errors that the interpolants of all steps so far left at boundary nodes; None without
     data reduction."""
     dropped_error: float = 0.0
@@ -209,7 +209,7 @@ class Solution:
     lost: float = 0.0
     """Largest error of an exact solution at its own control nodes, before they are set exactly; in
     the mesh's length unit."""
-    doubt: float = 0.0
+    error_estimate: float = 0.0
     """Estimated error of an exact solution between its control nodes, as a part of the largest
     displacement (`slideviz.rbf.refine`). With ``Problem.lasting``, also that for a wave over the
     whole mesh."""

@@ -94,7 +94,7 @@ def find_tracks(
     curved = False
     moving = np.zeros(classes.total, bool)
     moving[classes.moving] = reach > 0
-    across = _across_period(boundary, classes.stands, roles) if shift is not None else None
+    across = _across_period(boundary, classes.representative, roles) if shift is not None else None
     vectors = corner_vectors(place(boundary.facets))
     labels = _surface_labels(boundary, vectors, roles, feature_angle_deg, across)
     on_surface = classes.edge if boundary.dim == 2 else classes.surface
@@ -120,17 +120,19 @@ def find_tracks(
     return Tracks(tracks, of_node, bool(curved))
 
 
-def _across_period(boundary: Boundary, stands: IntArray, roles: Mapping[str, str]) -> IntArray:
+def _across_period(
+    boundary: Boundary, representative: IntArray, roles: Mapping[str, str]
+) -> IntArray:
     """Return pairs (j, 2) of facets that meet only where periodic images are taken as one node.
 
     Without the facets of periodic markers.
     """
-    glued = np.zeros(len(stands), bool)
-    glued[stands[stands != np.arange(len(stands))]] = True
-    across = glued[stands[boundary.facets]].any(axis=1)
+    glued = np.zeros(len(representative), bool)
+    glued[representative[representative != np.arange(len(representative))]] = True
+    across = glued[representative[boundary.facets]].any(axis=1)
     across &= _role_numbers(boundary, roles) != ROLE_NUMBER["periodic"]
     facets, count = np.flatnonzero(across), len(across)
-    pairs, nodes = find_joints(stands[boundary.facets[facets]], boundary.dim)
+    pairs, nodes = find_joints(representative[boundary.facets[facets]], boundary.dim)
     pairs = np.sort(facets[pairs[glued[nodes].all(axis=1)]], axis=1)
     beside = boundary.joints[across[boundary.joints].all(axis=1)]
     beside = np.sort(beside, axis=1) @ [count, 1]
@@ -235,8 +237,8 @@ def _edge_chains(
     a periodic boundary includes the one that begins at the image of its last node.
     """
     cluster = np.full(len(fans.fan_node), -1, np.int64)
-    stands = classes.stands
-    mine = stands[classes.cluster_node] == classes.cluster_node
+    representative = classes.representative
+    mine = representative[classes.cluster_node] == classes.cluster_node
     mine = mine[classes.row_cluster]
     cluster[classes.row_fan[mine]] = classes.row_cluster[mine]
     is_edge = np.zeros(fans.node.max(initial=0) + 1, bool)
@@ -258,10 +260,10 @@ def _edge_chains(
     # Link segments at edge nodes only: number each end by its node, or by itself elsewhere.
     count = len(is_edge)
     own = count + np.arange(ends.size).reshape(ends.shape)
-    tied = np.where(is_edge[ends], stands[ends], own)
+    tied = np.where(is_edge[ends], representative[ends], own)
     label = components(count + ends.size, tied[:, 0], tied[:, 1])
     chains = []
-    node_label = label[stands[classes.edge]]
+    node_label = label[representative[classes.edge]]
     for value in np.unique(node_label):
         segments = ends[label[tied[:, 0]] == value]
         if len(segments):

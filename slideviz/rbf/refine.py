@@ -6,7 +6,7 @@ far field, for example. So neither r nor the condition number shows it. One step
 does: its field, at some points between control nodes, is the error of the solution there. Rows
 that the pivot guard left out are included, for the error at their nodes spreads in the same way.
 
-Where the error is too large, the system is solved again with twice the precision (`twofold`), and
+Where the error is too large, the system is solved again with `double_double` precision, and
 the solution meets the rows that the guard left out, too: with a factor of that precision, and for a
 large system by conjugate gradients with the ordinary factor as preconditioner. Residuals are those
 of twice the precision: ordinary ones lose as many digits as the weights are larger than the data,
@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 
 from slideviz.mesh.model import FloatArray
+from slideviz.rbf.double_double import DoubleFactor, Residuals, supports
 from slideviz.rbf.evaluate import Basis, Tick, evaluate, matrix, no_tick
 from slideviz.rbf.solve import Factor, enough_threads, solve_lower
-from slideviz.rbf.twofold import DoubleFactor, Residuals, usable
 
 TRUSTED = 1e-5
 """Largest error of a field between control nodes, as a part of the largest displacement. Above it
@@ -59,7 +59,7 @@ MARGIN = 10.0
 nearly coincide, for the preconditioner does not see them."""
 
 CHECKS = 60
-"""Number of points between control nodes at each of four distances (`between`)."""
+"""Number of points between control nodes at each of four distances (`check_points`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class Refined:
 
     weights: FloatArray
     """(n, m)."""
-    doubt: FloatArray
+    error_estimate: FloatArray
     """(m,): error of each column's field, as a part of its largest data: a bound where ``exact``,
     an estimate times `MARGIN` else."""
     before: FloatArray
@@ -100,8 +100,8 @@ class System:
         waves = np.sin(2.0 * np.pi * at / np.where(span > 0.0, span, 1.0)).T
         return waves if normals is None else (waves * normals).sum(axis=1, keepdims=True)
 
-    def wrong(self, right: FloatArray, weights: FloatArray) -> FloatArray:
-        """Return the largest error of the field of weights (n, m) at some points (`between`), (m,).
+    def field_error(self, right: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return the largest error (m,) of the field of weights (n, m) at some `check_points`.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class System:
         if normals is not None:
             met = np.einsum("rd,rd->r", met, normals)[:, None]
         with enough_threads(2.0 * len(right) ** 2):
-            return self._field(self._whole().solve(right - met))
+            return self._field(self._full_factor().solve(right - met))
 
     def refined(
         self,
@@ -123,7 +123,7 @@ class System:
         start: FloatArray,
         tick: Tick = no_tick,
         *,
-        settle: bool = False,
+        of_weights: bool = False,
     ) -> Refined:
         """Return the weights that meet all rows, also those that the guard left out.
 
@@ -133,7 +133,7 @@ class System:
             Right-hand sides, and weights to begin with.
         largest : (m,)
             The largest data of each column, relative to which errors of its field are.
-        settle
+        of_weights
             Whether the weights themselves are the result, as of an adjoint system, where the field
             does not show errors in the weights of nodes that nearly coincide. The doubt is then
             the largest change of a weight in the last round, as a part of the largest weight.
@@ -141,39 +141,41 @@ class System:
         weights, low = start.copy(), np.zeros_like(start)
         residuals = self._residuals()
         size = np.where(largest > 0.0, largest, 1.0)
-        doubt = np.full(len(size), np.inf)
+        error_estimate = np.full(len(size), np.inf)
         first: FloatArray | None = None
         open_ = np.arange(len(size))
         for _ in range(ROUNDS):
             before = weights[:, open_]
             lacking = residuals(right[:, open_], before, low[:, open_], tick)
-            step, wrong = self._step(lacking, before, size[open_], tick, settle=settle)
-            first = wrong / size if first is None else first
+            step, field_error = self._step(
+                lacking, before, size[open_], tick, of_weights=of_weights
+            )
+            first = field_error / size if first is None else first
             weights[:, open_] = before + step
             low[:, open_] += before - weights[:, open_] + step
-            now = wrong / size[open_]
-            if settle:
+            now = field_error / size[open_]
+            if of_weights:
                 most = np.abs(weights[:, open_]).max(axis=0)
                 now = np.abs(step).max(axis=0) / np.where(most > 0.0, most, 1.0)
-            going = (now > VERIFIED) & (now < SLOW * doubt[open_])
-            doubt[open_] = now
+            going = (now > VERIFIED) & (now < SLOW * error_estimate[open_])
+            error_estimate[open_] = now
             open_ = open_[going]
             if not len(open_):
                 break
         assert first is not None
         factor = self._double_factor(tick)
-        if not settle:
+        if not of_weights:
             margin = 1.0 if factor is not None else MARGIN
             rounding = ROUNDING * np.abs(weights).sum(axis=0) / size
-            return Refined(weights, margin * doubt + rounding, first, factor is not None)
+            return Refined(weights, margin * error_estimate + rounding, first, factor is not None)
         if factor is not None:
             # Data of a reverse pass are sums, whose rounding the inverse of the system enlarges:
             # most where neighbours have different signs.
             signs = ROUNDING / 2.0 * np.where(np.arange(len(right)) % 2, 1.0, -1.0)
             most = np.abs(weights).max(axis=0)
             noise = np.abs(factor.solve(right * signs[:, None])).max(axis=0)
-            doubt += noise / np.where(most > 0.0, most, 1.0)
-        return Refined(weights, doubt, first, factor is not None)
+            error_estimate += noise / np.where(most > 0.0, most, 1.0)
+        return Refined(weights, error_estimate, first, factor is not None)
 
     def _step(
         self,
@@ -182,7 +184,7 @@ class System:
         size: FloatArray,
         tick: Tick,
         *,
-        settle: bool,
+        of_weights: bool,
     ) -> tuple[FloatArray, FloatArray]:
         """Return the change of weights (n, m) in a round, and the error of their field before it.
 
@@ -192,11 +194,11 @@ class System:
         if (factor := self._double_factor(tick)) is not None:
             exact = factor.solve(lacking)
             return exact, self._field(exact)
-        whole, residuals, r = self._whole(), self._residuals(), lacking.copy()
-        total, z = np.zeros_like(r), whole.solve(r)
+        full_factor, residuals, r = self._full_factor(), self._residuals(), lacking.copy()
+        total, z = np.zeros_like(r), full_factor.solve(r)
         p, rz = z.copy(), (r * z).sum(axis=0)
-        wrong = self._field(z)
-        on = np.flatnonzero(((wrong > VERIFIED * size) | settle) & (rz > 0.0))
+        field_error = self._field(z)
+        on = np.flatnonzero(((field_error > VERIFIED * size) | of_weights) & (rz > 0.0))
         for _ in range(STEPS):
             if not len(on):
                 break
@@ -210,40 +212,40 @@ class System:
             most = np.abs(weights[:, on] + total[:, on]).max(axis=0)
             going = self._field(change) > SETTLED * size[on]
             on = on[going | (np.abs(change).max(axis=0) > SETTLED * most)]
-            z = whole.solve(r[:, on])
+            z = full_factor.solve(r[:, on])
             new = (r[:, on] * z).sum(axis=0)
             p[:, on] = z + p[:, on] * (new / rz[on])
             rz[on] = new
             on = on[new > 0.0]
-        return total, wrong
+        return total, field_error
 
     def _field(self, weights: FloatArray) -> FloatArray:
         """Return the largest absolute component of each column's field, (m,), of weights (n, m).
 
-        At the points `between` the nodes.
+        At the points `check_points` the nodes.
         """
         features, normals = self.place
         if "checks" not in self._kept:
-            points = between(features)
+            points = check_points(features)
             self._kept["checks"] = matrix(self.basis, (points, None), (features, None))
         checks: FloatArray = self._kept["checks"]
         along = [weights] if normals is None else [weights * n[:, None] for n in normals.T]
         found = [np.abs(checks @ each).max(axis=0, initial=0.0) for each in along]
         return np.asarray(np.max(found, axis=0))
 
-    def _whole(self) -> Factor:
+    def _full_factor(self) -> Factor:
         """Return a factor of all rows; for those that were left out it is not exact (`SHIFT`)."""
         if not len(self.factor.dropped):
             return self.factor
         if "whole" not in self._kept:
             self._kept["whole"] = with_dropped_rows(self.basis, self.place, self.factor)
-        whole: Factor = self._kept["whole"]
-        return whole
+        full_factor: Factor = self._kept["whole"]
+        return full_factor
 
     def _double_factor(self, tick: Tick) -> DoubleFactor | None:
         """Return the factor with twice the digits; None of a large or a singular system."""
         if "double" not in self._kept:
-            small = self.place[0].shape[1] <= DENSE and usable(self.basis)
+            small = self.place[0].shape[1] <= DENSE and supports(self.basis)
             found = DoubleFactor.of(self._residuals(), tick) if small else None
             self._kept["double"] = found
         factor: DoubleFactor | None = self._kept["double"]
@@ -285,7 +287,7 @@ def with_dropped_rows(
     return Factor(lower, np.concatenate([kept, dropped]), np.empty(0, np.int64))
 
 
-def between(features: FloatArray) -> FloatArray:
+def check_points(features: FloatArray) -> FloatArray:
     """Return points (k, m) halfway between nodes with features (k, n), adjacent and distant ones.
 
     Adjacent in the order of the nodes, or a sixteenth, a quarter and a half of all nodes apart.

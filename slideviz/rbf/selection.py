@@ -27,7 +27,7 @@ BLOCK_LIMIT = 128
 
 TIE = 1e-4
 """Errors with a smaller relative difference may count as equal: far above their rounding, far
-below what matters for the choice. `favour` decides between them."""
+below what matters for the choice. `tie_breaker` decides between them."""
 
 FALL = 0.9
 """An error has fallen when it is below this part of the lowest one before."""
@@ -55,7 +55,7 @@ def newton(
         Of all rows of the pool, those of a block together, p the sum of all p_k.
     nodes, factor : (p,), (p,)
         The node of each row (all rows of a node are picked together), and the node's factor
-        (`favour`), with which its error is multiplied to decide between equal errors.
+        (`tie_breaker`), with which its error is multiplied to decide between equal errors.
     count, floor
         Number of nodes, and the error below which to stop (the first is always taken).
 
@@ -100,7 +100,7 @@ def newton(
     return np.array(picked, np.int64), [f[:, :k] for f, k in zip(basis, used, strict=True)]
 
 
-def favour(coords: FloatArray) -> FloatArray:
+def tie_breaker(coords: FloatArray) -> FloatArray:
     """Return a factor for the error of each candidate, (c,), that decides between equal errors.
 
     It grows from 1 to 1 + TIE along a direction that no symmetry of a mesh is likely to have: no
@@ -134,7 +134,7 @@ def pool(
     Parameters
     ----------
     errors : (c,)
-        Of each candidate, times its ``favour``; negative where it cannot be picked.
+        Of each candidate, times its ``tie_breaker``; negative where it cannot be picked.
     vectors : (c, d)
         The errors as vectors in the frame.
     chosen, chosen_in_level

@@ -43,7 +43,7 @@ def find_period(
     """Return periodic pairs, frame, coordinates (n, d) in it, and representatives (n,) of nodes.
 
     The representative of a node is the one of its periodic images that stands for all of them in
-    the system; of a node without images, itself (`Classes.stands`).
+    the system; of a node without images, itself (`Classes.representative`).
 
     Raises
     ------
@@ -56,8 +56,10 @@ def find_period(
     frame, coords = make_frame(inside, pairs, periodic_distance=periodic)
     if mesh.halo is not None:
         coords = frame.coords(mesh.points)
-    stands = find_images(pairs if periodic else (), frame, coords, boundary.nodes, mesh.extent)
-    return pairs, frame, coords, stands
+    representative = find_images(
+        pairs if periodic else (), frame, coords, boundary.nodes, mesh.extent
+    )
+    return pairs, frame, coords, representative
 
 
 def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
@@ -72,15 +74,15 @@ def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
 
 
 def find_classes(
-    case: Case, mesh: Mesh, boundary: Boundary, fans: Fans, frame: Frame, stands: IntArray
+    case: Case, mesh: Mesh, boundary: Boundary, fans: Fans, frame: Frame, representative: IntArray
 ) -> Classes:
-    """Return the classes of all nodes, given their representatives ``stands`` (n,)."""
+    """Return the classes of all nodes, given their representatives ``representative`` (n,)."""
     normals = fan_normals(boundary, fans, mesh.points)
     return classify(
         fans,
         fan_roles(boundary, fans, case.roles),
         frame.turned_back(frame.coords(mesh.points[fans.fan_node]), normals),
-        stands,
+        representative,
         sliding=case.sliding,
         periodic=case.periodic,
         feature_angle_deg=case.feature_angle_deg,

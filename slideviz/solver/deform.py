@@ -16,7 +16,7 @@ from slideviz.errors import DeformError, UnsoundError
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
-from slideviz.rbf.problem import Watch
+from slideviz.rbf.problem import PhaseTimer
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping, problem_at, renumbered
 from slideviz.solver.steps import Progress, Step, Trial
@@ -84,12 +84,14 @@ def deform(
     1 [0.   1.28 2.5 ]
     """
     report = progress or (lambda _: None)
-    watch = Watch(lambda phase, fraction: report(Progress(1, max(1, case.steps), phase, fraction)))
+    timer = PhaseTimer(
+        lambda phase, fraction: report(Progress(1, max(1, case.steps), phase, fraction))
+    )
     if setup is None:
-        with watch.phase("classify"):
+        with timer.phase("classify"):
             setup = make_setup(case, mesh)
     require_memory(setup, case)
-    stepping = Stepping(case, mesh, setup, report, watch.seconds)
+    stepping = Stepping(case, mesh, setup, report, timer.seconds)
     yield from all_steps(stepping)
 
 

@@ -18,7 +18,7 @@ from slideviz.rbf.axis import corners as corners_of
 from slideviz.rbf.axis import on_axis
 from slideviz.rbf.classify import Classes
 from slideviz.rbf.frames import Frame
-from slideviz.rbf.images import Spread, require_free
+from slideviz.rbf.images import ImageDisplacements, require_free
 from slideviz.solver.classes import find_classes
 from slideviz.solver.intersection import folding_message, intersection_message, jump_message
 
@@ -119,7 +119,7 @@ def prescribed(
     vectors = frame.difference(mesh.points[moved.nodes], moved.vectors)
     largest = float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
     allowed = tolerance * largest + ROUNDING * largest_coordinate(mesh.points)
-    spread = Spread(moved.nodes, vectors, classes.stands)
+    spread = ImageDisplacements(moved.nodes, vectors, classes.representative)
     spread.require_alike(allowed)
     follow = np.setdiff1d(classes.moving, moved.nodes)
     if len(follow):

@@ -29,7 +29,7 @@ from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import COINCIDENT
 from slideviz.rbf.methods import SLIDING_METHODS
-from slideviz.rbf.problem import GreedySettings, Problem, Solution, Watch
+from slideviz.rbf.problem import GreedySettings, PhaseTimer, Problem, Solution
 from slideviz.rbf.projection import Tracks, find_tracks
 from slideviz.solver.classes import find_classes, find_period, roles_of_copies
 from slideviz.solver.prescribed import displaced, image_tolerance, prescribed
@@ -84,7 +84,7 @@ class Setup:
     """The edges and surfaces along which nodes slide."""
     pairs: tuple[Pair, ...]
     """Periodic pairs of markers."""
-    solve: Callable[[Problem, Watch], Solution]
+    solve: Callable[[Problem, PhaseTimer], Solution]
     """Solves one step by the method of the case."""
     fitted_radius: float
     """The support radius that fits the motion, whatever the case says."""
@@ -111,7 +111,7 @@ class Setup:
 
     def once(self, nodes: IntArray) -> np.ndarray:
         """Return a mask (k,) of the nodes (k,) that represent their images, or have none."""
-        return np.asarray(self.classes.stands[nodes] == nodes)
+        return np.asarray(self.classes.representative[nodes] == nodes)
 
     def constraints(self, coords: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return nodes (q,) and unit normals (q, d) along which sliding nodes may not move.
@@ -190,9 +190,11 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
     asked, (case, notes) = case, roles_of_copies(case, mesh)
     boundary = boundary_of(mesh)
     fans = find_fans(boundary, mesh.points, case.feature_angle_deg)
-    pairs, frame, coords, stands = find_period(case, mesh, boundary)
+    pairs, frame, coords, representative = find_period(case, mesh, boundary)
     beyond = 0 if mesh.halo is None else len(mesh.halo.outer)
-    classes = replace(find_classes(case, mesh, boundary, fans, frame, stands), beyond=beyond)
+    classes = replace(
+        find_classes(case, mesh, boundary, fans, frame, representative), beyond=beyond
+    )
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
     tolerance = TOLERANCE if moved else image_tolerance(case, mesh, pairs)
@@ -217,8 +219,8 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
         shift=frame.shift() if case.periodic in ("fixed", "moving") and pairs else None,
         reach=REACH * largest,
     )
-    second = np.flatnonzero(stands != np.arange(len(stands)))
-    images = np.stack([stands[second], second], axis=1)
+    second = np.flatnonzero(representative != np.arange(len(representative)))
+    images = np.stack([representative[second], second], axis=1)
     angle = frame.period if frame.cylindrical else 0.0
     basis = Basis(support_radius(case, mesh, moved), angle, case.kernel)
     return Setup(
@@ -248,7 +250,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
 
 def _method(
     case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray
-) -> Callable[[Problem, Watch], Solution]:
+) -> Callable[[Problem, PhaseTimer], Solution]:
     """Return the function that solves one step, by METHOD and SLIDING_MODE of the case."""
     if case.method == "idw":
         from slideviz.baselines.idw import deform_idw
@@ -306,8 +308,10 @@ def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntAr
     if len(some):
         from scipy.spatial import cKDTree  # takes long to load
 
-        twins = some[cKDTree(mesh.points[some]).query_pairs(apart, output_type="ndarray")]
-        links = np.concatenate([twins.reshape(-1, 2), images])
+        coincident_pairs = some[
+            cKDTree(mesh.points[some]).query_pairs(apart, output_type="ndarray")
+        ]
+        links = np.concatenate([coincident_pairs.reshape(-1, 2), images])
     out = np.arange(len(mesh.points))
     nodes, ends = np.unique(links, return_inverse=True)
     label = components(len(nodes), *ends.reshape(links.shape).T)
@@ -323,4 +327,4 @@ def _candidates(classes: Classes, known: IntArray) -> int:
     ``known`` (a,) are the moving and fixed nodes.
     """
     nodes = np.concatenate([known, classes.edge, classes.surface])
-    return int((classes.stands[nodes] == nodes).sum())
+    return int((classes.representative[nodes] == nodes).sum())

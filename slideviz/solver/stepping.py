@@ -20,7 +20,7 @@ from slideviz.rbf.constraint_rows import AGREE
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import largest_misfit, misfits
 from slideviz.rbf.kernels import KERNELS
-from slideviz.rbf.problem import Problem, Solution, Watch
+from slideviz.rbf.problem import PhaseTimer, Problem, Solution
 from slideviz.rbf.refine import NOTED, TRUSTED
 from slideviz.solver.growth import farthest_node, stray_warning, unsoundness
 from slideviz.solver.setup import Setup
@@ -74,16 +74,16 @@ class Stepping:
         while ahead:
             part, halvings = ahead[0]
             total = index + len(ahead)
-            watch = Watch(self._phase_report(index + 1, total), seconds)
+            timer = PhaseTimer(self._phase_report(index + 1, total), seconds)
             goal = setup.coords[setup.known] + setup.target * part
-            solution = one_step(setup, coords, goal, watch, before)
+            solution = one_step(setup, coords, goal, timer, before)
             moved = displaced_coords(setup, coords, solution.displacement, goal)
             points = cartesian(setup.frame, mesh.points, setup.coords, moved)
             if mesh.halo is not None:
                 points, moved = with_halo_copies(setup, mesh, mesh.halo, points, moved)
             if not within(points, np.finfo(float).max):
                 raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
-            step = self._made(index + 1, total, points, solution, watch, part)
+            step = self._made(index + 1, total, points, solution, timer, part)
             unsound = unsoundness(setup, mesh, solution, moved, part)
             failure = UnsoundError(f"step {index + 1}: {unsound}") if unsound else None
             if halve:
@@ -111,7 +111,9 @@ class Stepping:
             if self.rate is None and self.case.method == "rbf":
                 farthest = farthest_node(mesh.points, points)
                 stray = stray_warning(setup, mesh, points, farthest)
-            least = max(least, (solution.doubt, solution.refined, index, solution.condition))
+            least = max(
+                least, (solution.error_estimate, solution.refined, index, solution.condition)
+            )
             misfit, apart = self._misfit(step)
             yield replace(
                 step,
@@ -162,7 +164,7 @@ class Stepping:
         total: int,
         points: FloatArray,
         solution: Solution,
-        watch: Watch,
+        timer: PhaseTimer,
         part: float,
     ) -> Step:
         return Step(
@@ -173,7 +175,7 @@ class Stepping:
             max_error=solution.max_error,
             condition=solution.condition,
             node_counts=self.setup.classes.counts(),
-            seconds=watch.seconds,
+            seconds=timer.seconds,
             warnings=(),
             history=solution.history,
             control=solution.control,
@@ -197,7 +199,7 @@ def one_step(
     setup: Setup,
     coords: FloatArray,
     goal: FloatArray,
-    watch: Watch,
+    timer: PhaseTimer,
     before: Solution | None,
 ) -> Solution:
     """Return the solution of one step from ``coords`` (n, d), with the displacement of all nodes.
@@ -212,7 +214,7 @@ def one_step(
     before : Solution or None
         The solution of the step before.
     """
-    found = setup.solve(problem_at(setup, coords, goal, before), watch)
+    found = setup.solve(problem_at(setup, coords, goal, before), timer)
     first, second = setup.images.T
     found.displacement[second] = found.displacement[first]
     return found
@@ -316,22 +318,25 @@ def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
     )
 
 
-def _doubt_warning(doubt: float, refined: float, index: int, condition: float) -> list[str]:
+def _doubt_warning(
+    error_estimate: float, refined: float, index: int, condition: float
+) -> list[str]:
     """Return the warning that a solution cannot be trusted, the note that it was refined, or []."""
     nearly = f"the system is nearly singular (condition number {condition:.0e})"
-    if doubt > TRUSTED:
+    if error_estimate > TRUSTED:
         sentence = (
             f"step {index}: {nearly}, so that between the boundary nodes the displacement may be "
-            f"wrong by {wrong_by(doubt, bounded=refined > 0.0)}; use DATA_REDUCTION= YES, a less "
-            "smooth RBF_KERNEL such as wendland-c0, or a smaller INFLUENCE_FACTOR"
+            f"wrong by {wrong_by(error_estimate, bounded=refined > 0.0)}; use "
+            "DATA_REDUCTION= YES, a less smooth RBF_KERNEL such as wendland-c0, or a smaller "
+            "INFLUENCE_FACTOR"
         )
-        return [sentence if doubt > NOTED else Note(sentence)]
+        return [sentence if error_estimate > NOTED else Note(sentence)]
     if refined:
         return [
             Note(
                 f"step {index}: {nearly}; between the boundary nodes its solution would be wrong "
                 f"by {100 * refined:.2g} % of the largest displacement, so it was refined with "
-                f"twice the digits, to {100 * doubt:.2g} %"
+                f"twice the digits, to {100 * error_estimate:.2g} %"
             )
         ]
     return []

@@ -21,7 +21,7 @@ from slideviz.errors import MeshError
 from slideviz.formats.su2b.elements import element_block
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.formats.su2b.partial import Partial, partial_copy, partial_file
-from slideviz.rbf.problem import Watch
+from slideviz.rbf.problem import PhaseTimer
 from slideviz.streaming.converting import text_of_binary
 from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.measuring import MeasuredBlock, PointFiles, QualityCollector, measured
@@ -52,7 +52,7 @@ class Output:
         given: StreamInput,
         metric: Metric,
         output: Path,
-        watch: Watch,
+        timer: PhaseTimer,
         ranks: SerialPool,
         about: str,
         *,
@@ -60,7 +60,7 @@ class Output:
         resume: bool,
         replaces: Path | None,
     ) -> None:
-        self._stack, self._given, self._path, self._watch = stack, given, output, watch
+        self._stack, self._given, self._path, self._watch = stack, given, output, timer
         self._metric, self._ranks, self._is_text, self._replaces = metric, ranks, is_text, replaces
         self._mesh_file, self._zone = given.path, given.zone
         source = BinaryFile(given.path, stack.enter_context(given.path.open("rb")))

@@ -23,7 +23,7 @@ from slideviz.errors import CaseError, NodeError
 from slideviz.formats.su2b.partial import keep_earlier
 from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
 from slideviz.mesh.quality import Quality
-from slideviz.rbf.problem import Watch
+from slideviz.rbf.problem import PhaseTimer
 from slideviz.rbf.projection import Tracks
 from slideviz.solver.deform import Progress, Step, all_steps, require_memory
 from slideviz.solver.growth import Farthest, stray_warning
@@ -178,9 +178,9 @@ def stream(
     is_text = (file_format or output.suffix.lower().removeprefix(".")) == "su2"
     first = "text" if require_su2(path, case.mesh_format) == "su2" else "read"
     remaining = RemainingTime(tell, first, "solve", "evaluate", "quality", *("write",) * is_text)
-    watch = Watch(lambda phase, part: remaining(Progress(total, total, phase, part)))
+    timer = PhaseTimer(lambda phase, part: remaining(Progress(total, total, phase, part)))
     with ExitStack() as stack:
-        with watch.phase("read") as tick:
+        with timer.phase("read") as tick:
             given = stack.enter_context(
                 open_for_run(
                     output,
@@ -201,7 +201,7 @@ def stream(
             given,
             case.quality_metric,
             output,
-            watch,
+            timer,
             ranks,
             about_run(case),
             is_text=is_text,
@@ -212,7 +212,7 @@ def stream(
             note(out.found())
 
         def read() -> Mesh:
-            with watch.phase("read") as tick:
+            with timer.phase("read") as tick:
                 skin = given.skin(tick, ranks)
             remaining.next()
             return skin
@@ -234,7 +234,7 @@ def stream(
         rating.quality(),
         rating.undeformed(),
         folded,
-        watch.seconds,
+        timer.seconds,
     )
 
 
@@ -243,12 +243,12 @@ def _solved(case: Case, read: Callable[[], Mesh], out: Output, tell: Tell) -> In
 
     With STEPS= auto, trials write the points of the whole mesh to ``out`` to rate it.
     """
-    watch = Watch(lambda phase, part: tell(Progress(1, max(1, case.steps), phase, part)))
+    timer = PhaseTimer(lambda phase, part: tell(Progress(1, max(1, case.steps), phase, part)))
     skin = read()
     assert skin.part is not None
     give_back()
     with _numbered(skin.part.points):
-        with watch.phase("classify"):
+        with timer.phase("classify"):
             setup = make_setup(case, skin)
         require_memory(setup, case)
         # Let go of what is not needed any more: cells and joints, and after the steps the tracks.
@@ -265,7 +265,7 @@ def _solved(case: Case, read: Callable[[], Mesh], out: Output, tell: Tell) -> In
             out.displace(InteriorDisplacer(skin, lean, steps), final=False)
             return out.rating(0).quality()
 
-        steps = tuple(all_steps(Stepping(case, skin, setup, tell, watch.seconds, rate)))
+        steps = tuple(all_steps(Stepping(case, skin, setup, tell, timer.seconds, rate)))
     return InteriorDisplacer(skin, lean, steps)
 
 

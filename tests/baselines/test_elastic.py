@@ -537,8 +537,10 @@ def test_forces_are_those_of_the_matrix_and_have_derivatives(dim, kind):
     wanted = (stiffness(mesh) @ moved.ravel()).reshape(moved.shape)
     scale = np.abs(wanted).max()
     np.testing.assert_allclose(forces.of(moved), wanted, atol=1e-13 * scale)
-    ahead, behind = (Forces.at(mesh.points + s * by, parts).of(moved) for s in (1e-6, -1e-6))
+    ahead, carried_error = (Forces.at(mesh.points + s * by, parts).of(moved) for s in (1e-6, -1e-6))
     pushed = forces.pushed(moved, by)
-    np.testing.assert_allclose(pushed, (ahead - behind) / 2e-6, atol=1e-7 * np.abs(pushed).max())
+    np.testing.assert_allclose(
+        pushed, (ahead - carried_error) / 2e-6, atol=1e-7 * np.abs(pushed).max()
+    )
     there, back = (weights * pushed).sum(), (forces.pulled(moved, weights) * by).sum()
     assert there == pytest.approx(back, abs=1e-13 * np.abs(weights * pushed).sum())

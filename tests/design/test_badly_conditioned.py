@@ -16,7 +16,7 @@ import slideviz as sv
 from slideviz.case.model import Case, Rotate, Scale, Translate
 from slideviz.case.reduction import Reduction
 from slideviz.design.accuracy_warnings import warn_of_condition, warn_of_error_estimate
-from slideviz.design.frozen.solve import whole
+from slideviz.design.frozen.solve import full_factor
 from slideviz.errors import ConditionWarning, DeformError, Note, ToleranceWarning
 from slideviz.samples.table import sample
 from slideviz.solver.stepping import _doubt_warning, _dropped_warning
@@ -97,13 +97,15 @@ def test_kernels_that_cannot_be_refined_are_measured_too(kernel):
 
 
 @pytest.mark.parametrize(("doubt", "little"), [(5e-4, True), (2e-3, False)])
-def test_a_small_error_is_a_note(doubt, little):
-    step: Any = SimpleNamespace(condition=1e12, refined=0.0, doubt=doubt)
+def test_a_small_error_is_a_note(error_estimate, little):
+    step: Any = SimpleNamespace(condition=1e12, refined=0.0, error_estimate=error_estimate)
     with pytest.warns(ConditionWarning) as told:
         warn_of_condition([step])
     with pytest.warns(ConditionWarning) as more:
-        warn_of_error_estimate([step], np.array(doubt))
-    said = [each.message.args[0] for each in (*told, *more)] + _doubt_warning(doubt, 0.0, 1, 1e12)
+        warn_of_error_estimate([step], np.array(error_estimate))
+    said = [each.message.args[0] for each in (*told, *more)] + _doubt_warning(
+        error_estimate, 0.0, 1, 1e12
+    )
     assert [isinstance(each, Note) for each in said] == [little] * 3
 
 
@@ -240,4 +242,4 @@ def test_a_derivative_that_cannot_be_trusted_is_told(reduction):
 
 def test_a_singular_system_of_a_design_is_refused():
     with pytest.raises(DeformError, match=r"system of the 2 control rows is singular at this des"):
-        whole(np.ones((2, 2)))
+        full_factor(np.ones((2, 2)))

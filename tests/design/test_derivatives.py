@@ -52,7 +52,7 @@ def alike(deformer, vectors):
         return out
     first: dict[int, int] = {}
     for k, node in enumerate(deformer.nodes.tolist()):
-        other = first.setdefault(int(setup.classes.stands[node]), k)
+        other = first.setdefault(int(setup.classes.representative[node]), k)
         turn = np.eye(mesh.dim)
         if setup.frame.cylindrical:
             apart = setup.coords[node, 1] - setup.coords[deformer.nodes[other], 1]

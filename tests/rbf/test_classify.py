@@ -24,15 +24,15 @@ def found(mesh, roles, method=("ps", "none"), angle=40.0, images=()):
     boundary = find_boundary(mesh)
     fans = find_fans(boundary, mesh.points, angle)
     normals = fan_normals(boundary, fans, mesh.points)
-    stands = np.arange(len(mesh.points))
+    representative = np.arange(len(mesh.points))
     for first, second in images:
-        stands[second] = first
+        representative[second] = first
     role = fan_roles(boundary, fans, roles)
     classes = classify(
         fans,
         role,
         normals,
-        stands,
+        representative,
         sliding=method[0],
         periodic=method[1],
         feature_angle_deg=angle,

@@ -153,11 +153,16 @@ def test_slanted_walls_are_solved_together(tmp_path, monkeypatch):
 
 
 @settings(max_examples=30, deadline=None)
-@given(n=st.integers(0, 30), m=st.integers(1, 30), twins=st.integers(0, 3), seed=st.integers(0, 5))
-def test_a_factor_that_grows_is_the_factor_of_all(n, m, twins, seed):
+@given(
+    n=st.integers(0, 30),
+    m=st.integers(1, 30),
+    coincident_pairs=st.integers(0, 3),
+    seed=st.integers(0, 5),
+)
+def test_a_factor_that_grows_is_the_factor_of_all(n, m, coincident_pairs, seed):
     x = np.random.default_rng(seed).uniform(size=(n + m, 3))
-    if n > twins:
-        x[n : n + twins] = x[:twins][: len(x[n : n + twins])]
+    if n > coincident_pairs:
+        x[n : n + coincident_pairs] = x[:coincident_pairs][: len(x[n : n + coincident_pairs])]
     full = matrix(Basis(2.5), (np.ascontiguousarray(x.T), None))
     first = extend(NOTHING, full[:n, :n])
     grown, whole = extend(first, full[n:]), factorise(full)

@@ -14,7 +14,7 @@ from slideviz.errors import DeformError
 from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.methods import SLIDING_METHODS
-from slideviz.rbf.problem import Problem, Watch
+from slideviz.rbf.problem import PhaseTimer, Problem
 from tests import builders
 from tests.oracles import radial, sliding
 
@@ -197,7 +197,7 @@ def problem(nodes, values, same_as, normals=None):
     )
 
 
-SILENT = Watch(lambda phase, fraction: None)
+SILENT = PhaseTimer(lambda phase, fraction: None)
 
 
 def test_coinciding_nodes_that_agree_are_one_control_node():

@@ -14,7 +14,7 @@ from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.evaluate import Basis, no_tick
 from slideviz.rbf.methods import correct, correction_of
 from slideviz.rbf.problem import GreedySettings, Problem
-from slideviz.rbf.selection import TIE, favour
+from slideviz.rbf.selection import TIE, tie_breaker
 from slideviz.rbf.slide_rows import FansAround, _clusters
 from slideviz.samples.table import sample
 from tests import builders
@@ -167,4 +167,4 @@ def test_fans_are_joined_over_others_between_them_in_any_order():
 @pytest.mark.parametrize("dim", [2, 3])
 def test_no_two_points_of_a_grid_are_favoured_alike(dim):
     points = np.stack(np.meshgrid(*[np.arange(6.0)] * dim), axis=-1).reshape(-1, dim)
-    assert np.diff(np.sort(favour(points))).min() > 1e-4 * TIE
+    assert np.diff(np.sort(tie_breaker(points))).min() > 1e-4 * TIE

@@ -126,12 +126,12 @@ def test_a_slide_is_seen_however_small_it_is_beside_the_way_to_the_boundary(slid
 def tracks_of(mesh, roles, method=("ps", "none"), shift=None):
     boundary = find_boundary(mesh)
     fans = find_fans(boundary, mesh.points)
-    normals, stands = fan_normals(boundary, fans, mesh.points), np.arange(len(mesh.points))
+    normals, representative = fan_normals(boundary, fans, mesh.points), np.arange(len(mesh.points))
     classes = classify(
         fans,
         fan_roles(boundary, fans, roles),
         normals,
-        stands,
+        representative,
         sliding=method[0],
         periodic=method[1],
         feature_angle_deg=40.0,

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from slideviz.rbf import refine
+from slideviz.rbf.double_double import FUNCTIONS, DoubleFactor, Residuals
 from slideviz.rbf.evaluate import Basis, matrix
 from slideviz.rbf.refine import System
 from slideviz.rbf.solve import factorise
-from slideviz.rbf.twofold import FUNCTIONS, DoubleFactor, Residuals
 from tests.oracles import digits
 
 
@@ -90,14 +90,14 @@ def test_the_error_is_measured_and_mended(monkeypatch, turned, dropped, dense):
     first = factor.solve(right)
     refined = system.refined(right, np.ones(right.shape[1]), first)
     assert error(refined.weights) < 0.01 * error(first)
-    assert error(refined.weights) <= refined.doubt.max() + 1e-12
-    assert refined.doubt.max() < 1e-4
+    assert error(refined.weights) <= refined.error_estimate.max() + 1e-12
+    assert refined.error_estimate.max() < 1e-4
     assert refined.exact == (dense > 0)
     if refined.exact:
         off = np.abs(refined.weights - all_digits).max(axis=0)
         assert (off < 1e-12 * np.abs(all_digits).max(axis=0)).all()
         assert 0.3 * error(first) < refined.before.max() < 30.0 * error(first)
-    assert 0.03 * error(first) < system.wrong(right, first).max() < 30.0 * error(first)
+    assert 0.03 * error(first) < system.field_error(right, first).max() < 30.0 * error(first)
 
 
 def test_nodes_in_one_place_have_no_factor_and_are_refined_by_conjugate_gradients():
@@ -108,7 +108,7 @@ def test_nodes_in_one_place_have_no_factor_and_are_refined_by_conjugate_gradient
     right = points[:, :1]
     found = system.refined(right, np.ones(1), system.factor.solve(right))
     assert not found.exact
-    assert found.doubt.max() < 1e-6
+    assert found.error_estimate.max() < 1e-6
 
 
 def test_a_factor_of_several_blocks_has_twice_the_digits():

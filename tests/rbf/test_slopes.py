@@ -34,10 +34,10 @@ def test_slopes_of_radial_sums(kernel, rule):
     dx, dc = rng.standard_normal(x.shape), rng.standard_normal(c.shape)
     w, back = rng.standard_normal((300, 3)), rng.standard_normal((70, 3))
     found = push_positions(basis, x, c, w, moved=dx, moved_controls=dc)
-    ahead, behind = (evaluate(basis, x + h * dx, c + h * dc, w) for h in (H, -H))
+    ahead, carried_error = (evaluate(basis, x + h * dx, c + h * dc, w) for h in (H, -H))
     size = np.abs(found).max()
     # Where a function begins to be zero, its third derivative may jump.
-    np.testing.assert_allclose((ahead - behind) / (2 * H), found, rtol=0, atol=2e-7 * size)
+    np.testing.assert_allclose((ahead - carried_error) / (2 * H), found, rtol=0, atol=2e-7 * size)
     of_targets = pull_positions(basis, x, c, back, w)
     of_controls = pull_positions(basis, c, x, w, back)
     both = (of_targets * dx).sum() + (of_controls * dc).sum()
@@ -62,10 +62,10 @@ def test_slopes_of_inverse_distances(power, rule):
     x, c = nodes(rule, 9, 1), nodes(rule, 20, 2)
     dx, dc, w = rng.random(x.shape), rng.random(c.shape), rng.random((20, 2))
     found = push_positions(basis, x, c, w, moved=dx, moved_controls=dc, power=power)
-    ahead, behind = (
+    ahead, carried_error = (
         sum_powers(basis, x + h * dx, c + h * dc, w, power) for h in (1e-3 * H, -1e-3 * H)
     )
-    np.testing.assert_allclose((ahead - behind) / (2e-3 * H), found, rtol=1e-4)
+    np.testing.assert_allclose((ahead - carried_error) / (2e-3 * H), found, rtol=1e-4)
     back = rng.random((9, 2))
     both = (pull_positions(basis, x, c, back, w, power) * dx).sum()
     both += (pull_positions(basis, c, x, w, back, power) * dc).sum()

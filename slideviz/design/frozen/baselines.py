@@ -25,10 +25,12 @@ class Weighting(Method):
 
         def mean(name: str, targets: IntArray | slice) -> Array:
             merged, given = self._merged(nodes, values)
-            own = self._step.choices(f"weights {name}", lambda: weights.of(value(given)))
+            source_weights = self._step.choices(f"weights {name}", lambda: weights.of(value(given)))
             x = self._features
             at = x if isinstance(targets, slice) else columns(x, targets)
-            return weighted_mean(setup.basis, at, columns(x, merged), given, own, weights.power)
+            return weighted_mean(
+                setup.basis, at, columns(x, merged), given, source_weights, weights.power
+            )
 
         for name, level in (("edge", self._edge), ("surface", self._surface)):
             if len(level):
@@ -37,9 +39,9 @@ class Weighting(Method):
                     free = self._within(level, free)
                 slid = self._project(level, free, name)
                 nodes, values = np.concatenate([nodes, level]), join(values, slid)
-        displacement = self._in_room(mean("all", slice(None)))
+        displacement = self._into_out(mean("all", slice(None)))
         errors = np.linalg.norm(value(values) - value(displacement)[..., nodes, :], axis=-1)
-        displacement = put(displacement, nodes, values, own=True)
+        displacement = put(displacement, nodes, values, overwrite=True)
         most = errors.max(axis=-1, initial=0.0)
         return Solved(displacement, None, nodes, most, np.zeros(most.shape))
 
@@ -61,7 +63,7 @@ class Elasticity(Method):
             gap = np.abs(value(slid) - value(free)).max()
             if self._step.choices("again", lambda: gap > AGREE * setup.basis.radius):
                 displacement = self._balanced(body, "slid", nodes, values)
-        displacement = put(self._in_room(displacement), nodes, values, own=True)
+        displacement = put(self._into_out(displacement), nodes, values, overwrite=True)
         nothing = np.zeros(value(displacement).shape[:-2])
         return Solved(displacement, None, nodes, nothing, nothing)
 

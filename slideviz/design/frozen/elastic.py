@@ -168,15 +168,15 @@ class Equilibrium:
 
     def _moved(self, unknown: Array) -> Array:
         """Return the displacement (..., n, d) of unknowns (..., k, d); zero for known nodes."""
-        own = take(_without(unknown, self._held), self._place[self._inside])
-        own = transform(self._turn[self._inside], own)
-        return put(self._nothing, self._inside, own)
+        free = take(_without(unknown, self._held), self._place[self._inside])
+        turned = transform(self._turn[self._inside], free)
+        return put(self._nothing, self._inside, turned)
 
     def _collected(self, forces: Array) -> Array:
         """Return the forces (..., k, d) on the unknowns, of nodal forces (..., n, d)."""
-        own = take(forces, self._inside)
+        inside = take(forces, self._inside)
         back = np.swapaxes(self._turn[self._inside], 1, 2)
-        found = gather(transform(back, own), self._place[self._inside], self._count)
+        found = gather(transform(back, inside), self._place[self._inside], self._count)
         return _without(found, self._held)
 
     def _directions(self, problem: Problem, normals: Array) -> list[tuple[IntArray, Array]]:
@@ -186,8 +186,8 @@ class Equilibrium:
         `slideviz.baselines.conditions`, on a tape.
         """
         rows = held_rows(problem, self._body, self._place)
-        own = _cartesian(self._body.frame, take(self._coords, problem.normal_nodes), normals)
-        full = join(own, rows.axis) if len(rows.axis) else own
+        cartesian = _cartesian(self._body.frame, take(self._coords, problem.normal_nodes), normals)
+        full = join(cartesian, rows.axis) if len(rows.axis) else cartesian
         if len(rows.images):
             full = put(full, rows.images, transform(rows.back, take(full, rows.images)))
         out: list[tuple[IntArray, Array]] = []

@@ -11,7 +11,13 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
 from slideviz.design.frozen.operations import columns, radial_sum, terms
-from slideviz.design.frozen.solve import LeastSquares, MeasuredSystem, columnwise, solved, whole
+from slideviz.design.frozen.solve import (
+    LeastSquares,
+    MeasuredSystem,
+    columnwise,
+    full_factor,
+    solved,
+)
 from slideviz.design.frozen.tape import (
     Array,
     Variable,
@@ -28,15 +34,15 @@ from slideviz.design.frozen.tape import (
 )
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows
+from slideviz.rbf.double_double import supports
 from slideviz.rbf.evaluate import Basis, matrix
-from slideviz.rbf.exact import parts, row_names
+from slideviz.rbf.exact import parts, row_keys
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Levels
 from slideviz.rbf.refine import System
 from slideviz.rbf.saddle import is_singular, pseudo_inverse, saddle_system
 from slideviz.rbf.solve import NOTHING, Factor, enough_threads, extend
-from slideviz.rbf.twofold import usable
 
 Keep = Callable[[str, Callable[[], Any]], Any]
 """Returns the object kept under a name; calls the function to make it if there is none yet."""
@@ -89,13 +95,13 @@ class FrozenFit:
         refined
             Whether systems are solved with twice the digits.
         checked
-            Whether the error of solutions is estimated (``doubt``).
+            Whether the error of solutions is estimated (``error_estimate``).
         """
         self._basis, self._features, self._dim = basis, features, dim
         self._chosen, self._fixed = chosen, fixed
         tailed = KERNELS[basis.kernel].polynomial
-        self._refined, self._checked = refined and usable(basis), checked and not tailed
-        self.doubt: FloatArray = np.zeros(())
+        self._refined, self._checked = refined and supports(basis), checked and not tailed
+        self.error_estimate: FloatArray = np.zeros(())
         """(...,): as of a ``Solution``."""
         self._rows: TapedRows | None = None
         self._factors: dict[int, tuple[IntArray, Factor]] = {}
@@ -111,7 +117,7 @@ class FrozenFit:
             nodes = np.concatenate([self._rows.nodes, rows.nodes])
             rows = TapedRows(nodes, None, join(self._rows.right, rows.right))
         self._rows = rows
-        names = row_names(ConstraintRows(rows.nodes, None, np.empty((0, 0))))
+        names = row_keys(ConstraintRows(rows.nodes, None, np.empty((0, 0))))
         sums: list[Sum] = []
         for level, wanted in enumerate(levels):
             index = self._chosen(f"{stage} rows {level}", partial(_at, names, wanted))
@@ -129,18 +135,18 @@ class FrozenFit:
         nodes: IntArray | slice,
         found: Sum | None = None,
         *,
-        room: FloatArray | None = None,
+        out: FloatArray | None = None,
     ) -> Array:
         """Return the displacements (..., m, d) of nodes in the frame.
 
-        Of ``found``, or of the fit's. ``room`` (..., m, d) is where they may be written.
+        Of ``found``, or of the fit's. ``out`` (..., m, d) is where they may be written.
         """
         found = found or self.found
         x = self._features
         here = x if isinstance(nodes, slice) else columns(x, nodes)
         if found is None:
             return np.zeros((value(here).shape[1], self._dim))
-        s = radial_sum(self._basis, here, columns(x, found.nodes), found.weights, room)
+        s = radial_sum(self._basis, here, columns(x, found.nodes), found.weights, out)
         if found.tail is not None:
             s = s + product(terms(self._basis, here), found.tail)
         return s
@@ -165,7 +171,7 @@ class FrozenFit:
         right[..., :count, :] = value(rows.right)
         found: Array = solve(right)
         if isinstance(solve, MeasuredSystem):
-            self.doubt = np.maximum(self.doubt, solve.doubt)
+            self.error_estimate = np.maximum(self.error_estimate, solve.error_estimate)
         if any(isinstance(x, Variable) for x in (rows.right, rows.normals, self._features)):
             data = join(rows.right, np.zeros((extra, m))) if extra else rows.right
             met = partial(self._system_times, rows, extra=extra)
@@ -176,15 +182,15 @@ class FrozenFit:
                 if isinstance(solve, MeasuredSystem):
                     forward, back = solve.tangent, solve.adjoint
                 found = solution(met(value(found)) - data, value(found), forward, back)
-        own = take(found, np.arange(count))
+        weights = take(found, np.arange(count))
         tail = None
         if extra:
             tail = take(found, count + np.arange(extra))
             tail = reshape(tail, extra * m // self._dim, self._dim)
         if rows.normals is None:
-            return Sum(rows.nodes, own, tail)
+            return Sum(rows.nodes, weights, tail)
         nodes, place = _firsts(rows.nodes)
-        return Sum(nodes, gather(multiply(rows.normals, own), place, len(nodes)), tail)
+        return Sum(nodes, gather(multiply(rows.normals, weights), place, len(nodes)), tail)
 
     def _system_times(self, rows: TapedRows, found: FloatArray, *, extra: int) -> Array:
         """Return the system times ``found`` (n, m), a constant, for the derivative of the system.
@@ -257,12 +263,12 @@ class FrozenFit:
         """Return the factor of rows with features (k, r) and directions (r, d).
 
         Of all rows, unless refinement meets the rows that the pivot guard leaves out. Raises
-        DeformError where the system is singular (`whole`).
+        DeformError where the system is singular (`full_factor`).
         """
         system = matrix(self._basis, (place, normals))
         with enough_threads(len(system) ** 3 / 3):
             factor = extend(NOTHING, system)
-            return factor if self._refined or not len(factor.dropped) else whole(system)
+            return factor if self._refined or not len(factor.dropped) else full_factor(system)
 
     def _extended(self, place: FloatArray, index: IntArray, level: int) -> Factor:
         """Return the factor of rows without directions, extended from that of the stage before."""
@@ -277,7 +283,7 @@ class FrozenFit:
             grown = extend(factor, system)
             if self._refined or not len(grown.dropped):
                 return grown
-            return whole(matrix(self._basis, (place, None)))
+            return full_factor(matrix(self._basis, (place, None)))
 
     def _saddle(
         self, place: FloatArray, normals: FloatArray | None, name: str

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 
 from slideviz.design.frozen.fit import FrozenFit, TapedRows
-from slideviz.design.frozen.loops import take_over
+from slideviz.design.frozen.loops import add_correction
 from slideviz.design.frozen.method import Method, Solved
-from slideviz.design.frozen.spread import FrozenSpread, chosen_spread, shares
+from slideviz.design.frozen.spread import FrozenCorrection, chosen_correction, shares
 from slideviz.design.frozen.tape import (
     Array,
     Variable,
@@ -57,7 +57,7 @@ class Interpolation(Method):
         for name, level in (("edge", self._edge), ("surface", self._surface)):
             if not len(level):
                 continue
-            free = self._less_behind(fit.at(level), level)
+            free = self._less_carried(fit.at(level), level)
             if setup.tracks.curved:
                 free = self._within(level, free)
             slid = self._project(level, free, name)
@@ -73,10 +73,10 @@ class Interpolation(Method):
             return self._regular()
         setup, fit = self._setup, self._fit()
         fit.add(self._sliding_rows(), self._stages.pop(0), "first")
-        doubt = fit.doubt
+        error_estimate = fit.error_estimate
         sliding = np.concatenate([self._edge, self._surface])
         nodes = np.concatenate([self._known, sliding])
-        free = self._less_behind(fit.at(sliding), sliding)
+        free = self._less_carried(fit.at(sliding), sliding)
         if not setup.tracks.curved:
             free = self._within(sliding, free)
         slid = self._project(sliding, free, "slid")
@@ -86,7 +86,7 @@ class Interpolation(Method):
             return self._finished(fit, nodes, join(self._values, slid))
         values = join(self._values, slid)
         second = self._fit()
-        second.doubt = doubt
+        second.error_estimate = error_estimate
         self._meet(second, nodes, values)
         return self._finished(second, nodes, values)
 
@@ -110,7 +110,7 @@ class Interpolation(Method):
 
     def _meet(self, fit: FrozenFit, nodes: IntArray, values: Array) -> None:
         """Add the rows of nodes with known displacement to a fit, coinciding nodes merged."""
-        merged, data = self._merged(nodes, self._plus_behind(values, nodes))
+        merged, data = self._merged(nodes, self._with_carried(values, nodes))
         stage = f"stage {len(self._stages)}"
         fit.add(TapedRows(merged, None, data), self._stages.pop(0), stage)
 
@@ -120,16 +120,16 @@ class Interpolation(Method):
         d = self._setup.coords.shape[1]
         nodes = np.concatenate([np.repeat(known, d), self._normal_nodes])
         normals = join(np.tile(np.eye(d), (len(known), 1)), self._normals)
-        values = reshape(self._plus_behind(self._values, known), len(known) * d, 1)
-        behind = self._behind(self._normal_nodes)
+        values = reshape(self._with_carried(self._values, known), len(known) * d, 1)
+        carried_error = self._carried_error(self._normal_nodes)
         across: Array = np.zeros((len(self._normal_nodes), 1))
-        if behind is not None:
-            across = dot(behind, self._normals)
+        if carried_error is not None:
+            across = dot(carried_error, self._normals)
         right = join(values, across)
         order = np.argsort(same[nodes], kind="stable")
         nodes, normals, right = nodes[order], take(normals, order), take(right, order)
-        stands = same[nodes]
-        starts = np.flatnonzero(np.r_[True, stands[1:] != stands[:-1]])
+        representative = same[nodes]
+        starts = np.flatnonzero(np.r_[True, representative[1:] != representative[:-1]])
         count = np.diff(np.r_[starts, len(nodes)])
         mixed = np.maximum.reduceat(nodes, starts) != np.minimum.reduceat(nodes, starts)
         keep = np.ones(len(nodes), bool)
@@ -137,7 +137,7 @@ class Interpolation(Method):
             rows = starts[mixed & (count == size), None] + np.arange(size)
             normals, right = self._orthonormal(nodes, normals, right, rows, keep)
         kept = np.flatnonzero(keep)
-        return TapedRows(stands[kept], take(normals, kept), take(right, kept))
+        return TapedRows(representative[kept], take(normals, kept), take(right, kept))
 
     def _orthonormal(
         self, nodes: IntArray, normals: Array, right: Array, rows: IntArray, keep: np.ndarray
@@ -175,10 +175,10 @@ class Interpolation(Method):
         As ``slideviz.rbf.methods._finish``; ``values`` (..., b, d) at boundary ``nodes`` (b,).
         """
         setup = self._setup
-        displacement = self._in_room(fit.at(slice(None), room=self._room))
+        displacement = self._into_out(fit.at(slice(None), out=self._out))
         errors = values - take(displacement, nodes)
-        total = self._plus_behind(errors, nodes)
-        lag = total if setup.reduction is not None else None
+        total = self._with_carried(errors, nodes)
+        carried = total if setup.reduction is not None else None
         size = np.linalg.norm(value(total), axis=-1)
         lost = np.zeros(size.shape[:-1])
         if setup.reduction is None:
@@ -186,31 +186,35 @@ class Interpolation(Method):
             gap = np.linalg.norm(value(errors), axis=-1)
             lost = np.where(inside, gap, 0.0).max(axis=-1, initial=0.0)
 
-        def choose() -> FrozenSpread | None:
+        def choose() -> FrozenCorrection | None:
             most = float(np.linalg.norm(value(values), axis=-1).max(initial=0.0))
             needed = float(np.max(lost)) > LOST * most or len(self._step.dropped) > 0
-            return chosen_spread(setup, value(self._coords), nodes, value(errors), needed=needed)
+            return chosen_correction(
+                setup, value(self._coords), nodes, value(errors), needed=needed
+            )
 
         spread = self._step.choices("correction", choose)
         if spread is not None:
             displacement = self._spread(displacement, spread, errors)
-        displacement = put(displacement, nodes, values, own=True)
+        displacement = put(displacement, nodes, values, overwrite=True)
         most = size.max(axis=-1, initial=0.0)
-        doubt = fit.doubt if setup.reduction is None else np.zeros_like(fit.doubt)
-        return Solved(displacement, lag, nodes, most, lost, doubt=doubt)
+        error_estimate = (
+            fit.error_estimate if setup.reduction is None else np.zeros_like(fit.error_estimate)
+        )
+        return Solved(displacement, carried, nodes, most, lost, error_estimate=error_estimate)
 
-    def _spread(self, displacement: Array, spread: FrozenSpread, errors: Array) -> Array:
+    def _spread(self, displacement: Array, spread: FrozenCorrection, errors: Array) -> Array:
         """Return the displacement with the boundary correction added."""
         setup = self._setup
         means = spread.mixing(value(errors).shape[-2])
         part = self._keep("shares", lambda: shares(setup, self._coords, spread))
-        if displacement is self._room and not isinstance(part, Variable):
-            take_over(self._room, spread.targets, means, part[:, 0], value(errors))
+        if displacement is self._out and not isinstance(part, Variable):
+            add_correction(self._out, spread.targets, means, part[:, 0], value(errors))
             return displacement
         taken = mixed(means, errors)
         taken = multiply(taken, part)
         more = take(displacement, spread.targets) + taken
-        return put(displacement, spread.targets, more, own=True)
+        return put(displacement, spread.targets, more, overwrite=True)
 
 
 def _above(size: FloatArray, least: float) -> np.ndarray:

@@ -36,8 +36,8 @@ def _shift(start, by):  # type: ignore[no-untyped-def]
 
 
 @njit(parallel=True, **_OPTIONS)
-def _rest(at, moved, start, before):  # type: ignore[no-untyped-def]
-    """Do what ``keep_rest`` does, for k designs."""
+def _keep_undeformed(at, moved, start, before):  # type: ignore[no-untyped-def]
+    """Do what ``keep_undeformed`` does, for k designs."""
     n = at.shape[1]
     for task in prange((n + BLOCK - 1) // BLOCK):
         for k in range(at.shape[0]):
@@ -64,8 +64,8 @@ def place(found, nodes, out):  # type: ignore[no-untyped-def]
 
 
 @njit(parallel=True, **_OPTIONS)
-def _taken(out, targets, starts, source, weight, part, lacking):  # type: ignore[no-untyped-def]
-    """Do what ``take_over`` does, with the rows of the sparse matrix."""
+def _add_correction(out, targets, starts, source, weight, part, lacking):  # type: ignore[no-untyped-def]
+    """Do what ``add_correction`` does, with the rows of the sparse matrix."""
     for k in prange(out.shape[0]):
         for row in range(len(targets)):
             i = targets[row]
@@ -160,7 +160,7 @@ def shift(start: FloatArray, by: FloatArray) -> FloatArray:
     return by
 
 
-def take_over(
+def add_correction(
     out: FloatArray, targets: IntArray, means: csr_array, part: FloatArray, lacking: FloatArray
 ) -> None:
     """Add the boundary correction to ``out`` (k, n, d), k designs, at the targets (h,).
@@ -176,10 +176,10 @@ def take_over(
     """
     with one_at_a_time(len(out) * means.nnz * out.shape[-1]):
         lacking = np.ascontiguousarray(lacking)
-        _taken(out, targets, means.indptr, means.indices, means.data, part, lacking)
+        _add_correction(out, targets, means.indptr, means.indices, means.data, part, lacking)
 
 
-def keep_rest(
+def keep_undeformed(
     at: FloatArray, moved: FloatArray, start: FloatArray, before: FloatArray
 ) -> FloatArray:
     """Return points ``at`` (..., n, d), with those of nodes at rest overwritten by ``before``.
@@ -192,14 +192,16 @@ def keep_rest(
     before = before.view()
     before.flags.writeable = False  # as those of a mesh are: the loop is compiled once
     with one_at_a_time(at.size):
-        _rest(at.reshape(-1, *start.shape), moved.reshape(-1, *start.shape), start, before)
+        _keep_undeformed(
+            at.reshape(-1, *start.shape), moved.reshape(-1, *start.shape), start, before
+        )
     return at
 
 
 def to_points(frame: Frame, coords: FloatArray, start: FloatArray, before: FloatArray) -> None:
     """Turn frame coordinates (..., n, d) into points, in place; nodes at rest become ``before``.
 
-    As ``frame.points`` does, but for rounding. Parameters as of ``keep_rest``.
+    As ``frame.points`` does, but for rounding. Parameters as of ``keep_undeformed``.
     """
     if frame.axis is None or frame.origin is None:
         return

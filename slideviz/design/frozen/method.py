@@ -41,29 +41,29 @@ class Solved:
 
     displacement: Array
     """(..., n, d): of all nodes, in the frame."""
-    lag: Array | None
+    carried: Array | None
     """(..., b, d) or None: the errors that the interpolants of all steps so far left at the
     boundary nodes ``of`` (b,); None without data reduction."""
     of: IntArray
     max_error: FloatArray
     lost: FloatArray
-    doubt: FloatArray = made_by(default_factory=lambda: np.zeros(()))
-    """`max_error`, `lost`, `doubt` (...,): as of a ``Solution``."""
+    error_estimate: FloatArray = made_by(default_factory=lambda: np.zeros(()))
+    """`max_error`, `lost`, `error_estimate` (...,): as of a ``Solution``."""
 
 
 class Method(ABC):
     """A method on one step, from one state; run once.
 
-    ``goal`` (..., a, d) are the coordinates of the known nodes after the step, ``room``
+    ``goal`` (..., a, d) are the coordinates of the known nodes after the step, ``out``
     (..., n, d) or None is where the displacement of all nodes may be written.
     """
 
     def __init__(
-        self, step: FrozenStep, before: StepState, goal: Array, room: FloatArray | None
+        self, step: FrozenStep, before: StepState, goal: Array, out: FloatArray | None
     ) -> None:
         self._step, self._setup, self._before = step, step.setup, before
-        self._room = room
-        setup, keep = step.setup, step.constants if step.first else _anew
+        self._out = out
+        setup, keep = step.setup, step.constants if step.first else _uncached
         self._keep, self._coords = keep, before.coords
         self._features = keep("features", lambda: features(setup.frame, before.coords))
         nodes, self._normals = keep("normals", lambda: sliding_normals(setup, before.coords))
@@ -97,23 +97,23 @@ class Method(ABC):
             refuse(int(nodes[row]), int(nodes[first[group[row]]]), float(gap.max()))
         return merged, multiply(gather(values, group, len(merged)), 1.0 / count[:, None])
 
-    def _behind(self, nodes: IntArray) -> Array | None:
+    def _carried_error(self, nodes: IntArray) -> Array | None:
         """Return the errors that all steps before left at boundary nodes (m,); None without."""
-        if self._before.lag is None:
+        if self._before.carried is None:
             return None
         row = np.full(len(self._setup.coords), -1)
         row[self._before.of] = np.arange(len(self._before.of))
-        return take(self._before.lag, row[nodes])
+        return take(self._before.carried, row[nodes])
 
-    def _plus_behind(self, values: Array, nodes: IntArray) -> Array:
+    def _with_carried(self, values: Array, nodes: IntArray) -> Array:
         """Return ``values`` plus the errors that all steps before left at nodes."""
-        behind = self._behind(nodes)
-        return values if behind is None else values + behind
+        carried_error = self._carried_error(nodes)
+        return values if carried_error is None else values + carried_error
 
-    def _less_behind(self, values: Array, nodes: IntArray) -> Array:
+    def _less_carried(self, values: Array, nodes: IntArray) -> Array:
         """Return ``values`` less the errors that all steps before left at nodes."""
-        behind = self._behind(nodes)
-        return values if behind is None else values - behind
+        carried_error = self._carried_error(nodes)
+        return values if carried_error is None else values - carried_error
 
     def _within(self, nodes: IntArray, free: Array) -> Array:
         """Return displacements of sliding nodes without their part along the normals."""
@@ -184,15 +184,15 @@ class Method(ABC):
             turn = np.broadcast_to(np.eye(d), turn.shape)
         return copy[both], origin[both], turn
 
-    def _in_room(self, displacement: Array) -> Array:
-        """Return the displacement, copied to the method's ``room`` if it has one."""
-        if self._room is None or displacement is self._room:
+    def _into_out(self, displacement: Array) -> Array:
+        """Return the displacement, copied to the method's ``out`` if it has one."""
+        if self._out is None or displacement is self._out:
             return displacement
-        self._room[:] = value(displacement)
-        return self._room
+        self._out[:] = value(displacement)
+        return self._out
 
 
-def _anew(_: str, make: Callable[[], Any]) -> Any:
+def _uncached(_: str, make: Callable[[], Any]) -> Any:
     """Make something each time: a ``Keep`` that keeps nothing."""
     return make()
 

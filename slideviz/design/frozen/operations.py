@@ -125,7 +125,7 @@ def radial_sum(
     targets: Array,
     controls: Array,
     weights: Array,
-    room: FloatArray | None = None,
+    out: FloatArray | None = None,
 ) -> Array:
     """Return the sum of weighted radial functions (..., N, d), at targets (k, N).
 
@@ -134,7 +134,7 @@ def radial_sum(
     Parameters
     ----------
     weights : (..., n, d)
-    room : (..., N, d), optional
+    out : (..., N, d), optional
         Where the sums of several designs are written.
     """
     x, c, w = value(targets), value(controls), value(weights)
@@ -143,7 +143,7 @@ def radial_sum(
         return many(basis, c, x, g)
 
     return recorded(
-        many(basis, x, c, w, room),
+        many(basis, x, c, w, out),
         (
             targets,
             lambda t: each_of(lambda each: push_positions(basis, x, c, w, moved=each), t),
@@ -170,7 +170,7 @@ def many(
     targets: FloatArray,
     controls: FloatArray,
     weights: FloatArray,
-    room: FloatArray | None = None,
+    out: FloatArray | None = None,
 ) -> FloatArray:
     """Return the values of `radial_sum`; each radial function is computed once for all weights."""
     if weights.ndim == 2:
@@ -178,7 +178,7 @@ def many(
     ahead, (n, d) = weights.shape[:-2], weights.shape[-2:]
     wide = np.ascontiguousarray(np.moveaxis(weights.reshape(-1, n, d), 0, 1).reshape(n, -1))
     total = targets.shape[1]
-    out = np.empty((wide.shape[1] // d, total, d)) if room is None else room
+    out = np.empty((wide.shape[1] // d, total, d)) if out is None else out
     near = reached(basis, targets, controls, weights)
     if near is None:
         near = np.arange(total)
@@ -224,25 +224,30 @@ def terms(basis: Basis, x: Array) -> Array:
 
 
 def weighted_mean(
-    basis: Basis, targets: Array, sources: Array, values: Array, own: FloatArray, power: float
+    basis: Basis,
+    targets: Array,
+    sources: Array,
+    values: Array,
+    source_weights: FloatArray,
+    power: float,
 ) -> Array:
     """Return means (..., N, d) of values (..., n, d), as ``slideviz.baselines.idw.weighted_means``.
 
     Parameters
     ----------
-    own : (n,)
+    source_weights : (n,)
         The weight g_j of each source.
     """
     x, c, v = value(targets), value(sources), value(values)
 
     def mean(each: FloatArray) -> FloatArray:
-        return each_of(lambda t: weighted_means(basis, x, c, t, own, power=power), each)
+        return each_of(lambda t: weighted_means(basis, x, c, t, source_weights, power=power), each)
 
     out = mean(v)
     if not any(isinstance(part, Variable) for part in (targets, sources, values)):
         return out
-    total = sum_powers(basis, x, c, own[:, None], power)
-    heavy, means = own[:, None] * v, out.copy()  # who owns the outcome may change it
+    total = sum_powers(basis, x, c, source_weights[:, None], power)
+    heavy, means = source_weights[:, None] * v, out.copy()  # who owns the outcome may change it
 
     def pushed(
         moved: FloatArray | None = None, moved_sources: FloatArray | None = None
@@ -251,7 +256,7 @@ def weighted_mean(
             push_positions(
                 basis, x, c, weights, moved=moved, moved_controls=moved_sources, power=power
             )
-            for weights in (heavy, own[:, None])
+            for weights in (heavy, source_weights[:, None])
         )
         return (above - means * below) / total
 
@@ -259,14 +264,14 @@ def weighted_mean(
         above, below = g / total, (g * means).sum(axis=1, keepdims=True) / total
         if of_sources:
             return pull_positions(basis, c, x, heavy, above, power) - pull_positions(
-                basis, c, x, own[:, None], below, power
+                basis, c, x, source_weights[:, None], below, power
             )
         return pull_positions(basis, x, c, above, heavy, power) - pull_positions(
-            basis, x, c, below, own[:, None], power
+            basis, x, c, below, source_weights[:, None], power
         )
 
     def back(g: FloatArray) -> FloatArray:
-        return own[:, None] * sum_powers(basis, c, x, g / total, power)
+        return source_weights[:, None] * sum_powers(basis, c, x, g / total, power)
 
     return recorded(
         out,

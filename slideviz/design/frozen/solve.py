@@ -28,30 +28,30 @@ class MeasuredSystem:
 
     def __init__(self, blocks: list[IntArray], systems: list[System], *, refined: bool) -> None:
         self._blocks, self._systems, self._refined = blocks, systems, refined
-        self.doubt: FloatArray = np.zeros(())
+        self.error_estimate: FloatArray = np.zeros(())
         """(...,): estimated error of each of the last solutions, as a part of its largest datum."""
 
-    def __call__(self, right: FloatArray, *, settle: bool = False) -> FloatArray:
-        """Return the solutions (..., n, m) for right-hand sides, and set ``doubt``.
+    def __call__(self, right: FloatArray, *, of_weights: bool = False) -> FloatArray:
+        """Return the solutions (..., n, m) for right-hand sides, and set ``error_estimate``.
 
-        ``settle``: as of ``System.refined``.
+        ``of_weights``: as of ``System.refined``.
         """
         n, m = right.shape[-2:]
         wide = np.ascontiguousarray(np.moveaxis(right.reshape(-1, n, m), 0, 1).reshape(n, -1))
         largest = np.repeat(np.abs(right).max(axis=(-1, -2), initial=0.0).ravel(), m)
-        out, doubt = np.empty_like(wide), np.zeros(len(largest))
+        out, error_estimate = np.empty_like(wide), np.zeros(len(largest))
         for block, system in zip(self._blocks, self._systems, strict=True):
             with enough_threads(2.0 * len(block) * wide[block].size):
                 found = system.factor.solve(wide[block])
                 if self._refined:
-                    refined = system.refined(wide[block], largest, found, settle=settle)
-                    found, wrong = refined.weights, refined.doubt
+                    refined = system.refined(wide[block], largest, found, of_weights=of_weights)
+                    found, field_error = refined.weights, refined.error_estimate
                 else:
                     parts = [slice(first, first + m) for first in range(0, wide.shape[1], m)]
-                    off = [system.wrong(wide[block, at], found[:, at]) for at in parts]
-                    wrong = np.concatenate(off) / np.where(largest > 0.0, largest, 1.0)
-            out[block], doubt = found, np.maximum(doubt, wrong)
-        self.doubt = doubt.reshape(*right.shape[:-2], m).max(axis=-1)
+                    off = [system.field_error(wide[block, at], found[:, at]) for at in parts]
+                    field_error = np.concatenate(off) / np.where(largest > 0.0, largest, 1.0)
+            out[block], error_estimate = found, np.maximum(error_estimate, field_error)
+        self.error_estimate = error_estimate.reshape(*right.shape[:-2], m).max(axis=-1)
         shaped = np.moveaxis(out.reshape(n, -1, m), 1, 0)
         return np.ascontiguousarray(shaped).reshape(right.shape)
 
@@ -64,7 +64,7 @@ class MeasuredSystem:
             The field of a solution is not accurate to `TRUSTED`.
         """
         found = self(right)
-        worst = float(self.doubt.max(initial=0.0))
+        worst = float(self.error_estimate.max(initial=0.0))
         if worst > TRUSTED:
             warnings.warn(
                 "the system of the derivative is nearly singular: between the boundary nodes it "
@@ -84,8 +84,8 @@ class MeasuredSystem:
         """
         if not self._refined:  # the error of a field is no measure for a gradient
             return solved(self._blocks, [system.factor for system in self._systems], right)
-        found = self(right, settle=True)
-        worst = float(self.doubt.max(initial=0.0))
+        found = self(right, of_weights=True)
+        worst = float(self.error_estimate.max(initial=0.0))
         if worst > TRUSTED:
             warnings.warn(
                 "the system of the gradient is nearly singular: gradients with respect to nodes "
@@ -132,9 +132,9 @@ class LeastSquares:
         constant = partial(self._along, factor=np.ones(len(self.values)))
 
         def outside(t: FloatArray) -> FloatArray:
-            own = np.zeros_like(t)
-            own[..., self.rows, :] = t[..., self.rows, :]
-            return own - constant(t)
+            inside = np.zeros_like(t)
+            inside[..., self.rows, :] = t[..., self.rows, :]
+            return inside - constant(t)
 
         def twice(t: FloatArray) -> FloatArray:
             return self(self(t))
@@ -165,7 +165,7 @@ def solved(blocks: list[IntArray], factors: list[Factor], right: FloatArray) -> 
     return out
 
 
-def whole(system: FloatArray) -> Factor:
+def full_factor(system: FloatArray) -> Factor:
     """Return a factor of all rows of a system (n, n), without the pivot guard.
 
     Raises

@@ -24,7 +24,7 @@ from slideviz.solver.setup import Setup
 
 
 @dataclass(frozen=True, eq=False)
-class FrozenSpread:
+class FrozenCorrection:
     """Which nodes take over the errors of which boundary nodes."""
 
     targets: IntArray
@@ -33,7 +33,7 @@ class FrozenSpread:
     source: IntArray
     weight: FloatArray
     """`row`, `source`, `weight` (k,): one entry for each pair of a target, by its place in
-    ``targets``, and a boundary node, by its place in ``nodes`` of `chosen_spread`, with its weight
+    ``targets``, and a boundary node, by its place in ``nodes`` (b,), with its weight
     in the mean of their errors."""
     radius: float
     """Distance at which the correction ends, in the mesh's length unit."""
@@ -48,14 +48,14 @@ class FrozenSpread:
         return csr_array((self.weight, (self.row, self.source)), shape=shape)
 
 
-def chosen_spread(
+def chosen_correction(
     setup: Setup,
     coords: FloatArray,
     nodes: IntArray,
     errors: FloatArray,
     *,
     needed: bool,
-) -> FrozenSpread | None:
+) -> FrozenCorrection | None:
     """Return the correction of errors at boundary nodes; None where they are not spread.
 
     The radius and the sources are those of `slideviz.rbf.methods.correction_of`.
@@ -85,7 +85,7 @@ def chosen_spread(
     lacking = np.zeros((tree.n, 1))
     found = Correction(tree, lacking, radius).sources(setup.frame.points(coords[targets]))
     hit, nearest, row, source, weight = found
-    return FrozenSpread(
+    return FrozenCorrection(
         targets=targets[hit],
         row=row,
         source=once[source % len(once)],
@@ -96,14 +96,14 @@ def chosen_spread(
     )
 
 
-def shares(setup: Setup, coords: Array, spread: FrozenSpread) -> Array:
+def shares(setup: Setup, coords: Array, spread: FrozenCorrection) -> Array:
     """Return the share (h,) of the error that each target takes over (`slideviz.rbf.field.share`).
 
     It depends on the target's distance from its nearest boundary node.
     """
     frame = setup.frame
-    own = points(frame, take(coords, spread.targets))
+    here = points(frame, take(coords, spread.targets))
     other = take(coords, spread.nearest) + spread.turn[:, None] * frame.shift()
-    gap = length(own - points(frame, other))
+    gap = length(here - points(frame, other))
     q = np.minimum(value(gap) / spread.radius, 1.0)
     return function(gap, share(q), -20.0 * q * (1.0 - q) ** 3 / spread.radius)

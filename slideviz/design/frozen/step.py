@@ -19,7 +19,7 @@ from slideviz.baselines.conditions import Body
 from slideviz.baselines.idw import Weights
 from slideviz.design.frozen.baselines import Elasticity, Weighting
 from slideviz.design.frozen.interpolation import Interpolation
-from slideviz.design.frozen.loops import keep_rest, shift
+from slideviz.design.frozen.loops import keep_undeformed, shift
 from slideviz.design.frozen.method import Method
 from slideviz.design.frozen.operations import coords as coords_of
 from slideviz.design.frozen.operations import points
@@ -44,29 +44,29 @@ class StepState:
 
     coords: Array
     """(..., n, d): positions in the frame."""
-    lag: Array | None = None
+    carried: Array | None = None
     """(..., b, d) or None: the errors that the interpolants of all steps so far left at the
     boundary nodes ``of`` (b,); None without data reduction."""
     of: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
     max_error: FloatArray = made_by(default_factory=lambda: np.zeros(()))
     lost: FloatArray = made_by(default_factory=lambda: np.zeros(()))
-    doubt: FloatArray = made_by(default_factory=lambda: np.zeros(()))
-    """`max_error`, `lost`, `doubt` (...,): as of a ``Solution``."""
+    error_estimate: FloatArray = made_by(default_factory=lambda: np.zeros(()))
+    """`max_error`, `lost`, `error_estimate` (...,): as of a ``Solution``."""
     points: Array = made_by(default_factory=lambda: np.empty((0, 0)))
     """(..., n, d): Cartesian positions; empty before the first step."""
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
+class ChoiceCache:
     """A store of objects that are made once, by name."""
 
-    things: dict[str, Any] = made_by(default_factory=dict)
+    items: dict[str, Any] = made_by(default_factory=dict)
 
     def __call__(self, name: str, make: Callable[[], Any]) -> Any:
         """Return the object of this name; ``make`` makes it the first time."""
-        if name not in self.things:
-            self.things[name] = make()
-        return self.things[name]
+        if name not in self.items:
+            self.items[name] = make()
+        return self.items[name]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ class FrozenStep:
     refined: float = 0.0
     """Where systems are solved with twice the digits, as at the reference: the estimated error of
     ordinary solutions, as of a ``Solution``; else 0."""
-    doubt: float = 0.0
+    error_estimate: float = 0.0
     """As of a ``Solution``, at the reference."""
     weights: Weights | None = None
     """Settings of inverse distance weighting, if that is the method."""
@@ -98,14 +98,14 @@ class FrozenStep:
     """The elastic body, if the method is linear elasticity."""
     reuse: bool = False
     """Whether a later step keeps the factors of the last positions that it began at."""
-    choices: Kept = made_by(default_factory=Kept)
-    constants: Kept = made_by(default_factory=Kept)
+    choices: ChoiceCache = made_by(default_factory=ChoiceCache)
+    constants: ChoiceCache = made_by(default_factory=ChoiceCache)
     """`choices`, `constants`: discrete choices; and, used in the first step only, what depends on
     positions only."""
-    last: Kept = made_by(default_factory=Kept)
+    last: ChoiceCache = made_by(default_factory=ChoiceCache)
     """The last positions that a later step began at, and its factors there."""
 
-    def factors(self, coords: FloatArray) -> Kept:
+    def factors(self, coords: FloatArray) -> ChoiceCache:
         """Return the store of the factors of systems at positions ``coords`` (n, d).
 
         An optimiser asks for points, ``jvp`` and ``vjp`` of one design: factors are most of the
@@ -113,11 +113,11 @@ class FrozenStep:
         """
         if self.first:
             return self.constants
-        at, kept = self.last.things.get("at", (None, Kept()))
+        at, kept = self.last.items.get("at", (None, ChoiceCache()))
         if at is None or not np.array_equal(at, coords):
-            kept = Kept()
+            kept = ChoiceCache()
         if self.reuse:
-            self.last.things["at"] = coords.copy(), kept
+            self.last.items["at"] = coords.copy(), kept
         return kept
 
     def run(self, before: StepState, target: Array) -> StepState:
@@ -132,31 +132,36 @@ class FrozenStep:
         coords, at = self._with_points(state.coords)
         return replace(state, coords=coords, points=at)
 
-    def moved(self, before: StepState, target: Array, room: FloatArray | None = None) -> StepState:
+    def moved(self, before: StepState, target: Array, out: FloatArray | None = None) -> StepState:
         """Return the state after this step, without points, and with copies in a halo not moved.
 
         Parameters
         ----------
-        room : (..., n, d), optional
+        out : (..., n, d), optional
             Where the coordinates are written, if nothing is a variable.
         """
         setup = self.setup
         goal = _shifted(setup.coords[setup.known], multiply(target, np.array([[self.part]])))
-        solved = self._method(self, before, goal, room).run()
+        solved = self._method(self, before, goal, out).run()
         displacement = solved.displacement
         if len(setup.images):
             first, second = setup.images.T
-            displacement = put(displacement, second, take(displacement, first), own=True)
+            displacement = put(displacement, second, take(displacement, first), overwrite=True)
         on = np.flatnonzero(setup.axis)
         if len(on):
             held = np.ones(setup.coords.shape[1])
             held[:2] = 0.0
             still = multiply(take(displacement, on), held[None])
-            displacement = put(displacement, on, still, own=True)
-        moved = _shifted(before.coords, displacement, own=True)
-        moved = put(moved, setup.known, goal, own=True)
+            displacement = put(displacement, on, still, overwrite=True)
+        moved = _shifted(before.coords, displacement, overwrite=True)
+        moved = put(moved, setup.known, goal, overwrite=True)
         return StepState(
-            moved, solved.lag, solved.of, solved.max_error, solved.lost, doubt=solved.doubt
+            moved,
+            solved.carried,
+            solved.of,
+            solved.max_error,
+            solved.lost,
+            error_estimate=solved.error_estimate,
         )
 
     @property
@@ -177,15 +182,15 @@ class FrozenStep:
         donors, copies = halo.donors[rows], halo.receivers[rows]
         donor, start = self.mesh.points[donors], self.mesh.points[copies]
         follow = transform(halo.rotations[rows], take(at, donors) - donor)
-        own = at is not moved
-        at = put(at, copies, _shifted(start, follow), own=own)
-        return put(moved, copies, coords_of(frame, take(at, copies)), own=own), at
+        overwrite = at is not moved
+        at = put(at, copies, _shifted(start, follow), overwrite=overwrite)
+        return put(moved, copies, coords_of(frame, take(at, copies)), overwrite=overwrite), at
 
 
-def _shifted(start: Array, by: Array, *, own: bool = False) -> Array:
-    """Return start + by, written to ``by`` with ``own``; adding zero keeps every bit."""
+def _shifted(start: Array, by: Array, *, overwrite: bool = False) -> Array:
+    """Return start + by, written to ``by`` with ``overwrite``; adding zero keeps every bit."""
     x, u = value(start), value(by)
-    out = shift(x, u if own else u.copy())
+    out = shift(x, u if overwrite else u.copy())
     return recorded(out, (start, lambda t: t, lambda g: g), (by, lambda t: t, lambda g: g))
 
 
@@ -193,5 +198,5 @@ def _at_rest(at: Array, moved: Array, start: FloatArray, before: FloatArray) -> 
     """Return points ``at``; those with coordinates ``moved`` as at the start become ``before``."""
     if at is moved:
         return at
-    keep_rest(value(at), value(moved), start, before)
+    keep_undeformed(value(at), value(moved), start, before)
     return at

@@ -290,17 +290,17 @@ def mixed(matrix: csr_array, x: Array) -> Array:
     )
 
 
-def put(x: Array, rows: IntArray, new: Array, *, own: bool = False) -> Array:
+def put(x: Array, rows: IntArray, new: Array, *, overwrite: bool = False) -> Array:
     """Return x (..., n, c) with some rows (m,), each named once, replaced by ``new``.
 
     Parameters
     ----------
-    own
+    overwrite
         Whether nothing else needs the values of x, so that they may be overwritten.
     """
     v, w = value(x), value(new)
     ahead = np.broadcast_shapes(v.shape[:-2], w.shape[:-2])
-    fits = own and v.shape[:-2] == ahead
+    fits = overwrite and v.shape[:-2] == ahead
     out = v if fits else np.array(np.broadcast_to(v, (*ahead, *v.shape[-2:])))
     out[..., rows, :] = w
     shape = v.shape[-2:]

@@ -344,6 +344,6 @@ class DoubleFactor:
         return np.ascontiguousarray(x.T)
 
 
-def usable(basis: Basis) -> bool:
+def supports(basis: Basis) -> bool:
     """Return whether `Residuals` can be computed for the kernel of ``basis``."""
     return basis.kernel in FUNCTIONS and not KERNELS[basis.kernel].polynomial
