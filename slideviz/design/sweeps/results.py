@@ -166,8 +166,11 @@ class SweepResults:
         write_csv(self.path, [self._head, *rows_in_order], CaseError)
 
     def _cells(self, row: DesignRow) -> list[object]:
+        """Return the cells of a row, each in one line, so that a line cut off is known as such."""
+        problem, *warnings = (" ".join(text.split()) for text in (row.problem, *row.warnings))
+        plain = replace(row, problem=problem, warnings=tuple(warnings))
         values = [row.values[name] for name in self._designs.columns]
-        return cells_of(row.design, values, row, folder=self._folder)
+        return cells_of(row.design, values, plain, folder=self._folder)
 
     def _row(self, line: int, cells: Sequence[str]) -> DesignRow:
         """Return the row of a line; CaseError where the design of that number is another."""

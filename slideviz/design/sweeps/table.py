@@ -206,8 +206,8 @@ def cells_of(
     result = row or DesignRow(number)
     texts = {
         "mesh": result.mesh and os.path.relpath(result.mesh, folder),
-        "warnings": "; ".join(" ".join(text.split()) for text in result.warnings),
-        "problem": " ".join(result.problem.split()),
+        "warnings": "; ".join(result.warnings),
+        "problem": result.problem,
     }
     done = row is not None and not row.problem
     numbers = [getattr(result, name) if done else None for name in NUMBERS]
