@@ -18,8 +18,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.baselines.shapes import ShapeBlock
-from slideviz.baselines.stiffness import OPTIONS, POISSON, _gather, _jacobian, cell_volumes
+from slideviz.baselines.stiffness import (
+    OPTIONS,
+    POISSON,
+    ShapeBlock,
+    _gather,
+    _jacobian,
+    cell_volumes,
+)
 from slideviz.mesh.model import FloatArray, IntArray, sealed
 from slideviz.system.jit_cache import njit
 

@@ -12,8 +12,15 @@ from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Cycle, Interpolant, Levels, PhaseTimer, Problem
 from slideviz.rbf.refine import TRUSTED, System, check_points
-from slideviz.rbf.saddle import saddle_condition, solve_saddle
-from slideviz.rbf.solve import NOTHING, Factor, condition, enough_threads, extend
+from slideviz.rbf.solve import (
+    NOTHING,
+    Factor,
+    condition,
+    enough_threads,
+    extend,
+    saddle_condition,
+    solve_saddle,
+)
 
 
 class ExactFit:

@@ -15,12 +15,12 @@ displacement.
 
 Candidates are sorted by position, and the error of each depends on nothing but the candidate and
 the order of the control nodes: neither numbering nor threads change the selection. Where errors are
-equal but for rounding, as on symmetric meshes, the position decides (`selection.tie_breaker`), so
+equal but for rounding, as on symmetric meshes, the position decides (`level.tie_breaker`), so
 that another processor chooses the same nodes.
 
 Every selection ends: a cycle without a new row is the last, and levels, which may choose the
 same rows again, are given up when the error no longer falls from one to the next, or when they
-have chosen as many rows as there are (`selection.LevelLimit`). Then one last level goes on without
+have chosen as many rows as there are (`level.LevelLimit`). Then one last level goes on without
 a limit. If an error stays above the tolerance, ``short`` says why, and the interpolant of lowest
 error is taken where it is clearly better than the last one (`WORSE`).
 """
@@ -35,9 +35,8 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows
 from slideviz.rbf.exact import row_keys
 from slideviz.rbf.kernels import PLAIN
-from slideviz.rbf.level import Candidates, GreedyLevel
+from slideviz.rbf.level import Candidates, GreedyLevel, LevelLimit, pool
 from slideviz.rbf.problem import Cycle, Interpolant, Levels, PhaseTimer, Problem
-from slideviz.rbf.selection import LevelLimit, pool
 from slideviz.rbf.solve import enough_threads
 
 STALE = 0.3
@@ -246,7 +245,7 @@ class GreedyFit:
             open_[pooled] = False
 
     def _pool(self, errors: FloatArray, residual: FloatArray) -> tuple[int, IntArray]:
-        """Return how many nodes to pick, and the candidates to pick them from (`selection.pool`).
+        """Return how many nodes to pick, and the candidates to pick them from (`level.pool`).
 
         ``errors`` (c,) are multiplied with the candidates' ``tie_breaker``, and negative where one
         cannot be picked; ``residual`` (r, m).

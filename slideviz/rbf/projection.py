@@ -6,13 +6,18 @@ undeformed boundary, in the working frame, so an arc about the axis stays an arc
 node never leaves its curve or surface however many steps are made. With periodic displacement
 pieces are continued beyond the periodic boundaries by their own images.
 
-The derivative of a projection is in `slideviz.rbf.projection_matrices`, which
-`slideviz.design.frozen.method` uses.
+A blade that moves along its hub leaves the place where it stood, and nodes of the hub slide into
+that place, where the hub has no facets. So at the rim of a moving boundary a sliding surface is
+extended flat, in the plane of its last facet, as far as the moving boundary moves.
+
+While the primitive that a closest point is on (facet, edge or vertex) stays the same, the closest
+point of x is ``a + P (x - a)``: P is I - n n^T on a facet, t t^T on an edge and zero at a vertex,
+and is the derivative of the projection (`projection_matrices`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -23,9 +28,129 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import Boundary, corner_vectors, find_joints, unit
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
 from slideviz.rbf.closest import ClosestPoints
-from slideviz.rbf.extension import Place, edge_extension, surface_extension
 from slideviz.system.threads import cores
 from slideviz.terms import ROLES
+
+CLOSE = 2e-6
+"""A closest point is on a facet (or an edge) when the foot of the node on its plane (or line) is
+within this part of the node's distance from it. So a node that slides along a line of the mesh on
+a flat boundary is on a facet, whatever rounding says, and the choice of the search among equally
+near facets does not matter."""
+
+ROUNDING = 1e-9
+"""Part of the facet's size by which that limit is increased."""
+
+
+def projection_matrices(corners: FloatArray, x: FloatArray, closest: FloatArray) -> FloatArray:
+    """Return the derivatives P (m, d, d) of closest points with respect to their nodes.
+
+    Parameters
+    ----------
+    corners : (m, c, d)
+        Of the segment (c = 2) or triangle (c = 3) that each closest point is on.
+    x, closest : (m, d)
+        Nodes, and their closest points on the simplices.
+    """
+    m, count, d = corners.shape
+    size = np.ptp(corners, axis=1).max(axis=1)
+    near = CLOSE * np.linalg.norm(x - closest, axis=1) + ROUNDING * size
+    out, done = np.zeros((m, d, d)), np.zeros(m, bool)
+    if count == 3:
+        out, done = _facets(corners, x, closest, near)
+    sides = [(0, 1)] if count == 2 else [(0, 1), (1, 2), (2, 0)]
+    for one, two in sides:
+        along = corners[:, two] - corners[:, one]
+        length = np.linalg.norm(along, axis=1)
+        use = ~done & (length > 0)
+        t = along / np.where(length > 0, length, 1.0)[:, None]
+        reach = np.einsum("md,md->m", x - corners[:, one], t)
+        foot = corners[:, one] + reach[:, None] * t
+        use &= np.linalg.norm(foot - closest, axis=1) <= near
+        out[use] = t[use, :, None] * t[use, None, :]
+        done |= use
+    return out
+
+
+def _facets(
+    corners: FloatArray, x: FloatArray, closest: FloatArray, near: FloatArray
+) -> tuple[FloatArray, np.ndarray]:
+    """Return projections on planes of triangles (m, 3, 3), and a mask (m,) where these apply.
+
+    They apply where the foot on the plane is within ``near`` (m,) of the closest point; elsewhere
+    the matrix is zero.
+    """
+    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(one, two)
+    area = np.linalg.norm(normal, axis=1)
+    flat = area > 0
+    normal /= np.where(flat, area, 1.0)[:, None]
+    height = np.einsum("md,md->m", x - corners[:, 0], normal)
+    foot = x - height[:, None] * normal
+    on = flat & (np.linalg.norm(foot - closest, axis=1) <= near)
+    out = np.zeros((len(x), 3, 3))
+    out[on] = np.eye(3) - normal[on, :, None] * normal[on, None, :]
+    return out, on
+
+
+Place = Callable[[IntArray], FloatArray]
+"""Returns the corners (m, k, d) of facets or segments (m, k), undeformed and in the frame."""
+
+
+def surface_extension(
+    boundary: Boundary, member: np.ndarray, moving: np.ndarray, place: Place, reach: float
+) -> FloatArray:
+    """Return simplices (s, d, d) that continue a surface (3D) or curve (2D) beyond its moving rim.
+
+    Parameters
+    ----------
+    member : (f,) bool
+        Facets of the surface (3D) or curve (2D).
+    moving : (n,) bool
+        Nodes of the moving boundaries.
+    reach : float
+        Length of the extension, in the mesh's length unit.
+    """
+    one, two = boundary.joints.T
+    rim = np.flatnonzero(member[one] != member[two])
+    rim = rim[moving[boundary.joint_nodes[rim]].all(axis=1)]
+    facet = np.where(member[one[rim]], one[rim], two[rim])
+    ends = place(boundary.joint_nodes[rim])
+    sides = place(boundary.facets[facet])
+    if not len(facet):
+        return np.empty((0, boundary.dim, boundary.dim))
+    out = ends.mean(axis=1) - sides.mean(axis=1)
+    if boundary.dim == 2:
+        return np.concatenate([ends, ends + reach * unit(out)[:, None]], axis=1)
+    along = unit(ends[:, 1] - ends[:, 0])
+    out -= np.einsum("ed,ed->e", out, along)[:, None] * along
+    far = ends + reach * unit(out)[:, None]
+    first = np.stack([ends[:, 0], ends[:, 1], far[:, 1]], axis=1)
+    second = np.stack([ends[:, 0], far[:, 1], far[:, 0]], axis=1)
+    return np.concatenate([first, second])
+
+
+def edge_extension(
+    segments: IntArray, moving: np.ndarray, place: Place, reach: float
+) -> FloatArray:
+    """Return segments (s, 2, d) that continue a chain of segments (m, 2) beyond its moving ends.
+
+    Parameters
+    ----------
+    moving : (n,) bool
+        Nodes of the moving boundaries.
+    reach : float
+        Length of each segment, in the mesh's length unit.
+    """
+    node, count = np.unique(segments, return_counts=True)
+    last = node[(count == 1) & moving[node]]
+    corners = place(segments)
+    found = []
+    for column in (0, 1):
+        rows = np.isin(segments[:, column], last)
+        end, before = corners[rows, column], corners[rows, 1 - column]
+        found.append(np.stack([end, end + reach * unit(end - before)], axis=1))
+    return np.concatenate(found)
+
 
 ROLE_NUMBER: dict[str, int] = {role: number for number, role in enumerate(ROLES)}
 """A number for each role of a marker, to compare arrays of roles."""

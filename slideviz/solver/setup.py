@@ -42,7 +42,7 @@ from slideviz.solver.reduction import (
 )
 
 if TYPE_CHECKING:
-    from slideviz.baselines.conditions import Body
+    from slideviz.baselines.elastic import Body
     from slideviz.baselines.idw import Weights
 
 REACH = 1.5
@@ -265,8 +265,8 @@ def _method(
 
 def elastic_body(mesh: Mesh, frame: Frame, axis: np.ndarray) -> Body:
     """Return the mesh as an elastic body, without its halo."""
-    from slideviz.baselines.conditions import Body
-    from slideviz.baselines.shapes import blocks
+    from slideviz.baselines.elastic import Body
+    from slideviz.baselines.stiffness import blocks
 
     return Body(blocks(without_halo(mesh)[0].cells), frame, axis)
 

@@ -12,8 +12,7 @@ import slideviz as sv
 from slideviz.baselines import elastic, multigrid
 from slideviz.baselines.elastic_forces import Forces
 from slideviz.baselines.multigrid import LinearSolution
-from slideviz.baselines.shapes import _CORNERS, blocks, shape
-from slideviz.baselines.stiffness import Conditions, assemble
+from slideviz.baselines.stiffness import _CORNERS, Conditions, assemble, blocks, shape
 from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
 from slideviz.errors import Cancelled, DeformError
 from slideviz.mesh.model import Cells, Marker, Mesh

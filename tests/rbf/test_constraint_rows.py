@@ -15,8 +15,7 @@ from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import Basis, matrix
 from slideviz.rbf.exact import ExactFit
 from slideviz.rbf.greedy import GreedyFit
-from slideviz.rbf.level import GrowingFactor
-from slideviz.rbf.selection import newton
+from slideviz.rbf.level import GrowingFactor, newton
 from slideviz.rbf.solve import NOTHING, extend, factorise
 from slideviz.samples.table import write_sample
 from tests import builders

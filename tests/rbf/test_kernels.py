@@ -12,8 +12,7 @@ from slideviz.case.reduction import Reduction
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
-from slideviz.rbf.saddle import saddle_condition, solve_saddle
-from slideviz.rbf.solve import _norm, condition
+from slideviz.rbf.solve import _norm, condition, saddle_condition, solve_saddle
 from slideviz.samples.table import sample, write_sample
 from tests import builders
 from tests.slow import one_of_each_fast

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 import slideviz as sv
 from slideviz.case.model import Case, Scale, Translate
 from slideviz.case.reduction import Reduction
+from slideviz.rbf.classify import FansAround, _clusters
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.evaluate import Basis, no_tick
+from slideviz.rbf.level import TIE, tie_breaker
 from slideviz.rbf.methods import correct, correction_of
 from slideviz.rbf.problem import GreedySettings, Problem
-from slideviz.rbf.selection import TIE, tie_breaker
-from slideviz.rbf.slide_rows import FansAround, _clusters
 from slideviz.samples.table import sample
 from tests import builders
 from tests.test_laws import METHODS

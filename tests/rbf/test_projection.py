@@ -11,7 +11,7 @@ from slideviz.mesh.fans import fan_normals, find_fans
 from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.classify import classify, fan_roles
 from slideviz.rbf.closest import ClosestPoints
-from slideviz.rbf.projection import Tracks, find_tracks
+from slideviz.rbf.projection import Tracks, find_tracks, projection_matrices
 from tests import builders
 from tests.oracles import geometry
 
@@ -272,3 +272,56 @@ def test_a_guess_changes_no_distance():
     for guess in (rng.integers(0, 40, size=100), tree.nearest(x)[1]):
         found = np.linalg.norm(tree.nearest(x, guess)[0] - x, axis=1)
         np.testing.assert_allclose(found, plain, rtol=1e-12, atol=1e-14)
+
+
+TRIANGLE = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
+SEGMENT = np.array([[[0.0, 0], [2, 0]]])
+
+
+def derivative(corners, x):
+    x = np.array([x], float)
+    closest, which = ClosestPoints(corners).nearest(x)
+    return projection_matrices(corners[which], x, closest)[0]
+
+
+@pytest.mark.parametrize(
+    ("x", "expected"),
+    [
+        ((0.2, 0.3, 0.4), np.diag([1.0, 1, 0])),
+        ((0.2, -0.3, 0.4), np.diag([1.0, 0, 0])),
+        ((-0.2, -0.3, 0.4), np.zeros((3, 3))),
+        ((0.2, 0.0, 0.4), np.diag([1.0, 1, 0])),
+        ((0.2, -1e-9, 0.4), np.diag([1.0, 1, 0])),
+    ],
+    ids=["facet", "edge", "vertex", "border", "rounding"],
+)
+def test_a_triangle(x, expected):
+    np.testing.assert_allclose(derivative(TRIANGLE, x), expected, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("x", "expected"),
+    [((0.5, 0.2), np.diag([1.0, 0])), ((2.5, 0.2), np.zeros((2, 2)))],
+    ids=["inside", "end"],
+)
+def test_a_segment(x, expected):
+    np.testing.assert_array_equal(derivative(SEGMENT, x), expected)
+
+
+def test_a_node_that_slides_along_a_line_of_the_mesh_is_on_a_facet():
+    """Two triangles in one plane: on their common edge the boundary is as smooth as elsewhere."""
+    quad = np.array([[[0.0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]])
+    for s in np.linspace(0.1, 0.9, 7):
+        np.testing.assert_allclose(derivative(quad, (s, s, 1e-3)), np.diag([1.0, 1, 0]), atol=1e-15)
+
+
+def test_near_a_closest_point_the_map_is_affine():
+    rng = np.random.default_rng(0)
+    corners = rng.random((40, 3, 3))
+    track = ClosestPoints(corners)
+    x = rng.random((200, 3)) * 2 - 0.5
+    closest, which = track.nearest(x)
+    matrix = projection_matrices(corners[which], x, closest)
+    t = 1e-7 * rng.standard_normal(x.shape)
+    moved = track.query(x + t)
+    np.testing.assert_allclose(moved - closest, np.einsum("mij,mj->mi", matrix, t), atol=1e-13)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from slideviz.rbf.evaluate import Basis, evaluate
-from slideviz.rbf.frame_slopes import coords_slopes, features_slopes, points_slopes
-from slideviz.rbf.frames import Frame
+from slideviz.rbf.frames import Frame, coords_slopes, features_slopes, points_slopes
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.slopes import pull_positions, push_positions, sum_powers
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.baselines.conditions import Body
+from slideviz.baselines.elastic import Body
 from slideviz.design.frozen.elastic import Equilibrium
 from slideviz.design.frozen.method import Method, Solved
 from slideviz.design.frozen.operations import columns, weighted_mean

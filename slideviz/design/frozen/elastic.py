@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.baselines.conditions import (
+from slideviz.baselines.elastic import (
     Body,
     cartesian_normals,
     held,
@@ -41,9 +41,9 @@ from slideviz.design.frozen.tape import (
 from slideviz.errors import DeformError
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.classify import RANK_TOLERANCE
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.problem import Problem
-from slideviz.rbf.slide_rows import RANK_TOLERANCE
 from slideviz.rbf.solve import enough_threads
 
 EXACT = 1e-13
@@ -183,7 +183,7 @@ class Equilibrium:
         """Return pairs of blocks of unknowns (h,) and unit directions (h, d) that hold them.
 
         A block is in a pair once. Directions of a block are orthonormal. As ``_projections`` in
-        `slideviz.baselines.conditions`, on a tape.
+        `slideviz.baselines.elastic`, on a tape.
         """
         rows = held_rows(problem, self._body, self._place)
         cartesian = _cartesian(self._body.frame, take(self._coords, problem.normal_nodes), normals)
@@ -222,7 +222,7 @@ def _longer(size: FloatArray, least: float) -> IntArray:
 
 
 def _cartesian(frame: Frame, coords: Array, normals: Array) -> Array:
-    """Return what ``slideviz.baselines.conditions.cartesian_normals`` does, on a tape."""
+    """Return what ``slideviz.baselines.elastic.cartesian_normals`` does, on a tape."""
     if not any(isinstance(x, Variable) for x in (coords, normals)):
         return cartesian_normals(frame, value(coords), value(normals))
     if not frame.cylindrical:

@@ -41,8 +41,15 @@ from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Levels
 from slideviz.rbf.refine import System
-from slideviz.rbf.saddle import is_singular, pseudo_inverse, saddle_system
-from slideviz.rbf.solve import NOTHING, Factor, enough_threads, extend
+from slideviz.rbf.solve import (
+    NOTHING,
+    Factor,
+    enough_threads,
+    extend,
+    is_singular,
+    pseudo_inverse,
+    saddle_system,
+)
 
 Keep = Callable[[str, Callable[[], Any]], Any]
 """Returns the object kept under a name; calls the function to make it if there is none yet."""

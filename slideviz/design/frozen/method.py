@@ -26,7 +26,7 @@ from slideviz.design.frozen.tape import (
 )
 from slideviz.mesh.model import FloatArray, IntArray, largest_coordinate
 from slideviz.rbf.constraint_rows import AGREE, refuse
-from slideviz.rbf.projection_matrices import projection_matrices
+from slideviz.rbf.projection import projection_matrices
 
 if TYPE_CHECKING:
     from slideviz.design.frozen.step import FrozenStep, StepState
@@ -153,7 +153,7 @@ class Method(ABC):
     ) -> tuple[FloatArray, FloatArray]:
         """Return the closest point of each displaced node (m, d), and the projection (m, d, d).
 
-        See `slideviz.rbf.projection_matrices`.
+        See `slideviz.rbf.projection.projection_matrices`.
         """
         tracks = self._setup.tracks
         label, at = tracks.of_node[nodes], base + free

@@ -13,8 +13,7 @@ from slideviz.design.frozen.tape import Array, Linear, Link, Variable, recorded,
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import Basis, evaluate, matrix, reached
 from slideviz.rbf.field import linear_terms
-from slideviz.rbf.frame_slopes import coords_slopes, features_slopes, points_slopes
-from slideviz.rbf.frames import Frame
+from slideviz.rbf.frames import Frame, coords_slopes, features_slopes, points_slopes
 from slideviz.rbf.slopes import pull_positions, push_positions, sum_powers
 from slideviz.rbf.solve import enough_threads
 from slideviz.system.threads import in_parts

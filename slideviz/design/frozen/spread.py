@@ -9,13 +9,7 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from slideviz.design.frozen.operations import points
-from slideviz.design.frozen.tape import (
-    Array,
-    function,
-    length,
-    take,
-    value,
-)
+from slideviz.design.frozen.tape import Array, function, length, take, value
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.field import Correction, share
 from slideviz.rbf.methods import NEGLIGIBLE

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.baselines.conditions import Body
+from slideviz.baselines.elastic import Body
 from slideviz.baselines.idw import Weights
 from slideviz.design.frozen.baselines import Elasticity, Weighting
 from slideviz.design.frozen.interpolation import Interpolation
@@ -23,15 +23,7 @@ from slideviz.design.frozen.loops import keep_undeformed, shift
 from slideviz.design.frozen.method import Method
 from slideviz.design.frozen.operations import coords as coords_of
 from slideviz.design.frozen.operations import points
-from slideviz.design.frozen.tape import (
-    Array,
-    multiply,
-    put,
-    recorded,
-    take,
-    transform,
-    value,
-)
+from slideviz.design.frozen.tape import Array, multiply, put, recorded, take, transform, value
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.rbf.problem import Levels
 from slideviz.solver.setup import Setup
