@@ -28,8 +28,7 @@ from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 from slideviz.rbf.images import FAR
 from slideviz.solver.deform import Progress
-from slideviz.solver.prescribed import displaced
-from slideviz.solver.radius import support_radius
+from slideviz.solver.prescribed import displaced, support_radius
 from slideviz.solver.setup import make_setup
 
 TOGETHER = 128

@@ -19,8 +19,7 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.session.state import Session
-from slideviz.solver.prescribed import displaced
-from slideviz.solver.radius import moving_bodies, support_radius
+from slideviz.solver.prescribed import displaced, moving_bodies, support_radius
 
 DIGITS = 12
 """Significant digits of a centroid, relative to the extent of the mesh, and of a direction."""

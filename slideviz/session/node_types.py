@@ -70,7 +70,7 @@ class NodeTypes:
         return self._types[1]
 
     def _classified(self, mesh: Mesh, case: Case) -> TypedNodes:
-        from slideviz.solver.classes import find_classes, find_period, roles_of_copies
+        from slideviz.solver.domain import find_classes, find_period, roles_of_copies
 
         if not mesh.markers:
             return NOTHING

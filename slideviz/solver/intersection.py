@@ -20,7 +20,7 @@ from slideviz.mesh.jacobians import cross3, dot3
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.topology import facet_vectors, unit
-from slideviz.solver.classes import find_period
+from slideviz.solver.domain import find_period
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import PART, in_parts
 

@@ -1,30 +1,39 @@
-"""The displacements that a case prescribes, at moving nodes and all their images."""
+"""What a case prescribes at the boundary, and the support radius fitted to it."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile, Prescribed
-from slideviz.case.motion import ROUNDING, same
+from slideviz.case.motion import ROUNDING, displacements, same
 from slideviz.errors import CaseError, DeformError
-from slideviz.mesh.fans import Fans, fan_normals
+from slideviz.mesh.fans import components
+from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE, Pair
-from slideviz.mesh.topology import Boundary
-from slideviz.rbf.axis import corners as corners_of
-from slideviz.rbf.axis import on_axis
-from slideviz.rbf.classify import Classes
-from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import ImageDisplacements, require_free
-from slideviz.solver.classes import find_classes
+from slideviz.solver.domain import Domain, find_classes
 from slideviz.solver.intersection import folding_message, intersection_message, jump_message
 
 APART = 100.0
 """Allowed difference of the displacements of images over the largest displacement, divided by their
 mismatch in place over the mesh's extent."""
+
+
+EXTENTS = 2.5
+"""Largest automatic support radius over the extent of the mesh: the thesis's rule, for passages."""
+
+BODIES = 15.0
+"""Automatic support radius over the largest extent of a moving body. A larger one carries a far
+field along where the body turns or stretches, a smaller one gives worse cells beside the body."""
+
+DISPLACEMENTS = 20.0
+"""Automatic support radius over the largest displacement, at least: a body that moves by more than
+its size needs a radius that fits the way."""
 
 
 def displaced(moved: Displacements, mesh: Mesh) -> Displacements:
@@ -80,25 +89,38 @@ def image_tolerance(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> float:
     return min(TOLERANCE, APART * mismatch / mesh.extent)
 
 
-def prescribed(
-    case: Case,
-    mesh: Mesh,
-    moved: Displacements,
-    tolerance: float,
-    *,
-    boundary: Boundary,
-    fans: Fans,
-    classes: Classes,
-    frame: Frame,
-) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
-    """Return moving and fixed nodes (a,), their displacement (a, d) in the frame, and warnings.
+@dataclass(frozen=True, eq=False)
+class BoundaryConditions:
+    """What is prescribed: nodes of known displacement, and that displacement."""
+
+    known: IntArray
+    """(a,): moving and fixed nodes."""
+    target: FloatArray
+    """(a, d): their displacement in the frame after the last step."""
+    moved: Displacements
+    """Of moving nodes, as `displaced` returns it."""
+    warnings: tuple[str, ...]
+
+    @cached_property
+    def largest(self) -> float:
+        """Return the largest displacement, in the frame."""
+        return largest_of(self.target)
+
+
+def largest_of(vectors: FloatArray) -> float:
+    """Return the largest length of vectors (k, d); 0 of none."""
+    return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
+
+
+def prescribe(
+    case: Case, mesh: Mesh, domain: Domain, moved: Displacements | None = None
+) -> BoundaryConditions:
+    """Return what a case prescribes at the moving and fixed nodes of a domain.
 
     Parameters
     ----------
-    moved : Displacements
-        What moving nodes are asked for, as `displaced` returns it.
-    tolerance
-        Allowed difference of the displacements of images, over the largest displacement.
+    moved : Displacements, optional
+        Displacements of moving nodes, as ``displaced`` returns them; None: by the case's motions.
 
     Raises
     ------
@@ -107,7 +129,10 @@ def prescribed(
     DeformError
         No node is moving or fixed, or images are asked to move differently.
     """
-    asked = case, mesh, moved.nodes, moved.vectors
+    tolerance = TOLERANCE if moved else image_tolerance(case, mesh, domain.pairs)
+    moved = moved or displaced(displacements(case, mesh), mesh)
+    classes, frame = domain.classes, domain.frame
+    asked = case.change(roles=domain.roles), mesh, moved.nodes, moved.vectors
     problem = intersection_message(*asked) or jump_message(*asked)
     if problem:
         raise CaseError(f"{mesh.name}: {problem}")
@@ -117,17 +142,58 @@ def prescribed(
             f"{mesh.name}: no boundary node has a known displacement; make a marker moving"
         )
     vectors = frame.difference(mesh.points[moved.nodes], moved.vectors)
-    largest = float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
-    allowed = tolerance * largest + ROUNDING * largest_coordinate(mesh.points)
+    allowed = tolerance * largest_of(vectors) + ROUNDING * largest_coordinate(mesh.points)
     spread = ImageDisplacements(moved.nodes, vectors, classes.representative)
     spread.require_alike(allowed)
     follow = np.setdiff1d(classes.moving, moved.nodes)
     if len(follow):
-        alone = find_classes(case, mesh, boundary, fans, frame, np.arange(len(mesh.points)))
-        coords = frame.coords(mesh.points)
-        corners = corners_of(coords, boundary.facets, on_axis(frame, coords))
-        normals = fan_normals(boundary, fans, coords, corners)
-        require_free(spread, follow, alone, normals, allowed)
+        alone = find_classes(
+            asked[0], mesh, domain.boundary, domain.fans, frame, np.arange(len(mesh.points))
+        )
+        require_free(spread, follow, alone, domain.normals, allowed)
     folded = folding_message(*asked)
     warnings = (*moved.warnings, *([f"{folded}; move it less"] if folded else []))
-    return known, spread.at(known), warnings
+    return BoundaryConditions(known, spread.at(known), moved, warnings)
+
+
+def support_radius(case: Case, mesh: Mesh, moved: Displacements) -> float:
+    """Return the support radius R, in the mesh's length unit.
+
+    Parameters
+    ----------
+    moved : Displacements
+        The prescribed displacements.
+    """
+    if case.support_radius is not None:
+        return case.support_radius
+    if case.influence_factor:
+        return case.influence_factor * mesh.extent
+    return fitted_radius(case, mesh, moved)
+
+
+def fitted_radius(case: Case, mesh: Mesh, moved: Displacements) -> float:
+    """Return the support radius of ``INFLUENCE_FACTOR= AUTO``; parameters as `support_radius`."""
+    sizes = np.ptp(moving_bodies(case, mesh, moved), axis=1)
+    farthest = np.linalg.norm(moved.vectors, axis=1).max(initial=0.0)
+    needed = max(BODIES * sizes.max(initial=0.0), DISPLACEMENTS * farthest)
+    return min(EXTENTS * mesh.extent, float(needed) or np.inf)
+
+
+def moving_bodies(case: Case, mesh: Mesh, moved: Displacements) -> FloatArray:
+    """Return the bounding boxes of the moving bodies, (b, 2, d): lowest and highest coordinates.
+
+    A body is a connected part of the moving boundaries. Those of which no node is displaced do not
+    count, unless no node at all is displaced.
+    """
+    inside, names = without_halo(mesh)[0], case.markers_with("moving")
+    tables = [table for name in names for _, table in inside.marker(name).cells.by_type.values()]
+    links = [table[:, [0, k]] for table in tables for k in range(1, table.shape[1])]
+    pairs = np.concatenate([np.empty((0, 2), np.int64), *links])
+    nodes, ends = np.unique(pairs, return_inverse=True)
+    body = components(len(nodes), *ends.reshape(-1, 2).T)
+    boxes = np.full((int(body.max(initial=-1)) + 1, 2, mesh.dim), np.inf)
+    boxes[:, 1] = -np.inf
+    np.minimum.at(boxes[:, 0], body, mesh.points[nodes])
+    np.maximum.at(boxes[:, 1], body, mesh.points[nodes])
+    displaced = np.isin(nodes, moved.nodes[moved.vectors.any(axis=1)])
+    return boxes[np.unique(body[displaced])] if displaced.any() else boxes

@@ -12,6 +12,7 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.classify import Classes
 from slideviz.rbf.problem import GreedySettings
 
 EXACT_NODES = 2000
@@ -33,9 +34,7 @@ LOOSE = 0.1
 """A tolerance above this part of the largest displacement gets a warning."""
 
 
-def sliding_gap(
-    points: FloatArray, facets: IntArray, moving: np.ndarray, sliding: np.ndarray
-) -> float:
+def sliding_gap(points: FloatArray, facets: IntArray, classes: Classes) -> float:
     """Return the smallest distance between a moving and a sliding node on one edge; or inf.
 
     Parameters
@@ -43,8 +42,9 @@ def sliding_gap(
     points : (n, d)
     facets : (f, k)
         Of the boundary, so that a streamed mesh has the same.
-    moving, sliding : (n,) bool
     """
+    moving, sliding = np.zeros((2, len(points)), bool)
+    moving[classes.moving], sliding[classes.sliding] = True, True
     near = facets[moving[facets].any(axis=1) & sliding[facets].any(axis=1)]
     ends = np.stack([near, np.roll(near, -1, axis=1)], axis=-1).reshape(-1, 2)
     ends = np.concatenate([ends, ends[:, ::-1]])

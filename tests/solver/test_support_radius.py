@@ -7,7 +7,7 @@ import slideviz as sv
 from slideviz.case.keys import KEYS
 from slideviz.case.motion import displacements
 from slideviz.errors import ArgumentError
-from slideviz.solver.radius import BODIES, DISPLACEMENTS, EXTENTS, moving_bodies
+from slideviz.solver.prescribed import BODIES, DISPLACEMENTS, EXTENTS, moving_bodies
 from slideviz.solver.setup import make_setup
 from tests.builders import far_field
 

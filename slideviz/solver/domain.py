@@ -1,0 +1,219 @@
+"""The domain of a deformation: a mesh with the roles of its boundaries, whatever the motion is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from slideviz.case.model import Case
+from slideviz.errors import MeshError
+from slideviz.mesh.cached_boundary import boundary_of
+from slideviz.mesh.check import check_size, within
+from slideviz.mesh.fans import Fans, components, fan_normals, find_fans
+from slideviz.mesh.halo import Halo, without_halo
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.nearest import near_duplicates
+from slideviz.mesh.periodic import Pair, pair_up
+from slideviz.mesh.topology import Boundary
+from slideviz.rbf.axis import corners as corners_of
+from slideviz.rbf.axis import hold_on_axis, on_axis
+from slideviz.rbf.classify import Classes, classify, directions, fan_roles
+from slideviz.rbf.frames import Frame, make_frame
+from slideviz.rbf.images import COINCIDENT, find_images
+from slideviz.terms import Role
+
+
+@dataclass(frozen=True, eq=False)
+class Domain:
+    """A mesh with the roles of its boundaries: all that is computed before a motion is known."""
+
+    roles: Mapping[str, Role]
+    """Role of each marker; of halo copies, that of what they copy."""
+    boundary: Boundary
+    """Facets of the boundary."""
+    fans: Fans
+    """The facets around each of its nodes, by marker and between edges."""
+    pairs: tuple[Pair, ...]
+    """Periodic pairs of markers."""
+    frame: Frame
+    coords: FloatArray
+    """(n, d): undeformed positions in the frame."""
+    axis: np.ndarray
+    """(n,) bool: nodes on the axis of a cylindrical frame."""
+    normals: FloatArray
+    """Undeformed unit normals of the fans, in the frame."""
+    classes: Classes
+    held: IntArray
+    """(h,): sliding nodes on the axis that stay in place."""
+    images: IntArray
+    """(p, 2): pairs of periodic images, which move alike; the first represents the second."""
+    same_as: IntArray
+    """(n,): for each node the one that represents all that coincide with it."""
+    halo: Halo | None
+    """Copies that follow their donors."""
+    warnings: tuple[str, ...]
+    """What the user should know of mesh and roles."""
+
+    def once(self, nodes: IntArray) -> np.ndarray:
+        """Return a mask (k,) of the nodes (k,) that represent their images, or have none."""
+        return np.asarray(self.classes.representative[nodes] == nodes)
+
+    def normals_at(self, coords: FloatArray) -> FloatArray:
+        """Return the unit normals of the fans at coordinates (n, d) in the frame."""
+        corners = corners_of(coords, self.boundary.facets, self.axis)
+        return fan_normals(self.boundary, self.fans, coords, corners)
+
+
+def find_domain(case: Case, mesh: Mesh) -> Domain:
+    """Return the domain of a mesh with the roles of a case.
+
+    Raises
+    ------
+    MeshError
+        Periodic markers do not match, a marker element is no side of a cell, or a coordinate is
+        not finite, or too large to compute with.
+    """
+    _require_finite(mesh)
+    check_size(mesh)
+    case, notes = roles_of_copies(case, mesh)
+    boundary = boundary_of(mesh)
+    fans = find_fans(boundary, mesh.points, case.feature_angle_deg)
+    pairs, frame, coords, representative = find_period(case, mesh, boundary)
+    classes = find_classes(case, mesh, boundary, fans, frame, representative)
+    axis = on_axis(frame, coords)
+    normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
+    second = np.flatnonzero(representative != np.arange(len(representative)))
+    images = np.stack([representative[second], second], axis=1)
+    return Domain(
+        roles=case.roles,
+        boundary=boundary,
+        fans=fans,
+        pairs=pairs,
+        frame=frame,
+        coords=coords,
+        axis=axis,
+        normals=normals,
+        classes=replace(classes, beyond=0 if mesh.halo is None else len(mesh.halo.outer)),
+        held=hold_on_axis(*directions(classes, normals), axis)[2],
+        images=images,
+        same_as=_coinciding(mesh, boundary.nodes, images),
+        halo=mesh.halo,
+        warnings=(*mesh.remarks, *notes),
+    )
+
+
+def roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
+    """Return the case with the roles of halo copies replaced, and notes for the user.
+
+    A boundary that is a copy of another one, by the mesh's halo, gets the other's role.
+    """
+    roles, notes = dict(case.roles), []
+    for copy, origin in mesh.halo.sides if mesh.halo is not None else ():
+        role, other = (case.roles.get(name, "fixed") for name in (copy, origin))
+        roles[copy] = other
+        if role == other == "periodic" and case.periodic == "none":
+            notes.append(
+                f"{copy} follows {origin} all the same, whose copy it is by the mesh's "
+                "SEND_RECEIVE markers"
+            )
+        if role != other:
+            notes.append(
+                f"{copy} follows {origin}, whose copy it is by the mesh's SEND_RECEIVE markers; "
+                f"its own role ({role}) has no effect"
+            )
+    return case.change(roles=roles), tuple(notes)
+
+
+def find_period(
+    case: Case, mesh: Mesh, boundary: Boundary
+) -> tuple[tuple[Pair, ...], Frame, FloatArray, IntArray]:
+    """Return periodic pairs, frame, coordinates (n, d) in it, and representatives (n,) of nodes.
+
+    The representative of a node is the one of its periodic images that stands for all of them in
+    the system; of a node without images, itself (`Classes.representative`).
+
+    Raises
+    ------
+    MeshError
+        Periodic markers do not match.
+    """
+    pairs = _pairs(case, without_halo(mesh)[0])
+    periodic = case.periodic != "none"
+    inside = mesh.points if mesh.halo is None else np.delete(mesh.points, mesh.halo.outer, axis=0)
+    frame, coords = make_frame(inside, pairs, periodic_distance=periodic)
+    if mesh.halo is not None:
+        coords = frame.coords(mesh.points)
+    representative = find_images(
+        pairs if periodic else (), frame, coords, boundary.nodes, mesh.extent
+    )
+    return pairs, frame, coords, representative
+
+
+def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
+    """Return the periodic pairs of the case; none where neither images nor frame need them.
+
+    With PERIODIC_MODE= none a rotational case needs them still: they give the cylindrical frame.
+    """
+    names = case.markers_with("periodic")
+    if not names or (case.periodic == "none" and case.periodic_type != "rotational"):
+        return ()
+    return pair_up(mesh, names, case.periodic_type, case.axis, case.origin)
+
+
+def find_classes(
+    case: Case, mesh: Mesh, boundary: Boundary, fans: Fans, frame: Frame, representative: IntArray
+) -> Classes:
+    """Return the classes of all nodes, given their representatives (n,)."""
+    normals = fan_normals(boundary, fans, mesh.points)
+    return classify(
+        fans,
+        fan_roles(boundary, fans, case.roles),
+        frame.turned_back(frame.coords(mesh.points[fans.fan_node]), normals),
+        representative,
+        sliding=case.sliding,
+        periodic=case.periodic,
+        feature_angle_deg=case.feature_angle_deg,
+    )
+
+
+def _require_finite(mesh: Mesh) -> None:
+    """Raise MeshError when a coordinate is NaN or infinite."""
+    if within(mesh.points, np.finfo(float).max):
+        return
+    bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
+    where = ", ".join(f"{v:.6g}" for v in mesh.points[bad[0]])
+    raise MeshError(
+        f"{mesh.name}: node {bad[0]} is at {where}; coordinates must be finite numbers "
+        f"({len(bad)} nodes are not), so correct the mesh"
+    )
+
+
+def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntArray:
+    """Return for each node the one that represents all that coincide with it, (n,); images count.
+
+    It is the first of them by position and not by number, because the selection of control nodes,
+    where it represents all of them, must not depend on how nodes are numbered.
+
+    Parameters
+    ----------
+    boundary_nodes : (b,)
+        The nodes that are compared.
+    images : (p, 2)
+        Pairs of periodic images, which are taken to coincide.
+    """
+    apart = COINCIDENT * mesh.extent
+    some, links = boundary_nodes[near_duplicates(mesh.points[boundary_nodes], apart)], images
+    if len(some):
+        from scipy.spatial import cKDTree  # takes long to load
+
+        close = some[cKDTree(mesh.points[some]).query_pairs(apart, output_type="ndarray")]
+        links = np.concatenate([close.reshape(-1, 2), images])
+    out = np.arange(len(mesh.points))
+    nodes, ends = np.unique(links, return_inverse=True)
+    label = components(len(nodes), *ends.reshape(links.shape).T)
+    order = np.lexsort(mesh.points[nodes].T[::-1])
+    _, first, group = np.unique(label[order], return_index=True, return_inverse=True)
+    out[nodes[order]] = nodes[order][first[group]]
+    return out
