@@ -167,11 +167,10 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
         reach=REACH * conditions.largest,
     )
     warnings = *domain.warnings, *conditions.warnings, *loose, *idle_settings(case)
-    {each.name: getattr(domain, each.name) for each in fields(domain)}
+    of_domain = {each.name: getattr(domain, each.name) for each in fields(domain)}
     angle = frame.period if frame.cylindrical else 0.0
     return Setup(
-        **{each.name: getattr(domain, each.name) for each in fields(domain)}
-        | {"warnings": warnings},
+        **of_domain | {"warnings": warnings},
         known=conditions.known,
         target=conditions.target,
         basis=Basis(support_radius(case, mesh, conditions.moved), angle, case.kernel),
