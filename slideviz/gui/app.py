@@ -12,9 +12,8 @@ from qtpy.QtCore import QCoreApplication, QSettings, QStandardPaths, Qt, QTimer
 from qtpy.QtGui import QSurfaceFormat
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.responsiveness.settings import READ_MS, WARM_UP_MS
-from slideviz.gui.responsiveness.threads import be_quick, ready_numerics
-from slideviz.gui.responsiveness.warmup_thread import prepare_drawing
+from slideviz.gui.responsiveness.threads import be_quick, prepare_drawing, ready_numerics
+from slideviz.gui.responsiveness.timers import READ_MS, WARM_UP_MS
 from slideviz.gui.widgets.error_reporter import caught, crash_log
 from slideviz.gui.widgets.icons import logo
 from slideviz.gui.window import MainWindow

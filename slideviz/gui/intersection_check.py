@@ -6,8 +6,7 @@ import logging
 
 from qtpy.QtCore import QObject
 
-from slideviz.gui.responsiveness.settings import INTERSECTION_MS
-from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.responsiveness.timers import INTERSECTION_MS, later
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.session import intersections
 from slideviz.session.state import Session

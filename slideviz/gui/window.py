@@ -16,7 +16,7 @@ from qtpy.QtWidgets import QDockWidget, QGridLayout, QLabel, QLineEdit, QSpinBox
 from slideviz.case.motion_words import mesh_words
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.actions import Actions
-from slideviz.gui.autosave import Autosave
+from slideviz.gui.autosave import Autosave, SessionRecovery
 from slideviz.gui.dialogs.exports import Exports
 from slideviz.gui.dialogs.help import Help
 from slideviz.gui.docks import Docks, room_for
@@ -29,8 +29,7 @@ from slideviz.gui.panels.method import MethodPanel
 from slideviz.gui.panels.motions import MotionPanel
 from slideviz.gui.panels.run import RunPanel
 from slideviz.gui.panels.worst import WorstPanel
-from slideviz.gui.recovery import SessionRecovery
-from slideviz.gui.responsiveness.warmup_thread import WarmupThread
+from slideviz.gui.responsiveness.threads import WarmupThread
 from slideviz.gui.running import Running
 from slideviz.gui.section_reader import READING, SectionReader
 from slideviz.gui.start import StartPage

@@ -58,8 +58,7 @@ class Bench:
     """A window, the beat of its event loop, and what waits for it."""
 
     def __init__(self, app, folder: Path) -> None:
-        from slideviz.gui.responsiveness.threads import be_quick, ready_numerics
-        from slideviz.gui.responsiveness.warmup_thread import prepare_drawing
+        from slideviz.gui.responsiveness.threads import be_quick, prepare_drawing, ready_numerics
         from slideviz.gui.window import MainWindow
 
         ready_numerics()

@@ -21,8 +21,7 @@ from slideviz.export.film import FilmOptions
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.gui.dialogs import exports as export
-from slideviz.gui.dialogs.film import FilmDialog
-from slideviz.gui.dialogs.film_form import FilmForm, length_words
+from slideviz.gui.dialogs.film import FilmDialog, FilmForm, length_words
 from slideviz.gui.dialogs.picture import PictureDialog
 from slideviz.gui.panels.boundaries import BoundariesPanel
 from slideviz.gui.widgets import questions

@@ -6,7 +6,7 @@ import pytest
 from qtpy.QtCore import QTimer
 
 from slideviz.errors import Cancelled
-from slideviz.gui.responsiveness.piece_runner import PieceRunner
+from slideviz.gui.responsiveness.worker import PieceRunner
 from slideviz.session.pieces import InThread
 
 

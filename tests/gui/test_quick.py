@@ -12,9 +12,9 @@ import pytest
 from qtpy.QtCore import QEvent, QObject
 from qtpy.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
 
-from slideviz.gui.responsiveness import settings, threads, warmup_thread
-from slideviz.gui.responsiveness.settings import GARBAGE_OBJECTS
+from slideviz.gui.responsiveness import threads, timers
 from slideviz.gui.responsiveness.threads import GarbageCollector
+from slideviz.gui.responsiveness.timers import GARBAGE_OBJECTS
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.widgets import plot_image
@@ -172,7 +172,7 @@ def test_old_garbage_is_found_too(tidy):
 
 BACK = """
 import _thread, os, threading, time
-from slideviz.gui.responsiveness import settings, threads
+from slideviz.gui.responsiveness import threads, timers
 
 numbers = {}
 
@@ -189,7 +189,7 @@ def read():
     return [os.getpriority(os.PRIO_PROCESS, numbers[name]) - mine for name in ("library", "python")]
 before = read()
 threads.hold_libraries_back()
-print(before, read(), settings.NICENESS)
+print(before, read(), timers.NICENESS)
 os._exit(0)
 """
 
@@ -226,7 +226,7 @@ def test_numpy_multiplies_in_the_thread_that_asks():
 def test_every_thread_stands_back_before_it_works(window, qtbot, monkeypatch):
     order = []
     monkeypatch.setattr(threads, "stand_back", lambda: order.append("back"))
-    monkeypatch.setattr(warmup_thread.jit_warmup, "warm_up", lambda *_: order.append("warm"))
+    monkeypatch.setattr(threads.jit_warmup, "warm_up", lambda *_: order.append("warm"))
     window.warmup.start()
     qtbot.waitUntil(lambda: len(order) == 2)
     assert order == ["back", "warm"], "before Numba makes its threads, which inherit it"
@@ -247,7 +247,7 @@ def test_python_is_set_up_for_a_window(qapp):
     before = sys.getswitchinterval()
     try:
         collector = threads.be_quick()
-        assert sys.getswitchinterval() == pytest.approx(settings.SWITCH_S)
+        assert sys.getswitchinterval() == pytest.approx(timers.SWITCH_S)
         assert not gc.isenabled()
         assert gc.get_freeze_count() > 1000
         assert collector.parent() is qapp
@@ -259,7 +259,7 @@ def test_python_is_set_up_for_a_window(qapp):
 
 # One place for what steers them ------------------------------------------------------------
 
-GUI = Path(settings.__file__).parents[1]
+GUI = Path(timers.__file__).parents[1]
 STEERING = re.compile(
     r"\bgc\.\w|setswitchinterval\(|setpriority\(|\bnice\(|\bThread\(|Executor\(|QThread|"
     r"set_num_threads\(|ThreadpoolController|(?:setInterval|singleShot)\([1-9]|^[A-Z_]+_MS\b *="
@@ -281,8 +281,8 @@ def test_nothing_else_in_the_window_steers_threads_timers_and_garbage():
 
 
 def test_every_setting_has_its_reason_and_is_used():
-    tree = ast.parse(Path(settings.__file__).read_text())
-    text = "".join(p.read_text() for p in GUI.rglob("*.py") if p != Path(settings.__file__))
+    tree = ast.parse(Path(timers.__file__).read_text())
+    text = "".join(p.read_text() for p in GUI.rglob("*.py") if p != Path(timers.__file__))
     for node, after in zip(tree.body, [*tree.body[1:], None], strict=True):
         if isinstance(node, ast.Assign):
             reason = getattr(getattr(after, "value", None), "value", "")

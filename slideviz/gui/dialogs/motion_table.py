@@ -8,8 +8,7 @@ from qtpy.QtCore import QSize
 from qtpy.QtWidgets import QDialog, QDialogButtonBox, QLabel, QPlainTextEdit, QWidget
 
 from slideviz.errors import SlidevizError
-from slideviz.gui.responsiveness.settings import TABLE_MS
-from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.responsiveness.timers import TABLE_MS, later
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import dialog_buttons, in_column, set_style
 from slideviz.gui.widgets.labels import fixed_font

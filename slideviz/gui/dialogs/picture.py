@@ -24,9 +24,8 @@ from slideviz.export.offscreen import LARGEST, LETTERS, SMALLEST, font_scale
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import BACKGROUNDS, PictureOptions, words_of_size
 from slideviz.export.vector import MOST_CELLS
-from slideviz.gui.responsiveness.piece_runner import PieceRunner, raise_again
-from slideviz.gui.responsiveness.settings import PREVIEW_MS
-from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.responsiveness.timers import PREVIEW_MS, later
+from slideviz.gui.responsiveness.worker import PieceRunner, raise_again
 from slideviz.gui.widgets.build import (
     boxed,
     check_box,

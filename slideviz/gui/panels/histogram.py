@@ -13,8 +13,7 @@ from qtpy.QtGui import QColor, QKeySequence, QMouseEvent, QPainter, QPaintEvent,
 from qtpy.QtWidgets import QLabel
 
 from slideviz.color_scheme import SELECTED_COLOR
-from slideviz.gui.responsiveness.settings import SELECTING_MS
-from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.responsiveness.timers import SELECTING_MS, later
 from slideviz.gui.widgets.build import FoldingRow, check_box, in_column, push_button
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write_plot, is_seen

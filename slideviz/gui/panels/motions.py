@@ -21,9 +21,8 @@ from slideviz.gui.dialogs.motion_table import ask_table
 from slideviz.gui.panels.motion_editor import MotionEditor
 from slideviz.gui.panels.motion_form import KINDS, new_motion
 from slideviz.gui.widgets.build import hint_label, in_column, in_row, tool_button
-from slideviz.gui.widgets.field_watch import FieldWatch
 from slideviz.gui.widgets.labels import elide_items, wrapped
-from slideviz.gui.widgets.panel import Panel
+from slideviz.gui.widgets.panel import FieldWatch, Panel
 from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes

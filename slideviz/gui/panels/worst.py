@@ -14,8 +14,7 @@ from qtpy.QtWidgets import QLabel, QStackedWidget
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.panels.worst_table import WorstModel, WorstTable
-from slideviz.gui.responsiveness.settings import REST_MS
-from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.responsiveness.timers import REST_MS, later
 from slideviz.gui.widgets.build import in_column, in_row, push_button
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import ask_and_write, is_seen, words_label

@@ -10,13 +10,62 @@ from itertools import chain
 import numpy as np
 import pyvista as pv
 from pyvistaqt import QtInteractor
-from qtpy.QtCore import QObject, QPoint, Qt, QTimer, Signal
+from qtpy.QtCore import QCoreApplication, QEvent, QObject, QPoint, Qt, QTimer, Signal
 from qtpy.QtGui import QContextMenuEvent, QKeyEvent, QMouseEvent, QResizeEvent, QWheelEvent
 from qtpy.QtWidgets import QApplication, QWidget
 from vtkmodules.vtkRenderingCore import vtkProp
 
-from slideviz.gui.responsiveness.repaint import RepaintCoalescer
+from slideviz.gui.responsiveness.timers import REPAINT_MS, later
 from slideviz.session.pieces import PART_CELLS, portions
+
+
+class RepaintCoalescer(QObject):
+    """Delays repaints so that a view and the widgets around it are painted together, soon.
+
+    After a change of the scene, Qt handles pending clicks and timers first; then the view is
+    drawn. Labels around it change at the same time, and Qt would paint each at once. In a window
+    with an OpenGL view, every such paint composes the whole window (10 to 20 ms without a graphics
+    card), so the window's update requests are held back until the view is painted.
+    """
+
+    def __init__(self, view: QWidget) -> None:
+        super().__init__(view)
+        self._view = view
+        self._window: QWidget | None = None
+        self._held = False
+        self._timer = later(self, self._paint, REPAINT_MS)
+
+    def ask(self) -> None:
+        """Schedule a repaint."""
+        window = self._view.window()
+        if window is not self._window:
+            self._let_go()
+            window.installEventFilter(self)
+            self._window = window
+        if not self._timer.isActive():
+            self._timer.start()
+
+    def end(self) -> None:
+        """Stop delaying repaints of the window."""
+        self._timer.stop()
+        self._let_go()
+
+    def _paint(self) -> None:
+        self._view.update()
+        self._let_go()
+
+    def _let_go(self) -> None:
+        if self._held and self._window is not None:
+            self._held = False
+            QCoreApplication.postEvent(self._window, QEvent(QEvent.Type.UpdateRequest))
+
+    def eventFilter(self, _window: QObject, event: QEvent) -> bool:
+        if event.type() != QEvent.Type.UpdateRequest or not self._timer.isActive():
+            return False
+        # The event is filtered out and posted again by `_let_go`: Qt takes it for handled.
+        self._held = True
+        return True
+
 
 ONE_LIGHT = 0.95
 """The intensity of the one light that replaces pyvista's five."""

@@ -11,7 +11,7 @@ from qtpy.QtGui import QAction, QActionGroup, QResizeEvent, QTextDocument
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QSlider, QToolButton, QWidget
 
 from slideviz.gui.commands import STEPS
-from slideviz.gui.responsiveness.settings import TICK_MS
+from slideviz.gui.responsiveness.timers import TICK_MS
 from slideviz.gui.widgets.build import tool_button
 from slideviz.gui.widgets.icons import set_icon
 from slideviz.gui.widgets.theme import alarm

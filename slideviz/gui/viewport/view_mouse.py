@@ -13,8 +13,7 @@ from qtpy.QtWidgets import QToolTip
 
 from slideviz.gui.panels.boundaries import boundary_menu
 from slideviz.gui.panels.worst import info_text
-from slideviz.gui.responsiveness.settings import SLOW_FRAME_S, STILL_MS
-from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.responsiveness.timers import SLOW_FRAME_S, STILL_MS, later
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.scene.flat_scene import FlatScene
 from slideviz.scene.scene import Scene

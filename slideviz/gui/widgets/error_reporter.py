@@ -22,8 +22,7 @@ from typing import Protocol
 from qtpy.QtCore import QObject, QtMsgType, Signal, qInstallMessageHandler, qVersion
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.responsiveness.settings import COUNTING_MS
-from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.responsiveness.timers import COUNTING_MS, later
 from slideviz.system.cleanup import is_alive, private_file, private_folder
 
 REST_S = 5.0

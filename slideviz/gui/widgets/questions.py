@@ -15,7 +15,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.gui.responsiveness.settings import ROWS_MS
+from slideviz.gui.responsiveness.timers import ROWS_MS
 from slideviz.gui.widgets.build import decimal_box, dialog_buttons, hint_label
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberBox
