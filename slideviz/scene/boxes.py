@@ -14,8 +14,8 @@ from slideviz.ffd.box import Box
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.surfaces import facet_connectivity, lifted
 from slideviz.scene.color_legend import set_letters
-from slideviz.scene.marked_cell import IN_FRONT
-from slideviz.scene.stage import Layer, Stage
+from slideviz.scene.marked_cells import IN_FRONT
+from slideviz.scene.stage import KeyedLayer
 from slideviz.session.state import Session
 from slideviz.terms import ROLES
 
@@ -29,38 +29,28 @@ FAINT, CLEAR = 0.3, 0.75
 """Opacity of parts that the mesh hides: of undeformed boxes, and of their moved parts."""
 
 
-class BoxLayer(Layer):
+class BoxLayer(KeyedLayer):
     """The lattices of control points of all boxes, undeformed and as moved by the motions.
 
     Parts that the mesh hides are drawn faintly, moved ones clearly. The name of a box is beside its
     first control point, and i, j and k are at the other ends of the edges from there.
     """
 
-    def __init__(self, stage: Stage) -> None:
-        self.stage = stage
-        self._key: tuple[object, ...] = ()
+    names = (BASE, MOVED, BEHIND, f"{MOVED}:behind", LABELS)
 
-    def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
-        self._key = ()
+    def key(self, session: Session) -> tuple[object, ...]:
+        """Return the boxes, their motions and the style, if they are shown."""
+        if session.mesh is None or "ffd" not in session.view.drawn:
+            return ()
+        case, style = session.case, (self.stage.scheme, self.stage.pixel_scale)
+        return session.mesh, box_motions(case), box_definition(case), style
 
-    def update(self, _old: Session | None, new: Session) -> None:
-        """Draw another state of the session."""
-        if new.mesh is None:
+    def draw(self, session: Session) -> None:
+        """Draw the lattices and their labels."""
+        mesh = session.mesh
+        if not self._key or mesh is None:
             return
-        shown = "ffd" in new.view.drawn
-        case = new.case
-        style = self.stage.scheme, self.stage.pixel_scale
-        key = (new.mesh, box_motions(case), box_definition(case), style) if shown else ()
-        if key == self._key:
-            return
-        self._key = key
-        for name in (BASE, MOVED, BEHIND, f"{MOVED}:behind", LABELS):
-            self.stage.remove(name)
-        if shown:
-            self._draw(*lattices(case, new.mesh), new.mesh)
-
-    def _draw(self, boxes: dict[str, Box], moved: dict[str, Box], mesh: Mesh) -> None:
+        boxes, moved = lattices(session.case, mesh)
         lift = 4.0 * self.stage.lift(mesh)
         every = {
             name: (box.points, np.ones(box.points.shape[:3], bool)) for name, box in boxes.items()

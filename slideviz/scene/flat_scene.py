@@ -13,9 +13,9 @@ from slideviz.mesh.quality import INVERTED
 from slideviz.plots.section_paint import Paint
 from slideviz.scene import pick
 from slideviz.scene.camera import Camera
-from slideviz.scene.marked_cell import IN_FRONT
+from slideviz.scene.marked_cells import IN_FRONT
 from slideviz.scene.passages import Period, matrices
-from slideviz.scene.polygon_actor import Instances, PolygonActor, plain_color
+from slideviz.scene.sections import Instances, PolygonActor, plain_color
 from slideviz.scene.stage import Stage
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons

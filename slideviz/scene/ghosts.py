@@ -1,4 +1,4 @@
-"""Ghosts in the scene: transparent boundaries, undeformed or as the motions will move them."""
+"""Previews of a run: transparent ghosts of boundaries, and circles of the support radius."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import pyvista as pv
 from slideviz.case.model import Case
 from slideviz.color_scheme import INTERSECTION_COLOR
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.mesh.surfaces import Surface
+from slideviz.mesh.surfaces import Surface, lifted
 from slideviz.scene import actors
-from slideviz.scene.stage import Layer, Stage
+from slideviz.scene.stage import KeyedLayer, Layer, Stage
+from slideviz.session.motions import support_case, support_key, support_of
 from slideviz.session.state import Session
 from slideviz.terms import ROLES
 
@@ -220,3 +221,58 @@ def is_planned(session: Session) -> bool:
 def _motion(case: Case) -> tuple[object, ...]:
     """Return the moving boundaries and the motions of a case, to be compared."""
     return frozenset(case.markers_with("moving")), tuple(case.motions)
+
+
+NAME, HALO = "support:circles", "support:halo"
+PIECES = 180
+"""Straight pieces of a circle."""
+
+
+class SupportLayer(KeyedLayer):
+    """A circle around the middle of each moving body, or in 3D a sphere as three circles."""
+
+    names = (HALO, NAME)
+
+    def key(self, session: Session) -> tuple[object, ...]:
+        """Return the support radius, the moving bodies and the style, if they are shown."""
+        if session.mesh is None or "support" not in session.view.drawn:
+            return ()
+        style = self.stage.pixel_scale, self.stage.scheme
+        return (*support_key(support_case(session), session.mesh), *style)
+
+    def draw(self, session: Session) -> None:
+        """Draw the circles, if there is a support radius."""
+        if not self._key or session.mesh is None:
+            return
+        radius, boxes = support_of(support_case(session), session.mesh)
+        if not radius:
+            return
+        points = circles(np.mean(boxes, axis=1), radius)
+        lines = np.arange(len(points)).reshape(-1, PIECES + 1)
+        shape = pv.PolyData(
+            lifted(points, 4.0 * self.stage.lift(session.mesh)),
+            lines=np.insert(lines, 0, PIECES + 1, axis=1).ravel(),
+        )
+        # The seam in the background's color keeps the circle apart from the cells.
+        for name, color, width in (
+            (HALO, self.stage.scheme.background, 7.0),
+            (NAME, ROLES["moving"].color, 3.5),
+        ):
+            actor = self.stage.add(shape, name, lighting=False, pickable=False)
+            actor.prop.color = color
+            actor.prop.line_width = width * self.stage.pixel_scale
+
+
+def circles(middles: FloatArray, radius: float) -> FloatArray:
+    """Return the points (m, d) of circles about ``middles`` (b, d), each closed and together.
+
+    In 3D there are three about each, in the planes of the axes.
+    """
+    angle = np.linspace(0.0, 2.0 * np.pi, PIECES + 1)
+    dim, found = middles.shape[1], []
+    for one in range(dim):
+        for other in range(one + 1, dim):
+            round_ = np.zeros((PIECES + 1, dim))
+            round_[:, one], round_[:, other] = radius * np.cos(angle), radius * np.sin(angle)
+            found.append(round_)
+    return (middles[:, None, None] + np.array(found)).reshape(-1, dim)

@@ -17,22 +17,21 @@ from slideviz.scene.color_legend import (
     place_bar,
     set_letters,
 )
-from slideviz.scene.stage import Layer, Stage
+from slideviz.scene.stage import KeyedLayer, Stage
 from slideviz.session.state import Session
 from slideviz.terms import COLOR_BY, ROLES
 
 PLATE = "plate:legend"
 
 
-class LegendLayer(Layer):
+class LegendLayer(KeyedLayer):
     """The legend of roles or the color bar, in a strip at the right."""
 
     def __init__(self, stage: Stage) -> None:
-        self.stage = stage
+        super().__init__(stage)
         # A mapper of its own: that of an actor may be removed before the bar.
         self._mapper = pv.DataSetMapper()
         self._mapper.lookup_table = stage.table
-        self._drawn: tuple[object, ...] = ()
         self._bar: tuple[str, float] | None = None
         self._plate: Plate | None = None
         self._end = 0.0
@@ -41,22 +40,20 @@ class LegendLayer(Layer):
     def clear(self) -> None:
         """Remove the legend."""
         clear_legend(self.stage.plotter)
-        self._drawn, self._bar, self._plate = (), None, None
+        self._key, self._bar, self._plate = (), None, None
 
-    def update(self, _old: Session | None, new: Session) -> None:
+    def update(self, old: Session | None, new: Session) -> None:
         """Draw another state of the session; make the legend anew if its content has changed."""
-        key = self._key(new)
-        if key != self._drawn:
-            self._drawn = key
-            clear_legend(self.stage.plotter)
-            self._bar = self._plate = None
-            if "legend" in new.view.drawn and self.stage.has_legend and new.mesh is not None:
-                self._make(new)
+        super().update(old, new)
         self._place()
 
-    def _make(self, session: Session) -> None:
+    def draw(self, session: Session) -> None:
+        """Make the legend, if it is shown."""
+        clear_legend(self.stage.plotter)
+        self._bar = self._plate = None
         stage, mesh, what = self.stage, session.mesh, session.view.color_by
-        assert mesh is not None
+        if mesh is None or not ("legend" in session.view.drawn and stage.has_legend):
+            return
         self._placed = ()
         # First, as later actors are drawn over it.
         self._plate = Plate(stage.plotter, PLATE, stage.scheme) if stage.has_plate else None
@@ -80,7 +77,7 @@ class LegendLayer(Layer):
         """Place color bar and plate, if the view's size or pixel scale has changed."""
         plotter, scale = self.stage.plotter, self.stage.pixel_scale
         size = (*plotter.window_size, scale)
-        if size == self._placed or not self._drawn:
+        if size == self._placed or not self._key:
             return
         self._placed = size
         rect = lines_room(plotter, self._end, scale)
@@ -90,16 +87,16 @@ class LegendLayer(Layer):
         if self._plate is not None:
             self._plate.place(rect)
 
-    def _key(self, session: Session) -> tuple[object, ...]:
+    def key(self, session: Session) -> tuple[object, ...]:
         """Return everything that the legend's content depends on."""
         mesh, view = session.mesh, session.view
         names = mesh.marker_names if mesh is not None and view.color_by == "role" else ()
-        said = frozenset(session.role(name) for name in names) or has_inverted(session)
+        content = frozenset(session.role(name) for name in names) or has_inverted(session)
         colors = (view.color_by, view.color_map, session.color_range)
         points = self.stage.point_words, self.stage.ring_words
         style = self.stage.scheme, self.stage.font_scale, self.stage.pixel_scale
         shown = "legend" in view.drawn and self.stage.has_legend, self.stage.has_plate
-        return (id(mesh), shown, colors, said, points, style)
+        return (id(mesh), shown, colors, content, points, style)
 
 
 def has_inverted(session: Session) -> bool:
@@ -114,34 +111,37 @@ COLORS = ("#c8452f", "#4c9a2a", "#3b7dd8")
 """Colors of the axes x, y and z, visible on light and dark backgrounds."""
 
 
-class TriadLayer(Layer):
+class TriadLayer(KeyedLayer):
     """The three axes in the lower left corner, which turn with the camera; two of a 2D mesh."""
 
     def __init__(self, stage: Stage) -> None:
-        self.stage = stage
+        super().__init__(stage)
         self._axes: Any = None
-        self._drawn: tuple[object, ...] = ()
 
     def clear(self) -> None:
         """Hide the arrows, which are no actors of the scene."""
         if self._axes is not None:
             self.stage.plotter.hide_axes()
-        self._drawn = ()
+        self._key = ()
 
-    def update(self, _old: Session | None, new: Session) -> None:
-        """Draw another state of the session."""
-        plotter = self.stage.plotter
-        shown = "triad" in new.view.drawn and new.mesh is not None
-        flat = new.mesh is not None and new.mesh.dim == 2
+    def key(self, session: Session) -> tuple[object, ...]:
+        """Return dimension, style and size of the view, if the axes are shown."""
+        if "triad" not in session.view.drawn or session.mesh is None:
+            return ()
         style = (self.stage.scheme, self.stage.pixel_scale, self.stage.has_plate)
-        key = (shown, flat, style, tuple(plotter.window_size))
-        if key == self._drawn or not (shown or self._axes):
+        return session.mesh.dim, style, tuple(self.stage.plotter.window_size)
+
+    def draw(self, session: Session) -> None:
+        """Draw the axes in the size of the view, or hide them."""
+        plotter = self.stage.plotter
+        if not self._key or session.mesh is None:
+            if self._axes is not None:
+                plotter.hide_axes()
             return
-        self._drawn = key
         if self._axes is None:
             self._axes = self._make()
         # Of a 2D mesh, z points at the camera: its letter would lie on the others' origin.
-        self._axes.SetZAxisLabelText("" if flat else "z")
+        self._axes.SetZAxisLabelText("" if session.mesh.dim == 2 else "z")
         for caption in self._captions(self._axes):
             letters = caption.GetCaptionTextProperty()
             set_letters(letters, self.stage.scheme, 13 * self.stage.font_scale)
@@ -154,10 +154,7 @@ class TriadLayer(Layer):
         widget.SetViewport(
             0.0, 0.0, min(size / max(width, 1), 0.5), min(size / max(height, 1), 0.5)
         )
-        if shown:
-            plotter.show_axes()
-        else:
-            plotter.hide_axes()
+        plotter.show_axes()
 
     def _make(self) -> Any:
         x, y, z = COLORS

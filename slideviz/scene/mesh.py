@@ -1,9 +1,9 @@
-"""The mesh in the scene: its boundaries, and the cells of a 2D mesh."""
+"""The mesh in the scene: boundaries in full or coarse detail; cells, all or within a threshold."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,10 +13,15 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
-from slideviz.scene.actors import CELL, POINT, VALUES, Band, DrawnBoundary, see_through
+from slideviz.scene.actors import CELL, POINT, VALUES, Band, DrawnBoundary, part_shape, see_through
 from slideviz.scene.stage import Layer, Stage
+from slideviz.sections.threshold import cells_in_range
 from slideviz.session.state import Session, StepFrame
 from slideviz.terms import ROLES
+
+if TYPE_CHECKING:
+    from slideviz.scene.sections import SectionLayer
+
 
 FADED = 0.3
 """Opacity of a 2D mesh while sections show the cells on them."""
@@ -264,3 +269,188 @@ def seen_from_outside(session: Session) -> bool:
     glass = view.hidden or "perspective" in view.drawn or looks_inside(session)
     # The faces of inverted cells are oriented inwards.
     return not glass and session.frame is not None and session.frame.quality.inverted == 0
+
+
+NAME = "threshold"
+
+
+class ThresholdLayer(Layer):
+    """The cells within the threshold of the view.
+
+    In 2D the other cells are a faint area without edges; in 3D only the outer faces of the cells
+    within the threshold are drawn.
+
+    Parameters
+    ----------
+    stage : Stage
+    others : CellLayer
+        Draws all cells; made faint while there is a threshold.
+
+    Attributes
+    ----------
+    cells : (k,) int64 or None
+        Indices of the cells within the threshold, in 2D the inverted ones last; None without one.
+    shape : pyvista.PolyData or None
+        The data set of these cells.
+    """
+
+    def __init__(self, stage: Stage, others: CellLayer) -> None:
+        self.stage = stage
+        self.others = others
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget the mesh; the scene removes its actors."""
+        self.cells: IntArray | None = None
+        self.shape: Any = None
+        self.actor: Any = None
+        self._faded = False
+
+    @property
+    def owner(self) -> IntArray:
+        """Return the index (f,) of the cell that each polygon of ``shape`` belongs to."""
+        return np.asarray(self.shape.cell_data[CELL])
+
+    def pickable(self) -> list[tuple[Any, IntArray]]:
+        """Return the actor of the cells with the cell of each polygon; empty if there are none."""
+        if self.cells is None or not len(self.cells):
+            return []
+        return [(self.actor, self.owner)]
+
+    def update(self, old: Session | None, new: Session) -> None:
+        """Draw another state of the session."""
+        on = new.view.threshold is not None and new.frame is not None
+        self._fade(new, on)
+        if not on:
+            if self.actor is not None:
+                self.actor.visibility = False
+            self.cells = None
+            return
+        moved = old is None or old.frame is not new.frame or self.cells is None
+        if moved or recolored(old, new) or old.view.threshold != new.view.threshold:  # type: ignore[union-attr]
+            self._draw(new)
+        if self.actor is not None:
+            self.actor.visibility = self.shape.n_cells > 0
+            self.actor.mapper.scalar_visibility = True
+            self.stage.edges(self.actor.prop, "edges" in new.view.drawn)
+
+    def _fade(self, session: Session, on: bool) -> None:
+        """Make all cells, drawn below those within the threshold, faint or as usual again."""
+        actor = self.others.actor
+        if actor is None or session.mesh is None or not (on or self._faded):
+            return
+        self._faded = on
+        if session.mesh.dim == 3:
+            see_through(actor, 0.12 if looks_inside(session) else 1.0)
+        if on:
+            actor.mapper.scalar_visibility = False
+            actor.prop.show_edges = False
+
+    def _draw(self, session: Session) -> None:
+        """Draw the cells within the threshold; in place if they are the same as before."""
+        frame, threshold = session.frame, session.view.threshold
+        assert frame is not None
+        assert threshold is not None
+        mesh, values = frame.mesh, self.stage.values(session)
+        cells = cells_in_range(values, threshold)
+        if mesh.dim == 2:
+            cells = cells[np.argsort(np.isnan(values[cells]), kind="stable")]  # see `CellLayer`
+        if self.cells is None or self.shape is None or not np.array_equal(cells, self.cells):
+            self.shape = part_shape(mesh, cells)
+            self.cells = cells
+        points = mesh.points[self.shape.point_data[POINT]]
+        actors.place(self.shape, points, 0.5 * self.stage.lift(mesh))
+        self.shape.cell_data[VALUES] = values[self.owner]
+        if self.actor is not None:
+            self.actor.mapper.dataset = self.shape
+        elif len(cells):  # an empty shape cannot be added
+            self.actor = self.stage.add(self.shape, NAME, lighting=mesh.dim == 3)
+            self.actor.prop.line_width = 1.0
+            self.actor.prop.ambient, self.actor.prop.diffuse = 0.6, 0.4
+
+
+class CoarseLayer(Layer):
+    """The coarse boundaries, drawn in place of those in full detail while ``on``.
+
+    Parameters
+    ----------
+    stage : Stage
+    boundaries : BoundaryLayer
+        Draws the boundaries in full detail; their properties are copied.
+    sections : SectionLayer
+        Draws sections, whose edges are switched off meanwhile.
+
+    Attributes
+    ----------
+    on : bool
+        Whether they are drawn.
+    """
+
+    def __init__(self, stage: Stage, boundaries: BoundaryLayer, sections: SectionLayer) -> None:
+        self.stage = stage
+        self._sections = sections
+        self.surfaces: Mapping[str, Surface] = {}
+        """The coarse boundaries by name, set before a mesh is opened; empty for small meshes."""
+        self._boundaries = boundaries
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget the mesh; the scene removes its actors."""
+        self.on = False
+        self.drawn: dict[str, DrawnBoundary] = {}
+        self._made_of: tuple[object, ...] = ()
+        self._session = Session()
+        self._edged: list[Any] = []
+
+    def update(self, _old: Session | None, new: Session) -> None:
+        """Draw another state of the session, after the boundaries in full detail were updated."""
+        self._session = new
+        if self.on:
+            self._draw()
+
+    def switch(self, on: bool) -> bool:
+        """Switch to coarse boundaries, or back; return whether anything has changed."""
+        if on == self.on or (on and not self.surfaces):
+            return False
+        self.on = on
+        if on:
+            self._draw()
+            return True
+        for name, one in self.drawn.items():
+            self._boundaries.drawn[name].actor.visibility = one.actor.visibility
+            one.actor.visibility = False
+        for prop in self._edged:
+            prop.show_edges = True
+        self._edged = []
+        return True
+
+    def _draw(self) -> None:
+        session = self._session
+        assert session.mesh is not None
+        assert session.frame is not None
+        if not self.drawn:
+            self.drawn = {name: self._add(one) for name, one in self.surfaces.items()}
+        made_of = session.frame, session.view.color_by
+        again, self._made_of = made_of != self._made_of, made_of
+        for name, one in self.drawn.items():
+            whole = self._boundaries.drawn[name].actor
+            if again:
+                actors.place(one.shape, session.frame.mesh.points[one.surface.nodes])
+            if again and session.view.color_by != "role":
+                one.shape.cell_data[VALUES] = self.stage.values_of(session, one.surface.owner)
+            one.actor.prop.DeepCopy(whole.prop)
+            one.actor.prop.show_edges = False
+            see_through(one.actor, whole.prop.opacity)
+            one.actor.mapper.scalar_visibility = whole.mapper.scalar_visibility
+            one.actor.visibility, whole.visibility = whole.visibility, False
+        props = [one.actor.prop for one in self._sections.drawn.values()]
+        self._edged = [prop for prop in props if prop.show_edges or prop in self._edged]
+        for prop in self._edged:
+            prop.show_edges = False
+
+    def _add(self, surface: Surface) -> DrawnBoundary:
+        assert self._session.mesh is not None
+        shape: Any = actors.surface_shape(surface, self._session.mesh.points)
+        return DrawnBoundary(
+            surface, shape, self.stage.add(shape, f"coarse:{surface.name}", pickable=False)
+        )

@@ -11,9 +11,8 @@ import pyvista as pv
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
-from slideviz.scene.mesh import BoundaryLayer, CellLayer
-from slideviz.scene.stage import Layer, Stage
-from slideviz.scene.threshold import ThresholdLayer
+from slideviz.scene.mesh import BoundaryLayer, CellLayer, ThresholdLayer
+from slideviz.scene.stage import KeyedLayer, Stage
 from slideviz.session.passages import find_period, moved, passages, passages_around
 from slideviz.session.state import Session
 
@@ -81,7 +80,7 @@ def outermost(points: FloatArray) -> FloatArray:
     return np.asarray(points[np.unique((ways @ points.T).argmax(axis=1))])
 
 
-class PassageLayer(Layer):
+class PassageLayer(KeyedLayer):
     """The neighbouring passages: boundaries, cells of a 2D mesh, cells within the threshold.
 
     The actors of all neighbours share the data sets of the scene, and per data set one mapper and
@@ -97,11 +96,10 @@ class PassageLayer(Layer):
     def __init__(
         self, stage: Stage, cells: CellLayer, boundaries: BoundaryLayer, threshold: ThresholdLayer
     ) -> None:
-        self.stage = stage
+        super().__init__(stage)
         self._cells, self._boundaries, self._threshold = cells, boundaries, threshold
         self._period = Period()
         self._table = pv.LookupTable()
-        self._key: tuple[object, ...] = ()
         self._table_key: tuple[object, ...] = ()
         self._matrices: dict[int, FloatArray] = {}
         self._mappers: dict[str, Any] = {}
@@ -126,16 +124,19 @@ class PassageLayer(Layer):
         ends = outermost(np.concatenate(every))
         return [pv.PolyData(moved(ends, matrix)) for matrix in self._matrices.values()]
 
-    def update(self, _old: Session | None, new: Session) -> None:
+    def update(self, old: Session | None, new: Session) -> None:
         """Draw another state of the session, after the layers whose data sets are shared."""
-        pair = self._period.of(new) if new.view.passages else None
-        # The threshold's actor is made when it first has cells.
-        key = (pair, new.view.passages, self._threshold.actor)
-        if key != self._key:
-            self._key = key
-            self._redraw(matrices(new, pair))
+        super().update(old, new)
         if self._matrices:
             self._style()
+
+    def _pair(self, session: Session) -> Pair | None:
+        return self._period.of(session) if session.view.passages else None
+
+    def key(self, session: Session) -> tuple[object, ...]:
+        """Return period and number of passages, and the actor of the threshold."""
+        # The threshold's actor is made when it first has cells.
+        return self._pair(session), session.view.passages, self._threshold.actor
 
     def _sources(self) -> dict[str, tuple[Any, Any]]:
         """Return data set and actor of everything that the passages repeat, by name."""
@@ -146,7 +147,9 @@ class PassageLayer(Layer):
             found[THRESHOLD] = self._threshold.shape, self._threshold.actor
         return found
 
-    def _redraw(self, wanted: dict[int, FloatArray]) -> None:
+    def draw(self, session: Session) -> None:
+        """Replace the actors of all passages."""
+        wanted = matrices(session, self._pair(session))
         # Not through the plotter, which goes through all its actors for each one.
         renderer = self.stage.plotter.renderer
         for copy in chain.from_iterable(self._actors.values()):

@@ -19,19 +19,15 @@ from slideviz.scene import pick
 from slideviz.scene.actors import CELL, DrawnBoundary
 from slideviz.scene.boxes import BoxLayer
 from slideviz.scene.camera import Camera
-from slideviz.scene.coarse import CoarseLayer
-from slideviz.scene.ghosts import GhostLayer
-from slideviz.scene.inverted import InvertedLayer
+from slideviz.scene.ghosts import GhostLayer, SupportLayer
 from slideviz.scene.legend import LegendLayer, TriadLayer
-from slideviz.scene.marked_cell import MarkLayer
-from slideviz.scene.mesh import BoundaryLayer, CellLayer
+from slideviz.scene.marked_cells import InvertedLayer, MarkLayer
+from slideviz.scene.mesh import BoundaryLayer, CellLayer, CoarseLayer, ThresholdLayer
 from slideviz.scene.moved import Overview
 from slideviz.scene.passages import PassageLayer
 from slideviz.scene.points import PointLayer
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
-from slideviz.scene.support import SupportLayer
-from slideviz.scene.threshold import ThresholdLayer
 from slideviz.session.colors import with_drawable_colors
 from slideviz.session.inspect import cell_at, surroundings
 from slideviz.session.state import Session

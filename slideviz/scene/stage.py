@@ -40,6 +40,39 @@ class Layer:
         return []
 
 
+class KeyedLayer(Layer):
+    """The base of layers that are drawn anew whenever the key of what they show differs."""
+
+    names: tuple[str, ...] = ()
+    """The names of its actors, removed before each drawing."""
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self._key: tuple[object, ...] = ()
+
+    def clear(self) -> None:
+        """Forget the mesh; the scene removes its actors."""
+        self._key = ()
+
+    def update(self, _old: Session | None, new: Session) -> None:
+        """Draw another state of the session, if its key differs."""
+        key = self.key(new)
+        if key == self._key:
+            return
+        self._key = key
+        for name in self.names:
+            self.stage.remove(name)
+        self.draw(new)
+
+    def key(self, session: Session) -> tuple[object, ...]:
+        """Return everything that the drawing depends on; empty if there is nothing to draw."""
+        raise NotImplementedError
+
+    def draw(self, session: Session) -> None:
+        """Draw a state of the session; nothing if its key is empty."""
+        raise NotImplementedError
+
+
 class Stage:
     """The plotter of a scene, and what its layers share."""
 

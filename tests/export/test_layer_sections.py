@@ -23,7 +23,7 @@ from slideviz.scene.actors import VALUES
 from slideviz.scene.flat_scene import FlatScene
 from slideviz.scene.mesh import looks_inside
 from slideviz.scene.pick import to_display
-from slideviz.scene.polygon_actor import plain_color
+from slideviz.scene.sections import plain_color
 from slideviz.sections.model import Section
 from slideviz.session import changes, section_start
 from slideviz.session.opening import open_mesh

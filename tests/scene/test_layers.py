@@ -11,7 +11,9 @@ from slideviz.ffd.section import with_boxes
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.samples.table import sample
+from slideviz.scene.ghosts import circles
 from slideviz.scene.legend import COLORS, SIZE
+from slideviz.scene.mesh import ThresholdLayer
 from slideviz.scene.passages import (
     PALER,
     THRESHOLD,
@@ -21,8 +23,6 @@ from slideviz.scene.passages import (
     outermost,
 )
 from slideviz.scene.pick import to_display
-from slideviz.scene.support import circles
-from slideviz.scene.threshold import ThresholdLayer
 from slideviz.session import changes
 from slideviz.session.inspect import middles
 from slideviz.session.opening import open_mesh

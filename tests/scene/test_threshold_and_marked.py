@@ -12,7 +12,7 @@ from slideviz.mesh.quality import INVERTED, quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.samples.table import sample
 from slideviz.scene.actors import VALUES, part_shape
-from slideviz.scene.marked_cell import DOT, FACES, OUTLINE
+from slideviz.scene.marked_cells import DOT, FACES, OUTLINE
 from slideviz.scene.pick import to_display
 from slideviz.scene.scene import Scene
 from slideviz.sections.model import Section

@@ -24,7 +24,7 @@ from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.scene.axis_handle import dragged_size, frame_of, patch_in, pixel_and_slope
-from slideviz.scene.marked_cell import IN_FRONT
+from slideviz.scene.marked_cells import IN_FRONT
 from slideviz.scene.pick import on_plane, to_display
 from slideviz.scene.scene import Scene
 from slideviz.sections.around_axis import Patch, PlaceOnSection, axis_shape
