@@ -17,10 +17,9 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.nearest import near_duplicates
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.topology import Boundary
-from slideviz.rbf.axis import corners as corners_of
-from slideviz.rbf.axis import hold_on_axis, on_axis
 from slideviz.rbf.classify import Classes, classify, directions, fan_roles
-from slideviz.rbf.frames import Frame, make_frame
+from slideviz.rbf.frames import Frame, hold_on_axis, make_frame, on_axis
+from slideviz.rbf.frames import corners as corners_of
 from slideviz.rbf.images import COINCIDENT, find_images
 from slideviz.terms import Role
 

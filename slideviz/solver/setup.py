@@ -15,22 +15,16 @@ from slideviz.case.model import Case
 from slideviz.case.motion import require_valid
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.rbf.axis import corners as corners_of
-from slideviz.rbf.axis import hold_on_axis
 from slideviz.rbf.classify import Classes, directions
 from slideviz.rbf.evaluate import Basis
-from slideviz.rbf.frames import Frame
+from slideviz.rbf.frames import Frame, hold_on_axis
+from slideviz.rbf.frames import corners as corners_of
 from slideviz.rbf.methods import SLIDING_METHODS
 from slideviz.rbf.problem import GreedySettings, PhaseTimer, Problem, Solution
 from slideviz.rbf.projection import Tracks, find_tracks
 from slideviz.solver.domain import Domain, find_domain
 from slideviz.solver.prescribed import fitted_radius, largest_of, prescribe, support_radius
-from slideviz.solver.reduction import (
-    find_reduction,
-    loose_warnings,
-    needed_by_layers,
-    sliding_gap,
-)
+from slideviz.solver.reduction import find_reduction, loose_warnings, needed_by_layers, sliding_gap
 
 if TYPE_CHECKING:
     from slideviz.baselines.elastic import Body

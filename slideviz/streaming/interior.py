@@ -13,7 +13,7 @@ import numpy as np
 
 from slideviz.errors import DeformError, MeshError, UnsoundError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
-from slideviz.rbf.axis import on_axis
+from slideviz.rbf.frames import on_axis
 from slideviz.solver.growth import overshoot_of_rest
 from slideviz.solver.setup import Setup
 from slideviz.solver.stepping import cartesian, shifted

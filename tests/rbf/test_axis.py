@@ -8,8 +8,7 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.mesh.topology import corner_vectors, unit
-from slideviz.rbf.axis import corners, hold_on_axis, on_axis
-from slideviz.rbf.frames import Frame
+from slideviz.rbf.frames import Frame, corners, hold_on_axis, on_axis
 from tests import builders
 
 # (r, rho theta, z): two nodes on the axis, and a sector of 0.4 at r = 1, z = 0 and 1.

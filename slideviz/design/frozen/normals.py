@@ -27,7 +27,7 @@ from slideviz.design.frozen.tape import (
 )
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import TINY
-from slideviz.rbf.axis import corners as corners_of
+from slideviz.rbf.frames import corners as corners_of
 from slideviz.solver.setup import Setup
 
 TURN = {2: np.array([[0.0, 1.0], [-1.0, 0.0]])}
@@ -85,7 +85,7 @@ class _Corners:
         """Return matrices (k, f d, m d) from coordinates of nodes to corners of facets at the axis.
 
         Of m nodes and f facets ``local`` (f, k), renumbered; found by probing
-        `slideviz.rbf.axis.corners` with unit vectors.
+        `slideviz.rbf.frames.corners` with unit vectors.
         """
         d = self.setup.coords.shape[1]
         width = table.shape[1]
