@@ -13,10 +13,18 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import BoxMotion, Case, Ffd, FfdThickness, FfdTwist, moves, named
 from slideviz.case.words import nearest
 from slideviz.errors import CaseError, Note, SlidevizError
-from slideviz.ffd.box import Box, Embedding, Index, plane_corners, regular_box
-from slideviz.ffd.coordinates import CARTESIAN, CoordinateSystem, polar_corners
+from slideviz.ffd.box import (
+    CARTESIAN,
+    Box,
+    CoordinateSystem,
+    Embedding,
+    Index,
+    plane_corners,
+    polar_corners,
+    regular_box,
+)
 from slideviz.ffd.inverse import parametric
-from slideviz.ffd.moves import Turn
+from slideviz.ffd.kinds import Turn
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 

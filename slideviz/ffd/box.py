@@ -4,7 +4,7 @@ Sederberg and Parry 1986, *Free-form deformation of solid geometric models*: a p
 the sum of its control points, each times the product of one blending function in each direction,
 at the point's parametric coordinates (u, v, w). In 2D the box is one cell thick, from z = -1/2 to
 1/2, and its points lie in the middle, w = 1/2, as SU2 has it. All this is done in the coordinates q
-of the box's coordinate system (`slideviz.ffd.coordinates`), which mostly are x, y, z.
+of the box's coordinate system (`CoordinateSystem`), which mostly are x, y, z.
 """
 
 from __future__ import annotations
@@ -17,12 +17,144 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from slideviz.errors import CaseError
-from slideviz.ffd.blending import blending
-from slideviz.ffd.coordinates import CARTESIAN, CoordinateSystem
 from slideviz.mesh.model import FloatArray, IntArray, frozen_array
+from slideviz.terms import FfdSystem
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
+
+WEDGE = 0.1
+"""Half the angle in radians of a box in 2D with polar coordinates, about the axis."""
+POLAR_CORNERS = np.array([1, 2, 2, 1, 0, 3, 3, 0])
+"""Which of the 4 corners that are given each of the 8 corners of a polar box in 2D is."""
+POLAR_SIDES = np.array([-1, -1, 1, 1, -1, -1, 1, 1])
+"""Side of the plane on which each of them is."""
+
+
+@dataclass(frozen=True)
+class CoordinateSystem:
+    """A coordinate system q with its axis along x through ``origin``.
+
+    Cylindrical: q = (r, theta, x - x0). Spherical and polar: q = (r, theta, phi), phi being the
+    angle from the axis. theta is in (-3 pi/2, pi/2], measured from y to z.
+    """
+
+    kind: FfdSystem = "CARTESIAN"
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def q_of(self, points: FloatArray) -> FloatArray:
+        """Return the coordinates q (..., 3) of points (..., 3)."""
+        if self.kind == "CARTESIAN":
+            return points
+        x, y, z = np.moveaxis(points - np.array(self.origin), -1, 0)
+        theta = np.arctan2(z, y)
+        theta = np.where(theta > 0.5 * np.pi, theta - 2.0 * np.pi, theta)
+        if self.kind == "CYLINDRICAL":
+            return np.stack([np.hypot(y, z), theta, x], axis=-1)
+        radius = np.sqrt(x * x + y * y + z * z)
+        cosine = np.divide(x, radius, out=np.ones_like(x), where=radius > 0.0)
+        return np.stack([radius, theta, np.arccos(np.clip(cosine, -1.0, 1.0))], axis=-1)
+
+    def points_of(self, q: FloatArray) -> FloatArray:
+        """Return the points (..., 3) of coordinates q (..., 3)."""
+        if self.kind == "CARTESIAN":
+            return q
+        first, theta, last = np.moveaxis(q, -1, 0)
+        x, r = (last, first) if self.kind == "CYLINDRICAL" else _spherical(first, last)
+        return np.stack([x, r * np.cos(theta), r * np.sin(theta)], -1) + np.array(self.origin)
+
+    def pushed(self, q: FloatArray, rates: FloatArray) -> FloatArray:
+        """Return the rates (..., 3) of points for rates (..., 3) of their q (..., 3)."""
+        if self.kind == "CARTESIAN":
+            return rates
+        first, theta, last = np.moveaxis(q, -1, 0)
+        d_first, d_theta, d_last = np.moveaxis(rates, -1, 0)
+        if self.kind == "CYLINDRICAL":
+            r, dx, dr = first, d_last, d_first
+        else:
+            x, r = _spherical(first, last)
+            along, across = _spherical(d_first, last)
+            dx, dr = along - r * d_last, across + x * d_last
+        sine, cosine = np.sin(theta), np.cos(theta)
+        turned = r * d_theta
+        return np.stack([dx, dr * cosine - turned * sine, dr * sine + turned * cosine], -1)
+
+
+CARTESIAN = CoordinateSystem()
+
+
+def _spherical(radius: FloatArray, phi: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the part of a radius along the axis, and that across it."""
+    return radius * np.cos(phi), radius * np.sin(phi)
+
+
+def polar_corners(corners: FloatArray) -> FloatArray:
+    """Return the corners (8, 3) of a polar box in 2D from its corners (4, 2) in the plane.
+
+    Its directions are i along given 1 to 2, j about the axis and k along given 1 to 0.
+    """
+    x, y = corners[POLAR_CORNERS].T
+    return np.stack([x, y * np.cos(WEDGE), POLAR_SIDES * y * np.sin(WEDGE)], axis=-1)
+
+
+def given_of_polar(corners: FloatArray) -> FloatArray:
+    """Return the corners (4, 2) from which `polar_corners` makes ``corners`` (8, 3)."""
+    first: IntArray = np.array([4, 0, 1, 5])
+    x, y, z = corners[first].T
+    return np.stack([x, np.copysign(np.hypot(y, z), y)], axis=-1)
+
+
+def knots(count: int, order: int) -> FloatArray:
+    """Return the knots of ``count`` functions of an order, (count + order,)."""
+    inner = np.arange(1, count - order + 1) / (count - order + 1)
+    return np.concatenate([np.zeros(order), inner, np.ones(order)])
+
+
+def blending(count: int, order: int, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the functions and their derivatives at parametric coordinates.
+
+    Parameters
+    ----------
+    count, order : int
+        Control points, and the order of the functions, from 1 to ``count``.
+    at : (m,) float64
+        Parametric coordinates; outside of [0, 1] the outermost polynomials are continued.
+
+    Returns
+    -------
+    values, slopes : (m, count) float64
+        The functions, and their derivatives with respect to the coordinate.
+    """
+    knot, degree = knots(count, order), order - 1
+    span = np.clip(np.searchsorted(knot, at, "right") - 1, degree, count - 1)
+    lower = np.zeros((len(at), 0))
+    found = np.ones((len(at), 1))
+    for j in range(1, order):
+        lower = found
+        # The two knots around each function of degree j - 1 that is not zero in the span.
+        left = knot[span[:, None] + np.arange(1 - j, 1)]
+        right = knot[span[:, None] + np.arange(1, j + 1)]
+        part = lower / (right - left)
+        found = np.zeros((len(at), j + 1))
+        found[:, :-1] = (right - at[:, None]) * part
+        found[:, 1:] += (at[:, None] - left) * part
+    slope = np.zeros_like(found)
+    if degree:
+        left = knot[span[:, None] + np.arange(1 - degree, 1)]
+        right = knot[span[:, None] + np.arange(1, degree + 1)]
+        part = degree * lower / (right - left)
+        slope[:, :-1] -= part
+        slope[:, 1:] += part
+    return _placed(found, span - degree, count), _placed(slope, span - degree, count)
+
+
+def _placed(values: FloatArray, first: np.ndarray, count: int) -> FloatArray:
+    """Return values (m, k) of the functions from ``first`` (m,) on in (m, count); others are 0."""
+    out = np.zeros((len(values), count))
+    rows = np.arange(len(values))[:, None]
+    out[rows, first[:, None] + np.arange(values.shape[1])] = values
+    return out
+
 
 Index = tuple[int, int, int]
 """A control point (i, j, k); an index of -1 means all of that direction."""

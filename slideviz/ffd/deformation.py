@@ -14,10 +14,9 @@ from functools import partial
 import numpy as np
 
 from slideviz.errors import CaseError
-from slideviz.ffd.box import Box, Embedding
-from slideviz.ffd.coordinates import CARTESIAN
+from slideviz.ffd.box import CARTESIAN, Box, Embedding
 from slideviz.ffd.inverse import parametric, placed_again, uvw_step
-from slideviz.ffd.moves import Move, Shift, Twist
+from slideviz.ffd.kinds import Move, Shift, Twist
 from slideviz.mesh.model import FloatArray, IntArray
 
 

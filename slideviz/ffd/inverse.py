@@ -8,8 +8,7 @@ from itertools import product
 import numpy as np
 
 from slideviz.errors import CaseError
-from slideviz.ffd.box import Box
-from slideviz.ffd.coordinates import CARTESIAN
+from slideviz.ffd.box import CARTESIAN, Box
 from slideviz.mesh.model import FloatArray
 
 INSIDE = 1e-8

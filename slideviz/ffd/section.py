@@ -6,19 +6,305 @@ Only rows of control points that changed are written anew; the rest of the secti
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from itertools import chain, islice
+from math import isfinite
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from slideviz.ffd.box import Box
-from slideviz.ffd.coordinates import CARTESIAN, CoordinateSystem, given_of_polar
-from slideviz.ffd.reader import Entries, entries_of, key_of, read_boxes
+from slideviz.errors import CaseError, MeshError
+from slideviz.ffd.box import (
+    CARTESIAN,
+    Box,
+    CoordinateSystem,
+    Index,
+    given_of_polar,
+    plane_corners,
+    polar_corners,
+    regular_box,
+)
 from slideviz.formats.su2.keyword_blocks import is_ffd
 from slideviz.formats.su2.read import Document
-from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 _LETTERS = "IJK"
+_FARTHEST = 10.0
+"""Largest parametric coordinate of a point in a box, which goes from 0 to 1."""
+
+Row = tuple[int, list[str]]
+"""A line of numbers: its place in the section, from 0, and its words."""
+
+
+@dataclass
+class BoxEntry:
+    """A keyword line of a box: its value, its place in the section, and the rows that follow it."""
+
+    value: str
+    line: int
+    rows: list[Row] = field(default_factory=list)
+
+
+Entries = dict[str, BoxEntry]
+"""The keyword lines of a box, by key."""
+
+
+def read_boxes(mesh: Mesh, lines: list[str], system: CoordinateSystem) -> tuple[Box, ...]:
+    """Return the boxes in the lines of a section, in a coordinate system.
+
+    Raises
+    ------
+    MeshError
+        The section has a mistake.
+    """
+    entries = entries_of(lines)
+    readers = [_Reader(mesh, one, system) for one in entries]
+    boxes = tuple(reader.box() for reader in readers)
+    names = [box.name for box in boxes]
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            line = entries[k]["FFD_TAG"].line
+            raise _error(mesh, line, f"the FFD box {name!r} stands twice; rename one")
+    _require_count(mesh, lines, names)
+    levels = next((_value(line) for line in lines if key_of(line) == "FFD_NLEVEL"), "1")
+    for reader in readers:
+        reader.check_tags(names)
+    for reader, box in zip(readers, boxes, strict=True):
+        reader.check_nesting(box, boxes, int(levels) if levels.isdecimal() else 1)
+    return boxes
+
+
+def _require_count(mesh: Mesh, lines: list[str], names: list[str]) -> None:
+    """Raise MeshError where ``FFD_NBOX=`` is missing or is not the number of boxes that follow."""
+    given = [(at, line) for at, line in enumerate(lines) if key_of(line) == "FFD_NBOX"]
+    if not given:
+        if names:
+            raise _error(
+                mesh, 0, f"FFD_NBOX= is missing; write FFD_NBOX= {len(names)} before the FFD boxes"
+            )
+        return
+    at, line = given[0]
+    word = _value(line)
+    if not word.isdecimal() or int(word) != len(names):
+        has = f"{len(names)} ({', '.join(names)})" if names else "none"
+        raise _error(
+            mesh, at, f"FFD_NBOX= {word}, but the FFD boxes that follow are {has}; correct it"
+        )
+
+
+def _error(mesh: Mesh, line: int, why: str) -> MeshError:
+    """Return the error about a line of the section, with its place in the file if it is known."""
+    at = next(islice(chain.from_iterable(mesh.origin.ffd_at), line, None), None)
+    place = mesh.name if at is None else f"{mesh.name}:{at + 1}"
+    return MeshError(f"{place}: {why}")
+
+
+def key_of(line: str) -> str:
+    """Return the key of a keyword line, in capitals; an empty text for other lines."""
+    head, sign, _ = line.partition("%")[0].partition("=")
+    return head.strip().upper() if sign else ""
+
+
+def _value(line: str) -> str:
+    """Return the value of a keyword line, without a comment."""
+    return line.partition("%")[0].partition("=")[2].strip()
+
+
+def entries_of(lines: list[str]) -> list[Entries]:
+    """Return the keyword lines of each box, with their rows."""
+    found: list[Entries] = []
+    entry = None
+    for number, line in enumerate(lines):
+        text = line.partition("%")[0]
+        if key := key_of(line):
+            entry = BoxEntry(_value(line), number)
+            if key == "FFD_TAG":
+                found.append({})
+            if found:
+                found[-1][key] = entry
+        elif entry is not None and (words := text.replace(",", " ").split()):
+            entry.rows.append((number, words))
+    return found
+
+
+class _Reader:
+    """Reads one box from its lines; all methods raise MeshError for a mistake."""
+
+    def __init__(self, mesh: Mesh, entries: Entries, system: CoordinateSystem) -> None:
+        self.mesh, self.entries, self.system = mesh, entries, system
+        self.name = entries["FFD_TAG"].value
+
+    def box(self) -> Box:
+        """Return the box."""
+        flat = self.mesh.dim == 2
+        letters = _LETTERS[: self.mesh.dim]
+        i, j, k = (*(self.count(f"FFD_DEGREE_{letter}") for letter in letters), 1)[:3]
+        corners = self.numbers("FFD_CORNER_POINTS", 4 if flat else 8, self.mesh.dim)
+        orders = self.orders(letters)
+        if flat and self.is_polar():
+            j, k = k, j
+            corners = polar_corners(corners)
+            orders = orders and (orders[0], orders[2], orders[1])
+        elif flat:
+            corners = plane_corners(corners)
+        degrees = i, j, k
+        try:
+            box = regular_box(self.name, corners, degrees, orders, self.system)
+        except CaseError as problem:
+            raise self.error(str(problem)) from problem
+        if self.count("FFD_CONTROL_POINTS"):
+            box = replace(box, points=self.control_points(degrees))
+        if "FFD_SURFACE_POINTS" in self.entries and self.count("FFD_SURFACE_POINTS"):
+            box = replace(box, embedded=self.surface_points())
+        level = self.count("FFD_LEVEL") if "FFD_LEVEL" in self.entries else 0
+        return replace(box, level=level, parent=(*self.tags("FFD_PARENTS"), "")[0])
+
+    def is_polar(self) -> bool:
+        """Return whether a box in 2D is one in polar coordinates: its second direction is k."""
+        entry = self.entries.get("FFD_CONTROL_POINTS")
+        rows = () if entry is None else entry.rows
+        return self.system.kind == "POLAR" or any((*row, "", "0")[2] > "1" for _, row in rows)
+
+    def tags(self, key: str) -> tuple[str, ...]:
+        """Return the names of the boxes in the rows after a key; () without it."""
+        if key not in self.entries:
+            return ()
+        return tuple(" ".join(words) for _, words in self.rows(key, self.count(key)))
+
+    def check_tags(self, names: list[str]) -> None:
+        """Raise MeshError where a parent or child is not among the names of the boxes."""
+        for name in (*self.tags("FFD_PARENTS"), *self.tags("FFD_CHILDREN")):
+            if name not in names:
+                raise self.error(f"there is no FFD box {name!r} beside it, but {', '.join(names)}")
+
+    def check_nesting(self, box: Box, boxes: tuple[Box, ...], levels: int) -> None:
+        """Raise MeshError where SU2 could not deform a nested box with those around it."""
+        by_name = {each.name: each for each in boxes}
+        parents = self.tags("FFD_PARENTS")
+        if len(parents) > 1:
+            why = f"FFD_PARENTS is {len(parents)}; supported is one parent"
+            raise self.error(why, "FFD_PARENTS")
+        if box.level >= levels:
+            why = f"FFD_LEVEL is {box.level}; FFD_NLEVEL must be larger, and is {levels}"
+            raise self.error(why, "FFD_LEVEL")
+        if parents and box.level <= by_name[box.parent].level:
+            why = f"FFD_LEVEL is {box.level}, as low as that of its parent {box.parent!r}"
+            raise self.error(f"{why}; make it larger", "FFD_LEVEL")
+        inner = {each.name for each in boxes if each.parent == box.name}
+        if inner != set(self.tags("FFD_CHILDREN")):
+            named = ", ".join(sorted(inner)) or "none"
+            why = f"FFD_CHILDREN must list the boxes that have it for a parent, which are {named}"
+            raise self.error(why)
+
+    def orders(self, letters: str) -> Index | None:
+        """Return the orders of the B-splines; None for a Bézier box."""
+        entry = self.entries.get("FFD_BLENDING")
+        kind = "BEZIER" if entry is None else entry.value.upper()
+        if kind == "BEZIER":
+            return None
+        if kind != "BSPLINE_UNIFORM":
+            raise self.error(
+                f"FFD_BLENDING is {kind}; needed is BEZIER or BSPLINE_UNIFORM", "FFD_BLENDING"
+            )
+        keys = [f"BSPLINE_ORDER_{letter}" for letter in letters]
+        keys = [key if key in self.entries else f"FFD_{key}" for key in keys]
+        i, j, k = (*(self.count(key) for key in keys), 2)[:3]
+        return i, j, k
+
+    def control_points(self, degrees: tuple[int, ...]) -> FloatArray:
+        """Return the control points (I, J, K, 3), each of which must be there once."""
+        shape = tuple(degree + 1 for degree in degrees)
+        rows = self.numbers("FFD_CONTROL_POINTS", int(np.prod(shape)), 6)
+        index = rows[:, :3]
+        points = np.full((*shape, 3), np.nan)
+        entire = (index == np.floor(index)) & (index >= 0) & (index <= degrees)
+        if entire.all():
+            points[tuple(index.astype(int).T)] = rows[:, 3:]
+        if np.isnan(points).any():
+            limits = ", ".join(map(str, degrees))
+            raise self.error(
+                "FFD_CONTROL_POINTS must have each (i, j, k) from (0, 0, 0) to "
+                f"({limits}) once; write the boxes again with DV_KIND= FFD_SETTING",
+                "FFD_CONTROL_POINTS",
+            )
+        return points
+
+    def surface_points(self) -> dict[str, tuple[IntArray, FloatArray]]:
+        """Return nodes and parametric coordinates on each marker, sorted by node."""
+        key, part = "FFD_SURFACE_POINTS", self.mesh.part
+        n_points = len(self.mesh.points) if part is None else part.n_points
+        on: dict[str, list[Row]] = {}
+        for line, words in self.rows(key, self.count(key)):
+            on.setdefault(words[0], []).append((line, words[1:]))
+        found = {}
+        for marker, tails in on.items():
+            table = self.table(key, tails, 4)
+            number = table[:, 0]
+            bad = (number != np.floor(number)) | (number < 0) | (number >= n_points)
+            if bad.any():
+                line, words = tails[int(np.argmax(bad))]
+                raise self.error(f"{key} names node {words[0]}, which is none", line)
+            far = np.abs(table[:, 1:]).max(axis=1) > _FARTHEST
+            if far.any():
+                line, words = tails[int(np.argmax(far))]
+                raise self.error(
+                    f"{key} puts node {words[0]} at ({', '.join(words[1:])}), and the box goes "
+                    "from 0 to 1; write the boxes again with DV_KIND= FFD_SETTING",
+                    line,
+                )
+            nodes, first = np.unique(number.astype(np.int64), return_index=True)
+            if part is not None:  # which has all nodes of markers
+                inside = np.isin(nodes, part.points)
+                nodes, first = np.searchsorted(part.points, nodes[inside]), first[inside]
+            found[marker] = nodes, table[first, 1:]
+        return found
+
+    def count(self, key: str) -> int:
+        """Return the value of a key, a whole number from 0."""
+        word = (self.entry(key).value.split() or [""])[0]
+        if not word.isdecimal():
+            raise self.error(f"{key}= {word} is no whole number from 0", key)
+        return int(word)
+
+    def numbers(self, key: str, count: int, width: int) -> FloatArray:
+        """Return the rows of numbers after a key, (count, width); its value must be ``count``."""
+        if self.count(key) != count:
+            raise self.error(f"{key} is {self.count(key)}; needed is {count}", key)
+        return self.table(key, self.rows(key, count), width)
+
+    def rows(self, key: str, count: int) -> list[Row]:
+        """Return the rows after a key, which must be ``count``."""
+        rows = self.entry(key).rows
+        if len(rows) != count:
+            raise self.error(f"{len(rows)} rows follow {key}= {count}; correct the count", key)
+        return rows
+
+    def table(self, key: str, rows: list[Row], width: int) -> FloatArray:
+        """Return rows as numbers, (len(rows), width), which must be finite."""
+        table = np.empty((len(rows), width))
+        for k, (line, words) in enumerate(rows):
+            try:
+                numbers = [float(word) for word in words]
+            except ValueError:
+                numbers = []
+            if len(numbers) != width or not all(map(isfinite, numbers)):
+                why = f"the row '{' '.join(words)[:60]}' of {key} needs {width} finite numbers"
+                raise self.error(why, line)
+            table[k] = numbers
+        return table
+
+    def entry(self, key: str) -> BoxEntry:
+        """Return the keyword line of a key."""
+        if key not in self.entries:
+            raise self.error(f"{key}= is missing")
+        return self.entries[key]
+
+    def error(self, why: str, at: str | int = "FFD_TAG") -> MeshError:
+        """Return the error about the box, at the line of a key or at another line."""
+        line = self.entries[at].line if isinstance(at, str) else at
+        return _error(self.mesh, line, f"FFD box {self.name!r}: {why}")
+
+
 _BOXES: WeakKeyDictionary[Mesh, dict[CoordinateSystem, tuple[Box, ...]]] = WeakKeyDictionary()
 """The boxes that were read, by mesh."""
 

@@ -15,7 +15,7 @@ from slideviz.design.su2.config import read_config
 from slideviz.design.su2.planes import held_planes
 from slideviz.design.su2.surface import make_surface
 from slideviz.errors import CaseError
-from slideviz.ffd.coordinates import CoordinateSystem
+from slideviz.ffd.box import CoordinateSystem
 from slideviz.ffd.section import boxes_of
 from tests.builders import cube, square
 from tests.design.test_su2_dot import differences, gradient, values_text, write_csv, written

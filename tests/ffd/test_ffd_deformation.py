@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from slideviz.errors import CaseError
-from slideviz.ffd.box import regular_box
-from slideviz.ffd.coordinates import CoordinateSystem
+from slideviz.ffd.box import CoordinateSystem, regular_box
 from slideviz.ffd.deformation import BoxDeformation, Drive, Limits
 from slideviz.ffd.inverse import parametric
 from slideviz.ffd.kinds import Request, moves_of

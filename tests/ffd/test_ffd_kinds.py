@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from slideviz.ffd.box import lattice, regular_box
-from slideviz.ffd.coordinates import CoordinateSystem, polar_corners
+from slideviz.ffd.box import CoordinateSystem, lattice, polar_corners, regular_box
 from slideviz.ffd.kinds import KINDS, Request, moves_of, variable_problem
 from tests.oracles.freeform import moved
 

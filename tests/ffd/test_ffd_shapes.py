@@ -14,8 +14,7 @@ from slideviz.case.motion_words import describe, motion_labels
 from slideviz.design.sweeps.columns import numbers_of
 from slideviz.design.sweeps.results import sources_of
 from slideviz.errors import CaseError
-from slideviz.ffd.box import plane_corners, regular_box
-from slideviz.ffd.coordinates import CoordinateSystem
+from slideviz.ffd.box import CoordinateSystem, plane_corners, regular_box
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.session.run_messages import moves_nothing
 from tests.oracles.freeform import blended, rotated

@@ -24,8 +24,7 @@ from slideviz.design.su2.variables import angle_notes
 from slideviz.errors import CaseError
 from slideviz.ffd.box import Box, Embedding
 from slideviz.ffd.deformation import BoxDeformation, Drive, Limits
-from slideviz.ffd.kinds import Planes, moves_of, variable_problem
-from slideviz.ffd.moves import Move
+from slideviz.ffd.kinds import Move, Planes, moves_of, variable_problem
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 

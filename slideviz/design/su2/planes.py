@@ -13,8 +13,7 @@ from slideviz.case.words import list_of
 from slideviz.design.su2.config import CONTINUITIES, SU2_CONTINUITY, Su2Config
 from slideviz.design.su2.variables import DesignVariable
 from slideviz.ffd.box import Box
-from slideviz.ffd.kinds import DIRECTIONS, NONE, Planes, Request, moves_of
-from slideviz.ffd.moves import Move
+from slideviz.ffd.kinds import DIRECTIONS, NONE, Move, Planes, Request, moves_of
 from slideviz.mesh.model import FloatArray, Mesh
 
 
