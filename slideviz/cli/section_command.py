@@ -112,7 +112,7 @@ def section(arguments: argparse.Namespace) -> int:
     """Draw a section of a mesh to a file; return the exit code."""
     from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.errors import CaseError
-    from slideviz.plots.around import surroundings
+    from slideviz.plots.cells import surroundings
     from slideviz.plots.section_paint import paint
     from slideviz.plots.section_picture import (
         SectionInRun,

@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.errors import CaseError
 from slideviz.export.titles import pair_names
-from slideviz.plots.around import surroundings
+from slideviz.plots.cells import surroundings
 from slideviz.plots.section_paint import paint
 from slideviz.plots.section_picture import (
     SectionInRun,

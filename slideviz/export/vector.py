@@ -15,8 +15,7 @@ from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions, headings, panes
 from slideviz.export.titles import draw_mark
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.plots.bar import color_bar
-from slideviz.plots.cells import color_scale, draw_cells
+from slideviz.plots.cells import color_bar, color_scale, draw_cells
 from slideviz.plots.figure_io import empty_figure, write_figure
 from slideviz.scene.color_legend import OPACITY, STRIP
 from slideviz.scene.mesh import FADED, is_faded

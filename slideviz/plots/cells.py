@@ -1,14 +1,20 @@
-"""Cells drawn with matplotlib: polygons in the colors of their values, edges, light."""
+"""Cells drawn with matplotlib, flat: polygons in colors, faint surroundings, color bars."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from slideviz.color_scheme import INVERTED_COLOR, PAPER
 from slideviz.mesh.model import FloatArray
-from slideviz.sections.polygons import Polygons
+from slideviz.plots.ticks import bar_ticks
+from slideviz.sections.cut import Cutter
+from slideviz.sections.line import Box, trace
+from slideviz.sections.model import Section
+from slideviz.sections.polygons import Polygons, joined
+from slideviz.session.passages import moved
 
 MANY = 200_000
 """Number of polygons above which they are pixels in SVG and PDF too, as viewers would fail."""
@@ -122,3 +128,173 @@ def boxes_of(cells: Polygons) -> tuple[FloatArray, FloatArray]:
     corner = cells.points[cells.connectivity, :2]
     low = np.minimum.reduceat(corner, cells.offsets[:-1])
     return low, np.maximum.reduceat(corner, cells.offsets[:-1])
+
+
+MOST_EDGED = 150_000
+"""Number of cells above which they are drawn as pixels without visible edges, which is faster."""
+_EDGE, _FACE = "#c9d0d8", "#f3f5f7"
+"""Colors of the faint cells' edges and faces."""
+
+_SECTION_LINE = 0.7
+"""Width of the section's line in points."""
+
+
+def surroundings(
+    cutter: Cutter, points: FloatArray, matrices: Mapping[int, FloatArray]
+) -> Polygons | None:
+    """Return all cells of a 2D mesh under each matrix (4, 4); None in 3D: they would hide the cut.
+
+    ``points`` are those of the mesh, ``matrices`` the transformations of the passages by number.
+    """
+    if cutter.dim == 3:
+        return None
+    own = cutter.all_cells(points)
+    return joined([own.with_points(moved(own.points, matrix)) for matrix in matrices.values()])
+
+
+def window(cut: Box, around: Polygons, ratio: float) -> Box:
+    """Return the box of a 2D mesh to show around a cut, with the ratio of the room on paper.
+
+    Parameters
+    ----------
+    cut : (2,), (2,) float64
+        Corners of the box around the cut, which the result contains.
+    around : Polygons
+        All cells; the result is within the box around them.
+    ratio : float
+        Width by height of the room.
+    """
+    low, high = cut
+    size = high - low
+    wanted = np.maximum(size, [size[1] * ratio, size[0] / ratio])
+    found = np.stack([(low + high - wanted) / 2.0, (low + high + wanted) / 2.0])
+    corners = around.points[around.connectivity, :2]
+    ends = np.stack([corners.min(axis=0), corners.max(axis=0)])
+    # Where the mesh ends on one side, the box is shifted to show more of the other.
+    shift = np.maximum(ends[0] - found[0], 0.0) - np.maximum(found[1] - ends[1], 0.0)
+    fits = ends[1] - ends[0] >= wanted
+    found = np.where(fits, found + shift, np.stack([ends[0], ends[1]]))
+    return found[0], found[1]
+
+
+def draw_around(axes: Any, around: Polygons, section: Section, box: Box) -> None:
+    """Draw the cells within a box faintly, and the line or circle of a section.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    around : Polygons
+    section : Section
+    box : (2,), (2,) float64
+        Lower and upper corner of what the axes show.
+    """
+    from matplotlib.collections import LineCollection
+
+    low, high = boxes_of(around)
+    seen = around.take(np.flatnonzero(((high >= box[0]) & (low <= box[1])).all(axis=1)))
+    if len(seen):
+        many = len(seen) > MOST_EDGED
+        look: dict[str, Any] = {
+            "facecolors": _FACE,
+            "edgecolors": _FACE if many else _EDGE,
+            "linewidths": 0.3,
+        }
+        draw_cells(axes, seen, None, **look, zorder=0).set_rasterized(many)
+    line = LineCollection(
+        trace(section, box), colors=PAPER.text, linewidths=_SECTION_LINE, zorder=3
+    )
+    axes.add_collection(line, autolim=False)
+
+
+_OUTLINE = 0.6
+"""Width of a bar's outline in points."""
+_THICK, BAR_GAP = 0.14, 0.12
+"""Thickness of a bar, and its distance from the axes beside it, in inches."""
+BAR_BELOW = 0.62
+"""Distance in inches between axes that have numbers and a label, and a bar below them."""
+
+
+def bar_beside(axes: Any) -> Any:
+    """Return inset axes for a color bar at the right of ``axes``, as high as these."""
+    from matplotlib.transforms import ScaledTranslation, blended_transform_factory
+
+    right = axes.figure.dpi_scale_trans + ScaledTranslation(1.0, 0.0, axes.transAxes)
+    place = blended_transform_factory(right, axes.transAxes)
+    return axes.inset_axes((BAR_GAP, 0.0, _THICK, 1.0), transform=place)
+
+
+def bar_below(axes: Any, length: float, gap: float = BAR_BELOW) -> Any:
+    """Return inset axes for a color bar below ``axes``; its length and their gap in inches."""
+    from matplotlib.transforms import ScaledTranslation
+
+    middle = axes.figure.dpi_scale_trans + ScaledTranslation(0.5, 0.0, axes.transAxes)
+    return axes.inset_axes((-length / 2.0, -gap - _THICK, length, _THICK), transform=middle)
+
+
+def color_bar(
+    axes: Any, scale: Any, label: str, letters: float, *, inverted: bool, upright: bool
+) -> Any:
+    """Draw a color bar, with as many numbers as fit, and return it.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        The axes for the bar; see `bar_beside` and `bar_below`.
+    scale : matplotlib.cm.ScalarMappable
+        See `slideviz.plots.cells.color_scale`.
+    label : str
+    letters : float
+        Size of the numbers in points; the label's is one point more.
+    inverted : bool
+        Whether the color of inverted cells is shown at the lower end.
+    upright : bool
+        Whether the bar is vertical.
+    """
+    from matplotlib.cm import ScalarMappable
+
+    bar = axes.figure.colorbar(
+        ScalarMappable(scale.norm, scale.cmap.with_extremes(under=INVERTED_COLOR)),
+        cax=axes,
+        orientation="vertical" if upright else "horizontal",
+        extend="min" if inverted else "neither",
+        extendfrac=0.05,
+    )
+    bar.set_label(label, fontsize=letters + 1.0)
+    axes.tick_params(labelsize=letters, width=_OUTLINE, length=3, labelcolor=PAPER.text)
+    bar.outline.set_linewidth(_OUTLINE)
+    bar.solids.set_rasterized(False)
+    bar.solids.set_edgecolor("face")
+    _number(bar, scale.get_clim(), letters)
+    if inverted:
+        # Beyond the triangle, clear of the numbers.
+        at, ha, va = ((0.0, -0.07), "left", "top") if upright else ((-0.07, 0.5), "right", "center")
+        style = {"fontsize": letters, "color": PAPER.text, "transform": axes.transAxes}
+        axes.text(*at, "inverted", ha=ha, va=va, **style)
+    return bar
+
+
+def _number(bar: Any, limits: tuple[float, float], letters: float) -> None:
+    """Set ticks at both ends of a bar and between them; how many depends on its drawn length."""
+    from matplotlib.textpath import TextPath
+    from matplotlib.ticker import FuncFormatter, Locator
+
+    upright, form = bar.orientation == "vertical", "%g"
+
+    class Ends(Locator):
+        def __call__(self) -> Any:
+            nonlocal form
+            long = bar.ax.bbox.height if upright else bar.ax.bbox.width
+            points = max(72.0 * long / bar.ax.figure.dpi, letters)
+
+            def part(text: str) -> float:
+                box = TextPath((0.0, 0.0), text, size=letters).get_extents()
+                # With a gap: digits that nearly touch read as one number.
+                size = 1.4 * box.height if upright else box.width + 0.6 * letters
+                return float(size / points)
+
+            at, form = bar_ticks(*limits, part)
+            return at
+
+    bar.locator = Ends()
+    bar.formatter = FuncFormatter(lambda value, _: form % value)
+    bar.minorticks_off()

@@ -11,8 +11,7 @@ from slideviz.color_scheme import COLOR_MAP
 from slideviz.export.encode import Pixels
 from slideviz.export.picture import WHITE, pictures_alike
 from slideviz.mesh.model import Mesh
-from slideviz.plots.bar import color_bar
-from slideviz.plots.cells import color_scale
+from slideviz.plots.cells import color_bar, color_scale
 from slideviz.plots.figure_io import SMALLEST, empty_figure, fitted, trim
 from slideviz.plots.style import PRINT
 from slideviz.session.state import StepFrame

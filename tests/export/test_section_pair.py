@@ -11,7 +11,7 @@ from slideviz.errors import CaseError
 from slideviz.export.section_job import PageFormat, save_section
 from slideviz.mesh.quality import quality
 from slideviz.plots import section_picture
-from slideviz.plots.section_layout import arranged
+from slideviz.plots.section_picture import arranged
 from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh

@@ -138,13 +138,11 @@ def test_counts_are_made_once_for_a_frame_and_can_be_linear(full, qtbot, monkeyp
     with qtbot.waitSignal(full.canvas.drawn):
         full.log.setChecked(False)
     assert full.canvas.figure.axes[0].get_yscale() == "linear"
-    from slideviz.plots import session_histogram
+    from slideviz.plots import session_plots
 
     asked = []
-    real = session_histogram.distribution
-    monkeypatch.setattr(
-        session_histogram, "distribution", lambda *v: asked.append(v[0]) or real(*v)
-    )
+    real = session_plots.distribution
+    monkeypatch.setattr(session_plots, "distribution", lambda *v: asked.append(v[0]) or real(*v))
     with qtbot.waitSignal(full.canvas.drawn):
         full.store.change(changes.show_frame, 1)
     assert asked == [full.store.session.frame]

@@ -356,10 +356,10 @@ def test_the_mouse_at_rest_tells_of_the_cell(opened, monkeypatch):
 
 
 def test_panels_behind_another_tab_do_nothing_until_they_are_in_front(opened, monkeypatch):
-    from slideviz.plots import session_histogram
+    from slideviz.plots import session_plots
 
     window, asked = opened.window, []
-    for module, name in ((worst, "worst_cells"), (session_histogram, "distribution")):
+    for module, name in ((worst, "worst_cells"), (session_plots, "distribution")):
         real = getattr(module, name)
 
         def told(*values, real=real, name=name):

@@ -11,7 +11,7 @@ from slideviz.mesh.quality import INVERTED, quality
 from slideviz.plots.draw import ON_DARK, PRINT
 from slideviz.plots.histogram import BAND, draw_distribution
 from slideviz.plots.series import Bars, Distribution, Outline
-from slideviz.plots.session_histogram import BINS, distribution
+from slideviz.plots.session_plots import BINS, distribution
 from slideviz.session.state import StepFrame
 
 

@@ -8,9 +8,8 @@ from matplotlib.figure import Figure
 
 from slideviz.color_scheme import COLOR_MAP
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.plots import around as section_around
-from slideviz.plots.around import surroundings, window
-from slideviz.plots.curves import UNDEFORMED, series_of
+from slideviz.plots import cells as plot_cells
+from slideviz.plots.cells import surroundings, window
 from slideviz.plots.section_curve import (
     Colors,
     Curve,
@@ -22,7 +21,14 @@ from slideviz.plots.section_curve import (
 )
 from slideviz.plots.section_paint import paint
 from slideviz.plots.section_picture import SectionInRun, SectionStyle, draw_section
-from slideviz.plots.section_rows import CurveRows, colors_of, facts_of, labels_of
+from slideviz.plots.session_plots import (
+    UNDEFORMED,
+    CurveRows,
+    colors_of,
+    facts_of,
+    labels_of,
+    series_of,
+)
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import changes
@@ -272,7 +278,7 @@ def test_what_is_shown_around_a_cut_stays_on_the_mesh():
 
 
 def test_very_many_cells_are_an_area_without_lines(mesh, monkeypatch):
-    monkeypatch.setattr(section_around, "MOST", 10)
+    monkeypatch.setattr(plot_cells, "MOST_EDGED", 10)
     whole = Section("plane", (0.0, 0.45, 0.0), (0.0, 1.0, 0.0), whole=True)
     faint = picture(mesh, whole).axes[0].collections[0]
     assert faint.get_rasterized()

@@ -15,9 +15,14 @@ from slideviz.errors import CaseError
 from slideviz.mesh.periodic import match
 from slideviz.mesh.quality import quality
 from slideviz.plots import cells as plot_cells
-from slideviz.plots.section_layout import in_space
 from slideviz.plots.section_paint import paint
-from slideviz.plots.section_picture import SectionInRun, SectionStyle, draw_section, section_picture
+from slideviz.plots.section_picture import (
+    SectionInRun,
+    SectionStyle,
+    draw_section,
+    in_space,
+    section_picture,
+)
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session.passages import passages, show_passages

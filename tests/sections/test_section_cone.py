@@ -12,9 +12,8 @@ from slideviz.cli import run
 from slideviz.errors import CaseError
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import quality
-from slideviz.plots.section_layout import laid_flat
 from slideviz.plots.section_paint import paint
-from slideviz.plots.section_picture import SectionInRun, SectionStyle, section_picture
+from slideviz.plots.section_picture import SectionInRun, SectionStyle, laid_flat, section_picture
 from slideviz.scene.axis_handle import dragged_size, frame_of
 from slideviz.scene.flat_scene import flat_matrix
 from slideviz.sections.around_axis import patch_of

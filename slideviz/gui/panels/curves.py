@@ -22,7 +22,7 @@ from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write_plot
 from slideviz.gui.widgets.plot_image import Draw
 from slideviz.mesh.model import FloatArray
-from slideviz.plots import curves
+from slideviz.plots import session_plots as curves
 from slideviz.plots.draw import convergence, quality_by_step
 from slideviz.plots.spanwise import Profile, spanwise
 from slideviz.plots.style import Style, add_legend

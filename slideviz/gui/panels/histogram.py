@@ -19,12 +19,7 @@ from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write_plot, is_seen
 from slideviz.gui.widgets.plot_image import Draw
 from slideviz.gui.widgets.theme import alarm
-from slideviz.plots.session_histogram import (
-    FrameCounts,
-    draw_histogram,
-    first_value,
-    shown_measure,
-)
+from slideviz.plots.session_plots import FrameCounts, draw_histogram, first_value, shown_measure
 from slideviz.sections.threshold import ONLY_INVERTED, cells_in_range, range_words
 from slideviz.session import changes
 from slideviz.session.state import IN_FILE, Session, StepFrame

@@ -22,7 +22,7 @@ from slideviz.gui.widgets.plot_canvas import PlotArea, ask_and_write_plot
 from slideviz.gui.widgets.plot_image import Draw
 from slideviz.gui.widgets.ruler import Ruler
 from slideviz.plots.section_curve import Colors, CurveRow, draw_curves
-from slideviz.plots.section_rows import CurveRows, colors_of, facts_of, labels_of
+from slideviz.plots.session_plots import CurveRows, colors_of, facts_of, labels_of
 from slideviz.plots.style import Style
 from slideviz.scene.flat_scene import FlatScene
 from slideviz.sections.model import Section

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.mesh.quality import quality
 from slideviz.plots.draw import ON_LIGHT
-from slideviz.plots.session_histogram import MOST, FrameCounts, compared, draw_histogram
+from slideviz.plots.session_plots import MOST_COMPARED, FrameCounts, compared, draw_histogram
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import Run, StepFrame
@@ -40,7 +40,7 @@ def numbers(session):
 def test_runs_of_the_same_motion_and_newer_ones_are_compared_first(many):
     assert numbers(many) == ([1, 3, 5, 6], 2)
     assert numbers(changes.show_run(many, 2)) == ([4, 5, 6, 7], 2)
-    assert len(numbers(many)[0]) == MOST
+    assert len(numbers(many)[0]) == MOST_COMPARED
 
 
 def test_the_run_beside_is_always_compared(many):

@@ -1,0 +1,388 @@
+"""The data of the plots of a session: curves of steps, span and sections, histogram of a step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from slideviz.case.motion_words import deformation
+from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.quality import INVERTED
+from slideviz.plots.draw import GreedyRun, StepRun
+from slideviz.plots.histogram import draw_distribution
+from slideviz.plots.section_curve import Colors, CurveRow, curve_of, position_label
+from slideviz.plots.section_paint import Paint
+from slideviz.plots.series import Bars, Distribution, Outline
+from slideviz.plots.spanwise import Profile, along, along_radius
+from slideviz.plots.style import Style
+from slideviz.plots.ticks import rounded_out
+from slideviz.sections.model import Section
+from slideviz.session.changes import show_frame
+from slideviz.session.section_cuts import Cuts
+from slideviz.session.state import Run, Session, StepFrame
+from slideviz.session.whole import FINE, PartQuality
+from slideviz.terms import QUANTITIES, ColorBy, Quantity, quantity_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Coordinate = Literal["r", "x", "y", "z"]
+
+UNDEFORMED = 4
+"""Series number of the undeformed mesh, which no run has."""
+
+
+def series_of(run: Run) -> int:
+    """Return the series number of a run, the same in all plots (see `Style.series`)."""
+    number = run.number - 1
+    return number if number < UNDEFORMED else number + 1
+
+
+def step_runs(session: Session) -> list[StepRun]:
+    """Return minimum and mean quality of each run with steps, from the undeformed mesh on.
+
+    They are in the order of their numbers: the solid line of the first is drawn below dashed ones,
+    so that it shows where lines coincide.
+    """
+    found = []
+    first = session.first
+    for run in sorted(session.runs, key=lambda run: run.number):
+        if first is None or not run.frames:
+            continue
+        frames = (first, *run.frames)
+        found.append(
+            StepRun(
+                run.label,
+                np.arange(len(frames)),
+                np.array([frame.quality.min for frame in frames]),
+                np.array([frame.quality.mean for frame in frames]),
+                series_of(run),
+            )
+        )
+    return found
+
+
+def greedy_run(session: Session) -> GreedyRun | None:
+    """Return the convergence of the greedy selection in the shown step; None if it had none."""
+    frame, run = session.frame, session.run_shown
+    if frame is None or run is None or frame.step is None or not frame.step.history:
+        return None
+    cycles = frame.step.history
+    return GreedyRun(
+        f"{run.label}, step {frame.step.index}",
+        np.array([cycle.control_nodes for cycle in cycles]),
+        np.array([cycle.error for cycle in cycles]),
+        np.array([cycle.level for cycle in cycles]),
+        frame.step.tolerance,
+        series_of(run),
+    )
+
+
+class Profiles:
+    """A cache of profiles of the quality along the span, kept as long as their frames exist."""
+
+    def __init__(self) -> None:
+        self._made: WeakKeyDictionary[StepFrame, dict[object, Profile]] = WeakKeyDictionary()
+
+    def of(self, session: Session, coordinate: Coordinate) -> list[Profile]:
+        """Return the profiles of the shown step, other runs' last steps, and the undeformed mesh.
+
+        Raises
+        ------
+        SlidevizError
+            The mesh has no extent along the coordinate.
+        """
+        found = []
+        shown, run_shown = session.frame, session.run_shown
+        if shown is not None and run_shown is not None and shown is not session.first:
+            found.append(self._one(session, shown, coordinate, run_shown))
+        others = [run for run in session.runs if run is not run_shown]
+        found += [self._one(session, r.last, coordinate, r) for r in others if r.last is not None]
+        if session.first is not None:
+            found.append(self._one(session, session.first, coordinate, None))
+        return found
+
+    def _one(
+        self, session: Session, frame: StepFrame, coordinate: Coordinate, run: Run | None
+    ) -> Profile:
+        case, mesh = session.case, session.mesh
+        assert mesh is not None
+        label = "undeformed" if run is None else run.label
+        key = coordinate, case.axis, case.origin, label
+        kept = self._made.setdefault(frame, {})
+        if key not in kept:
+            # In layers of the undeformed mesh, so that layers of cells stay together.
+            values = frame.quality.values
+            if coordinate == "r":
+                made = along_radius(mesh, values, case.axis, case.origin, label=label)
+            else:
+                made = along(mesh, values, coordinate, label=label)
+            kept[key] = replace(made, series=UNDEFORMED if run is None else series_of(run))
+        return kept[key]
+
+
+def coordinates(session: Session) -> dict[Coordinate, str]:
+    """Return in words the coordinates that curves along the span can have; no z in 2D."""
+    if session.mesh is None or session.mesh.dim == 2:
+        return {"y": "along y", "x": "along x", "r": "along the radius"}
+    return {"r": "along the radius", "z": "along z", "y": "along y", "x": "along x"}
+
+
+def usual_coordinate(session: Session) -> Coordinate:
+    """Return the default coordinate along the span.
+
+    It is the radius if the mesh repeats by rotation; else y in 2D, or the axis of largest extent.
+    """
+    if session.mesh is None or any(pair.kind == "rotational" for pair in session.pairs):
+        return "r"
+    extent = np.ptp(session.mesh.points, axis=0)
+    return "y" if session.mesh.dim == 2 else ("x", "y", "z")[int(extent.argmax())]
+
+
+class CurveRows:
+    """Makes the curves of sessions, and caches the undeformed mesh's cuts."""
+
+    def __init__(self) -> None:
+        self._first = Cuts()
+
+    def of(self, shown: Sequence[tuple[Session, Cuts]], section: Section) -> tuple[CurveRow, ...]:
+        """Return the curve of the undeformed mesh, then one per session, the first session's last.
+
+        A mesh that the section misses has no curve; nor has the undeformed one for displacements.
+
+        Parameters
+        ----------
+        shown : sequence of (Session, Cuts)
+            The session of each view, the first view first, with the view's cached cuts.
+        section : Section
+        """
+        line = _line(section)
+        states = [(session, cuts) for session, cuts in reversed(shown) if session.view.frame]
+        first = shown[0][0]
+        if first.first is not None and quantity_drawn(first) != "displacement":
+            states.insert(0, (show_frame(first, 0), self._first))
+        found = (self._row(session, cuts, line) for session, cuts in states)
+        return tuple(row for row in found if row is not None)
+
+    def _row(self, session: Session, cuts: Cuts, line: Section) -> CurveRow | None:
+        frame, run = session.frame, session.run_shown
+        assert frame is not None
+        lines = cuts.of(frame.mesh, line)
+        if not len(lines):
+            return None
+        values = frame.values(quantity_drawn(session), session.mesh)
+        curve = curve_of(lines, line, values, frame.quality.status == INVERTED)
+        if run is None or session.view.frame == 0:
+            return CurveRow("undeformed", curve, UNDEFORMED)
+        return CurveRow(run.label, curve, series_of(run))
+
+
+def quantity_drawn(session: Session) -> Quantity:
+    """Return the quantity of the curve: that of the colors, or the quality for roles."""
+    return quantity_of(session.view.color_by)
+
+
+def labels_of(session: Session, section: Section) -> tuple[str, str]:
+    """Return the labels of both axes of the curves."""
+    return position_label(section).full, QUANTITIES[quantity_drawn(session)].axis
+
+
+def colors_of(session: Session) -> Colors:
+    """Return the colors of the areas below a curve: those of the view."""
+    limits = session.color_range if session.view.color_by != "role" else (0.0, 1.0)
+    return Colors(session.view.color_map, limits)
+
+
+def facts_of(session: Session, cuts: Cuts, section: Section) -> str:
+    """Return a sentence with the number of cut cells, their min, mean and inverted ones."""
+    frame = session.frame
+    assert frame is not None
+    lines = cuts.of(frame.mesh, _line(section))
+    if not len(lines):
+        return "it cuts no cell"
+    what = quantity_drawn(session)
+    inverted = frame.quality.status == INVERTED
+    values = frame.values(what, session.mesh)
+    return Paint(what, values, inverted, (0.0, 1.0)).sentence(lines.cell_ids)
+
+
+def _line(section: Section) -> Section:
+    return replace(section, whole=False)
+
+
+LEAST_SPREAD = 0.05
+"""Least range of qualities that the axis shows."""
+
+MOST_COMPARED = 4
+"""Most runs that are compared with the shown one, so that lines can be told apart."""
+
+Range = tuple[float, float]
+
+
+class FrameCounts:
+    """A cache of the frames' distributions, kept as long as their frames exist."""
+
+    def __init__(self) -> None:
+        self._kept: WeakKeyDictionary[StepFrame, dict[object, Distribution]] = WeakKeyDictionary()
+        self._spreads: WeakKeyDictionary[StepFrame, dict[ColorBy, Range | None]] = (
+            WeakKeyDictionary()
+        )
+
+    def limits(self, session: Session, whole: bool) -> Range:
+        """Return the limits of the axis: round numbers around the cells' values.
+
+        They are the same for all steps of the shown run, so that bars can be compared during play.
+        ``whole``: all values that are possible (of the displacement, from 0).
+        """
+        what = shown_measure(session)
+        shown = [*session.frames, *(run.last for run in session.runs if run.last is not None)]
+        for frame in shown:
+            kept = self._spreads.setdefault(frame, {})
+            if what not in kept:
+                kept[what] = spread(frame, what, session.mesh)
+        found = [ends for frame in shown if (ends := self._spreads[frame][what]) is not None]
+        low, high = min((e[0] for e in found), default=0.0), max((e[1] for e in found), default=1.0)
+        if what != "displacement":
+            # A smaller range would enlarge meaningless differences.
+            return (0.0, 1.0) if whole else rounded_out(min(low, high - LEAST_SPREAD), high)
+        return rounded_out(0.0 if whole else low, high)
+
+    def of(self, session: Session, frame: StepFrame, limits: Range) -> Distribution:
+        """Return the distribution of a frame's values between limits."""
+        what = shown_measure(session)
+        kept = self._kept.setdefault(frame, {})
+        if (what, limits) not in kept:
+            kept[what, limits] = distribution(frame, what, limits, session.mesh)
+        return kept[what, limits]
+
+
+def draw_histogram(
+    counts: FrameCounts, session: Session, figure: Figure, style: Style, *, log: bool, whole: bool
+) -> None:
+    """Draw the histogram of a session into a figure; nothing without a mesh.
+
+    Parameters
+    ----------
+    counts : FrameCounts
+    session : Session
+    figure : Figure
+    style : Style
+    log : bool
+        Whether the axis of the counts is logarithmic.
+    whole : bool
+        Whether the other axis shows all possible values, not only those of the cells.
+    """
+    if session.frame is None:
+        return
+    what = shown_measure(session)
+    limits = counts.limits(session, whole)
+    shown, run = counts.of(session, session.frame, limits), session.run_shown
+    label = "undeformed" if session.view.frame == 0 or run is None else run.label
+    term = QUANTITIES[what]
+    metric = term.axis if term.unit else f"{term.label} quality [-]"
+    runs, left_out = compared(session)
+    outlines = [
+        Outline(other.label, counts.of(session, other.last, limits), series_of(other))
+        for other in runs
+        if other.last is not None
+    ]
+    # The undeformed mesh has no displacement.
+    if session.first is not None and session.view.frame > 0 and what != "displacement":
+        outlines.append(Outline("undeformed", counts.of(session, session.first, limits), None))
+    axes = figure.add_subplot()
+    bars = Bars(label, shown, _colors(session, shown))
+    draw_distribution(axes, bars, outlines, metric, log, style)
+    legend = axes.get_legend()
+    if left_out and legend is not None:
+        legend.set_title(f"without {left_out} other run{'s' if left_out > 1 else ''}")
+        legend.get_title().set_fontsize(style.size)
+        legend.get_title().set_color(style.scheme.text)
+
+
+def compared(session: Session) -> tuple[list[Run], int]:
+    """Return the runs to compare with the shown one, and the number of those left out.
+
+    Preferred are the run shown beside it, then those with the same motion, then newer ones. The
+    result is in the order of their numbers.
+    """
+    shown = session.run_shown
+    others = [run for run in session.runs if run.last is not None and run is not shown]
+
+    def rank(run: Run) -> tuple[bool, bool, int]:
+        alike = shown is not None and deformation(run.case) == deformation(shown.case)
+        return run.number != session.view.beside, not alike, -run.number
+
+    first = sorted(others, key=rank)[:MOST_COMPARED]
+    return sorted(first, key=lambda run: run.number), len(others) - len(first)
+
+
+def first_value(axes: Axes) -> float:
+    """Return the lowest value of a drawn histogram: where its bars begin."""
+    bars = [patch for patch in axes.patches if patch.get_gid() == "shown"]
+    return min(float(bar.get_x()) for bar in bars)  # type: ignore[attr-defined]
+
+
+def shown_measure(session: Session) -> Quantity:
+    """Return the quantity of the histogram: that of the view's colors.
+
+    For a mesh that stays in its file it is size-skew, the only one known of all cells.
+    """
+    return quantity_of("size-skew" if session.in_file else session.view.color_by)
+
+
+def _colors(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
+    """Return the color of each bar: that of its middle value in the view."""
+    import matplotlib as mpl
+
+    low, high = session.color_range
+    middle = (shown.edges[1:] + shown.edges[:-1]) / 2.0
+    part = np.clip((middle - low) / max(high - low, 1e-300), 0.0, 1.0)
+    return [tuple(rgba) for rgba in mpl.colormaps[session.view.color_map](part)]
+
+
+_MIDDLES = (np.arange(FINE) + 0.5) / FINE
+"""Middles of the fine intervals (`FINE`) of a totals of qualities."""
+
+BINS = 25
+"""Number of intervals: few enough that an outline's steps show its dashes in a narrow panel."""
+
+
+def distribution(
+    frame: StepFrame,
+    what: ColorBy,
+    limits: tuple[float, float] = (0.0, 1.0),
+    undeformed: Mesh | None = None,
+) -> Distribution:
+    """Return the distribution of a frame's values ``what`` in `BINS` equal intervals of limits.
+
+    ``undeformed`` is needed for displacements.
+    """
+    edges = np.linspace(*limits, BINS + 1)
+    if isinstance(frame.quality, PartQuality):
+        totals = frame.quality.all
+        places = np.clip(np.searchsorted(edges, _MIDDLES, "right") - 1, 0, BINS - 1)
+        counts = np.bincount(places, totals.counts, BINS).astype(np.int64)
+        return Distribution(counts, edges, totals.inverted)
+    return Distribution.of(_values(frame, what, undeformed), edges)
+
+
+def spread(
+    frame: StepFrame, what: ColorBy, undeformed: Mesh | None = None
+) -> tuple[float, float] | None:
+    """Return the lowest and the highest value of the cells of a frame; None if all are inverted."""
+    if isinstance(frame.quality, PartQuality):
+        there = _MIDDLES[np.flatnonzero(frame.quality.all.counts)]
+        return (float(there[0]), float(there[-1])) if len(there) else None
+    values = _values(frame, what, undeformed)
+    right = values[np.isfinite(values)]
+    return (float(right.min()), float(right.max())) if len(right) else None
+
+
+def _values(frame: StepFrame, what: ColorBy, undeformed: Mesh | None) -> FloatArray:
+    """Return the values of a frame's counted cells (those of a halo are not); NaN if inverted."""
+    return np.asarray(frame.shown_values(what, undeformed)[frame.quality.counted])
