@@ -112,13 +112,13 @@ def _run(arguments: argparse.Namespace) -> int:
         write_qualities(qualities, found)
     seconds["write"] += time.perf_counter()
     if arguments.picture:
-        from slideviz.export.picture import SIZE, picture
+        from slideviz.export.offscreen_renderer import PICTURE_SIZE, picture
         from slideviz.session.opening import of_runs
         from slideviz.session.state import Run, StepFrame
 
         named = StepFrame(replace(last.mesh, name=output.name), found, last)
         session = of_runs(StepFrame(mesh, before), [Run(1, case, (named,), "done")])
-        picture(session, arguments.picture, arguments.picture_size or SIZE, arguments.zoom)
+        picture(session, arguments.picture, arguments.picture_size or PICTURE_SIZE, arguments.zoom)
     seconds["total"] = time.perf_counter() - begin
     folded = folded_cells(steps, mesh, found)
     report = run_report(case, mesh, steps, seconds, quality=found, undeformed=before, folded=folded)
@@ -149,10 +149,10 @@ def _require_output_paths(
         _require_series(arguments.steps_file)
     if arguments.picture:
         from slideviz.export.offscreen import check_png, check_size
-        from slideviz.export.picture import SIZE
+        from slideviz.export.offscreen_renderer import PICTURE_SIZE
 
         check_png(arguments.picture)
-        check_size(arguments.picture_size or SIZE)
+        check_size(arguments.picture_size or PICTURE_SIZE)
     require_output_paths(
         arguments,
         mesh,

@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.color_scheme import COLOR_MAP
 from slideviz.export.encode import Pixels
-from slideviz.export.picture import WHITE, pictures_alike
+from slideviz.export.offscreen_renderer import WHITE, pictures_alike
 from slideviz.mesh.model import Mesh
 from slideviz.plots.cells import color_bar, color_scale
 from slideviz.plots.figure_io import SMALLEST, empty_figure, fitted, trim

@@ -6,7 +6,7 @@ from PIL import Image
 from slideviz.case.model import Case
 from slideviz.color_scheme import COLOR_MAP
 from slideviz.errors import MeshError, SlidevizError
-from slideviz.export.picture import picture, pictures_alike
+from slideviz.export.offscreen_renderer import picture, pictures_alike
 from slideviz.mesh.quality import quality
 from slideviz.scene.actors import CELL, POINT, VALUES
 from slideviz.scene.moved import Detail, half_of, tiny_motion
