@@ -141,8 +141,8 @@ def test_the_view_needs_no_qt():
     import sys
 
     code = (
-        "import sys, slideviz.scene.scene, slideviz.export.offscreen_renderer, slideviz.session.jobs, "
-        "slideviz.session.changes, slideviz.session.motions\n"
+        "import sys, slideviz.scene.scene, slideviz.export.offscreen_renderer\n"
+        "import slideviz.session.jobs, slideviz.session.changes, slideviz.session.motions\n"
         "bad = [m for m in sys.modules if m.split('.')[0] in ('qtpy', 'PySide6', 'pyvistaqt')]\n"
         "sys.exit(str(bad) if bad else 0)"
     )
