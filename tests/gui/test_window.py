@@ -1058,7 +1058,7 @@ def test_all_panels_fit_1280_x_800_and_links_lead_to_them(ready):
     bottom = window.run_panel.mapTo(window, window.run_panel.rect().bottomLeft()).y()
     assert bottom < 800
     assert window.run_panel.run.isVisible()
-    from slideviz.session.intersections import intersection_key, set_intersection
+    from slideviz.session.jobs import intersection_key, set_intersection
 
     window = ready.window
     ready.qtbot.waitUntil(lambda: not window.intersection_check.busy)

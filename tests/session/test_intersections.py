@@ -6,7 +6,7 @@ import pytest
 from slideviz.case.model import Case, FromFile, Translate
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
-from slideviz.session.intersections import find_intersection, intersection_key, set_intersection
+from slideviz.session.jobs import find_intersection, intersection_key, set_intersection
 from slideviz.session.opening import open_mesh
 from slideviz.session.run_messages import run_requirements
 from slideviz.session.state import StepFrame

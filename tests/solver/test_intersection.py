@@ -10,7 +10,7 @@ from slideviz.errors import CaseError
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
-from slideviz.session.intersections import find_intersection
+from slideviz.session.jobs import find_intersection
 from slideviz.solver import intersection
 from slideviz.solver.intersection import folding_message, jump_message
 from slideviz.solver.intersection import intersection_message as message
