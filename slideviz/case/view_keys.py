@@ -1,6 +1,6 @@
 """Keys of a case file about the view of the window; runs without a window ignore them.
 
-Their values are in ``Case.view``, by key; `slideviz.session.keep` makes a view of them and back.
+Their values are in ``Case.view``, by key; `slideviz.session.saving` makes a view of them and back.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ from slideviz.gui.widgets.banner import Banner
 from slideviz.gui.widgets.error_reporter import old_crashes
 from slideviz.session import jobs
 from slideviz.session.design_table import DesignTable, read_results, write_results
-from slideviz.session.keep import Camera, restored, view_to_case
+from slideviz.session.saving import Camera, restored, view_to_case
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.system.cleanup import private_file, private_folder

@@ -20,7 +20,7 @@ from slideviz.gui.widgets import questions
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.session import changes, jobs
 from slideviz.session.formats import left_out
-from slideviz.session.keep import files_beside, view_to_case
+from slideviz.session.saving import files_beside, view_to_case
 from slideviz.session.unsaved import Unsaved
 from slideviz.system.atomic import atomic_write
 

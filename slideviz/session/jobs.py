@@ -27,7 +27,7 @@ from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.session.formats import holds_quality
-from slideviz.session.keep import Camera, camera_from_case
+from slideviz.session.saving import Camera, camera_from_case
 from slideviz.session.large import first_frame, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.opening import open_mesh

@@ -8,7 +8,7 @@ import pytest
 from slideviz.mesh.quality import quality
 from slideviz.sections.model import Section
 from slideviz.session import changes
-from slideviz.session.keep import view_to_case
+from slideviz.session.saving import view_to_case
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import Run, StepFrame
 from slideviz.session.unsaved import Unsaved, title_of

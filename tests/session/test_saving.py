@@ -13,7 +13,7 @@ from slideviz.case.view_keys import read_sections, write_sections
 from slideviz.errors import CaseError
 from slideviz.sections.model import Section
 from slideviz.session import changes
-from slideviz.session.keep import camera_from_case, view_from_case, view_to_case
+from slideviz.session.saving import camera_from_case, view_from_case, view_to_case
 from slideviz.session.state import ViewState
 from slideviz.terms import COLOR_BY, COLOR_MAPS, POINTS_SHOWN, SHOWN
 
