@@ -20,8 +20,7 @@ from slideviz.gui.widgets import questions
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.session import changes, jobs
 from slideviz.session.formats import left_out
-from slideviz.session.saving import files_beside, view_to_case
-from slideviz.session.unsaved import Unsaved
+from slideviz.session.saving import Unsaved, files_beside, view_to_case
 from slideviz.system.atomic import atomic_write
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ class Files(QObject):
     """Opens and saves the files of a window, and remembers recent ones.
 
     Closing the window with unsaved work: `MainWindow.closeEvent` calls `ask_about_unsaved`, which
-    takes the text and what can be saved from `slideviz.session.unsaved.Unsaved`, and the answer
+    takes the text and what can be saved from `slideviz.session.saving.Unsaved`, and the answer
     from `slideviz.gui.widgets.questions.ask_unsaved`. Opening another file asks the same way.
     """
 

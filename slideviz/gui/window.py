@@ -51,8 +51,8 @@ from slideviz.scene.scene import Scene
 from slideviz.session import changes, jobs
 from slideviz.session.motions import boxes_hint
 from slideviz.session.run_messages import Requirement, run_requirements
+from slideviz.session.saving import title_of
 from slideviz.session.store import Store
-from slideviz.session.unsaved import title_of
 from slideviz.system.file_checks import protected
 
 log = logging.getLogger("slideviz")

@@ -27,12 +27,12 @@ from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.session.formats import holds_quality
-from slideviz.session.saving import Camera, camera_from_case
 from slideviz.session.large import first_frame, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.opening import open_mesh
 from slideviz.session.passages import find_period
 from slideviz.session.run_messages import in_window_words
+from slideviz.session.saving import Camera, camera_from_case
 from slideviz.session.state import Session, StepFrame
 from slideviz.solver.intersection import folding_message, intersection_message, jump_message
 from slideviz.system.atomic import atomic_write

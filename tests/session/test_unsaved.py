@@ -8,10 +8,9 @@ import pytest
 from slideviz.mesh.quality import quality
 from slideviz.sections.model import Section
 from slideviz.session import changes
-from slideviz.session.saving import view_to_case
 from slideviz.session.opening import open_mesh
+from slideviz.session.saving import Unsaved, title_of, view_to_case
 from slideviz.session.state import Run, StepFrame
-from slideviz.session.unsaved import Unsaved, title_of
 
 
 @pytest.fixture(scope="module")
