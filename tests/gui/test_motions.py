@@ -25,8 +25,7 @@ from slideviz.gui.dialogs.motion_table import TableDialog
 from slideviz.gui.panels.motion_form import control_point
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.session import changes
-from slideviz.session.motion_table import TableRows
-from slideviz.session.motions import Ghosts
+from slideviz.session.motions import Ghosts, TableRows
 from slideviz.session.run_messages import run_requirements
 from slideviz.terms import SHOWN
 from tests.builders import airfoil

@@ -7,7 +7,7 @@ from slideviz.case.displacement import read_displacements
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
 from slideviz.session import motion_table
-from slideviz.session.motion_table import TableRows, table_text, write_table
+from slideviz.session.motions import TableRows, table_text, write_table
 
 CASE = Case(roles={"bottom": "moving", "left": "moving", "top": "sliding"})
 

@@ -7,8 +7,7 @@ from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
 from slideviz.case.motion import displacements
 from slideviz.case.motion_words import describe, motion_labels
 from slideviz.session import changes
-from slideviz.session.motion_table import TableRows
-from slideviz.session.motions import Ghosts
+from slideviz.session.motions import Ghosts, TableRows
 from slideviz.session.run_messages import run_requirements
 
 PAIR = ("bottom", "left")

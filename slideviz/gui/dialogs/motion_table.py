@@ -12,7 +12,7 @@ from slideviz.gui.responsiveness.timers import TABLE_MS, later
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import dialog_buttons, in_column, set_style
 from slideviz.gui.widgets.labels import fixed_font
-from slideviz.session.motion_table import TableRows, table_text, write_table
+from slideviz.session.motions import TableRows, table_text, write_table
 
 FILTERS = "Displacements (*.txt)"
 ABOUT = (

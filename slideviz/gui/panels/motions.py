@@ -26,8 +26,8 @@ from slideviz.gui.widgets.panel import FieldWatch, Panel
 from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes
-from slideviz.session.motion_table import TableRows
 from slideviz.session.motions import (
+    TableRows,
     box_names,
     boxes_hint,
     centroid,
