@@ -14,7 +14,7 @@ from slideviz.mesh.model import Cells, Mesh
 from slideviz.sections.cut import Cutter, cut_cases
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import joined
-from slideviz.session.section_start import span
+from slideviz.session.section_cuts import span
 from tests.builders import cube, passage, permuted, square
 from tests.oracles.sections import cut_cells, height
 

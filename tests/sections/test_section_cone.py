@@ -21,7 +21,7 @@ from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session.opening import open_mesh
 from slideviz.session.passages import keeps, passages
-from slideviz.session.section_start import first_section, span, turned
+from slideviz.session.section_cuts import first_section, span, turned
 from slideviz.session.state import StepFrame
 from tests.builders import cube, grid, ring, square
 from tests.sections.test_section import KINDS, areas, shaken

@@ -9,7 +9,7 @@ from slideviz.mesh.quality import quality
 from slideviz.sections.shape import round_middle
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
-from slideviz.session.section_start import first_section
+from slideviz.session.section_cuts import first_section
 from slideviz.session.state import StepFrame
 from tests.builders import grid, ring
 

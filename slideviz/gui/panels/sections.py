@@ -32,8 +32,7 @@ from slideviz.gui.widgets.services import Services
 from slideviz.scene.passages import Period
 from slideviz.sections.model import Section
 from slideviz.session import changes
-from slideviz.session.section_cuts import can_cut
-from slideviz.session.section_start import first_section
+from slideviz.session.section_cuts import can_cut, first_section
 from slideviz.session.state import IN_FILE, Session
 
 if TYPE_CHECKING:
