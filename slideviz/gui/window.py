@@ -17,11 +17,11 @@ from slideviz.case.motion_words import mesh_words
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.actions import Actions
 from slideviz.gui.autosave import Autosave, SessionRecovery
+from slideviz.gui.background import READING, IntersectionCheck, SectionReader
 from slideviz.gui.dialogs.exports import Exports
 from slideviz.gui.dialogs.help import Help
 from slideviz.gui.docks import Docks, room_for
 from slideviz.gui.files import Files
-from slideviz.gui.intersection_check import IntersectionCheck
 from slideviz.gui.panels.boundaries import BoundariesPanel
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.panels.log import LogPanel
@@ -31,7 +31,6 @@ from slideviz.gui.panels.run import RunPanel
 from slideviz.gui.panels.worst import WorstPanel
 from slideviz.gui.responsiveness.threads import WarmupThread
 from slideviz.gui.running import Running
-from slideviz.gui.section_reader import READING, SectionReader
 from slideviz.gui.start import StartPage
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.player import Player
@@ -111,8 +110,8 @@ class MainWindow(Services):
         self.store.listen(lambda *_: self.sync_actions())
         self.intersection_check = IntersectionCheck(self.store, self)
         self.section_reader = SectionReader(self.store, self)
-        self.section_reader.found.connect(self.section_views.redraw)
-        self.section_reader.said.connect(self._say_reading)
+        self.section_reader.finished.connect(self.section_views.redraw)
+        self.section_reader.progressed.connect(self._say_reading)
         self.warmup = WarmupThread(self)
         self.warmup.compiling.connect(self.preparing.setVisible)
         self.warmup.compiling.connect(self.run_panel.set_compiling)

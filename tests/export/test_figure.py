@@ -28,7 +28,7 @@ from slideviz.mesh.surfaces import find_surfaces
 from slideviz.scene.mesh import FADED
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
-from slideviz.session import changes, jobs_export
+from slideviz.session import changes, jobs
 from slideviz.session.formats import MESH_FORMATS, formats_for, holds_quality, left_out
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
@@ -387,10 +387,10 @@ def test_formats_and_what_they_leave_out(square, cube):
 
 
 def test_centroids_and_names_of_steps(square):
-    middles = jobs_export.centroids(square)
+    middles = jobs.centroids(square)
     cell = square.cells.connectivity[: square.cells.offsets[1]]
     assert np.allclose(middles[0], square.points[cell].mean(axis=0))
-    names = [path.name for path in jobs_export.step_paths(Path("/x/a.su2"), 10)]
+    names = [path.name for path in jobs.step_paths(Path("/x/a.su2"), 10)]
     assert names[0] == "a_01.su2"
     assert names[-1] == "a_10.su2"
 
@@ -402,7 +402,7 @@ def test_the_table_tells_inverted_cells_and_every_type(square, tmp_path):
     bad = square.with_points(points)
     said = []
     frame = StepFrame(bad, quality(bad, square))
-    path = jobs_export.save_quality(tmp_path / "q.csv", frame, said.append, lambda: False)
+    path = jobs.save_quality(tmp_path / "q.csv", frame, said.append, lambda: False)
     lines = path.read_text().splitlines()
     assert len(lines) == 1 + len(bad.cells)
     assert sum(",inverted," in line for line in lines) == frame.quality.inverted > 0

@@ -25,7 +25,7 @@ from slideviz.scene.mesh import looks_inside
 from slideviz.scene.pick import to_display
 from slideviz.scene.sections import plain_color
 from slideviz.sections.model import Section
-from slideviz.session import changes, section_start
+from slideviz.session import changes, section_cuts
 from slideviz.session.opening import open_mesh
 from slideviz.session.passages import find_period, moved
 from slideviz.session.section_cuts import KEPT, Cuts
@@ -402,7 +402,7 @@ def test_cuts_are_remembered_for_the_frame_only(cube):
 def test_a_first_plane_cuts_the_longest_extent_in_the_middle(square):
     mesh = square.with_points(square.points * (3.0, 1.0))
     session = open_mesh(StepFrame(mesh, quality(mesh)), None)
-    plane = section_start.first_section("plane", session)
+    plane = section_cuts.first_section("plane", session)
     assert plane.direction == (1.0, 0.0, 0.0)
     assert plane.shape.position(plane) == 6.0
     assert plane.whole
@@ -412,7 +412,7 @@ def test_a_first_cylinder_has_the_axis_of_the_period(stator):
     mesh = stator.mesh
     session = open_mesh(StepFrame(mesh, quality(mesh)), None, (), stator.case)
     pair = find_period(mesh, stator.case)
-    cylinder = section_start.first_section("cylinder", session, pair)
+    cylinder = section_cuts.first_section("cylinder", session, pair)
     assert np.cross(cylinder.direction, (0, 0, 1)) == pytest.approx(0.0)
     radii = np.unique(np.hypot(*mesh.points[:, :2].T).round(9))
     low, high = radii[0], radii[-1]
@@ -421,7 +421,7 @@ def test_a_first_cylinder_has_the_axis_of_the_period(stator):
     # Along it rounding would say which cells are cut: the middle of the next ones is.
     assert np.abs(radii - cylinder.radius).min() > 1e-3 * (high - low)
     assert abs(cylinder.radius - middle) < np.diff(radii).max()
-    assert section_start.first_section("cylinder", session, None).direction == stator.case.axis
+    assert section_cuts.first_section("cylinder", session, None).direction == stator.case.axis
 
 
 def test_positions_move_a_plane_along_its_normal():
@@ -429,18 +429,18 @@ def test_positions_move_a_plane_along_its_normal():
     assert plane.shape.position(plane) == pytest.approx(3.6)
     there = plane.shape.at_position(plane, 4.6)
     assert there.origin == pytest.approx((1.0, 2.6, 3.8))
-    low, high = section_start.span(plane, np.array([[0.0, 0.0, 0.0], [0.0, 5.0, 0.0]]))
+    low, high = section_cuts.span(plane, np.array([[0.0, 0.0, 0.0], [0.0, 5.0, 0.0]]))
     assert (low, high) == pytest.approx((0.0, 3.0))
     with pytest.raises(CaseError, match="radius -1 is not positive"):
         Section("cylinder", radius=1.0).sized(-1.0)
 
 
 def test_a_turned_plane_still_cuts(cube):
-    points = section_start.cell_points(cube)
+    points = section_cuts.cell_points(cube)
     outside = Section("plane", (0.0, 5.0, 0.3), (0.0, 0.0, 1.0))
-    within = section_start.turned(outside, (0.0, 1.0, 0.0), points).origin[1]
+    within = section_cuts.turned(outside, (0.0, 1.0, 0.0), points).origin[1]
     assert within == pytest.approx(0.5, abs=0.1)
-    kept = section_start.turned(MIDDLE, (0.0, 1.0, 1.0), points)
+    kept = section_cuts.turned(MIDDLE, (0.0, 1.0, 1.0), points)
     assert kept.origin == MIDDLE.origin
 
 

@@ -27,7 +27,7 @@ from slideviz.gui.panels.boundaries import BoundariesPanel
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import fitted, framed, to_image
 from slideviz.mesh.quality import quality
-from slideviz.session import changes, jobs, jobs_export, manual, pieces
+from slideviz.session import changes, jobs, manual, pieces
 from tests.mesh.test_interfaces import moved, zones
 
 pytestmark = pytest.mark.usefixtures("unpainted")
@@ -466,7 +466,7 @@ def test_a_cancelled_table_leaves_no_file(computed, tmp_path):
     from slideviz.errors import Cancelled
 
     with pytest.raises(Cancelled, match="as you asked"):
-        jobs_export.save_quality(
+        jobs.save_quality(
             tmp_path / "q.csv", computed[0].session.first, lambda _: None, lambda: True
         )
     assert not list(tmp_path.glob("q*"))
@@ -505,7 +505,7 @@ def test_cancelled_steps_keep_whole_files(steps, tmp_path):
 
     said = []
     with pytest.raises(Cancelled, match="as you asked"):
-        jobs_export.save_steps(tmp_path / "s.su2", steps, said.append, lambda: len(said) > 0)
+        jobs.save_steps(tmp_path / "s.su2", steps, said.append, lambda: len(said) > 0)
     assert [path.name for path in tmp_path.glob("s_*")] in ([], ["s_1.su2"])
 
 

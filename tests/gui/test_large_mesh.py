@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
+from slideviz.gui.background import READING
 from slideviz.gui.panels.designs import DesignsPanel
-from slideviz.gui.section_reader import READING
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import write_sample
 from slideviz.scene.actors import VALUES

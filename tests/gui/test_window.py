@@ -278,7 +278,7 @@ def test_a_rotation_is_typed_and_an_intersection_is_told_meanwhile_of_the_last_m
     opened, monkeypatch
 ):
     from slideviz.color_scheme import INTERSECTION_COLOR
-    from slideviz.session import intersections
+    from slideviz.session import jobs
     from slideviz.terms import ROLES
 
     opened.add_motion(Rotate)
@@ -324,7 +324,7 @@ def test_a_rotation_is_typed_and_an_intersection_is_told_meanwhile_of_the_last_m
         return "", ""
 
     opened.qtbot.waitUntil(lambda: not window.intersection_check.busy)
-    monkeypatch.setattr(intersections, "find_intersection", listening)
+    monkeypatch.setattr(jobs, "find_intersection", listening)
     opened.add_motion(Translate)
     field = window.motions.editor.vector.fields[1]
     opened.click(field)

@@ -6,7 +6,7 @@ import pytest
 from slideviz.case.displacement import read_displacements
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
-from slideviz.session import motion_table
+from slideviz.session import motions
 from slideviz.session.motions import TableRows, table_text, write_table
 
 CASE = Case(roles={"bottom": "moving", "left": "moving", "top": "sliding"})
@@ -71,6 +71,6 @@ def test_it_is_written_as_a_displacement_file(rows, tmp_path):
 def test_a_large_file_is_not_edited_by_hand(tmp_path, monkeypatch):
     path = tmp_path / "table.txt"
     path.write_text("1 0 0\n" * 10)
-    monkeypatch.setattr(motion_table, "LARGEST", 59)
+    monkeypatch.setattr(motions, "LARGEST", 59)
     with pytest.raises(CaseError, match="too much to be edited here"):
         table_text(path)

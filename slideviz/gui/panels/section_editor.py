@@ -17,7 +17,7 @@ from slideviz.gui.widgets.fields import NumberField
 from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.sections.model import Section, Triple
-from slideviz.session import section_start
+from slideviz.session import section_cuts
 
 STEPS = 1000
 """Positions of the slider."""
@@ -107,7 +107,7 @@ class SectionEditor(QWidget):
         if section is None or mesh is None:
             return
         if mesh is not self._mesh:
-            self._mesh, self._points = mesh, section_start.cell_points(mesh)
+            self._mesh, self._points = mesh, section_cuts.cell_points(mesh)
         terms, flat = section.shape.terms, mesh.dim == 2
         # A circle's axis is always z.
         fixed = flat and bool(terms.point)
@@ -151,7 +151,7 @@ class SectionEditor(QWidget):
         key = (self._mesh, section.kind, section.direction, centre)
         if key != self._span_of:
             assert self._points is not None
-            self._span_of, self._span = key, section_start.span(section, self._points)
+            self._span_of, self._span = key, section_cuts.span(section, self._points)
         value, (low, high) = section.shape.position(section), self._span
         self.number.show_value(float(f"{value:.6g}"))
         if self.slider.isSliderDown() or self._soon.isActive():
@@ -177,7 +177,7 @@ class SectionEditor(QWidget):
         if word == FREE:
             self.show_section(self._section, self._mesh, self._place)
         else:
-            self._offer(section_start.turned(self._section, AXES[word], self._points))
+            self._offer(section_cuts.turned(self._section, AXES[word], self._points))
 
     def _direction_typed(self, values: tuple[float, ...]) -> None:
         x, y, z = (*values, 0.0, 0.0)[:3]
@@ -185,7 +185,7 @@ class SectionEditor(QWidget):
         if any(direction) and self._section is not None and self._points is not None:
             self._typing = True
             try:
-                self._offer(section_start.turned(self._section, direction, self._points))
+                self._offer(section_cuts.turned(self._section, direction, self._points))
             finally:
                 self._typing = False
         elif not any(direction):

@@ -85,7 +85,7 @@ def ask_unsaved(
 
     Return ``case``, ``mesh``, ``table`` or ``all`` to save that, ``discard`` or ``cancel``. Called
     by `slideviz.gui.files.Files.ask_about_unsaved`, which has the text from
-    `slideviz.session.unsaved`.
+    `slideviz.session.saving`.
 
     Parameters
     ----------

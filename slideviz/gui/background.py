@@ -1,0 +1,164 @@
+"""Jobs in the background of the window: the intersection check, and reading the cells of sections.
+
+Each has a runner of its own, so that neither it nor a run waits for the other.
+"""
+
+from __future__ import annotations
+
+import logging
+from functools import partial
+
+from qtpy.QtCore import QObject, Signal
+
+from slideviz.gui.responsiveness.timers import INTERSECTION_MS, later
+from slideviz.gui.responsiveness.worker import JobRunner
+from slideviz.mesh.model import Mesh
+from slideviz.sections.model import Section
+from slideviz.session import jobs
+from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
+from slideviz.session.panes import shown_views
+from slideviz.session.section_cuts import is_awaited
+from slideviz.session.slabs import keep_slab, plain, read_slab
+from slideviz.session.state import Session, StepFrame
+from slideviz.session.store import Store
+
+log = logging.getLogger("slideviz")
+
+READING = "Reading the cells of the section"
+"""Begin of the progress messages of `SectionReader`."""
+
+
+class BackgroundJob(QObject):
+    """The base of a job that follows the session: `_start` begins it, soon after a change."""
+
+    def __init__(self, store: Store, parent: QObject | None = None, wait_ms: int = 0) -> None:
+        super().__init__(parent)
+        self.store = store
+        self._runner = JobRunner(self)
+        self._timer = later(self, self._start, wait_ms)
+
+    @property
+    def busy(self) -> bool:
+        """Return whether the job is running or scheduled."""
+        return self._runner.busy or self._timer.isActive()
+
+    def close(self) -> None:
+        """Stop the job."""
+        self._timer.stop()
+        self._runner.close()
+
+    def _start(self) -> None:
+        raise NotImplementedError
+
+
+class IntersectionCheck(BackgroundJob):
+    """Keeps ``Session.intersection`` up to date by a job; a result stays until the next one."""
+
+    def __init__(self, store: Store, parent: QObject | None = None) -> None:
+        super().__init__(store, parent, INTERSECTION_MS)
+        self._runner.finished.connect(self._finished)
+        self._runner.cancelled.connect(self._schedule)
+        self._runner.failed.connect(self._failed)
+        self._running_key: tuple[object, ...] = ()
+        self._checked_key: tuple[object, ...] = ()
+        store.listen(self._changed)
+
+    def _changed(self, old: Session, new: Session) -> None:
+        if old.mesh is not new.mesh or old.case is not new.case:
+            self._schedule()
+
+    def _schedule(self) -> None:
+        session = self.store.session
+        if session.mesh is not None and jobs.intersection_key(session) != self._checked_key:
+            self._timer.start()
+
+    def _start(self) -> None:
+        session = self.store.session
+        if self._runner.busy:
+            self._timer.start()
+        elif session.mesh is not None:
+            self._running_key = jobs.intersection_key(session)
+            self._runner.start(jobs.find_intersection, session.case, session.mesh)
+
+    def _finished(self, found: tuple[str, str]) -> None:
+        self._checked_key = self._running_key
+        self.store.change(jobs.set_intersection, found, self._running_key)
+        self._schedule()
+
+    def _failed(self, error: Exception) -> None:
+        log.error("the intersection check failed: %s", error)
+        self._checked_key = self._running_key
+
+
+class SectionReader(BackgroundJob):
+    """Reads the cells that shown sections cut, of a mesh that stays in its file.
+
+    A job whose section has changed is cancelled.
+
+    Signals
+    -------
+    finished()
+        The cells of a section have been read.
+    progressed(str)
+        A message for the status bar.
+    """
+
+    finished = Signal()
+    progressed = Signal(str)
+
+    def __init__(self, store: Store, parent: QObject | None = None) -> None:
+        super().__init__(store, parent)
+        self._runner.finished.connect(self._read)
+        self._runner.cancelled.connect(self._timer.start)
+        self._runner.failed.connect(self._failed)
+        self._runner.doing.connect(lambda doing: self.progressed.emit(doing.text))
+        self._running: tuple[Mesh, Section] | None = None
+        self._unreadable: set[tuple[Mesh, Section]] = set()
+        store.listen(lambda _old, new: self._timer.start() if new.in_file else None)
+
+    def _awaited(self) -> list[tuple[StepFrame, Section]]:
+        """Return the sections whose cells are still to be read, each with the frame it cuts."""
+        return [
+            (view.frame, plain(section))
+            for view in shown_views(self.store.session)
+            for section in view.view.sections
+            if view.frame is not None
+            and section.shown
+            and is_awaited(view.frame.mesh, section)
+            and (view.frame.mesh, plain(section)) not in self._unreadable
+        ]
+
+    def _start(self) -> None:
+        awaited = self._awaited() if self.store.session.in_file else []
+        if self._runner.busy:
+            # The section being read may be dragged on, and its cells no longer wanted.
+            if self._running not in [(frame.mesh, section) for frame, section in awaited]:
+                self._runner.cancel()
+            return
+        if awaited:
+            frame, section = awaited[0]
+            self._running = frame.mesh, section
+            self._runner.start(_read_section, frame, section)
+
+    def _read(self, slab: StepFrame) -> None:
+        assert self._running is not None
+        keep_slab(*self._running, slab)
+        self.progressed.emit("")
+        self.finished.emit()
+        self._timer.start()
+
+    def _failed(self, error: Exception) -> None:
+        assert self._running is not None
+        self._unreadable.add(self._running)
+        log.error("the section cannot be read: %s", error)
+        self.progressed.emit(f"The section cannot be read: {error}")
+        self._timer.start()
+
+
+def _read_section(
+    frame: StepFrame, section: Section, report: Report, stopped: Stopped
+) -> StepFrame:
+    def progress(part: float) -> None:
+        report(JobProgress(f"{READING}: {part:.0%}"))
+
+    return read_slab(frame, section, progress, partial(raise_if_cancelled, stopped))
