@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from slideviz.errors import Cancelled
-from slideviz.session import changes, jobs_export
+from slideviz.session import changes, jobs
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
@@ -44,7 +44,7 @@ def test_all_steps_go_into_one_file(ran, answers, tmp_path):
 def test_cancelled_steps_leave_no_file(ran, tmp_path):
     said = []
     with pytest.raises(Cancelled, match="as you asked"):
-        jobs_export.save_steps(
+        jobs.save_steps(
             tmp_path / "s.vtkhdf", ran.session.frames[1:], said.append, lambda: len(said) > 0
         )
     assert not list(tmp_path.glob("*.vtkhdf"))

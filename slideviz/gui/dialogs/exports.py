@@ -20,7 +20,7 @@ from slideviz.gui.dialogs.picture import PictureDialog
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import copy_image, to_image, wait_cursor
 from slideviz.gui.widgets.services import Services
-from slideviz.session import changes, jobs_export
+from slideviz.session import changes, jobs
 from slideviz.session.state import Session
 
 log = logging.getLogger("slideviz")
@@ -155,7 +155,7 @@ class Exports(QObject):
         path = questions.ask_save(self.window, "Export quality", default, "CSV table (*.csv)")
         if path is not None:
             self.window.running.start_job(
-                f"Saving {path.name}", self._written, jobs_export.save_quality, path, frame
+                f"Saving {path.name}", self._written, jobs.save_quality, path, frame
             )
 
     def steps(self) -> None:
@@ -171,13 +171,13 @@ class Exports(QObject):
         path = questions.ask_numbered(self.window, title, default, filters)
         if path is None:
             return
-        there = [one for one in jobs_export.step_paths(path, len(run.frames)) if one.exists()]
+        there = [one for one in jobs.step_paths(path, len(run.frames)) if one.exists()]
         if there and not questions.ask_replace(self.window, there):
             return
         self.window.running.start_job(
             "Saving the steps",
             lambda paths: self._steps_written(paths, run.number),
-            partial(jobs_export.save_steps, first=session.frames[0]),
+            partial(jobs.save_steps, first=session.frames[0]),
             path,
             run.frames,
         )
