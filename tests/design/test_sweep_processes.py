@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
@@ -80,12 +81,18 @@ def test_the_call_that_a_killed_worker_had_not_begun_is_done_by_another(passage)
         workers.submit(divmod, 1, 1).result()
         long = workers.submit(time.sleep, 60)
         others = [workers.submit(divmod, 7, k) for k in (1, 2, 3)]
-        assert [call.running() for call in (long, *others)] == [True, True, False, False]
+        wait_until(long.running)
+        assert not any(call.running() for call in others)
         os.kill(workers.pids[0], signal.SIGKILL)
         assert [call.result(timeout=60) for call in others] == [(7, 0), (3, 1), (2, 1)]
         with pytest.raises(BrokenProcessPool):
             long.result(timeout=60)
         assert workers.lost == 1
+        pid = workers.pids[0]
+        os.kill(pid, signal.SIGKILL)
+        wait_until(lambda: not is_running(pid))
+        assert workers.submit(divmod, 7, 2).result(timeout=60) == (3, 1)
+        assert workers.lost == 1, "no call is lost with a process that has none"
 
 
 def test_workers_end_with_their_parent_however_it_ends(tmp_path):
@@ -154,6 +161,10 @@ def test_what_a_process_cannot_do_is_an_error_of_the_call(passage):
     with Processes(1, packed(passage.mesh)) as workers:
         with pytest.raises(ZeroDivisionError):
             workers.submit(divmod, 1, 0).result()
+        with pytest.raises(AttributeError, match="lambda"):
+            workers.submit(lambda: 1).result()
+        with pytest.raises(RuntimeError, match="cannot be sent back"):
+            workers.submit(threading.Lock).result()
         assert workers.submit(divmod, 7, 2).result() == (3, 1)
         assert workers.lost == 0
 
