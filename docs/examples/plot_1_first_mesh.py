@@ -2,7 +2,7 @@
 A turbine blade in its passage
 ==============================
 
-Read a mesh and a case, deform, rate the result, look at it with PyVista, and write it.
+Read a mesh and a case, deform the mesh, measure its quality, draw it with PyVista, and write it.
 """
 
 import subprocess
@@ -28,22 +28,22 @@ print(mesh)
 print(dict(case.roles))
 
 # %%
-# ``sv.deform`` is a generator: it gives a step when it is asked for one. Whoever pulls it may stop
-# at any time.
+# ``sv.deform`` is a generator: it computes a step when the loop asks for one. The loop may stop at
+# any time.
 
 for step in sv.deform(case, mesh):
     print(f"step {step.index} of {step.total}: {step.control_nodes} control nodes")
 deformed = step.mesh
 
 # %%
-# Quality is size-skew, from 0 to 1, against the undeformed mesh.
+# Quality is size-skew, from 0 to 1, relative to the undeformed mesh.
 
 quality = sv.quality(deformed, reference=mesh)
 print(f"minimum {quality.min:.3f}, mean {quality.mean:.3f}, {quality.inverted} inverted cells")
 print("worst cells:", quality.worst(3))
 
 # %%
-# A VTU file takes values on the cells along, and PyVista and ParaView read it.
+# A VTU file also stores values of the cells. PyVista and ParaView read it.
 
 sv.write(folder / "deformed.vtu", deformed, cell_data={"quality": quality.values}, base=mesh)
 plotter = pv.Plotter(window_size=(900, 560))
@@ -53,6 +53,6 @@ plotter.camera.zoom(1.4)
 plotter.show()
 
 # %%
-# The same mesh for SU2, with everything else that the file had:
+# Write the same mesh for SU2, with everything else that the input file had:
 
 sv.write(folder / "deformed.su2", deformed)

@@ -2,8 +2,8 @@
 What sliding does
 =================
 
-The block of the thesis, turned by 60 degrees and moved to a corner of its square, with its outer
-boundaries held, sliding, and with periodic sides that move along.
+The block of the thesis is rotated by 60 degrees and moved to a corner of its square. Its outer
+boundaries are held, or slide, or its periodic sides move along as well.
 """
 
 import subprocess
@@ -25,16 +25,16 @@ subprocess.run([sys.executable, "-m", "slideviz", *sample], check=True, stdout=s
 mesh, case = sv.read(folder / "mesh.su2"), sv.Case.read(folder / "square.cfg")
 
 # %%
-# A case is a value: ``change`` gives another one. Three ways, 20 steps each, as in thesis section
-# 5.1.1.
+# A case is a value: ``change`` returns another one. Compare three methods with 20 steps each, as in
+# thesis section 5.1.1.
 
-ways = {
+methods = {
     "all held": case.change(sliding="none", periodic="none", steps=20),
     "pseudo sliding": case.change(sliding="ps", periodic="none", steps=20),
     "and periodic sides move": case.change(sliding="ps", periodic="moving", steps=20),
 }
 figure, all_axes = plt.subplots(1, 3, figsize=(10, 4.2), layout="constrained")
-for axes, (name, changed) in zip(all_axes, ways.items(), strict=True):
+for axes, (name, changed) in zip(all_axes, methods.items(), strict=True):
     *_, last = sv.deform(changed, mesh)
     quality = sv.quality(last.mesh, reference=mesh)
     print(f"{name}: minimum {quality.min:.6f}, mean {quality.mean:.6f}")

@@ -2,8 +2,8 @@
 The periodic distance
 =====================
 
-Why a node near one periodic side feels what moves near the other one: the distance between nodes
-repeats with the mesh.
+A motion near one periodic side acts on nodes near the other side, because the distance between
+nodes is periodic, as the mesh is.
 """
 
 import matplotlib.pyplot as plt
@@ -13,9 +13,9 @@ PERIOD = 1.0
 SUPPORT_RADIUS = 2.5
 
 # %%
-# In the direction of the period λ, a difference Δ counts as (λ/π) sin(π Δ/λ) (thesis, Eq. 2.13).
-# It is what the chord of a circle of circumference λ is to its arc: nearly Δ for close nodes, and
-# 0 again after one period.
+# In the direction of the period λ, a difference Δ is replaced by (λ/π) sin(π Δ/λ) (thesis, Eq.
+# 2.13). This is the chord of an arc of length Δ on a circle of circumference λ: nearly Δ for close
+# nodes, and 0 again after one period.
 
 difference = np.linspace(0, 2 * PERIOD, 401)
 periodic = np.abs(PERIOD / np.pi * np.sin(np.pi * difference / PERIOD))

@@ -2,7 +2,7 @@
 Choose a tolerance
 ==================
 
-How many control nodes a tolerance takes, and what it does to the quality: a stator passage of
+See how many control nodes a tolerance needs, and how it changes the quality of a stator passage of
 about 5,000 hexahedra.
 """
 
@@ -25,19 +25,19 @@ case = case.change(steps=1)
 # %%
 # ``DATA_RED_RELATIVE`` is the tolerance as a part of the largest extent of the mesh.
 
-found = []
+results = []
 for relative in (1e-3, 3e-4, 1e-4, 3e-5, 1e-5):
     changed = case.change(reduction=replace(case.reduction, relative=relative))
     *_, last = sv.deform(changed, mesh)
     quality = sv.quality(last.mesh, reference=mesh)
-    found.append((relative, last.control_nodes, quality.min))
+    results.append((relative, last.control_nodes, quality.min))
     print(f"{relative:.0e}: {last.control_nodes} control nodes, minimum {quality.min:.4f}")
 
 # %%
-# Control nodes cost memory and time. The minimum quality settles long before the selection is
-# exhausted: choose the largest tolerance from which on it no longer changes.
+# Control nodes cost memory and time. The minimum quality converges long before the selection has
+# taken all nodes. Choose the largest tolerance below which the quality no longer changes.
 
-tolerances, nodes, lowest = zip(*found, strict=True)
+tolerances, nodes, lowest = zip(*results, strict=True)
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
 left.loglog(tolerances, nodes, "o-")
 left.set(xlabel="tolerance / extent", ylabel="control nodes")

@@ -2,8 +2,8 @@
 Quality along the span
 ======================
 
-Where along the span of a stator are the worst cells, and by which method? Rate each cell, and
-sort it by its radius.
+Where along the span of a stator are the worst cells, and with which method? Measure the quality of
+each cell, and sort the cells by radius.
 """
 
 import subprocess
@@ -25,7 +25,7 @@ subprocess.run([sys.executable, "-m", "slideviz", *sample], check=True, stdout=s
 mesh, case = sv.read(folder / "mesh.su2"), sv.Case.read(folder / "stator.cfg")
 
 # %%
-# The stator's axis is z, so the radius of a cell is that of its middle in x and y. The passage has
+# The stator's axis is z, so the radius of a cell is that of its centre in x and y. The passage has
 # eight layers of cells from hub to shroud, all of the same size.
 
 ids, nodes = mesh.cells.by_type[HEXAHEDRON]

@@ -2,8 +2,8 @@
 Hold a tip gap
 ==============
 
-A body that moves along a casing, with a gap of two per cent between them. The mesh is made in
-Python, without a file.
+A body moves along a casing, with a gap of two per cent between them. Python makes the mesh, without
+a file.
 """
 
 import matplotlib.pyplot as plt
@@ -16,9 +16,9 @@ LINE, QUADRILATERAL = 3, 9
 """Their numbers in SU2 and VTK."""
 
 # %%
-# A channel, seen from the side: a body stands on its floor, and four layers of cells fill the gap
-# between the tip of the body and the casing. First a grid of 40 by 24 cells, then the cells of the
-# body are left out.
+# The mesh is a channel, seen from the side. A body stands on its floor, and four layers of cells
+# fill the gap between the tip of the body and the casing. Make a grid of 40 by 24 cells, and leave
+# out the cells of the body.
 
 across = np.linspace(0, 2, 41)
 up = np.r_[np.linspace(0, 0.98, 21), np.linspace(0.985, 1, 4)]
@@ -50,8 +50,8 @@ mesh = sv.Mesh(
 print(mesh)
 
 # %%
-# The body moves by 0.3, fifteen times the height of the gap. Where the casing is held, the cells of
-# the gap are sheared. Where it slides, they go along, and the gap keeps its height.
+# The body moves by 0.3, fifteen times the height of the gap. If the casing is held, the cells of
+# the gap are sheared. If it slides, they follow the body, and the gap keeps its height.
 
 case = sv.Case(
     roles={"body": "moving", "casing": "sliding", "floor": "sliding"},

@@ -31,8 +31,8 @@ subprocess.run([sys.executable, "-m", "slideviz", *sample], check=True, stdout=s
 mesh, case = sv.read(folder / "mesh.su2"), sv.Case.read(folder / "passage.cfg")
 
 # %%
-# The deformation is prepared once. All that is discrete in it is chosen here and kept, so that the
-# mesh is a smooth function of the blade, and its derivatives are exact.
+# The deformation is prepared once. All discrete choices are made here and kept, so that the mesh is
+# a smooth function of the blade, and its derivatives are exact.
 
 deformer = sv.Deformer(mesh, case.change(steps=1))
 blade = mesh.points[deformer.nodes]
@@ -40,7 +40,7 @@ pitch = np.array([0.0, np.ptp(mesh.points[mesh.marker("inflow").nodes, 1])])
 print(f"{len(mesh.cells)} cells, {len(blade)} nodes on the blade")
 
 # %%
-# **The design.** The first variable turns the blade about its middle, in degrees. The others move
+# **The design.** The first variable rotates the blade about its centre, in degrees. The others move
 # the 4 x 2 control points of a box around it in y: free-form deformation with Bernstein
 # polynomials, whose values are those of binomial distributions.
 
@@ -66,8 +66,8 @@ def shape(design):
 
 
 # %%
-# **The throat** is the smallest distance of two neighbouring blades: here a smooth minimum over all
-# pairs of nodes, ``(Σ distance^-60)^(-1/60)``.
+# **The throat** is the smallest distance between two neighbouring blades: here a smooth minimum
+# over all pairs of nodes, ``(Σ distance^-60)^(-1/60)``.
 
 
 def throat(surface):
@@ -80,8 +80,9 @@ def throat(surface):
 
 
 # %%
-# **The mesh.** ``sv.quality`` has the derivative of a smooth minimum by all points; the deformer's
-# ``vjp`` takes it to the blade, and the shape's derivative to the design.
+# **The mesh.** ``sv.quality`` returns the derivative of a smooth minimum by all points. The
+# deformer's ``vjp`` turns it into a derivative by the blade, and the shape's derivative into one by
+# the design.
 
 calls = dict.fromkeys(("meshes", "gradients of the mesh"), 0)
 
@@ -124,12 +125,12 @@ def slope_of_narrowness(design):
 # iteration costs a mesh and one product with the transposed Jacobian, however many design
 # variables there are; with differences a mesh for each of them.
 
-found = {}
+results = {}
 for name, exact in {"exact gradients": True, "finite differences": False}.items():
     calls.update(dict.fromkeys(calls, 0))
     measured.cache_clear()
     constraint = {"type": "ineq", "fun": least_quality}
-    found[name] = minimize(
+    results[name] = minimize(
         narrowness,
         start,
         jac=slope_of_narrowness if exact else None,
@@ -138,8 +139,8 @@ for name, exact in {"exact gradients": True, "finite differences": False}.items(
         method="SLSQP",
     )
     counted = ", ".join(f"{count} {what}" for what, count in calls.items())
-    print(f"{name}: throat {-found[name].fun:.4f}, {found[name].nit} iterations, {counted}")
-best = found["exact gradients"].x
+    print(f"{name}: throat {-results[name].fun:.4f}, {results[name].nit} iterations, {counted}")
+best = results["exact gradients"].x
 print("bounds reached:", int(np.isclose(np.abs(best), np.max(bounds, axis=1)).sum()))
 
 # %%
@@ -150,14 +151,14 @@ figure, all_axes = plt.subplots(
     1, 2, figsize=(9, 4.2), sharex=True, sharey=True, layout="constrained"
 )
 for axes, design in zip(all_axes, (start, best), strict=True):
-    moved, rated = measured(tuple(design))
+    moved, quality = measured(tuple(design))
     ids, nodes = mesh.cells.by_type[QUADRILATERAL]
     for shift in (0, pitch):
         corners = moved.points[nodes] + shift
-        cells = PolyCollection(corners, array=rated.values[ids], ec="k", lw=0.2)
+        cells = PolyCollection(corners, array=quality.values[ids], ec="k", lw=0.2)
         cells.set_clim(0, 1)
         axes.add_collection(cells)
-    title = f"throat {-narrowness(design):.3f}, minimum quality {rated.min:.3f}"
+    title = f"throat {-narrowness(design):.3f}, minimum quality {quality.min:.3f}"
     axes.set(title=title, aspect="equal", xticks=[], yticks=[])
     axes.autoscale_view()
 figure.colorbar(cells, ax=all_axes, label="size-skew quality", shrink=0.75)
