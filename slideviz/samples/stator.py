@@ -3,18 +3,20 @@
 The grid of ``passage``, an O-grid in a channel, is smoothed at three radii in the plane of z
 and r theta; between them z and theta are quadratic in r. The annulus has the dimensions of the
 thesis's Aachen stator; its blade is our own. A fine grid is interpolated from a smoothed coarse one
-(`slideviz.samples.refined`) and smoothed, the finest are not smoothed again. Nodes and cells are
+(`refined`) and smoothed, the finest are not smoothed again. Nodes and cells are
 computed from these planes by their numbers, so that any part of a mesh can be made without the
 rest. The displacement moves the blade as an optimiser might: twist, lean and bumps
-(`slideviz.samples.reshaping`).
+(`reshaped`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise, product
 from typing import ClassVar
 
 import numpy as np
+from scipy.interpolate import RectBivariateSpline
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile
@@ -22,12 +24,121 @@ from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
 from slideviz.formats.su2b.write import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
-from slideviz.samples.blade import BladeSection, Shares, camber, counts
-from slideviz.samples.passage import Grid, make_grid, smoothed, straight_points
-from slideviz.samples.refined import refined
-from slideviz.samples.reshaping import reshaped
-from slideviz.samples.structured import LARGEST, QUADRILATERAL, mesh_of, zone_of
-from slideviz.samples.thesis import FILE
+from slideviz.samples.passage import (
+    BladeSection,
+    Grid,
+    GridCounts,
+    Shares,
+    blade_nodes,
+    camber,
+    counts,
+    layer_parts,
+    make_grid,
+    smoothed,
+    straight_points,
+)
+from slideviz.samples.thesis import FILE, LARGEST, QUADRILATERAL, mesh_of, zone_of
+
+TWIST_DEG = -8.0
+"""Rotation about the stacking line at the shroud; 0 at the hub."""
+LEAN_DEG = -3.0
+"""Shift in theta at the shroud, which moves the blade out of its old passage; 0 at the hub."""
+BUMPS, SEED = 40, 41
+"""Number of bumps, and seed of their random places, widths and heights."""
+HEIGHT, WIDTH = 6e-4, (3e-3, 9e-3)
+"""Greatest height of a bump, and its least and greatest radius, in the mesh's length unit."""
+
+
+def reshaped(points: FloatArray, radii: tuple[float, float], stack_z: float) -> FloatArray:
+    """Return the displacement (k, 3) of blade nodes, which keeps their distance from the axis.
+
+    Parameters
+    ----------
+    points : (k, 3)
+        Nodes of the blade; the axis is z.
+    radii : (float, float)
+        Radii of hub and shroud.
+    stack_z : float
+        z of the stacking line, which has theta = 0.
+    """
+    r, theta = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
+    z, arc = points[:, 2], r * theta
+    span = (r - radii[0]) / (radii[1] - radii[0])
+    twist = np.radians(TWIST_DEG) * span**2
+    away = z - stack_z
+    moved_z = stack_z + np.cos(twist) * away - np.sin(twist) * arc
+    moved_arc = np.sin(twist) * away + np.cos(twist) * arc
+    moved_arc += r * np.radians(LEAN_DEG) * np.sin(np.pi / 2 * span) + _bumps(points)
+    angle = moved_arc / r
+    return np.column_stack([r * np.cos(angle), r * np.sin(angle), moved_z]) - points
+
+
+def _bumps(points: FloatArray) -> FloatArray:
+    """Return the sum (k,) of Gaussian bumps at points (k, 3), a length along theta.
+
+    Their centres are random in the bounding box of the points.
+    """
+    random = np.random.default_rng(SEED)
+    low, high = points.min(axis=0), points.max(axis=0)
+    total = np.zeros(len(points))
+    for _ in range(BUMPS):
+        centre = random.uniform(low, high)
+        width, height = random.uniform(*WIDTH), random.uniform(-HEIGHT, HEIGHT)
+        near = np.sum((points - centre) ** 2, axis=1) / width**2
+        total += height * np.exp(-near)
+    return total
+
+
+def refined(coarse: Grid, points: FloatArray, fine: Grid, section: BladeSection) -> FloatArray:
+    """Return the nodes (m, 2) of the fine grid, interpolated from ``points`` of the coarse one.
+
+    Nodes of the blade are moved onto it, those of the O-grid with them, less the further out.
+    """
+    found = np.full((int(fine.quads.max()) + 1, 2), np.nan)
+    places = [_channel_knots(grid.n) for grid in (coarse, fine)]
+    for i, j in product(range(3), range(3)):
+        if i == j == 1:
+            continue
+        old, new = (
+            grid.number[a[i] : a[i + 1] + 1, b[j] : b[j + 1] + 1]
+            for grid, (a, b) in zip((coarse, fine), places, strict=True)
+        )
+        found[new] = _spline(points[old], new.shape)
+    turns = [_ring_knots(grid.n) for grid in (coarse, fine)]
+    for side in range(4):
+        old, new = (
+            np.roll(grid.ring, -start, axis=1)[:, : stop - start + 1]
+            for grid, knots in zip((coarse, fine), turns, strict=True)
+            for start, stop in [list(pairwise(knots))[side]]
+        )
+        found[new[:-1]] = _spline(points[old], new.shape)[:-1]
+    blade = blade_nodes(fine.n.lower, fine.ring.shape[1] - fine.n.lower, section)
+    fade = 1 - layer_parts(fine.n)[:-1, None, None]
+    found[fine.ring[:-1]] += fade * (blade - found[fine.ring[0]])
+    return found
+
+
+def _channel_knots(n: GridCounts) -> tuple[list[int], list[int]]:
+    """Return the indices of grid lines between the blocks of the channel, in both directions."""
+    along = np.cumsum([0, n.ahead, n.along, n.behind]).tolist()
+    return along, np.cumsum([0, n.below, n.beside, n.above]).tolist()
+
+
+def _ring_knots(n: GridCounts) -> list[int]:
+    """Return the columns of the O-grid at the corners of the hole, the first one again."""
+    return (n.nose + np.cumsum([0, n.along, n.beside, n.along, n.beside])).tolist()
+
+
+def _spline(block: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """Return a block of points (a, b, 2) resampled by cubic splines: (*shape, 2)."""
+    x, y = (np.linspace(0, 1, size) for size in block.shape[:2])
+    new_x, new_y = (np.linspace(0, 1, size) for size in shape)
+    kx, ky = min(3, len(x) - 1), min(3, len(y) - 1)
+    columns = [
+        RectBivariateSpline(x, y, block[..., k], kx=kx, ky=ky)(new_x, new_y) for k in range(2)
+    ]
+    return np.stack(columns, axis=2)
+
 
 SIZES = (5_000, 5_000_000)
 """Least and largest number of cells of a mesh in memory."""

@@ -12,10 +12,16 @@ from slideviz.case.motion import displacements
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.periodic import pair_up
-from slideviz.samples.blade import BladeSection, Shares, blade_nodes, counts
-from slideviz.samples.passage import make_grid, smoothed, straight_points
-from slideviz.samples.refined import refined
-from slideviz.samples.stator import stator_mesh
+from slideviz.samples.passage import (
+    BladeSection,
+    Shares,
+    blade_nodes,
+    counts,
+    make_grid,
+    smoothed,
+    straight_points,
+)
+from slideviz.samples.stator import refined, stator_mesh
 from slideviz.samples.table import SAMPLES, Sample, sample, write_sample
 
 made = cache(sample)

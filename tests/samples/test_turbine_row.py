@@ -11,9 +11,18 @@ import slideviz as sv
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.periodic import pair_up
-from slideviz.samples.sizing import Sizing, find_sizing, inside, relax, triangulate
 from slideviz.samples.table import SAMPLES, sample
-from slideviz.samples.turbine_row import NEAREST, front_points, row_case, row_mesh
+from slideviz.samples.turbine_row import (
+    NEAREST,
+    Sizing,
+    find_sizing,
+    front_points,
+    inside,
+    relax,
+    row_case,
+    row_mesh,
+    triangulate,
+)
 from slideviz.samples.vane import camber, pitch, vane_layers
 
 TRIANGLE, QUADRILATERAL = 5, 9
