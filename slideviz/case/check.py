@@ -11,7 +11,7 @@ from slideviz.case.boxes import ffd_problems
 from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.key import BOUNDARIES, FILES, MOTION, Key
 from slideviz.case.keys import KEYS
-from slideviz.case.method_keys import FACTORS
+from slideviz.case.method_keys import FACTORS, why_no_tolerance
 from slideviz.case.model import (
     BoxMotion,
     FromFile,
@@ -25,7 +25,6 @@ from slideviz.case.model import (
     named,
 )
 from slideviz.case.motion_text import read_motions, write_motions
-from slideviz.case.reduction_keys import why_no_tolerance
 from slideviz.case.words import nearest
 from slideviz.errors import CaseError, Note
 from slideviz.terms import ROLES, SLIDES

@@ -55,7 +55,7 @@ class Reduction:
     `slideviz.rbf.problem.GAMMA`, which holds without data reduction, too."""
     auto: bool = False
     """Select only where the boundary has many nodes, to a tolerance that is a part of the largest
-    displacement, whatever ``tolerance`` and ``relative`` are (`slideviz.solver.reduction` has both
+    displacement, whatever ``tolerance`` and ``relative`` are (`slideviz.solver.setup` has both
     numbers)."""
 
     def __post_init__(self) -> None:

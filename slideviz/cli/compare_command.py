@@ -68,9 +68,8 @@ def compare(arguments: argparse.Namespace) -> int:
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
     from slideviz.errors import CaseError
-    from slideviz.study.combinations import COMPARED_METHODS, MODES, warm
+    from slideviz.study.combinations import COMPARED_METHODS, MODES, announcement, refused, warm
     from slideviz.study.table import terminal_head
-    from slideviz.study.wanted import announcement, refused
 
     case = read_case(arguments)
     mesh_file = require_mesh_file(arguments, case)
@@ -116,8 +115,13 @@ def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...
         A name is unknown, a list is empty, or a number of steps is not valid.
     """
     from slideviz.errors import CaseError
-    from slideviz.study.combinations import AUTO, COMPARED_METHODS
-    from slideviz.study.wanted import combinations, wanted_methods, wanted_modes
+    from slideviz.study.combinations import (
+        AUTO,
+        COMPARED_METHODS,
+        combinations,
+        wanted_methods,
+        wanted_modes,
+    )
     from slideviz.terms import PERIODIC_MODES
 
     def names(option: str, known: Sequence[str], usual: Sequence[str]) -> list[str]:
@@ -208,9 +212,8 @@ def _drawn(
     folder: Path,
 ) -> list[Path]:
     """Write plots and pictures, and return their paths."""
-    from slideviz.study.facets import profiler
     from slideviz.study.montage import DPI, montage
-    from slideviz.study.plots import figures, save_figure, steps_name
+    from slideviz.study.plots import figures, profiler, save_figure, steps_name
 
     span = None if arguments.span == "none" else profiler(case, mesh, arguments.span)
     files = []

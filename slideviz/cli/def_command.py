@@ -92,8 +92,7 @@ def _run_def(arguments: argparse.Namespace) -> int:
     from slideviz.cli.report import folded_cells, run_report
     from slideviz.cli.run_command import run_steps
     from slideviz.cli.run_outcome import CELLS, advice_for, report_outcome, write_qualities
-    from slideviz.design.su2.convexity import convex_part
-    from slideviz.design.su2.surface import at_rest, make_surface
+    from slideviz.design.su2.surface import at_rest, convex_part, make_surface
 
     begin = time.perf_counter()
     config, mesh = read_configuration(arguments)

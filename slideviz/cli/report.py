@@ -10,9 +10,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from slideviz.case.method_keys import automatic_radius
+from slideviz.case.method_keys import automatic_radius, get_reduction
 from slideviz.case.model import Case
-from slideviz.case.reduction_keys import get_reduction
 from slideviz.errors import CaseError, Note
 from slideviz.mesh.check import unused_nodes
 from slideviz.mesh.elements import ELEMENTS

@@ -18,8 +18,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf.images import FAR, largest_misfit, misfits
 from slideviz.rbf.problem import Solution
 from slideviz.solver.growth import GROWTH, HOPELESS, unsoundness
-from slideviz.solver.reduction import AUTO_TOLERANCE
-from slideviz.solver.setup import Setup
+from slideviz.solver.setup import AUTO_TOLERANCE, Setup
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""The sample ``passage``, one blade of a linear turbine cascade, and the grid of ``stator``.
+"""The sample ``passage``, one blade of a linear turbine cascade, and grids around blades.
 
 An O-grid lies around the blade, in a rectangular hole of a channel of quadrilaterals (H-grid).
 Both are made with straight lines first and then smoothed together; nodes of the periodic sides

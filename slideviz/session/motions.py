@@ -12,10 +12,9 @@ import numpy as np
 
 from slideviz.case.boxes import box_definition, boxes_for
 from slideviz.case.displacement import Displacements, parse_displacements, read_displacements
-from slideviz.case.given import key_of, placed_displacements
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case, FromFile, Target, moves, named
-from slideviz.case.motion import displacements, moved_together
+from slideviz.case.motion import displacements, key_of, moved_together, placed_displacements
 from slideviz.case.motion_words import direction_words
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh

@@ -27,8 +27,8 @@ from slideviz.case.model import (
 from slideviz.errors import Note
 from slideviz.mesh.model import Mesh
 from slideviz.session.state import PanelPlace, Run, Session
-from slideviz.solver.reduction import LOOSE
 from slideviz.solver.remedies import MOST_NAMES, beyond_pitch, fixed_beside, remedies
+from slideviz.solver.setup import LOOSE
 from slideviz.terms import KERNELS
 
 LARGE = 1e9

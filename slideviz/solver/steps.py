@@ -82,7 +82,7 @@ class Step:
     """The tolerance of the data reduction, in the mesh's length unit; None where there was none."""
     layers: float = 0.0
     """The tolerance that layers at moving boundaries need where it is smaller than ``tolerance``
-    (`slideviz.solver.reduction.LAYER`); else 0."""
+    (`slideviz.solver.setup.LAYER`); else 0."""
     periodic_misfit: float | None = None
     """Largest difference of the displacements of periodic images so far, in the mesh's length unit.
     It is rounding only, since more raises. None where images need not move alike."""

@@ -15,9 +15,16 @@ from slideviz.plots.cells import color_bar, color_scale
 from slideviz.plots.figure_io import SMALLEST, empty_figure, fitted, trim
 from slideviz.plots.style import PRINT
 from slideviz.session.state import StepFrame
-from slideviz.study.combinations import COMPARED_METHODS, MODES, CombinationRow, Result
+from slideviz.study.combinations import (
+    COMPARED_METHODS,
+    MODES,
+    TITLES,
+    CombinationRow,
+    Result,
+    reasons,
+    words_for,
+)
 from slideviz.study.plots import WIDTH
-from slideviz.study.wanted import TITLES, reasons, words_for
 
 GridPlace = tuple[int, int]
 """Row and column of a picture in the montage."""

@@ -3,24 +3,117 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from slideviz.case.model import Case
+from slideviz.errors import CaseError, MeshError
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.quality import INVERTED
 from slideviz.plots import draw as plots
 from slideviz.plots.figure_io import empty_figure, write_figure
-from slideviz.plots.spanwise import spanwise
+from slideviz.plots.spanwise import Profile, along, along_radius, spanwise
 from slideviz.plots.style import PRINT
 from slideviz.plots.ticks import rounded_out
-from slideviz.study.combinations import CombinationRow
-from slideviz.study.facets import Facet, FacetLine, Profiler, facets, result_of
+from slideviz.study.combinations import COMPARED_METHODS, MODES, CombinationRow, Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+Span = Literal["r", "x", "y", "z"]
+
+
+@dataclass(frozen=True, eq=False)
+class FacetLine:
+    """A line in a facet: its name, its number ``series`` (which sets its look), and its row."""
+
+    label: str
+    series: int
+    row: CombinationRow
+
+
+@dataclass(frozen=True, eq=False)
+class Facet:
+    """Lines that are drawn in one plot; ``title`` is empty where there is one facet only."""
+
+    title: str
+    lines: tuple[FacetLine, ...]
+
+
+def facets(rows: Sequence[CombinationRow]) -> tuple[Facet, ...]:
+    """Return facets of the rows that have a result; lines of one name look alike in all facets."""
+    asked = [list(dict.fromkeys(_titles(row)[axis] for row in rows)) for axis in (0, 1)]
+    done = [row for row in rows if row.result is not None]
+    methods, modes = (len({_titles(row)[axis] for row in done}) for axis in (0, 1))
+    # 0: each method is a line, each mode a facet; 1: the other way round.
+    lined = 0 if modes == 1 or modes < methods else 1
+    other = 1 - lined
+    found: dict[str, list[FacetLine]] = {title: [] for title in asked[other]}
+    for row in done:
+        titles = _titles(row)
+        line = FacetLine(titles[lined], asked[lined].index(titles[lined]), row)
+        found[titles[other]].append(line)
+    several = len(found) > 1
+    made = [Facet(title if several else "", tuple(lines)) for title, lines in found.items()]
+    return tuple(facet for facet in made if facet.lines)
+
+
+def _titles(row: CombinationRow) -> tuple[str, str]:
+    """Return the names of method and mode of a row."""
+    return COMPARED_METHODS[row.combination.method][0], MODES[row.combination.periodic]
+
+
+Profiler = Callable[[FacetLine], Profile]
+"""Returns the profile of a line's quality along the span."""
+
+
+def result_of(line: FacetLine) -> Result:
+    """Return the result of a line; lines always have one."""
+    assert line.row.result is not None
+    return line.row.result
+
+
+def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | None:
+    """Return the function that makes profiles along the span; None without a span.
+
+    Parameters
+    ----------
+    case : Case
+    mesh : Mesh
+        The undeformed mesh. Cells are assigned to places along the span by it, so that a layer of
+        cells stays together when it bends.
+    span : {"r", "x", "y", "z"}, optional
+        When left out: the radius of a 3D mesh that repeats by rotation, z of another 3D mesh,
+        no span for a 2D mesh.
+    """
+    axis, origin, turns = case.axis, case.origin, False
+    names = case.markers_with("periodic")
+    if names and span in (None, "r"):
+        try:
+            first = pair_up(mesh, names, case.periodic_type, case.axis, case.origin)[0]
+            turns = first.kind == "rotational"
+            axis, origin = (first.axis, first.origin) if turns else (axis, origin)
+        except (MeshError, CaseError):
+            pass  # the rows say it
+    if span is None and mesh.dim == 2:
+        return None
+    where = span or ("r" if turns else "z")
+
+    def profile(line: FacetLine) -> Profile:
+        values = result_of(line).quality.values
+        if where == "r":
+            made = along_radius(mesh, values, axis, origin, label=line.label)
+        else:
+            made = along(mesh, values, where, label=line.label)
+        return replace(made, series=line.series)
+
+    return profile
+
 
 WIDTH = 7.0
 """Width of figures, in inches: that of a page's text, so that letters are at least 8 points."""
@@ -42,7 +135,7 @@ def figures(rows: Sequence[CombinationRow], span: Profiler | None) -> Iterator[t
     rows : sequence of CombinationRow
         Rows without a result are left out.
     span : callable or None
-        Returns the profile of a row along the span, as `slideviz.study.facets.profiler` makes it;
+        Returns the profile of a row along the span, as `slideviz.study.plots.profiler` makes it;
         None: no figures along the span.
     """
     numbers = list(dict.fromkeys(row.combination.steps for row in rows))

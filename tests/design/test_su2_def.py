@@ -448,7 +448,7 @@ def test_continuity_holds_planes_where_it_is_asked_for(here):
 
 
 def test_continuity_in_3d_finds_the_sides_that_the_surface_passes(here):
-    from slideviz.design.su2.planes import _meets
+    from slideviz.design.su2.boxes import _meets
 
     side = np.array([[0.0, 0, 0], [0, 0, 1], [0, 1, 0], [0, 1, 1]])
     through = np.array([[[-1.0, 0.9, 0.9], [1.0, 0.8, 0.8]], [[-1.0, 0.1, 0.1], [1.0, 0.2, 0.1]]])
@@ -458,7 +458,7 @@ def test_continuity_in_3d_finds_the_sides_that_the_surface_passes(here):
 
 
 def test_continuity_in_2d_continues_the_sides_beyond_the_box_as_su2_does():
-    from slideviz.design.su2.planes import _meets
+    from slideviz.design.su2.boxes import _meets
 
     side = np.array([[0.0, 0, -0.5], [0, 0, 0.5], [0, 1, -0.5], [0, 1, 0.5]])
     edges = np.array([[[-1.0, 5.0, 0.0], [1.0, 6.0, 0.0]], [[0.5, 0.0, 0.0], [0.5, 1.0, 0.0]]])

@@ -10,7 +10,7 @@ from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
 from slideviz.session.run_messages import help_for
 from slideviz.session.state import Run, StepFrame
-from slideviz.solver import reduction, setup
+from slideviz.solver import setup
 from slideviz.solver.deform import Step
 from slideviz.streaming.run import stream
 from tests import builders
@@ -36,16 +36,16 @@ def test_up_to_its_limit_it_is_the_exact_method_to_the_bit(passage):
 
 def test_the_limit_counts_periodic_images_once(passage, monkeypatch):
     count = _last(passage.case.change(steps=1), passage.mesh).candidates
-    monkeypatch.setattr(reduction, "EXACT_NODES", count)
+    monkeypatch.setattr(setup, "EXACT_NODES", count)
     assert setup.make_setup(passage.case, passage.mesh).reduction is None
-    monkeypatch.setattr(reduction, "EXACT_NODES", count - 1)
+    monkeypatch.setattr(setup, "EXACT_NODES", count - 1)
     assert setup.make_setup(passage.case, passage.mesh).reduction is not None
 
 
 def test_beyond_its_limit_it_follows_the_motion_to_a_thousandth(passage, monkeypatch):
     case, mesh = passage.case.change(steps=2), passage.mesh
     exact = _last(case.change(reduction=None), mesh)
-    monkeypatch.setattr(reduction, "EXACT_NODES", 10)
+    monkeypatch.setattr(setup, "EXACT_NODES", 10)
     found = _last(case, mesh)
     prepared = setup.make_setup(case, mesh)
     largest = np.linalg.norm(prepared.target, axis=1).max()
@@ -59,7 +59,7 @@ def test_beyond_its_limit_it_follows_the_motion_to_a_thousandth(passage, monkeyp
 
 
 def test_a_motion_of_nothing_changes_no_bit(passage, monkeypatch):
-    monkeypatch.setattr(reduction, "EXACT_NODES", 10)
+    monkeypatch.setattr(setup, "EXACT_NODES", 10)
     blade = passage.case.markers_with("moving")[0]
     still = passage.case.change(motions=(sv.Translate(blade, (0.0, 0.0)),))
     assert np.array_equal(_last(still, passage.mesh).mesh.points, passage.mesh.points)
@@ -81,7 +81,7 @@ def test_a_relative_tolerance_is_a_length_of_the_step(passage):
 
 def _layers(monkeypatch):
     """A cylinder that changes its shape between sliding walls, with layers of 1e-6."""
-    monkeypatch.setattr(reduction, "EXACT_NODES", 10)
+    monkeypatch.setattr(setup, "EXACT_NODES", 10)
     roles = {"wall": "moving", "far": "fixed", "hub": "sliding", "shroud": "sliding"}
     motions = sv.Scale("wall", (1.1, 0.95, 1.0)), sv.Translate("wall", (0.1, 0.0, 0.0))
     return builders.layered_cylinder(), sv.Case(roles=roles, motions=motions, sliding="ps")
@@ -112,7 +112,7 @@ def test_it_stays_below_half_of_the_first_layer_beside_sliding_walls(monkeypatch
 
 def test_layers_that_it_cannot_follow_are_told(monkeypatch):
     mesh, case = _layers(monkeypatch)
-    monkeypatch.setattr(reduction, "SMALLEST", 1e-3)
+    monkeypatch.setattr(setup, "SMALLEST", 1e-3)
     found = _last(case, mesh)
     (said,) = [text for text in found.warnings if "too little for" in text]
     assert said.startswith("sliding nodes are 1e-06 from moving ones, too little for DATA_REDUCT")

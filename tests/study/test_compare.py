@@ -13,21 +13,19 @@ from slideviz.samples.table import sample
 from slideviz.study import combinations as comparing
 from slideviz.study.combinations import (
     COMPARED_METHODS,
-    Combination,
-    bounded,
-    compare,
-)
-from slideviz.study.table import csv_text, terminal_head, terminal_line
-from slideviz.study.wanted import (
     KEYS,
+    Combination,
     announcement,
+    bounded,
     combinations,
+    compare,
     reasons,
     refused,
     wanted_methods,
     wanted_modes,
     words_for,
 )
+from slideviz.study.table import csv_text, terminal_head, terminal_line
 
 
 @pytest.fixture(scope="module")

@@ -13,12 +13,10 @@ from slideviz.case.model import Translate
 from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
 from slideviz.samples.table import sample
-from slideviz.study.combinations import COMPARED_METHODS, MODES, compare
-from slideviz.study.facets import facets, profiler
+from slideviz.study.combinations import COMPARED_METHODS, MODES, combinations, compare
 from slideviz.study.montage import NOT_KEPT, montage
-from slideviz.study.plots import figures, save_figure, steps_name
+from slideviz.study.plots import facets, figures, profiler, save_figure, steps_name
 from slideviz.study.table import history_text
-from slideviz.study.wanted import combinations
 
 
 @pytest.fixture(scope="module")

@@ -11,16 +11,15 @@ import numpy as np
 
 from slideviz.design.deformer import Deformer
 from slideviz.design.su2.config import Su2Config
-from slideviz.design.su2.convexity import convex_part
-from slideviz.design.su2.restart import angle_sensitivity
 from slideviz.design.su2.sensitivities import (
     CLOSE,
     Matched,
     Sensitivities,
+    angle_sensitivity,
     match,
     read_sensitivities,
 )
-from slideviz.design.su2.surface import MovingSurface, make_surface
+from slideviz.design.su2.surface import MovingSurface, convex_part, make_surface
 from slideviz.errors import ConditionWarning, ToleranceWarning
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 from slideviz.solver.deform import deform

@@ -2,28 +2,201 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from pathlib import Path
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from slideviz.case.check import raise_all
+from slideviz.case.displacement import Columns, parse_rows
+from slideviz.case.lines import read_text
 from slideviz.case.model import Case, Prescribed
 from slideviz.design.su2.boxes import move_boxes, problems_of_boxes
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.markers import problems_of_markers
-from slideviz.design.su2.positions import ListedPositions
 from slideviz.design.su2.shapes import Shapes
-from slideviz.design.su2.variables import Group
-from slideviz.errors import CaseError, Note, SlidevizError
+from slideviz.design.su2.variables import WITHOUT_VALUE, DesignVariable, Group
+from slideviz.errors import CaseError, DeformError, Note, SlidevizError
 from slideviz.ffd.section import boxes_of
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.quality import quality
 from slideviz.solver.setup import make_setup
 from slideviz.solver.steps import Step
+
+Attempt = TypeVar("Attempt")
+
+
+def scaled(config: Su2Config, part: float) -> Su2Config:
+    """Return a configuration with ``part`` of its design."""
+    variables = tuple(_scaled(variable, part) for variable in config.variables)
+    return replace(config, variables=variables)
+
+
+def _scaled(variable: DesignVariable, part: float) -> DesignVariable:
+    # The value that moves nothing.
+    neutral = 1.0 if variable.kind in ("SCALE", "SCALE_GRID") else 0.0
+    return replace(variable, values=tuple(neutral + part * (v - neutral) for v in variable.values))
+
+
+def convex_part(
+    config: Su2Config,
+    mesh: Mesh,
+    attempt: Callable[[Su2Config], Attempt],
+    deformed: Callable[[Attempt], Mesh],
+) -> tuple[float, Attempt, Sequence[str]]:
+    """Return the part of the design that CONVEXITY_CHECK leaves, its deformation, and warnings.
+
+    Parameters
+    ----------
+    config : Su2Config
+    mesh : Mesh
+        The undeformed mesh.
+    attempt, deformed : callable
+        Deforms the mesh by a configuration; returns the mesh of what that returned.
+
+    Raises
+    ------
+    CaseError, DeformError
+        Not even the smallest part that is tried can be done.
+    """
+    if config.words["CONVEXITY_CHECK"].upper() != "YES":
+        return 1.0, attempt(config), ()
+    least, kind = quality(mesh).inverted, config.variables[0]
+    impossible: list[CaseError | DeformError] = []
+
+    def tried(config: Su2Config) -> tuple[Attempt | None, int]:
+        try:
+            found = attempt(config)
+        except (CaseError, DeformError) as problem:  # a boundary goes through another one
+            impossible.append(problem)
+            return None, 1
+        return found, max(0, quality(deformed(found), reference=mesh).inverted - least)
+
+    full, first = tried(config)
+    if full is not None and not first:
+        return 1.0, full, ()
+    if kind.group in WITHOUT_VALUE and full is not None:
+        note = f"CONVEXITY_CHECK scales values, which {kind.kind} has none of: all of it is done"
+        return 1.0, full, (note,)
+    best: tuple[float, Attempt] | None = None
+    part, step, depth, valid = 1.0, 1.0, 0, False
+    for _ in range(_count(config, "ITER")):
+        step /= 2.0
+        part += step if valid else -step
+        found, inverted = tried(scaled(config, part))
+        valid = found is not None and not inverted
+        if found is not None and valid:  # which is larger than the one before
+            best, depth = (part, found), depth + 1
+        if depth == _count(config, "DEPTH"):
+            break
+    note = f"CONVEXITY_CHECK: all of the design would invert {first} more cells"
+    note = f"CONVEXITY_CHECK: {impossible[0]}" if full is None else note
+    if best is None and full is None:
+        raise impossible[0]
+    if best is None:
+        assert full is not None
+        return 1.0, full, (f"{note}, and so does the smallest part that was tried, {part:g}",)
+    return *best, (f"{note}; {best[0]:g} of it is done: its values times {best[0]:g}",)
+
+
+def _count(config: Su2Config, name: str) -> int:
+    return int(float(config.words[f"CONVEXITY_CHECK_{name}"]))
+
+
+POSITION = Columns("position", ("x", "y", "z"), flat=True)
+
+
+@dataclass(frozen=True, eq=False)
+class ListedPositions:
+    """New positions of nodes, as a file lists them (a `Displacer`)."""
+
+    config: Su2Config
+    mesh: Mesh
+    nodes: IntArray
+
+    @cached_property
+    def _listed(self) -> tuple[FloatArray, tuple[str, ...]]:
+        config = self.config
+        of = f"{config.named[config.markers[0]]}= ({', '.join(config.markers)})"
+        return read_positions(config.files["DV_FILENAME"], self.nodes, self.mesh, of)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Return what reading the file found."""
+        return self._listed[1]
+
+    @property
+    def idle(self) -> tuple[bool, ...]:
+        """Return that no variable is without effect."""
+        return (False,) * len(self.config.variables)
+
+    @property
+    def inside(self) -> dict[str, int]:
+        """Return that no FFD box moves nodes."""
+        return {}
+
+    def displacement(self) -> FloatArray:
+        """Return the displacement (m, d) of the nodes."""
+        return self._listed[0] - self.mesh.points[self.nodes]
+
+    def slope(self, place: int, part: int, undeformed: bool) -> FloatArray:
+        """Return zeros (m, d): the variable has no value to change."""
+        del place, part, undeformed
+        return np.zeros((len(self.nodes), self.mesh.dim))
+
+    def boxed(self, mesh: Mesh) -> Mesh:
+        """Return the mesh: its FFD boxes stay."""
+        return mesh
+
+
+def read_positions(
+    path: Path, nodes: IntArray, mesh: Mesh, of: str
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return the new positions of nodes, (m, d), and warnings; nodes that are not listed stay.
+
+    Lines are ``index x y [z]`` in any order, with blanks, tabs or commas between; a plane mesh may
+    have a z of 0. As in SU2, nodes that are on none of the moving boundaries are ignored, but with
+    a warning.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    nodes : (m,) int64
+        Of the moving boundaries, ascending.
+    mesh : Mesh
+    of : str
+        Key and moving boundaries for messages: ``DV_MARKER= (low)``.
+
+    Raises
+    ------
+    CaseError
+        The file cannot be read, has mistakes (a line ``file:line: sentence`` for each), or none of
+        these nodes.
+    """
+    text, warnings = read_text(path, "surface file")
+    every = np.arange(len(mesh.points))
+    table = parse_rows(text, path, every, mesh.points.shape, "the mesh", POSITION)
+    listed = table[:, 0].astype(np.int64)
+    moving = np.isin(listed, nodes)
+    others = int(np.count_nonzero(~moving))
+    if others == len(listed):
+        raise CaseError(
+            f"{path}: none of its {others} nodes is on {of}, so that nothing would move; correct "
+            "the file or the boundaries"
+        )
+    positions = mesh.points[nodes]
+    positions[np.searchsorted(nodes, listed[moving])] = table[moving, 1:]
+    if others:
+        sentence = f"{path}: {others} of {len(listed)} nodes are not on {of}; they are passed over"
+        warnings = (*warnings, sentence)
+    return positions, warnings
+
 
 RIGID = ("TRANSLATION", "ROTATION", "SCALE")
 """Kinds of variables that move boundaries as a rigid body, or scale them."""

@@ -10,12 +10,10 @@ from qtpy.QtCore import Qt, QTimer, Signal
 from qtpy.QtWidgets import QComboBox, QFormLayout, QLabel, QWidget
 
 from slideviz.case.key import Form, Key
-from slideviz.case.keys import BY_WEIGHT, KEYS
-from slideviz.case.method_keys import nothing_slides
+from slideviz.case.keys import BY_WEIGHT, KEYS, no_pair
+from slideviz.case.method_keys import get_reduction, nothing_slides, put_reduction
 from slideviz.case.model import Case
-from slideviz.case.periodic_keys import no_pair
 from slideviz.case.reduction import AUTO, Reduction
-from slideviz.case.reduction_keys import get_reduction, put_reduction
 from slideviz.case.values import Entry, Kind
 from slideviz.gui.widgets.build import (
     PanelScroll,
