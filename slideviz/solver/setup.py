@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from slideviz.baselines.idw import Weights
 
 EXACT_NODES = 2000
-"""Most candidates with which DATA_REDUCTION= AUTO makes all of them control nodes. The key's text in
+"""Most candidates with which DATA_REDUCTION= AUTO makes all of them control nodes. The text in
 `slideviz.case.method_keys` has this number and the next in words."""
 
 AUTO_TOLERANCE = 1e-3
