@@ -586,7 +586,7 @@ def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
     assert save_section(three, session, section, *going) == three
     save_section(one, changes.set_view(session, passages=0), section, *going)
     assert three.stat().st_size > 2 * one.stat().st_size
-    assert [type(each).__name__ for each in told] == ["Doing"] * 4
+    assert [type(each).__name__ for each in told] == ["JobProgress"] * 4
     with pytest.raises(CaseError, match="no mesh is open"):
         save_section(one, Session(), section, *going)
     with pytest.raises(CaseError, match="a section is drawn as"):

@@ -66,13 +66,13 @@ class CurvesPanel(Panel):
     def __init__(self, store: Store) -> None:
         super().__init__(store)
         self._profiles = curves.Profiles()
-        self._mesh: object = None
         self.canvas = CurveCanvas(self.drawing)
         self.area = PlotArea(self.canvas)
         self.canvas.picked = self._picked
         head, span = self._make_head(), self._make_span()
         in_column(head, self.area, span, wide=[self.area], spacing=3, on=self, margins=(4, 4, 4, 4))
-        self.follow(_concerned)
+        self.follow(lambda session: session.mesh, self._offer_coordinates)
+        self.follow(_shown)
 
     def _make_head(self) -> QHBoxLayout:
         self.kind = Choice(KINDS, name="curve_kind")
@@ -105,12 +105,6 @@ class CurvesPanel(Panel):
 
     def sync(self, session: Session) -> None:
         """Plot the selected curves of the session, or show why there are none."""
-        if session.mesh is not self._mesh:
-            self._mesh = session.mesh
-            self.coordinate.clear()
-            for name, text in curves.coordinates(session).items():
-                self.coordinate.addItem(text, name)
-            self.coordinate.show_value(curves.usual_coordinate(session))
         kind = self.kind.currentData()
         missing = self._missing(session, kind)
         self.kind.setToolTip(TIPS[kind])
@@ -124,6 +118,12 @@ class CurvesPanel(Panel):
             self.area.say(missing)
         else:
             self.area.plot()
+
+    def _offer_coordinates(self, session: Session) -> None:
+        self.coordinate.clear()
+        for name, text in curves.coordinates(session).items():
+            self.coordinate.addItem(text, name)
+        self.coordinate.show_value(curves.usual_coordinate(session))
 
     def _missing(self, session: Session, kind: str) -> str:
         """Return why the session has no plot of a kind; an empty text if it has one."""
@@ -177,10 +177,9 @@ class CurvesPanel(Panel):
         ask_and_write_plot(self, "Save plot", name, self.drawing())
 
 
-def _concerned(old: Session, new: Session) -> bool:
-    """Return whether the curves differ between two sessions: by frame, runs or the case's axis."""
-    same = old.frame is new.frame and old.runs is new.runs and old.shown == new.shown
-    return not same or old.case.axis != new.case.axis or old.case.origin != new.case.origin
+def _shown(session: Session) -> object:
+    """Return what the curves show of a session."""
+    return session.frame, session.runs, session.shown, session.case.axis, session.case.origin
 
 
 def close_limits(values: Iterable[FloatArray]) -> tuple[float, float]:

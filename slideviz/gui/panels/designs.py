@@ -121,7 +121,6 @@ class DesignsPanel(Panel):
         """The number, from 1, of the design that the user last asked to see."""
         self.written: DesignTable | None = None
         """The table as it was saved last."""
-        self._drawn: tuple[object, object] = (None, None)
         self._mistakes = ""
         self.job = DesignsJob(self._ended, self)
         self.runner = self.job.runner
@@ -143,7 +142,8 @@ class DesignsPanel(Panel):
             margins=(6, 4, 6, 4),
         )
         self._connect()
-        self.follow()
+        self.follow(lambda session: session.mesh, self._clear)
+        self.follow(lambda session: (session.mesh, session.case))
 
     def sizeHint(self) -> QSize:
         return QSize(600, 330)
@@ -178,17 +178,15 @@ class DesignsPanel(Panel):
 
     # State to widgets ------------------------------------------------------------------
 
+    def _clear(self, _session: Session) -> None:
+        """Stop and clear the table, as another mesh is shown."""
+        self.runner.cancel()
+        self.case = self.mesh = self.shown = None
+        self.put(DesignTable())
+        self._say("")
+
     def sync(self, session: Session) -> None:
-        """Offer the columns of the session's case; for another mesh stop and clear the table."""
-        now = (session.mesh, session.case)
-        if now[0] is self._drawn[0] and now[1] is self._drawn[1]:
-            return
-        if session.mesh is not self._drawn[0]:
-            self.runner.cancel()
-            self.case = self.mesh = self.shown = None
-            self.put(DesignTable())
-            self._say("")
-        self._drawn = now
+        """Offer the columns of the session's case."""
         self.rows.show_columns(session.case, session.mesh)
         if self.table.results and not self.runner.busy and not self._left().results:
             self._say("The settings have changed since: Run does all designs again.")

@@ -147,7 +147,6 @@ class DisplayPanel(Panel):
     def __init__(self, store: Store) -> None:
         super().__init__(store)
         self._period = Period()
-        self._key: tuple[object, ...] = ()
         content = QWidget()
         in_column(PanelScroll(content), on=self)
         self.form = QFormLayout(content)
@@ -157,7 +156,7 @@ class DisplayPanel(Panel):
         self._make_colors()
         self._make_threshold()
         self._make_rest()
-        self.follow()
+        self.follow(_shown)
 
     def _make_colors(self) -> None:
         self.color_by = self._choice("display_color_by", labels(COLOR_BY), "color_by")
@@ -218,14 +217,7 @@ class DisplayPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
-        """Fill the panel from the session; skipped if nothing shown here has changed."""
-        case, view = session.case, session.view
-        periodic = case.markers_with("periodic"), case.periodic_type, case.axis, case.origin
-        runs = session.runs if view.color_by == "displacement" else ()
-        key = (session.mesh, session.pairs, view.style, periodic, runs)
-        if key == self._key:
-            return
-        self._key = key
+        """Fill the panel from the session."""
         with QSignalBlocker(self.only), QSignalBlocker(self.passages):
             self._sync(session)
 
@@ -288,6 +280,14 @@ class DisplayPanel(Panel):
     def _passages(self, value: int) -> None:
         whole = self.passages.around is not None and value == self.passages.maximum()
         self._set(passages=-1 if whole else value)
+
+
+def _shown(session: Session) -> object:
+    """Return what the panel shows of a session."""
+    case, view = session.case, session.view
+    periodic = case.markers_with("periodic"), case.periodic_type, case.axis, case.origin
+    runs = session.runs if view.color_by == "displacement" else ()
+    return session.mesh, session.pairs, view.style, periodic, runs
 
 
 def _worse_half(session: Session) -> tuple[float, float]:

@@ -148,7 +148,7 @@ class HistogramPanel(Panel):
         escape = QShortcut(QKeySequence(Qt.Key.Key_Escape), self)
         escape.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
         escape.activated.connect(self.clear_range)
-        self.follow(_concerned)
+        self.follow(_shown)
 
     def _make_buttons(self) -> FoldingRow:
         self.log = check_box("log", "Counts on a logarithmic axis, which shows a few bad cells.")
@@ -272,13 +272,8 @@ class HistogramPanel(Panel):
         ask_and_write_plot(self, "Save plot", "histogram", self.drawing())
 
 
-def _concerned(old: Session, new: Session) -> bool:
-    """Return whether the histogram differs between two sessions."""
-    names = ("color_by", "color_map", "threshold", "beside")
-    same = (
-        old.frame is new.frame,
-        old.runs is new.runs or old.runs == new.runs,
-        old.color_range == new.color_range,
-        *(getattr(old.view, name) == getattr(new.view, name) for name in names),
-    )
-    return not all(same)
+def _shown(session: Session) -> object:
+    """Return what the histogram shows of a session."""
+    view = session.view
+    values = session.frame, session.runs, session.color_range
+    return *values, view.color_by, view.color_map, view.threshold, view.beside

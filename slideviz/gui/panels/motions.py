@@ -68,6 +68,7 @@ class MotionPanel(Panel):
         parts = (buttons, self.list, self.editor, self.hint, None)
         layout = in_column(*parts, spacing=4, on=self, margins=(6, 6, 6, 4))
         layout.setStretchFactor(self.list, 4)
+        self.follow(lambda session: session.mesh, self._take_mesh)
         self.follow()
         self.watch = FieldWatch(self, store, "motion")
 
@@ -107,8 +108,6 @@ class MotionPanel(Panel):
     def sync(self, session: Session) -> None:
         """Fill list and editor from the motions of the session's case."""
         motions, moving = session.case.motions, session.case.markers_with("moving")
-        if session.mesh is not self._mesh:
-            self._take_mesh(session.mesh)
         dim = session.mesh.dim if session.mesh is not None else 2
         said = (describe(motion, dim, self._extent) for motion in motions)
         texts = [f"{i}.  {text}" for i, text in enumerate(said, 1)]
@@ -129,8 +128,9 @@ class MotionPanel(Panel):
         self._sync_editor(session)
         self._sync_buttons(session, moving)
 
-    def _take_mesh(self, mesh: Mesh | None) -> None:
+    def _take_mesh(self, session: Session) -> None:
         """Store another mesh and its extent (slow for a large mesh) and pass both to the editor."""
+        mesh = session.mesh
         self._mesh, self._extent = mesh, mesh.extent if mesh is not None else 0.0
         self.add_actions[FfdTwist].setEnabled(mesh is None or mesh.dim == 3)  # as in the editor
         self.editor.set_centroid(self._centroid)

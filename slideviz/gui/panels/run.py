@@ -51,7 +51,6 @@ class RunPanel(Panel):
         super().__init__(store)
         self._busy = self._doing = ""
         self._compiling = False
-        self._key: tuple[object, ...] = ()
         self._missing: tuple[Requirement, ...] = ()
         self._cost = ""
         self._remedy: tuple[Run | None, str, str] = (None, "", "")
@@ -71,6 +70,8 @@ class RunPanel(Panel):
         self.bar.setSizePolicy(policy)
         row = in_row(self.run, self.cancel, self.text, wide=[self.text])
         in_column(row, self.bar, spacing=5, on=self, margins=(6, 6, 6, 6))
+        # Some checks go through the mesh: they are not repeated if only the view changed.
+        self.follow(_checked, self._check)
         self.follow()
 
     def _button(self, command: Command, color: str) -> QPushButton:
@@ -82,14 +83,12 @@ class RunPanel(Panel):
         button.setShortcut(command.button_key)
         return button
 
+    def _check(self, session: Session) -> None:
+        self._missing = run_requirements(session)
+        self._cost = exact_cost(session.case, session.mesh) if session.mesh else ""
+
     def sync(self, session: Session) -> None:
         """Show the shown run's end, that a run can start, or the first missing requirement."""
-        # Some checks go through the mesh: they are not repeated if only the view changed.
-        key = (session.mesh, session.case, session.intersection, session.invalid)
-        if key != self._key:
-            self._key = key
-            self._missing = run_requirements(session)
-            self._cost = exact_cost(session.case, session.mesh) if session.mesh else ""
         self.cancel.setVisible(bool(self._busy))
         self.run.setVisible(not self._busy)
         self.bar.setVisible(bool(self._busy))
@@ -201,6 +200,11 @@ class RunPanel(Panel):
         """Show that the job was asked to stop."""
         self.cancel.setEnabled(False)
         self.text.setText("Cancelling…")
+
+
+def _checked(session: Session) -> object:
+    """Return what the requirements of a run depend on."""
+    return session.mesh, session.case, session.intersection, session.invalid
 
 
 def _short(text: str) -> str:

@@ -178,7 +178,6 @@ class RunsPanel(Panel):
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
-        self._drawn: tuple[object, ...] = ()
         self.empty = hint_label(EMPTY, Qt.AlignmentFlag.AlignTop)
         self.tree = RunTree()
         self.actions_table = RunActions(self, self.tree, store)
@@ -186,6 +185,7 @@ class RunsPanel(Panel):
         self._connect()
         parts = (self.empty, self.tree, self.actions_table.row)
         in_column(*parts, wide=parts[:2], spacing=4, on=self, margins=(6, 6, 6, 4))
+        self.follow(lambda one: (one.runs, one.shown, one.view.beside), self._fill)
         self.follow()
 
     def _connect(self) -> None:
@@ -200,19 +200,13 @@ class RunsPanel(Panel):
 
     def take_theme(self, _scheme: ColorScheme) -> None:
         """Draw the icons of the rows in the colors of another theme."""
-        self._drawn = ()
-        if self.store.session.runs:
-            self.sync(self.store.session)
+        self._fill(self.store.session)
 
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
-        """Fill the list from the session; playing only selects another row."""
-        key = (session.runs, session.shown, session.view.beside)
+        """Select the row of the session's run; playing does not fill the list again."""
         with QSignalBlocker(self.tree):
-            if key != self._drawn:
-                self._drawn = key
-                self._fill(session)
             self._select(session)
         self.empty.setVisible(not session.runs)
         self.tree.setVisible(bool(session.runs))
@@ -229,19 +223,20 @@ class RunsPanel(Panel):
             self.tree.setCurrentIndex(index)
 
     def _fill(self, session: Session) -> None:
-        tree, runs = self.tree, session.runs
-        count = len(runs) + 1 if runs else 0
-        while tree.topLevelItemCount() > count:
-            tree.takeTopLevelItem(tree.topLevelItemCount() - 1)
-        while tree.topLevelItemCount() < count:
-            item = QTreeWidgetItem()
-            item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable)
-            tree.addTopLevelItem(item)
-        champions = best(runs)
-        for place, run in enumerate((None, *runs) if runs else ()):
-            row = tree.topLevelItem(place)
-            assert row is not None
-            self._sync_row(row, run, session, run is not None and run.number in champions)
+        with QSignalBlocker(self.tree):
+            tree, runs = self.tree, session.runs
+            count = len(runs) + 1 if runs else 0
+            while tree.topLevelItemCount() > count:
+                tree.takeTopLevelItem(tree.topLevelItemCount() - 1)
+            while tree.topLevelItemCount() < count:
+                item = QTreeWidgetItem()
+                item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable)
+                tree.addTopLevelItem(item)
+            champions = best(runs)
+            for place, run in enumerate((None, *runs) if runs else ()):
+                row = tree.topLevelItem(place)
+                assert row is not None
+                self._sync_row(row, run, session, run is not None and run.number in champions)
 
     def _sync_row(
         self, item: QTreeWidgetItem, run: Run | None, session: Session, champion: bool

@@ -84,7 +84,7 @@ class SectionsPanel(Panel):
         self._make_list()
         self._make_tools()
         self._place()
-        self.follow(_concerned)
+        self.follow(_shown)
 
     # Parts -----------------------------------------------------------------------------
 
@@ -253,11 +253,10 @@ class SectionsPanel(Panel):
             self.store.change(changes.choose_section, row)
 
 
-def _concerned(old: Session, new: Session) -> bool:
-    """Return whether the mesh or the sections differ between two sessions."""
-    names = ("sections", "section_index", "handle")
-    same = (getattr(old.view, name) == getattr(new.view, name) for name in names)
-    return old.mesh is not new.mesh or not all(same)
+def _shown(session: Session) -> object:
+    """Return what the panel shows of a session."""
+    view = session.view
+    return session.mesh, view.sections, view.section_index, view.handle
 
 
 def sections_panel(window: Services) -> SectionsPanel:

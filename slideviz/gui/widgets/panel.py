@@ -75,7 +75,7 @@ def _title(field: QWidget, panel: QWidget) -> str:
 class Panel(QWidget):
     """The base of the widgets in the docks, which show the session and change it.
 
-    A subclass makes its widgets, then calls `follow`; only its `sync` fills them.
+    A subclass makes its widgets, then calls `follow`; only functions given to it fill them.
 
     Parameters
     ----------
@@ -86,15 +86,32 @@ class Panel(QWidget):
         super().__init__()
         self.store = store
 
-    def follow(self, concerns: Callable[[Session, Session], bool] = lambda *_: True) -> None:
-        """Call `sync` now, and after each change for which ``concerns(old, new)`` is true."""
+    def follow(
+        self,
+        select: Callable[[Session], object] = lambda session: session,
+        sync: Callable[[Session], object] | None = None,
+    ) -> None:
+        """Call ``sync`` now, and after each change of what ``select`` returns of the session.
 
-        def changed(old: Session, new: Session) -> None:
-            if concerns(old, new):
-                self.sync(new)
+        Parameters
+        ----------
+        select : callable
+            Returns the values that are shown, to be compared; default: the session, which differs
+            after each change.
+        sync : callable, optional
+            Fills widgets from the session; default: `sync` of the panel.
+        """
+        fill = sync or self.sync
+        shown = select(self.store.session)
+
+        def changed(_old: Session, new: Session) -> None:
+            nonlocal shown
+            before, shown = shown, select(new)
+            if shown != before:
+                fill(new)
 
         self.store.listen(changed)
-        self.sync(self.store.session)
+        fill(self.store.session)
 
     def sync(self, session: Session) -> None:
         """Fill the widgets from the session."""
