@@ -23,14 +23,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.commands import COMMANDS
-from slideviz.gui.widgets.build import (
-    FoldingRow,
-    boxed,
-    hint_label,
-    in_column,
-    in_row,
-    push_button,
-)
+from slideviz.gui.widgets.build import FoldingRow, boxed, hint_label, in_column, in_row, push_button
 from slideviz.gui.widgets.cards import SIZE, card
 from slideviz.gui.widgets.icons import icon, logo
 from slideviz.gui.widgets.labels import ElidedLabel, rich_label, wrapped

@@ -6,14 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from slideviz.case.model import Case
-from slideviz.session.jobs import (
-    PHASES,
-    JobProgress,
-    Report,
-    Stopped,
-    overall,
-    raise_if_cancelled,
-)
+from slideviz.session.jobs import PHASES, JobProgress, Report, Stopped, overall, raise_if_cancelled
 from slideviz.session.large import frame_of
 from slideviz.session.results import StepFrame
 from slideviz.session.whole import totals_of
