@@ -20,6 +20,7 @@ from slideviz.gui.widgets.command import (
     CommandState,
     Menu,
     colored_by_value,
+    fill_compare,
     has_boundary_target,
     has_boxes,
     has_mesh,
@@ -33,7 +34,6 @@ from slideviz.gui.widgets.command import (
     why_not,
 )
 from slideviz.gui.widgets.icons import STROKES
-from slideviz.gui.widgets.runs_menu import fill_compare
 from slideviz.session import changes
 from slideviz.session.colors import fit_colors, usual_range
 from slideviz.terms import SHOWN, Shown, ShownTerm

@@ -13,12 +13,11 @@ from slideviz.color_scheme import ColorScheme
 from slideviz.gui.commands import COMPARE
 from slideviz.gui.panels.runs_tree import MIN, NAME, NUMBER, RUN, WORDS, RunTree
 from slideviz.gui.widgets.build import FoldingRow, hint_label, in_column, tool_button
-from slideviz.gui.widgets.command import Command
+from slideviz.gui.widgets.command import Command, fill_compare
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import ask_and_write
-from slideviz.gui.widgets.runs_menu import fill_compare
 from slideviz.gui.widgets.services import Services, main_window
 from slideviz.session import changes
 from slideviz.session.runs_table import QUALITY, best, described, table_text, write_table

@@ -14,7 +14,7 @@ from slideviz.color_scheme import ColorScheme
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.linked_views import CameraLink, TitleBar
 from slideviz.gui.viewport.view_mouse import BoundaryMouse, CellMouse, CoarseWhileMoving
-from slideviz.gui.widgets.runs_menu import fill_pane
+from slideviz.gui.widgets.command import fill_pane
 from slideviz.scene.color_legend import STRIP
 from slideviz.scene.scene import Scene
 from slideviz.session import changes, jobs

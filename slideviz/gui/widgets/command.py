@@ -6,16 +6,55 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from qtpy.QtGui import QAction, QKeySequence
+from qtpy.QtGui import QAction, QActionGroup, QKeySequence
 from qtpy.QtWidgets import QMenu
 
 from slideviz.gui.widgets.icons import set_icon
 from slideviz.gui.widgets.labels import wrapped
+from slideviz.session import changes
 from slideviz.session.motions import box_names
+from slideviz.session.panes import choices, panes, show_in
 from slideviz.session.state import IN_FILE, Session
+from slideviz.session.store import Store
 
 if TYPE_CHECKING:
     from slideviz.gui.widgets.services import Services
+
+
+def fill_pane(menu: QMenu, store: Store, pane: int) -> None:
+    """Fill the menu of view 0 or 1 of a comparison: the undeformed mesh and the runs."""
+    _fill(menu, store, panes(store.session)[pane], lambda n: store.change(show_in, pane, n))
+
+
+def fill_compare(menu: QMenu, store: Store) -> None:
+    """Fill the menu with what the shown run can be compared with, and the end of comparison."""
+    beside, shown = store.session.view.beside, store.session.shown
+    _fill(menu, store, beside, lambda n: store.change(changes.show_beside, n), leave=shown)
+    menu.addSeparator()
+    end = menu.addAction("End the comparison")
+    end.setEnabled(beside is not None)
+    end.triggered.connect(lambda: store.change(changes.show_beside, None))
+
+
+def _fill(
+    menu: QMenu,
+    store: Store,
+    now: int | None,
+    choose: Callable[[int], None],
+    leave: int | None = None,
+) -> None:
+    menu.clear()
+    group = QActionGroup(menu)
+    for number, text in choices(store.session).items():
+        if number == leave:
+            continue
+        act = menu.addAction(text)
+        act.setCheckable(True)
+        act.setChecked(number == now)
+        act.setData(number)
+        group.addAction(act)
+        act.triggered.connect(lambda _=False, number=number: choose(number))
+
 
 Keys = str | QKeySequence.StandardKey
 
