@@ -21,13 +21,13 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.commands import MENUS
+from slideviz.gui.dialogs.manual import manual_folder
 from slideviz.gui.widgets.build import dialog_buttons, hint_label, in_column, in_row
 from slideviz.gui.widgets.command import CommandState
 from slideviz.gui.widgets.error_reporter import versions
 from slideviz.gui.widgets.icons import logo
 from slideviz.gui.widgets.labels import fixed_font
 from slideviz.gui.widgets.services import Services
-from slideviz.session.manual import manual_folder
 
 LOG_LINES = 40
 """Number of the log's last lines in a bug report."""
