@@ -21,13 +21,14 @@ from slideviz.export.film import FilmOptions
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.gui.dialogs import exports as export
+from slideviz.gui.dialogs import manual
 from slideviz.gui.dialogs.film import FilmDialog, FilmForm, length_words
 from slideviz.gui.dialogs.picture import PictureDialog
 from slideviz.gui.panels.boundaries import BoundariesPanel
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import fitted, framed, to_image
 from slideviz.mesh.quality import quality
-from slideviz.session import changes, jobs, manual, pieces
+from slideviz.session import changes, jobs, pieces
 from tests.mesh.test_interfaces import moved, zones
 
 pytestmark = pytest.mark.usefixtures("unpainted")
