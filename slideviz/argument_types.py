@@ -110,7 +110,7 @@ def _require(called: str, owner: object, given: Iterable[tuple[str, object]]) ->
         wrong = _misfit(value, needed.get(name, Any), name)
         if wrong is not None:
             raise ArgumentError(
-                f"{called}: {wrong.place} is {_said(wrong.value)}; needed is {_words(wrong.needed)}"
+                f"{called}: {wrong.place} is {_said(wrong.value)}; expected {_words(wrong.needed)}"
             )
 
 
@@ -208,7 +208,7 @@ def _said(value: object) -> str:
 
 
 def _words(hint: Any) -> str:
-    """Return the words for a type in "needed is ..."."""
+    """Return the words for a type in "expected ..."."""
     kind, inner = origin_of(hint) or hint, get_args(hint)
     if kind is Annotated:
         return str(inner[1])

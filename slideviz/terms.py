@@ -177,13 +177,13 @@ SLIDING: dict[Sliding, Term] = {
     ),
     "ps": Term(
         "pseudo sliding",
-        "Sliding nodes follow as inner nodes do and are put back on their boundary, in stages: "
-        "edges first, then surfaces.",
+        "Sliding nodes first move as inner nodes do. Then they are projected to their boundary: "
+        "first on edges, then on surfaces.",
     ),
     "ds": Term(
         "direct sliding",
-        "That nodes stay on their boundary is part of the system, which has all components of "
-        "the displacement at once: takes longer.",
+        "The system itself keeps nodes on their boundary. It has all components of the "
+        "displacement at once, so it takes longer.",
     ),
 }
 SLIDES = " or ".join(value for value in SLIDING if value != "none")
@@ -252,11 +252,15 @@ DataReduction = Literal["AUTO", "NO", "YES"]
 DATA_REDUCTIONS: dict[DataReduction, Term] = {
     "AUTO": Term(
         "automatic",
-        "All boundary nodes where they are few; where they are more than some thousands, as many "
-        "as it takes to follow the motion to a thousandth of it.",
+        "All boundary nodes if there are up to a few thousand. If there are more, as many as are "
+        "needed to follow the motion to a thousandth of it.",
     ),
-    "NO": Term("off", "All boundary nodes are control nodes: exact, for up to some thousands."),
-    "YES": Term("on", "As many boundary nodes as the tolerance needs; the rest is corrected."),
+    "NO": Term(
+        "off", "All boundary nodes are control nodes: exact, for up to a few thousand nodes."
+    ),
+    "YES": Term(
+        "on", "As many boundary nodes as the tolerance needs; the remaining error is corrected."
+    ),
 }
 """Whether only some of the boundary nodes are control nodes."""
 
@@ -273,22 +277,23 @@ PeriodicMode = Literal["none", "periodic", "fixed", "moving"]
 PERIODIC_MODES: dict[PeriodicMode, Term] = {
     "none": Term(
         "none",
-        "Periodic boundaries are treated as sliding ones; distances do not repeat.",
+        "Periodic boundaries are treated as sliding ones; distances are not periodic.",
         standalone="not periodic",
     ),
     "periodic": Term(
         "periodic distance",
-        "Periodic boundaries are treated as sliding ones, and distances repeat: what moves near "
-        "one side is felt at the other.",
+        "Periodic boundaries are treated as sliding ones, and distances are periodic: a motion "
+        "near one side also acts near the other side.",
     ),
     "fixed": Term(
         "periodic, fixed vertices",
-        "Periodic boundaries move freely, both sides alike; the corners of the domain are held.",
+        "Both periodic boundaries move freely and in the same way; the corners of the domain are "
+        "fixed.",
     ),
     "moving": Term(
         "periodic, moving vertices",
-        "Periodic boundaries move freely, both sides alike; the corners of the domain slide in "
-        "the periodic direction. Needs a sliding method.",
+        "Both periodic boundaries move freely and in the same way; the corners of the domain "
+        "slide in the periodic direction. Needs a sliding method.",
     ),
 }
 
@@ -452,7 +457,7 @@ SHOWN: dict[Shown, ShownTerm] = {
     "support": ShownTerm(
         "Support radius",
         "Draw how far the radial functions of the moving boundaries reach with the present "
-        "settings: a circle or sphere around each of these; in a comparison, those of each run.",
+        "settings: a circle or sphere around each of them. A comparison shows those of each run.",
         shortcut="D",
         in_bar=False,
     ),

@@ -145,7 +145,7 @@ def test_input_mesh_is_not_overwritten(square, capsys):
         (["--picture", "a.png", "--zoom", "0,0,0,1"], "is not a place in a 2D mesh"),
         (["--steps-dir", "mesh.su2/a"], "mesh.su2/a: cannot be made a folder: a part of"),
         (["--steps-dir", "mesh.su2"], "mesh.su2: cannot be made a folder: it is a file"),
-        (["--steps", "0"], "STEPS=0: 0 is too small; needed is a whole number from 1"),
+        (["--steps", "0"], "STEPS=0: 0 is too small; expected a whole number from 1"),
         (["--zone", "0"], "there is no zone 0"),
     ],
 )
@@ -430,7 +430,7 @@ def test_what_is_harmless_is_a_note_and_no_warning(square, capsys):
     for quiet in ([], ["-q"]):
         run([*argv, "--set", "PERIODIC_MODE=fixed", *quiet])
         told = capsys.readouterr().err
-        assert ("slideviz: note: CURVED= YES is without effect" in told) == (not quiet)
+        assert ("slideviz: note: CURVED= YES has no effect" in told) == (not quiet)
         assert "slideviz: warning: SLIDING_MODE= none: " in told
 
 

@@ -40,7 +40,7 @@ def content(folder: Path) -> dict[str, bytes]:
 def test_a_mesh_is_not_written_to_a_folder(square, capsys, folder):
     assert run(["run", *CASE, "-o", folder]) == 1
     assert (
-        f"{folder}: is a folder; needed is the name of the mesh to write" in capsys.readouterr().err
+        f"{folder}: is a folder; expected the name of the mesh to write" in capsys.readouterr().err
     )
 
 

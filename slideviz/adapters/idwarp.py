@@ -267,7 +267,7 @@ class USMesh:
             places = places[self._indices]
         if len(given) != len(places):
             raise CaseError(
-                f"a vector of the grid has {len(given)} numbers; needed are {len(places)}, as "
+                f"a vector of the grid has {len(given)} numbers; expected {len(places)}, as "
                 f"{'getSolverGrid' if solver else 'getWarpGrid'} returns"
             )
         sums = np.bincount(places, given, self._points.size)

@@ -231,8 +231,8 @@ def off_points(box: Box, mesh: Mesh, marker: str) -> list[str]:
     _, off = embedding(box, mesh, marker)
     sentence = (
         f"{mesh.name}: the surface points of the FFD box {box.name!r} on {marker} are not those of "
-        f"the mesh, by up to {off:.1g} of the box; was the mesh moved without it? Then define the "
-        "box anew; or is it in other coordinates? Then set FFD_COORD_SYSTEM"
+        f"the mesh, by up to {off:.1g} of the box; if the mesh was moved without it, define the "
+        f"box again; if it is in other coordinates, set FFD_COORD_SYSTEM"
     )
     return [sentence] if off > OFF else []
 
@@ -275,8 +275,8 @@ def ffd_displacements(case: Case, mesh: Mesh, names: Iterable[str]) -> dict[obje
 
 def _stays(name: str) -> Note:
     return Note(
-        f"the FFD box {name!r} in the deformed mesh stays where it was, since boxes are nested, or "
-        "other motions move boundaries, too; define it anew to use it with that mesh"
+        f"the FFD box {name!r} in the deformed mesh stays where it was, because boxes are nested "
+        f"or other motions move boundaries, too; define it again to use it with that mesh"
     )
 
 

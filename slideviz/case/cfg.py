@@ -159,7 +159,7 @@ def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]
 
 def _value(key: Key, entry: Entry) -> Any:
     if not entry.value:
-        raise CaseError(f"it has no value; needed is {key.kind.allowed}")
+        raise CaseError(f"it has no value; expected {key.kind.allowed}")
     return key.kind.read(entry.value)
 
 
@@ -240,8 +240,9 @@ def describe_keys() -> str:
         "Keys of a case file: KEY= value, one in each line, in any order.",
         "",
         *textwrap.wrap(
-            "Comments begin with %, # or $. A line that ends with a backslash goes on in the "
-            "next. Paths are relative to the file. Names with other signs than letters, digits "
+            "Comments begin with %, # or $. A line that ends with a backslash continues in the "
+            "next line. Paths are relative to the file. Names with other signs than letters, "
+            "digits "
             'and _ . - : / @ + stand between double quotes: "tip #2". NONE or ( ) is an empty '
             "list. Keys marked + are slideviz's own, the others are RBF-SliDe's too.",
             width=90,

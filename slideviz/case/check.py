@@ -86,7 +86,8 @@ def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
             seen.add(name)
             remedy, several = "one of the two is wrong", name.split("+")
             if set(several) <= set(moving):
-                remedy = f"several stand in brackets, as (({', '.join(several)}), translate, ...)"
+                markers = ", ".join(several)
+                remedy = f"write several in brackets, as in (({markers}), translate, ...)"
             sentence = (
                 f"motion {place} names {name!r}, which does not move: MARKER_MOVING= "
                 f"({', '.join(moving)}) does not have it; {remedy}"
@@ -127,7 +128,7 @@ def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:
 def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return a sentence for each moving marker without motion, and each motion that is unfit."""
     boxed = any(isinstance(motion, BoxMotion) for motion in case.motions)
-    of_all = ", or let (*, ffd, ...) move what is in the box of all moving markers" if boxed else ""
+    of_all = ", or move all moving markers in the box with (*, ffd, ...)" if boxed else ""
     found = [
         f"moving marker {marker!r} has no motion; add MOTION= ({marker}, translate, ...) or "
         f"DEFORMATION_FILENAME, or name it in MARKER_FIXED instead if it stays{of_all}"
@@ -180,7 +181,7 @@ def _prescribed_problems(case: Case, mesh: Mesh, motion: Prescribed) -> Iterator
     stray = np.setdiff1d(motion.nodes, np.concatenate([*on, np.empty(0, np.int64)]))
     if len(stray):
         more = f" (and {len(stray) - 1} more)" if len(stray) > 1 else ""
-        yield f"node {stray[0]}{more} is on none of the markers that it moves; take it out"
+        yield f"node {stray[0]}{more} is on none of the markers that it moves; remove it"
 
 
 def _value_problems(case: Case) -> Iterator[str]:
@@ -200,7 +201,7 @@ def _radius_problems(case: Case, mesh: Mesh) -> Iterator[str]:
     if case.support_radius is not None and not low < case.support_radius < high:
         yield (
             f"SUPPORT_RADIUS: {case.support_radius!r} does not fit {mesh.name}, whose extent is "
-            f"{mesh.extent:g}; needed is a length above {low:g} and below {high:g}"
+            f"{mesh.extent:g}; expected a length above {low:g} and below {high:g}"
         )
 
 
@@ -240,12 +241,12 @@ def idle_roles(case: Case) -> tuple[str, ...]:
     periodic, sliding = case.markers_with("periodic"), case.markers_with("sliding")
     if periodic and case.periodic == "none":
         found.append(
-            f"PERIODIC_MODE= none: {' and '.join(periodic)} will not repeat any more; with "
-            "PERIODIC_MODE= moving (or fixed) they do"
+            f"PERIODIC_MODE= none: {' and '.join(periodic)} will not stay periodic; with "
+            f"PERIODIC_MODE= moving (or fixed) they do"
         )
     if sliding and case.sliding == "none":
         found.append(
-            f"SLIDING_MODE= none: {', '.join(sliding)} will not slide, but stay as they are; with "
+            f"SLIDING_MODE= none: {', '.join(sliding)} will not slide but stay fixed; with "
             f"SLIDING_MODE= {SLIDES} they do"
         )
     return tuple(found)
@@ -282,12 +283,12 @@ def idle_settings(case: Case) -> tuple[str, ...]:
     if idle:
         found.append(f"METHOD= {case.method} does not use {', '.join(idle)}")
     found += [
-        f"{_with_switch(key, case)} is without effect: {key.no_effect}"
+        f"{_with_switch(key, case)} has no effect: {key.no_effect}"
         for key in KEYS.values()
         if key.no_effect and key.get(case) != key.get(usual)
     ]
     found += [
-        f"{key.name} is without effect: DATA_REDUCTION= AUTO finds the tolerance, YES takes it"
+        f"{key.name} has no effect: DATA_REDUCTION= AUTO finds the tolerance; YES uses this one"
         for key in KEYS.values()
         if key.idle_reason is why_no_tolerance
         and case.reduction is not None

@@ -150,7 +150,7 @@ def _table(path: Path, lines: list[str], dim: int, columns: Columns) -> FloatArr
         There are none, or some line is no row of finite numbers.
     """
     if not any(line.strip() for line in lines):
-        raise CaseError(f"{path}: the file lists no node; needed are lines {columns.heading(dim)}")
+        raise CaseError(f"{path}: the file lists no node; expected lines {columns.heading(dim)}")
     try:
         table = _numbers([line for line in lines if line.strip()])
     except ValueError:
@@ -201,7 +201,7 @@ def _row(content: str, dim: int, columns: Columns) -> list[list[float]]:
             )
         words.pop()
     if words and len(words) != 1 + dim:
-        sentence = f"{shown(content.strip())} has {len(words)} columns; needed are {1 + dim}"
+        sentence = f"{shown(content.strip())} has {len(words)} columns; expected {1 + dim}"
         raise CaseError(f"{sentence}: {columns.heading(dim)} (put % before a heading)")
     return [[number(word) for word in words]] if words else []
 
@@ -225,7 +225,7 @@ def _table_problems(
     for wrong, begin, end in (
         (broken, "", "is not a node number"),
         (outside, "node ", f"is not in the mesh; {last}"),
-        (strange, "node ", f"is not on {of}; take the line out or change the roles"),
+        (strange, "node ", f"is not on {of}; remove the line or change the roles"),
     ):
         if wrong.any():
             k = int(np.argmax(wrong))

@@ -42,7 +42,7 @@ def _read_definition(text: str) -> tuple[Definition, ...]:
             corners = _without_zeros(corners)
         if len(corners) != NUMBERS or name.is_number:
             raise CaseError(
-                f"box {shown(name.text)} has {len(corners)} numbers; needed are its name and "
+                f"box {shown(name.text)} has {len(corners)} numbers; expected its name and "
                 f"{NUMBERS}: 8 corners x, y, z (in 2D 4 with z = 0, and zeros)"
             )
         found.append((name.text, tuple(number(word.text) for word in corners)))
@@ -130,7 +130,8 @@ _ROWS = (
         MOTION,
         DEFINITION,
         "ffd_boxes",
-        "Boxes for free-form deformation, by SU2's order of corners; those in the mesh go before.",
+        "Boxes for free-form deformation, in SU2's order of corners; boxes of the mesh override "
+        "them.",
         label="FFD boxes",
     ),
     setting(
@@ -138,7 +139,7 @@ _ROWS = (
         MOTION,
         DEGREES,
         "ffd_degrees",
-        "The degrees of each box of FFD_DEFINITION: control points of each direction, less one.",
+        "The degrees of each box of FFD_DEFINITION: control points of each direction, minus one.",
         label="FFD degrees",
         idle_reason=without_definition,
     ),
@@ -147,7 +148,7 @@ _ROWS = (
         MOTION,
         one_of(FFD_BLENDINGS),
         "ffd_blending",
-        "How control points of these boxes move what is inside.",
+        "How control points of these boxes move the nodes inside.",
         label="FFD blending",
         idle_reason=without_definition,
     ),
@@ -165,7 +166,7 @@ _ROWS = (
         MOTION,
         one_of(FFD_SYSTEMS),
         "ffd_system",
-        "The coordinates in which boxes are straight, those of the mesh too; their axis is along "
+        "The coordinates in which boxes are straight, also those of the mesh; their axis is along "
         "x: r, θ, x (CYLINDRICAL), or r, θ, φ with φ from the axis (SPHERICAL, POLAR).",
         label="FFD coordinates",
     ),

@@ -59,13 +59,13 @@ PERIODIC_ROWS = (
         PERIODICITY,
         one_of(PERIODIC_MODES),
         "periodic",
-        "How boundaries repeat: not, in the distance only, or also in the displacement with "
-        "fixed or moving vertices.",
+        "How boundaries are periodic: not at all, in the distance only, or also in the "
+        "displacement with fixed or moving vertices.",
         label="Periodicity",
         form="main",
-        tip="What the periodic boundaries do: nothing special (none), only the distance repeats "
-        "(periodic), or both sides deform alike with the corners of the domain held (fixed "
-        "vertices) or sliding along (moving vertices).",
+        tip="What the periodic boundaries do: nothing special (none), only the distance is "
+        "periodic (periodic), or both sides deform in the same way, with the corners of the "
+        "domain fixed (fixed vertices) or sliding (moving vertices).",
         run_label="",
         idle_reason=no_pair,
     ),
@@ -77,7 +77,8 @@ PERIODIC_ROWS = (
         "Shift (0) or rotation (1); auto finds out by matching the markers.",
         label="Type",
         form="main",
-        tip="Whether one side is the other one shifted or turned; automatic takes what matches.",
+        tip="Whether one side is the other one shifted or rotated; automatic takes the one that "
+        "matches.",
         run_label="{} type",
         idle_reason=no_pair,
     ),
@@ -85,7 +86,7 @@ PERIODIC_ROWS = (
         "PERIODIC_DIRECTION",
         PERIODICITY,
         choice({word: word for word in PERIODIC_DIRECTIONS}),
-        "Without effect, but that x, y, r and theta imply PERIODIC_TYPE: the direction (0, 1, 2 "
+        "No effect, except that x, y, r and theta imply PERIODIC_TYPE: the direction (0, 1, 2 "
         "for x, y, z or r, theta, z) is found by matching the markers.",
         put_direction,
         get_direction,
@@ -160,7 +161,7 @@ _ROWS = (
         FILES,
         _FORMAT,
         "mesh_format",
-        "SU2's text or binary; without it ending and content of the file tell.",
+        "SU2's text or binary format; without this key, ending and content of the file decide.",
     ),
     setting(
         "MESH_OUT_FORMAT",
@@ -171,9 +172,9 @@ _ROWS = (
     ),
     setting("ZONE", FILES, whole(1), "zone", "The zone to deform, from 1, of a mesh with several."),
     role("MARKER_MOVING", NAMES, "moving", "Boundaries whose displacement is prescribed."),
-    role("MARKER_FIXED", NAMES, "fixed", "Boundaries that stay; so do those in no list."),
+    role("MARKER_FIXED", NAMES, "fixed", "Boundaries that stay, as do those in no list."),
     role("MARKER_SLIDING", NAMES, "sliding", "Boundaries along which their nodes may slide."),
-    role("MARKER_PERIODIC", PAIRS, "periodic", "Boundaries that repeat, in pairs of any order."),
+    role("MARKER_PERIODIC", PAIRS, "periodic", "Periodic boundaries, in pairs of any order."),
     role(
         "MARKER_INTERNAL",
         NAMES,
@@ -201,7 +202,7 @@ _ROWS = (
         "MOTION",
         MOTION,
         MOTIONS,
-        "What the moving boundaries do, one after the other, after DEFORMATION_FILENAME.",
+        "Motions of the moving boundaries, one after the other, after DEFORMATION_FILENAME.",
         put_motions,
         get_motions,
         label="Motion",
@@ -226,8 +227,8 @@ _ROWS = (
         "Size-skew as published, or as RBF-SliDe computes it (differs for hexahedra).",
         label="Quality",
         form="more",
-        tip="How cells are judged: Knupp's published size-skew, or as the program RBF-SliDe "
-        "computes it for hexahedra.",
+        tip="How the quality of cells is measured: Knupp's published size-skew, or as the program "
+        "RBF-SliDe computes it for hexahedra.",
     ),
     *VIEW_ROWS,
 )

@@ -55,16 +55,16 @@ def read_text(path: Path, what: str) -> tuple[str, tuple[str, ...]]:
     except FileNotFoundError as problem:
         raise CaseError(f"{path}: there is no such {what}; check name and folder") from problem
     except IsADirectoryError as problem:
-        raise CaseError(f"{path}: is a folder; needed is a {what}") from problem
+        raise CaseError(f"{path}: is a folder; expected a {what}") from problem
     except (OSError, ValueError) as problem:  # ValueError: no name of a file
         reason = getattr(problem, "strerror", None) or problem
         raise CaseError(f"{path}: cannot be read: {reason}") from problem
     if not data.strip():
-        raise CaseError(f"{path}: the file is empty; needed is a {what}")
+        raise CaseError(f"{path}: the file is empty; expected a {what}")
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         text = data.decode("utf-16", errors="replace")
     elif b"\0" in data:
-        raise CaseError(f"{path}: is a binary file; needed is a {what}, which is text")
+        raise CaseError(f"{path}: is a binary file; expected a {what}, which is text")
     else:
         try:
             return data.decode("utf-8-sig"), ()

@@ -100,18 +100,18 @@ REDUCTION_ROWS = (
         "DATA_REDUCTION",
         REDUCTION,
         one_of(DATA_REDUCTIONS, {"TRUE": "YES", "FALSE": "NO"}),
-        "Interpolate with some of the boundary nodes only; with NO the keys below do nothing. AUTO "
-        "does so where they are more than 2000, to a thousandth of the largest displacement, or "
-        "half of the first layer's height beside sliding boundaries.",
+        "Interpolate with only some of the boundary nodes; with NO the keys below have no effect. "
+        "AUTO does so if there are more than 2000, to a thousandth of the largest displacement, "
+        "or half of the first layer's height beside sliding boundaries.",
         put_reduction,
         get_reduction,
         "AUTO",
         field="reduction",
         label="Data reduction",
         form="main",
-        tip="Interpolate with some of the boundary nodes, as many as the tolerance needs, and "
-        "correct the rest: for meshes whose boundary has more than some thousand nodes. Automatic: "
-        "where it has.",
+        tip="Interpolate with only as many boundary nodes as the tolerance needs, and correct the "
+        "remaining error: for meshes with more than a few thousand boundary nodes. Automatic: "
+        "only for these.",
         method="rbf",
     ),
     greedy(
@@ -142,15 +142,15 @@ REDUCTION_ROWS = (
         "Select the control nodes in levels.",
         label="Levels",
         form="more",
-        tip="Whether data reduction selects in levels, each on what the ones before left, and "
-        "what ends a level.",
+        tip="Whether data reduction selects in levels, each on the error that the previous ones "
+        "left, and what ends a level.",
         run_label="",
     ),
     greedy(
         "MULTI_CRIT",
         one_of(LEVEL_CRITERIA),
         "criterion",
-        "What ends a level: its number of nodes, or the fall of its error.",
+        "What ends a level: its number of nodes, or the decrease of its error.",
         run_label="levels by {}",
         idle_reason=why_no_levels,
     ),
@@ -158,7 +158,7 @@ REDUCTION_ROWS = (
         "LVL_TOL_CRIT",
         real(0.0, 1.0),
         "level_tolerance",
-        "Fall of the error that ends a level.",
+        "Decrease of the error that ends a level.",
         run_label="a level ends at {}",
         idle_reason=why_no_levels,
     ),
@@ -176,8 +176,8 @@ REDUCTION_ROWS = (
         "DOUBLE_EDGE",
         REDUCTION,
         YES_NO,
-        "Select two nodes at a time, with opposite errors (YES), or one (NO); SELECTION says it "
-        "better.",
+        "Select two nodes at a time, with opposite errors (YES), or one (NO); prefer the key "
+        "SELECTION.",
         put_double_edge,
         lambda _: None,
     ),
@@ -185,24 +185,24 @@ REDUCTION_ROWS = (
         "SELECTION",
         one_of(SELECTIONS),
         "selection",
-        "Nodes taken in a cycle: a growing block (fastest), two with opposite errors, or one.",
+        "Nodes added in a cycle: a growing block (fastest), two with opposite errors, or one.",
         label="Selection",
         form="more",
-        tip="How many control nodes data reduction takes in a cycle: a growing block (fastest), "
+        tip="How many control nodes data reduction adds in a cycle: a growing block (fastest), "
         "two with opposite errors, or the one with the largest error.",
     ),
     greedy(
         "MAX_CONTROL_NODES",
         whole(1),
         "max_nodes",
-        "Stop at so many control nodes in any case.",
+        "Stop at this number of control nodes in any case.",
         run_label="",
     ),
     greedy(
         "GAMMA",
         real(0.0),
         "gamma",
-        "Radius of the correction over the largest error.",
+        "Radius of the correction, divided by the largest error.",
         label="Correction radius ×",
         form="more",
         tip="How far the last correction of the boundary reaches, as a multiple of the largest "
@@ -259,14 +259,14 @@ METHOD_ROWS = (
         METHOD,
         one_of(METHODS),
         "method",
-        "Radial basis functions, or to compare with them: inverse distance weighting, or linear "
-        "elasticity with cells that are the stiffer the smaller they are (as SU2 by default). "
-        "With both, ps and ds do the same, and kernel, radius and data reduction nothing.",
+        "Radial basis functions, or for comparison inverse distance weighting, or linear "
+        "elasticity with stiffer small cells (as in SU2 by default). With these two, ps and ds do "
+        "the same, and kernel, radius and data reduction have no effect.",
         label="Method",
         form="main",
-        tip="How the inner nodes follow: by radial basis functions, or to compare with them, as "
-        "means weighted with the inverse distance to the boundary, or as an elastic body whose "
-        "cells are the stiffer the smaller they are (as SU2 deforms by default).",
+        tip="How the inner nodes follow: by radial basis functions, or for comparison by inverse "
+        "distance weighting, or as an elastic body whose small cells are stiffer (as in SU2 by "
+        "default).",
         run_label="",
     ),
     setting(
@@ -274,10 +274,10 @@ METHOD_ROWS = (
         METHOD,
         one_of(SLIDING),
         "sliding",
-        f"How nodes slide: not, {_WAYS}.",
+        f"How nodes slide: not at all, {_WAYS}.",
         label="Sliding",
         form="main",
-        tip="Whether the nodes of sliding boundaries stay (none), slide and are put back on the "
+        tip="Whether the nodes of sliding boundaries stay (none), slide and are projected to the "
         "boundary in stages (pseudo), or slide as part of the system itself (direct).",
         run_label="",
         idle_reason=nothing_slides,
@@ -300,8 +300,8 @@ METHOD_ROWS = (
         METHOD,
         real(0.0, 1.0),
         "steps_gain",
-        "With STEPS= auto, enough is when more steps raise the minimum quality by less than "
-        "this part.",
+        "With STEPS= auto, steps are enough if more of them raise the minimum quality by less "
+        "than this part.",
         run_label="gain {}",
     ),
     replace(
@@ -310,9 +310,10 @@ METHOD_ROWS = (
             METHOD,
             or_auto(real(*FACTORS), "AUTO"),
             "influence_factor",
-            "Support radius of the radial function over the largest extent of the mesh. AUTO: 15 "
+            "Support radius of the radial function, divided by the largest extent of the mesh. "
+            "AUTO: 15 "
             "times the largest extent of a connected moving body, or 20 times the largest "
-            "displacement where that is more, and 2.5 extents of the mesh at most.",
+            "displacement if that is more, and at most 2.5 extents of the mesh.",
             label="Radius × extent",
             form="more",
             tip="Support radius: how far a boundary node reaches into the mesh, as a multiple of "
@@ -346,7 +347,7 @@ METHOD_ROWS = (
         label="Kernel",
         form="more",
         tip="The radial function; a global one reaches through the whole mesh whatever the "
-        "radius, and wants a smaller support radius.",
+        "radius, and needs a smaller support radius.",
         run_label="{}",
         method="rbf",
     ),
@@ -355,8 +356,7 @@ METHOD_ROWS = (
         METHOD,
         real(0.0, 20.0, closed=True),
         "idw_power",
-        "With METHOD= idw, the power of the inverse distance; the number of dimensions if not "
-        "given.",
+        "With METHOD= idw, the power of the inverse distance; by default the number of dimensions.",
         run_label="power {}",
         method="idw",
     ),
@@ -365,7 +365,7 @@ METHOD_ROWS = (
         METHOD,
         real(1e-12, 1e12),
         "idw_fixed_weight",
-        "With METHOD= idw, what a boundary node that stays counts, where one that moves counts 1.",
+        "With METHOD= idw, the weight of a boundary node that stays, relative to one that moves.",
         run_label="fixed weight {}",
         method="idw",
     ),
@@ -374,9 +374,9 @@ METHOD_ROWS = (
         METHOD,
         YES_NO,
         "curved",
-        "Without effect: curved boundaries, RBF-SliDe's switch, are found and followed anyway.",
+        "No effect: RBF-SliDe's switch for curved boundaries, which are always found and followed.",
         run_label="",
-        no_effect="curved boundaries are found and followed anyway",
+        no_effect="curved boundaries are always found and followed",
     ),
     setting(
         "FEATURE_ANGLE",

@@ -257,7 +257,7 @@ class Prescribed:
         vectors = frozen_array(self.vectors, np.float64)
         if nodes.ndim != 1 or vectors.ndim != 2 or len(nodes) != len(vectors):
             raise CaseError(
-                f"nodes and vectors have the shapes {nodes.shape} and {vectors.shape}; needed are "
+                f"nodes and vectors have the shapes {nodes.shape} and {vectors.shape}; expected "
                 "(k,) and (k, d)"
             )
         if (np.diff(nodes) <= 0).any() or not np.isfinite(vectors).all():

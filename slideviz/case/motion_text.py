@@ -124,8 +124,8 @@ def _groups(words: list[Word], text: str) -> list[list[Word]]:
             depth += 1
     if depth:
         raise CaseError(
-            f"{shown(text)}: a bracket is not closed; a list that goes on in the next line "
-            "needs a backslash at the end of its line"
+            f"{shown(text)}: a bracket is not closed; a list that continues in the next line "
+            f"needs a backslash at the end of its line"
         )
     return groups
 
@@ -133,7 +133,7 @@ def _groups(words: list[Word], text: str) -> list[list[Word]]:
 def _read_motion(group: list[Word]) -> Motion:
     items = [word for word in group if not word.is_sign(",")]
     if len(items) < 2:
-        raise CaseError(f"needed are a marker and one of {', '.join(VERBS)}")
+        raise CaseError(f"expected a marker and one of {', '.join(VERBS)}")
     marker, items = _read_target(items)
     word = items[0].text if items else ""
     verb, remaining = word.lower(), items[1:]
@@ -177,7 +177,7 @@ def _read_target(items: list[Word]) -> tuple[Target, list[Word]]:
 def _read_file(marker: Target, rest: list[Word]) -> FromFile:
     if len(rest) != 1 or not rest[0].text:
         raise CaseError(
-            "needed is (MARKER, file, path); a path with spaces, commas or brackets needs quotes"
+            "expected (MARKER, file, path); a path with spaces, commas or brackets needs quotes"
         )
     return FromFile(Path(rest[0].text.replace("\\", "/")), marker)
 
@@ -203,7 +203,7 @@ def _read_rotate(marker: Target, rest: list[Word]) -> Rotate:
     allowed = (1,) if at_centroid else (2, 3) if n_axis else (2,)
     if len(place) not in allowed:
         raise CaseError(
-            "after the angle needed are the axis (x, y, z or three numbers; not in 2D) and then "
+            "expected after the angle: the axis (x, y, z or three numbers; not in 2D) and then "
             "centroid or the point"
         )
     axis = read_axis(items[:n_axis]) if n_axis else (0.0, 0.0, 1.0)
@@ -224,11 +224,11 @@ def _read_scale(marker: Target, rest: list[Word]) -> Scale:
         factors, place = items[:n_factors], items[n_factors:]
         if len(place) not in (2, 3):
             raise CaseError(
-                "needed are one factor or one for each axis, then centroid or the point; put the "
+                "expected one factor or one for each axis, then centroid or the point; put the "
                 "point in brackets: scale, 1.1, (0, 0, 0)"
             )
     if len(factors) not in (1, 2, 3):
-        raise CaseError(f"{len(factors)} factors are given; needed is one, or one for each axis")
+        raise CaseError(f"{len(factors)} factors are given; expected one, or one for each axis")
     values = tuple(number(word.text) for word in factors)
     if min(values) <= 0.0:
         raise CaseError(f"the factor {min(values):g} is not above 0: it would fold the marker")
@@ -242,7 +242,7 @@ def _read_radial(marker: Target, rest: list[Word]) -> Radial:
     place = items[2 + n_axis :]
     if len(items) < 4 or len(place) != (3 if n_axis else 2):
         raise CaseError(
-            "needed are the factor of the radius, the distance, the axis (x, y, z or three "
+            "expected the factor of the radius, the distance, the axis (x, y, z or three "
             "numbers) and a point on it; in 2D no axis: radial, 1.03, 0, z, (0, 0, 0)"
         )
     factor, distance = number(items[0].text), number(items[1].text)
@@ -257,7 +257,7 @@ def _read_ffd(marker: Target, rest: list[Word]) -> Ffd:
     name = items[0].text if items else ""
     if len(items) not in (5, 7) or not name:
         raise CaseError(
-            "needed are the box, the control point i, j, k (-1 is all of a direction) and its "
+            "expected the box, the control point i, j, k (-1 is all of a direction) and its "
             "shift: ffd, BOX, 2, 1, 0, dx, dy, dz; in 2D ffd, BOX, 2, 1, dx, dy will do"
         )
     count = (len(items) - 1) // 2
@@ -282,7 +282,7 @@ def _read_bump(marker: Target, verb: str, rest: list[Word]) -> OnAirfoil:
         given = next((word.text for word in words[:1] if word.text.lower() in SIDES), "upper")
         hint = "; decimals are written with a point" if len(numbers) > 2 else ""
         raise CaseError(
-            f"{counted(len(numbers), 'number')} given; needed is "
+            f"{counted(len(numbers), 'number')} given; expected "
             f"{_BUMPS[verb].replace('upper', given)}{hint}"
         )
     low, high = (*numbers[before:], 0.0, 1.0)[:2]
@@ -311,7 +311,7 @@ def term_of(k: float, n: float) -> tuple[int, int]:
     """Return term k of n of an airfoil's shape as whole numbers; raises CaseError if none is."""
     if k != int(k) or n != int(n) or not 1 <= k <= n <= MOST_TERMS:
         raise CaseError(
-            f"there is no term {k:g} of {n:g}; needed are whole numbers, 1 to n of n, and n up to "
+            f"there is no term {k:g} of {n:g}; expected whole numbers, 1 to n of n, and n up to "
             f"{MOST_TERMS}"
         )
     return int(k), int(n)
@@ -336,7 +336,7 @@ def _read_column(
     name = items[0].text if items else ""
     if len(items) not in (3, 4) or not name:
         raise CaseError(
-            "needed are the box, the column of control points i, j (-1 is all of a direction) and "
+            "expected the box, the column of control points i, j (-1 is all of a direction) and "
             f"the amount: {VERB_OF[kind]}, BOX, 2, 1, 0.01; in 2D {VERB_OF[kind]}, BOX, 2, 0.01"
         )
     i, j = (*_whole(items[1:-1]), -1)[:2]
@@ -349,7 +349,7 @@ def _read_twist(marker: Target, rest: list[Word]) -> FfdTwist:
     n_axis = 1 if letter else 3
     if len(items) != 6 + n_axis or not items[0].text:
         raise CaseError(
-            "needed are the box, the plane j of control points (-1 is all), the angle in degrees, "
+            "expected the box, the plane j of control points (-1 is all), the angle in degrees, "
             "the axis (x, y, z or three numbers) and a point on it: ffd-twist, BOX, 2, 5.0, y, "
             "0.25, 0, 0"
         )
@@ -363,7 +363,7 @@ def _whole(words: list[Word]) -> list[int]:
     at = [number(word.text) for word in words]
     if any(value != int(value) or value < -1 for value in at):
         text = ", ".join(word.text for word in words)
-        raise CaseError(f"the control point ({text}) is none; needed are whole numbers from -1")
+        raise CaseError(f"the control point ({text}) is none; expected whole numbers from -1")
     return [int(value) for value in at]
 
 

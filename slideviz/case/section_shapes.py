@@ -139,7 +139,7 @@ SECTION_SHAPES = {
                     "Plane",
                     "&Cut by a plane",
                     add="Add a plane through the middle of the mesh.",
-                    handle="Drag the plane in the view: its face moves it, the arrow turns it.",
+                    handle="Drag the plane in the view to move it, or its arrow to turn it.",
                     flat="Show the section along its normal beside the 3D view.",
                     flat_name="Flat view",
                     look="Look along the normal.",
@@ -148,7 +148,7 @@ SECTION_SHAPES = {
                     "Line",
                     "&Cut by a line",
                     add="Add a line through the middle of the mesh.",
-                    handle="Drag the line in the view: itself or its middle moves it, its ends "
+                    handle="Drag the line or its middle in the view to move it, or its ends to "
                     "turn it.",
                     flat=_CURVE,
                     flat_name="Curve",
@@ -184,14 +184,15 @@ SECTION_SHAPES = {
                     handle="Drag the ball in the view to change the radius.",
                     flat="Show the cylinder unrolled to axis and r θ beside the 3D view.",
                     flat_name="Unrolled",
-                    look="Look at the cylinder from outside, at the middle of what it cuts.",
+                    look="Look at the cylinder from outside, at the middle of the cells that it "
+                    "cuts.",
                 ),
                 2: Words(
                     "Circle",
                     "Cut by a circl&e",
-                    add="Add a circle around what moves, or about the axis of the period.",
-                    handle="Drag the circle in the view: its middle moves it, itself changes the "
-                    "radius.",
+                    add="Add a circle around the moving body, or about the axis of the period.",
+                    handle="Drag the middle of the circle in the view to move it, or the circle "
+                    "to change its radius.",
                     flat=_CURVE,
                     flat_name="Curve",
                 ),
@@ -230,7 +231,7 @@ SECTION_SHAPES = {
                     handle="Drag the ball in the view to change the half angle.",
                     flat="Show the cone unrolled, its apex at 0, beside the 3D view.",
                     flat_name="Unrolled",
-                    look="Look at the cone from outside, at the middle of what it cuts.",
+                    look="Look at the cone from outside, at the middle of the cells that it cuts.",
                 ),
             },
         ),

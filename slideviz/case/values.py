@@ -117,7 +117,7 @@ def whole(low: int) -> Kind:
         if not _WHOLE.match(text):
             raise CaseError(f"{shown(text)} is not {allowed}")
         if int(text) < low:
-            raise CaseError(f"{text} is too small; needed is {allowed}")
+            raise CaseError(f"{text} is too small; expected {allowed}")
         return int(text)
 
     return Kind(allowed, read, str, entry="whole", span=(low, LARGEST_WHOLE))
@@ -133,7 +133,7 @@ def real(low: float, high: float | None = None, closed: bool = False) -> Kind:
         value = number(text)
         too_large = high is not None and (value > high or (value == high and not closed))
         if value <= low or too_large:
-            raise CaseError(f"{text} is out of range; needed is {allowed}")
+            raise CaseError(f"{text} is out of range; expected {allowed}")
         return value
 
     return Kind(allowed, read, lambda value: repr(float(value)), entry="real")
@@ -151,7 +151,7 @@ def _read_path(text: str) -> Path | None:
         raise CaseError("the file name is empty; give one, or NONE")
     path = Path(text.replace("\\", "/"))
     if path.name in ("", ".."):
-        raise CaseError(f"{shown(text)} is a folder; needed is the name of a file")
+        raise CaseError(f"{shown(text)} is a folder; expected the name of a file")
     return path
 
 
@@ -207,8 +207,8 @@ def _read_pairs(text: str) -> tuple[str, ...]:
         items = [item for i, item in enumerate(items) if i % _SU2_GROUP < _SU2_PAIR]
     elif any(item.is_number for item in items) and not all(item.is_number for item in items):
         raise CaseError(
-            "numbers stand among the names; write ( A, B ), or as SU2 does nine numbers after "
-            "each pair; a name that looks like a number needs quotes"
+            "there are numbers among the names; write ( A, B ), or nine numbers after each pair "
+            "as SU2 does; a name that looks like a number needs quotes"
         )
     return _checked_names([item.text for item in items])
 
@@ -231,7 +231,7 @@ def read_vector(items: list[Word], what: str) -> tuple[float, ...]:
         The words are not two or three, or not numbers.
     """
     if len(items) not in (2, 3):
-        raise CaseError(f"{what} has {len(items)} values; needed are 2 or 3 numbers")
+        raise CaseError(f"{what} has {len(items)} values; expected 2 or 3 numbers")
     return tuple(number(item.text) for item in items)
 
 

@@ -34,9 +34,9 @@ def numbers(count: int, allowed: str, rising: bool = False, more: int = 0) -> Ki
     def read(text: str) -> tuple[float, ...]:
         values = tuple(number(item.text) for item in list_of(text))
         if not count <= len(values) <= count + more:
-            raise CaseError(f"{shown(text)} has {len(values)} numbers; needed is {allowed}")
+            raise CaseError(f"{shown(text)} has {len(values)} numbers; expected {allowed}")
         if rising and any(a >= b for a, b in pairwise(values)):
-            raise CaseError(f"{shown(text)} does not rise; needed is {allowed}")
+            raise CaseError(f"{shown(text)} does not rise; expected {allowed}")
         return values
 
     return Kind(allowed, read, vector_text)
@@ -134,7 +134,7 @@ def _row(name: str, kind: Kind, meaning: str) -> Key:
 
 
 VIEW_ROWS = (
-    _row("VIEW_COLOR", choice({w: w for w in COLOR_BY}), "What the colors say."),
+    _row("VIEW_COLOR", choice({w: w for w in COLOR_BY}), "What the colors show."),
     _row("VIEW_RANGE", numbers(2, "two rising numbers", True), "Ends of the color bar."),
     _row("VIEW_MAP", choice({w: w for w in COLOR_MAPS}), "The color map."),
     _row("VIEW_THRESHOLD", numbers(2, "two rising numbers", True), "Only cells between them."),
@@ -146,7 +146,7 @@ VIEW_ROWS = (
     _row(
         "VIEW_CAMERA",
         numbers(10, "ten or eleven numbers", more=1),
-        "Where the eye is, what it looks at, what is up, half the height that it sees; and how "
-        "much wider than high that view was, for one that is narrower.",
+        "Position of the camera, the point that it looks at, its upward direction, and half the "
+        "height of the view; then width over height of the view, for a narrower one.",
     ),
 )

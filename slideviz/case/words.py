@@ -92,8 +92,8 @@ def list_of(text: str) -> list[Word]:
     closed = bool(words) and words[-1].is_sign(")")
     if opened != closed:
         raise CaseError(
-            f"a bracket of {shown(text)} is missing; a list that goes on in the next line "
-            "needs a backslash at the end of its line"
+            f"a bracket of {shown(text)} is missing; a list that continues in the next line needs "
+            f"a backslash at the end of its line"
         )
     items = [word for word in words[opened : len(words) - closed] if not word.is_sign(",")]
     for item in items:
@@ -125,7 +125,7 @@ def number(text: str) -> float:
         raise CaseError(f"{shown(text)} is not a number{hint}")
     value = float(text)
     if not math.isfinite(value):
-        raise CaseError(f"{shown(text)} is too large for a number; needed is a finite one")
+        raise CaseError(f"{shown(text)} is too large for a number; expected a finite one")
     return value
 
 

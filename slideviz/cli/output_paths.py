@@ -69,7 +69,7 @@ def qualities_path(output: Path) -> Path:
     if not output.name:
         from slideviz.errors import CaseError
 
-        raise CaseError(f"{output}: is a folder; needed is the name of the mesh to write")
+        raise CaseError(f"{output}: is a folder; expected the name of the mesh to write")
     return output.with_name(f"{output.stem}_qual.txt")
 
 

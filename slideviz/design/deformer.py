@@ -268,7 +268,7 @@ class Deformer:
         out = np.asarray(vectors, np.float64)
         if out.shape[-2:] != shape or out.ndim not in (2, 3):
             raise CaseError(
-                f"{name} has the shape {out.shape}; needed is {shape}, a row for each node, or "
+                f"{name} has the shape {out.shape}; expected {shape}, a row for each node, or "
                 f"(k, {shape[0]}, {shape[1]}) for k of them"
             )
         if not np.isfinite(out).all():

@@ -336,12 +336,12 @@ def regular_box(
     """
     for letter, degree in zip("ijk", degrees, strict=True):
         if degree < 1:
-            raise CaseError(f"the degree of {letter} is {degree}; needed is 1 or more")
+            raise CaseError(f"the degree of {letter} is {degree}; expected 1 or more")
     for letter, order, degree in zip("ijk", orders or (2, 2, 2), degrees, strict=True):
         if not 2 <= order <= degree + 1:
             raise CaseError(
                 f"the B-splines of {letter} have the order {order}, and {degree + 1} control "
-                f"points; needed is an order from 2 to {degree + 1}"
+                f"points; expected an order from 2 to {degree + 1}"
             )
     control = system.points_of(lattice(system.q_of(corners), degrees))
     box = Box(name, control, orders, corners, system=system)
@@ -350,7 +350,7 @@ def regular_box(
     # The box may be left-handed, and sides may shrink to an edge.
     if volume.min() < 0.0 < volume.max() or not volume.any():
         raise CaseError(
-            "the corners enclose no volume in their order; needed are those of the bottom "
+            "the corners enclose no volume in their order; expected those of the bottom "
             "counter-clockwise, then those above them"
         )
     return box

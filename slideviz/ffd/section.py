@@ -204,7 +204,7 @@ class _Reader:
             return None
         if kind != "BSPLINE_UNIFORM":
             raise self.error(
-                f"FFD_BLENDING is {kind}; needed is BEZIER or BSPLINE_UNIFORM", "FFD_BLENDING"
+                f"FFD_BLENDING is {kind}; expected BEZIER or BSPLINE_UNIFORM", "FFD_BLENDING"
             )
         keys = [f"BSPLINE_ORDER_{letter}" for letter in letters]
         keys = [key if key in self.entries else f"FFD_{key}" for key in keys]
@@ -269,7 +269,7 @@ class _Reader:
     def numbers(self, key: str, count: int, width: int) -> FloatArray:
         """Return the rows of numbers after a key, (count, width); its value must be ``count``."""
         if self.count(key) != count:
-            raise self.error(f"{key} is {self.count(key)}; needed is {count}", key)
+            raise self.error(f"{key} is {self.count(key)}; expected {count}", key)
         return self.table(key, self.rows(key, count), width)
 
     def rows(self, key: str, count: int) -> list[Row]:

@@ -249,7 +249,7 @@ class Mesh:
         check_fields(self)
         object.__setattr__(self, "points", frozen_array(self.points, np.float64))
         if self.points.ndim != 2 or self.points.shape[1] not in (2, 3):
-            raise MeshError(f"points have shape {self.points.shape}; needed is (n, 2) or (n, 3)")
+            raise MeshError(f"points have shape {self.points.shape}; expected (n, 2) or (n, 3)")
 
     def __repr__(self) -> str:
         return (
@@ -313,5 +313,5 @@ class Mesh:
         """
         moved = np.asarray(points, np.float64)
         if moved.shape != self.points.shape:
-            raise MeshError(f"points have shape {moved.shape}; needed is {self.points.shape}")
+            raise MeshError(f"points have shape {moved.shape}; expected {self.points.shape}")
         return replace(self, points=moved)

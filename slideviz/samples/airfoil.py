@@ -38,7 +38,7 @@ def airfoil_mesh(size: int, variant: str) -> Mesh:
     """
     if size < LEAST:
         raise CaseError(
-            f"size {size} is too coarse for the airfoil; needed are {LEAST} cells or more"
+            f"size {size} is too coarse for the airfoil; expected {LEAST} cells or more"
         )
     circle = np.exp(1j * np.arange(size) / size * 2.0 * np.pi)
     front, end = (x + 1.0 / x for x in (CENTRE - RADIUS, CENTRE + RADIUS))

@@ -153,7 +153,7 @@ def counts(size: int, shares: Shares = PASSAGE_SHARES) -> GridCounts:
         ``size`` is below 12, too few to follow the blade.
     """
     if size < 12:
-        raise CaseError(f"size {size} is too coarse for the blade; needed are 12 cells or more")
+        raise CaseError(f"size {size} is too coarse for the blade; expected 12 cells or more")
     cells = (shares.ahead, shares.along, shares.behind, shares.beside, shares.layers)
     ahead, along, behind, beside, layers = (round(size * share / 36) for share in cells)
     below = (size - beside) // 2

@@ -339,7 +339,7 @@ def layout(name: str, n: int) -> Layout:
         n is below 3, so that the block would touch the sides.
     """
     if n < 3:
-        raise CaseError(f"size {n} leaves no room for the block; needed are 3 cells or more")
+        raise CaseError(f"size {n} leaves no room for the block; expected 3 cells or more")
     dim = DIMENSIONS[name]
     lengths = [_centred(BLOCK_LENGTH * n, n)] + [_centred(BLOCK_HEIGHT * n, n)] * (dim - 1)
     start = tuple((n - length) // 2 for length in lengths)

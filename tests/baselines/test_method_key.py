@@ -58,13 +58,13 @@ def test_settings_without_effect_are_told_and_change_no_result():
     made = sample("square", 6, "motion")
     given = made.case.change(curved=True, direction=1)
     direction, curved = idle_settings(given)
-    assert curved.startswith("CURVED= YES is without effect")
-    assert direction.startswith("PERIODIC_DIRECTION is without effect")
+    assert curved.startswith("CURVED= YES has no effect")
+    assert direction.startswith("PERIODIC_DIRECTION has no effect")
     assert effective(given) == effective(made.case) == made.case
     last, other = (list(sv.deform(case, made.mesh))[-1] for case in (given, made.case))
     assert last.mesh.points.tobytes() == other.mesh.points.tobytes()
     for key in ("CURVED", "PERIODIC_DIRECTION"):
-        assert "without effect" in KEYS[key].meaning.lower()
+        assert "no effect" in KEYS[key].meaning.lower()
 
 
 def test_a_mesh_too_large_for_elasticity_is_refused_and_for_the_explicit_method_is_not(

@@ -61,12 +61,12 @@ def test_the_real_keys_are_found():
 @pytest.mark.parametrize("name", REALS)
 def test_an_absurd_number_is_refused_or_works(name, text, sliding):
     if name in REFUSED["small" if float(text) < 1 else "large"]:
-        with pytest.raises(CaseError, match=f"{text} is out of range; needed is a number above"):
+        with pytest.raises(CaseError, match=f"{text} is out of range; expected a number above"):
             KEYS[name].kind.read(text)
         return
     case, mesh = case_with(name, text, sliding)
     if name == "SUPPORT_RADIUS":
-        with pytest.raises(CaseError, match=r"SUPPORT_RADIUS: .* does not fit .*; needed is a"):
+        with pytest.raises(CaseError, match=r"SUPPORT_RADIUS: .* does not fit .*; expected a"):
             next(sv.deform(case, mesh))
         return
     *_, last = sv.deform(case, mesh)
@@ -97,7 +97,7 @@ def test_a_program_is_told_of_an_absurd_radius(value):
         motions=(Translate("BLOCK", (0.02, 0.01)),),
         influence_factor=value,
     )
-    with pytest.raises(CaseError, match=r"INFLUENCE_FACTOR: 1e[-+]300 is out of range; needed is"):
+    with pytest.raises(CaseError, match=r"INFLUENCE_FACTOR: 1e[-+]300 is out of range; expected"):
         next(sv.deform(case, mesh))
 
 
@@ -109,7 +109,7 @@ def test_a_program_is_told_of_absurd_steps_and_names():
     assert case.change(steps="auto").steps == Case(steps="AUTO").steps == 0
     with pytest.raises(CaseError, match="a case has no 'stepz'; did you mean steps"):
         case.change(stepz=3)
-    with pytest.raises(ArgumentError, match="steps is 'many'; needed is a whole number"):
+    with pytest.raises(ArgumentError, match="steps is 'many'; expected a whole number"):
         case.change(steps="many")
 
 

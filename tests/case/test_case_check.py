@@ -96,10 +96,10 @@ def test_good_cases(square, case):
             good(motions=(Rotate("UPPER", 5.0, "centroid", (0.0, 0.0, 0.0)),)),
             "motion 1: the axis (0, 0, 0) has no direction; write x, y, z or another vector",
         ),
-        (good(steps=-1), "STEPS: -1 is too small; needed is a whole number from 1, or auto"),
+        (good(steps=-1), "STEPS: -1 is too small; expected a whole number from 1, or auto"),
         (
             good(reduction=Reduction(gamma=-1.0)),
-            "GAMMA: -1.0 is out of range; needed is a number above 0",
+            "GAMMA: -1.0 is out of range; expected a number above 0",
         ),
         (
             good(zone=2),
@@ -185,4 +185,4 @@ def test_all_problems_at_once(square):
 def test_several_markers_with_a_plus_are_told_their_brackets():
     roles = dict.fromkeys(("UPPER", "LEFT"), "moving")
     ((_, said),) = contradictions(Case(roles=roles, motions=(Translate("UPPER+LEFT", (1.0, 0.0)),)))
-    assert said.endswith("several stand in brackets, as ((UPPER, LEFT), translate, ...)")
+    assert said.endswith("write several in brackets, as in ((UPPER, LEFT), translate, ...)")

@@ -61,11 +61,11 @@ def test_latin_1_comments_are_no_obstacle(read):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", r"d\.txt: the file is empty; needed is a displacement file"),
-        ("% nothing\n", r"d\.txt: the file lists no node; needed are lines node dx dy$"),
+        ("", r"d\.txt: the file is empty; expected a displacement file"),
+        ("% nothing\n", r"d\.txt: the file lists no node; expected lines node dx dy$"),
         (b"3 1 2\n\0", r"d\.txt: is a binary file"),
-        ("\n3 1\n", r"d\.txt:2: '3 1' has 2 columns; needed are 3: node dx dy"),
-        ("3 1 2\n8 1 2 0\n", r"d\.txt:2: '8 1 2 0' has 4 columns; needed are 3"),
+        ("\n3 1\n", r"d\.txt:2: '3 1' has 2 columns; expected 3: node dx dy"),
+        ("3 1 2\n8 1 2 0\n", r"d\.txt:2: '8 1 2 0' has 4 columns; expected 3"),
         ("node dx dy\n3 1 2\n", r"d\.txt:1: 'node' is not a number"),
         ("node dx\n3 1 2\n", r"d\.txt:1: 'node dx' has 2 columns; .*\(put % before a heading\)"),
         ("3 1 2\n8 nan 0\n", r"d\.txt:2: 'nan' is not a number"),
@@ -76,7 +76,7 @@ def test_latin_1_comments_are_no_obstacle(read):
         ("-1 0 0\n", r"d\.txt:1: node -1 is not in the mesh"),
         ("1e300 0 0\n", r"d\.txt:1: node 1e\+300 is not in the mesh"),
         ("2.5 0 0\n", r"d\.txt:1: 2\.5 is not a node number"),
-        ("3 1 2\n4 0 0\n", r"d\.txt:2: node 4 is not on a moving marker; take the line out or"),
+        ("3 1 2\n4 0 0\n", r"d\.txt:2: node 4 is not on a moving marker; remove the line or"),
         ("3 1 2\n5 0 0\n\n3 1 3\n", r"d\.txt:4: node 3 has another displacement in line 1; keep"),
     ],
 )
@@ -88,7 +88,10 @@ def test_mistakes(read, text, words):
 @pytest.mark.parametrize(
     ("row", "said"),
     [
-        ("1 2 3 4 5 6", r"d\.txt:1: '1 2 3 4 5 6' has 6 columns; needed .* \(and 24 more lines l"),
+        (
+            "1 2 3 4 5 6",
+            r"d\.txt:1: '1 2 3 4 5 6' has 6 columns; expected .* \(and 24 more lines l",
+        ),
         ("a " * 99, r"d\.txt:1: '.{0,70}\.\.\.' has 99 columns; .* \(and 24 more lines like it\)"),
         ("99 0 0", r"d\.txt:1: node 99 is not in the mesh; .* \(and 24 more lines like it\)"),
         ("0.5 0 0", r"d\.txt:1: 0\.5 is not a node number \(and 24 more lines like it\)"),
@@ -106,7 +109,7 @@ def test_mistakes_of_one_kind_are_one_sentence(read, row, said):
 
 
 def test_columns_of_a_mesh_in_3d(read):
-    with pytest.raises(CaseError, match="has 3 columns; needed are 4: node dx dy dz"):
+    with pytest.raises(CaseError, match="has 3 columns; expected 4: node dx dy dz"):
         read("3 1 2\n", dim=3)
 
 

@@ -90,14 +90,14 @@ def test_values(read, line, field, value):
     ("line", "words"),
     [
         ("STEPS= 1.5", r"STEPS: '1.5' is not a whole number from 1"),
-        ("STEPS= -3", r"STEPS: -3 is too small; needed is a whole number from 1"),
+        ("STEPS= -3", r"STEPS: -3 is too small; expected a whole number from 1"),
         ("ZONE= 0", r"ZONE: 0 is too small"),
         ("STEPS= 99999999999", r"STEPS: '99999999999' is not a whole number"),
         ("GAMMA= 2,5", r"GAMMA: '2,5' is not a number; write decimals with a point"),
         ("GAMMA= nan", r"GAMMA: 'nan' is not a number"),
         ("GAMMA= 1_0", r"GAMMA: '1_0' is not a number"),
-        ("GAMMA= 1e999", r"GAMMA: '1e999' is too large for a number; needed is a finite one"),
-        ("GAMMA= 0", r"GAMMA: 0 is out of range; needed is a number above 0"),
+        ("GAMMA= 1e999", r"GAMMA: '1e999' is too large for a number; expected a finite one"),
+        ("GAMMA= 0", r"GAMMA: 0 is out of range; expected a number above 0"),
         ("INFLUENCE_FACTOR= 1e-300", r"FACTOR: 1e-300 is out of range; .* above 1e-06 and below"),
         ("INFLUENCE_FACTOR= 1e300", r"FACTOR: 1e300 is out of range; .* and below 1e\+06"),
         ("IDW_POWER= 1e300", r"IDW_POWER: 1e300 is out of range; .* above 0 up to 20"),
@@ -110,17 +110,17 @@ def test_values(read, line, field, value):
         ("PERIODIC_AXIS= w", r"'w' is not an axis; write x, y, z or three numbers"),
         ("PERIODIC_AXIS= (0, 0, 0)", r"the axis \(0, 0, 0\) has no direction"),
         ("PERIODIC_AXIS= (1, a, 0)", r"PERIODIC_AXIS: 'a' is not a number"),
-        ("PERIODIC_ORIGIN= 1", r"the point has 1 values; needed are 2 or 3 numbers"),
+        ("PERIODIC_ORIGIN= 1", r"the point has 1 values; expected 2 or 3 numbers"),
         ('MESH_FILENAME= "a" b', r"""'"a" b' is not one file name; write it as "name\""""),
         ('MESH_FILENAME= ""', r"the file name is empty; give one, or NONE"),
-        ("MESH_OUT_FILENAME= /", r"'/' is a folder; needed is the name of a file"),
-        ("MESH_OUT_FILENAME= ..", r"'\.\.' is a folder; needed is the name of a file"),
+        ("MESH_OUT_FILENAME= /", r"'/' is a folder; expected the name of a file"),
+        ("MESH_OUT_FILENAME= ..", r"'\.\.' is a folder; expected the name of a file"),
         ('MESH_FILENAME= "a', r"""the quotation mark in '"a' is not closed; close it"""),
         ("MARKER_FIXED= (A, A)", r"MARKER_FIXED: marker 'A' is listed twice; list it once"),
         ('MARKER_FIXED= ("")', r"a marker has an empty name; give one"),
         ("MARKER_FIXED= (A", r"a bracket of '\(A' is missing; .* needs a backslash"),
         ("MARKER_FIXED= (A), (B)", r"'\(A\), \(B\)' is not one list of names; write \( A, B \)"),
-        ("MARKER_PERIODIC= (A, B, 1, 2)", r"numbers stand among the names; write \( A, B \)"),
+        ("MARKER_PERIODIC= (A, B, 1, 2)", r"there are numbers among the names; write \( A, B \)"),
     ],
 )
 def test_wrong_values(read, line, words):
@@ -295,8 +295,8 @@ class TestSetKey:
         ("key", "value", "words"),
         [
             ("STEP", "1", "--set STEP=1: unknown key 'STEP'; did you mean STEPS?"),
-            ("STEPS", "0", "--set STEPS=0: 0 is too small; needed is a whole number from 1"),
-            ("MOTION", "(A)", "--set MOTION=(A): motion 1: needed are a marker and one of"),
+            ("STEPS", "0", "--set STEPS=0: 0 is too small; expected a whole number from 1"),
+            ("MOTION", "(A)", "--set MOTION=(A): motion 1: expected a marker and one of"),
         ],
     )
     def test_wrong(self, key, value, words):
@@ -330,7 +330,7 @@ def test_a_key_that_the_method_panel_shows_has_what_its_field_needs():
 
 def test_a_kind_says_why_a_text_is_no_value_and_what_the_window_calls_one():
     assert KEYS["GAMMA"].kind.problem("25") == ""
-    assert KEYS["GAMMA"].kind.problem("-1") == "-1 is out of range; needed is a number above 0"
+    assert KEYS["GAMMA"].kind.problem("-1") == "-1 is out of range; expected a number above 0"
     for name, text, called in (
         ("SLIDING_MODE", "PS", "pseudo sliding"),
         ("PERIODIC_TYPE", "1", "rotational"),

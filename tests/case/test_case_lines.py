@@ -122,10 +122,10 @@ def test_a_backslash_at_the_very_end_is_harmless(read):
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (b"", "the file is empty; needed is a case file"),
-        (b"\n \r\n", "the file is empty; needed is a case file"),
+        (b"", "the file is empty; expected a case file"),
+        (b"\n \r\n", "the file is empty; expected a case file"),
         (b"% nothing\n", "has no `KEY= value` line; `slideviz keys` lists the keys"),
-        (b"STEPS= 2\0", "is a binary file; needed is a case file, which is text"),
+        (b"STEPS= 2\0", "is a binary file; expected a case file, which is text"),
         (b"NDIME= 2\nNELEM= 24\n", "is an SU2 mesh, not a case file; name it in MESH_FILENAME="),
         (b"NZONE= 2\n", "is an SU2 mesh, not a case file"),
     ],
@@ -138,7 +138,7 @@ def test_files_that_are_no_case_files(read, data, words):
 def test_missing_file_and_folder(tmp_path):
     with pytest.raises(CaseError, match=r"no\.cfg: there is no such case file; check name"):
         Case.read(tmp_path / "no.cfg")
-    with pytest.raises(CaseError, match=r"is a folder; needed is a case file"):
+    with pytest.raises(CaseError, match=r"is a folder; expected a case file"):
         read_case(tmp_path)
 
 
@@ -161,7 +161,7 @@ def test_all_problems_at_once_in_order(read):
         "2: CURVED: 'perhaps' is not one of YES | NO",
         "3: 'foo' is not `KEY= value`",
         "5: STEPS is given in line 4 already; keep one of the two",
-        "6: GAMMA: it has no value; needed is a number above 0",
+        "6: GAMMA: it has no value; expected a number above 0",
     ]
 
 

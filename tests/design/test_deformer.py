@@ -246,7 +246,7 @@ def test_images_must_move_alike():
 @pytest.mark.parametrize(
     ("values", "sentence"),
     [
-        (np.zeros((3, 2)), r"has the shape \(3, 2\); needed is \(8, 2\)"),
+        (np.zeros((3, 2)), r"has the shape \(3, 2\); expected \(8, 2\)"),
         (np.zeros(16), "has the shape"),
         (np.zeros((1, 1, 8, 2)), "has the shape"),
         (np.full((8, 2), np.nan), "not finite"),

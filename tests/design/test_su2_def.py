@@ -303,13 +303,13 @@ def test_surface_file_gives_positions_in_any_order(here):
     ("text", "message"),
     [
         (None, r"surface_positions\.dat: there is no such surface file; check name"),
-        ("", r"the file is empty; needed is a surface file"),
-        ("% nothing\n", r"the file lists no node; needed are lines node x y$"),
-        ("3 0.5\n", r"dat:1: '3 0.5' has 2 columns; needed are 3: node x y \(put"),
+        ("", r"the file is empty; expected a surface file"),
+        ("% nothing\n", r"the file lists no node; expected lines node x y$"),
+        ("3 0.5\n", r"dat:1: '3 0.5' has 2 columns; expected 3: node x y \(put"),
         ("3 1 2\n3 1 3\n", r"dat:2: node 3 has another position in line 1; keep one"),
         ("3 1 2 0.0\n4 1 2 1e-9\n", r"dat:2: z is '1e-9', and the mesh has 2 dim"),
         ("3 1 2\n4 1 2 1\n", r"dat:2: z is '1', and the mesh has 2 dim"),
-        ("3 1 2 0 0\n", r"dat:1: '3 1 2 0 0' has 5 columns; needed are 3"),
+        ("3 1 2 0 0\n", r"dat:1: '3 1 2 0 0' has 5 columns; expected 3"),
         ("99 1 2\n", r"node 99 is not in the mesh; its nodes are 0 to 48"),
         ("30 1 2\n48 1 1\n", r"none of its 2 nodes is on DV_MARKER= \(low\), so that nothing"),
     ],
@@ -689,7 +689,7 @@ def test_zeros_after_the_last_box_are_passed_over_as_in_su2(here):
     np.testing.assert_array_equal(
         surface(more + kind).displacement, surface(BOXED + kind).displacement
     )
-    with pytest.raises(CaseError, match="FFD_DEFINITION: box 'BOX' has 25 numbers; needed are"):
+    with pytest.raises(CaseError, match="FFD_DEFINITION: box 'BOX' has 25 numbers; expected"):
         config(BOXED.replace(")\nFFD_DEGREE", ", 3)\nFFD_DEGREE") + kind)
 
 

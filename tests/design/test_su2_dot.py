@@ -260,15 +260,15 @@ def test_several_objectives_and_names_of_files(case):
         ),
         (
             lambda p, w: Path("adj_cd.csv").write_text('"x", "Sensitivity_x"\n0, a\n1, 2\n'),
-            "adj_cd.csv:2: needed is a number for each of the 2 columns, separated by commas; dec",
+            "adj_cd.csv:2: expected a number for each of the 2 columns, separated by commas; dec",
         ),
         (
             lambda p, w: Path("adj_cd.csv").write_text('"x", "Sensitivity_x"\n1, 2\n0,5, 2\n'),
-            "adj_cd.csv:3: needed is a number for each of the 2 columns, separated by commas; dec",
+            "adj_cd.csv:3: expected a number for each of the 2 columns, separated by commas; dec",
         ),
         (
             lambda p, w: Path("adj_cd.csv").write_text('"x", "Sensitivity_x"\n1,5, 2,5\n'),
-            "adj_cd.csv:2: needed is a number for each of the 2 columns, separated by commas; dec",
+            "adj_cd.csv:2: expected a number for each of the 2 columns, separated by commas; dec",
         ),
         (
             lambda p, w: write_csv("adj_cd.csv", p[on := square(8).marker("BLOCK").nodes], w[on]),
@@ -291,13 +291,13 @@ def test_several_objectives_and_names_of_files(case):
         ),
         (
             lambda p, w: Path("adj_cd.csv").write_text('"x", "Sensitivity_x", "Sensitivity_y"\n'),
-            "has no row of numbers; needed is one for each point",
+            "has no row of numbers; expected one for each point",
         ),
         (
             lambda p, w: Path("dot.cfg").write_text(
                 Path("dot.cfg").read_text() + "\nSOLUTION_ADJ_FILENAME= .\n"
             ),
-            "SOLUTION_ADJ_FILENAME: '.' is a folder; needed is the name of a file",
+            "SOLUTION_ADJ_FILENAME: '.' is a folder; expected the name of a file",
         ),
     ],
 )
@@ -313,7 +313,7 @@ def test_wrong_unordered_files_are_told(case, capsys):
     Path("dot.cfg").write_text(simple() + more)
     rows = [", ".join(map(repr, map(float, [*p, 0, *w, 0]))) for p, w in zip(*case, strict=True)]
     for text, message in (
-        ("1, 2\n", "needed are rows x, y, z, dJ/dx, dJ/dy, dJ/dz of numbers"),
+        ("1, 2\n", "expected rows x, y, z, dJ/dx, dJ/dy, dJ/dz of numbers"),
         ("1, 2, 3, 4, 5, six\n", "unordered_sensitivity.dat:1: has something that is no number"),
         ("\n".join([*rows, rows[0]]), "several rows are at the point 0; one each is needed"),
     ):

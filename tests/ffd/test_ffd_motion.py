@@ -181,7 +181,7 @@ def test_usual_case_file_says_nothing_of_boxes(tmp_path):
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("FFD_DEFINITION= (BOX, 1, 2, 3)", "box 'BOX' has 3 numbers; needed are its name and 24"),
+        ("FFD_DEFINITION= (BOX, 1, 2, 3)", "box 'BOX' has 3 numbers; expected its name and 24"),
         ("FFD_DEGREE= (3, 1)", r"\(3, 1\) is not three whole numbers from 0"),
         ("FFD_BSPLINE_ORDER= 3, 0, 4", r"\(3, 0, 4\) is not three whole numbers from 1"),
         ("FFD_BLENDING= NURBS", "'NURBS' is not one of BEZIER | BSPLINE_UNIFORM"),
@@ -257,7 +257,7 @@ def test_wrong_prescribed_displacements_are_told():
     low = mesh.marker("y_low").nodes[2:3]
     with pytest.raises(CaseError, match="its vectors have 3 components, and the mesh 2 dimensions"):
         next(sv.deform(case(sv.Prescribed(low, [[0.0, 0.1, 0.0]])), mesh))
-    with pytest.raises(CaseError, match=r"the shapes \(2,\) and \(1, 2\); needed are"):
+    with pytest.raises(CaseError, match=r"the shapes \(2,\) and \(1, 2\); expected"):
         sv.Prescribed([1, 2], [[0.0, 0.1]])
     with pytest.raises(CaseError, match="nodes must be ascending, each once"):
         sv.Prescribed([2, 1], [[0.0, 0.1], [0.0, 0.1]])

@@ -185,9 +185,9 @@ def test_mesh_without_boxes_has_none():
         ("FFD_LEVEL= 0", "FFD_LEVEL= 1", "FFD_LEVEL is 1; FFD_NLEVEL must be larger, and is 1"),
         ("FFD_DEGREE_J= 1", "FFD_DEGREE_J= x", "FFD_DEGREE_J= x is no whole number from 0"),
         ("FFD_DEGREE_J= 1\n", "", "FFD_DEGREE_J= is missing"),
-        ("FFD_DEGREE_J= 1", "FFD_DEGREE_J= 0", "the degree of j is 0; needed is 1 or more"),
-        ("BEZIER", "NURBS", "FFD_BLENDING is NURBS; needed is BEZIER or BSPLINE_UNIFORM"),
-        ("POINTS= 4", "POINTS= 8", "FFD_CORNER_POINTS is 8; needed is 4"),
+        ("FFD_DEGREE_J= 1", "FFD_DEGREE_J= 0", "the degree of j is 0; expected 1 or more"),
+        ("BEZIER", "NURBS", "FFD_BLENDING is NURBS; expected BEZIER or BSPLINE_UNIFORM"),
+        ("POINTS= 4", "POINTS= 8", "FFD_CORNER_POINTS is 8; expected 4"),
         ("1.1 0.1\n", "", "3 rows follow FFD_CORNER_POINTS= 4; correct the count"),
         ("1.1 0.1\n", "1.1 wide\n", "the row '1.1 wide' of FFD_CORNER_POINTS needs 2 finite numb"),
         (
@@ -198,7 +198,7 @@ def test_mesh_without_boxes_has_none():
         ("NBOX= 1", "NBOX= one", "FFD_NBOX= one, but the FFD boxes"),
         ("FFD_NBOX= 1\n", "", "FFD_NBOX= is missing; write FFD_NBOX= 1 before the FFD boxes"),
         (SECTION[12:], "", "FFD_NBOX= 1, but the FFD boxes that follow are none"),
-        ("CONTROL_POINTS= 0", "CONTROL_POINTS= 2", "FFD_CONTROL_POINTS is 2; needed is 12"),
+        ("CONTROL_POINTS= 0", "CONTROL_POINTS= 2", "FFD_CONTROL_POINTS is 2; expected 12"),
         ("SURFACE_POINTS= 0", "SURFACE_POINTS= 1\nlow 999 0 0 0", "names node 999, which is none"),
         ("SURFACE_POINTS= 0", "SURFACE_POINTS= 1\nlow 9223372036854775808 0 0 0", "which is none"),
         (

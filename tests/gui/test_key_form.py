@@ -72,5 +72,5 @@ def test_a_field_refuses_a_number_with_the_words_of_a_case_file(ready, name):
     field.selectAll()
     QTest.keyClicks(field, "-3")
     assert field.fault == key.kind.problem("-3")
-    assert f"{key.title}: -3 is out of range; needed is" in ready.window.run_panel.text.text()
+    assert f"{key.title}: -3 is out of range; expected" in ready.window.run_panel.text.text()
     assert key.get(ready.session.case) == before

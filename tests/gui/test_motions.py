@@ -185,7 +185,7 @@ def test_a_table_is_checked_as_it_is_typed_can_have_all_nodes_and_is_not_accepte
     assert not dialog.answer.property("bad")
     QTest.keyClicks(dialog.edit, " 7")
     qtbot.waitUntil(lambda: bool(dialog.answer.property("bad")))
-    assert "needed are 3: node dx dy" in dialog.answer.text()
+    assert "expected 3: node dx dy" in dialog.answer.text()
     assert not dialog.save.isEnabled()
     dialog.edit.setPlainText("")
     blade.click(dialog.fill)

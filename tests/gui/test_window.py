@@ -417,7 +417,7 @@ def test_settings_reach_the_case_and_impossible_numbers_do_not(opened):
     field.selectAll()
     QTest.keyClicks(field, "-1")
     assert field.property("bad")
-    assert "-1 is out of range; needed is a number above 1e-06" in field.toolTip()
+    assert "-1 is out of range; expected a number above 1e-06" in field.toolTip()
     assert opened.session.case.influence_factor == 2.5
     opened.type(field, "auto")
     assert opened.session.case.influence_factor == 0

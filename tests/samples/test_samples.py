@@ -220,10 +220,10 @@ def test_written_sample_reads_back_bit_for_bit_wherever_it_is_moved(tmp_path, na
     [
         (("sqare",), r"no sample 'sqare'; the samples are square, .*did you mean square\?"),
         (("polar", None, "motion"), "no variant 'motion' of polar; it has file"),
-        (("square", 2), "size 2 leaves no room for the block; needed are 3 cells or more"),
+        (("square", 2), "size 2 leaves no room for the block; expected 3 cells or more"),
         (("hexahedron", -1), "size -1 leaves no room"),
-        (("airfoil", 15), "size 15 is too coarse for the airfoil; needed are 16 cells or more"),
-        (("passage", 11), "size 11 is too coarse for the blade; needed are 12 cells or more"),
+        (("airfoil", 15), "size 15 is too coarse for the airfoil; expected 16 cells or more"),
+        (("passage", 11), "size 11 is too coarse for the blade; expected 12 cells or more"),
     ],
 )
 def test_wrong_request_is_told(arguments, sentence):

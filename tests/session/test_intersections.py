@@ -59,7 +59,7 @@ def test_mistakes_of_a_displacement_file_are_told_without_its_folder(passage, tm
     file.write_text(f"{node} 0.001\nx 1 2\n")
     text = look(case, passage.mesh)
     assert text.startswith("table.txt:1: ")
-    assert "needed are 3" in text
+    assert "expected 3" in text
     assert text.endswith("(1 more).")
 
 

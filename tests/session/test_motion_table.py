@@ -34,7 +34,7 @@ def test_it_says_what_the_rows_do(rows, separator):
 def test_it_says_what_is_wrong_and_where(rows):
     with pytest.raises(CaseError, match=r"^Type or paste rows: node dx dy$"):
         rows.check(" \n")
-    with pytest.raises(CaseError, match=r"^Line 2: .* has 2 columns; needed are 3: node dx dy"):
+    with pytest.raises(CaseError, match=r"^Line 2: .* has 2 columns; expected 3: node dx dy"):
         rows.check("1 0 0\n2 0\n")
     with pytest.raises(CaseError, match=r"^Line 1: node 7 is not on bottom.*\(1 more\)$"):
         rows.check("7 0 0\n99 0 0\n")

@@ -69,8 +69,8 @@ def test_a_tolerance_that_it_does_not_use_is_remarked(passage):
     asked = passage.case.change(reduction=Reduction(auto=True, tolerance=1e-6))
     (remark,) = [w for w in _last(asked, passage.mesh).warnings if "DATA_RED_TOLERANCE" in w]
     assert remark == (
-        "DATA_RED_TOLERANCE is without effect: DATA_REDUCTION= AUTO finds the tolerance, YES takes "
-        "it"
+        "DATA_RED_TOLERANCE has no effect: DATA_REDUCTION= AUTO finds the tolerance; YES uses "
+        "this one"
     )
 
 

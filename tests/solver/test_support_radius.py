@@ -66,7 +66,7 @@ def test_one_marker_of_two_bodies_is_two_bodies():
 
 
 def test_a_word_that_is_not_auto_is_told():
-    with pytest.raises(ArgumentError, match="influence_factor is 'large'; needed is a number"):
+    with pytest.raises(ArgumentError, match="influence_factor is 'large'; expected a number"):
         sv.Case(influence_factor="large")
 
 

@@ -325,7 +325,7 @@ class _Reader:
         path = Path(self.word(key, default))
         if path.name in ("", ".."):
             self.note(
-                self.rows[key], f"{shown(str(path))} is a folder; needed is the name of a file"
+                self.rows[key], f"{shown(str(path))} is a folder; expected the name of a file"
             )
         return path
 

@@ -65,7 +65,7 @@ def _csv(path: Path) -> tuple[list[str], FloatArray]:
     while lines and not is_number(lines[-1].partition(",")[0].strip()):
         lines.pop()  # what SU2 notes at the end
     if not lines:
-        raise CaseError(f"{path}: has no row of numbers; needed is one for each point")
+        raise CaseError(f"{path}: has no row of numbers; expected one for each point")
     try:
         table = np.loadtxt(lines, delimiter=",", ndmin=2, comments=None)
     except ValueError:
@@ -74,7 +74,7 @@ def _csv(path: Path) -> tuple[list[str], FloatArray]:
         rows = enumerate((line.split(",") for line in lines), start=2)
         line = next(k for k, row in rows if len(row) != len(names) or not all(map(is_number, row)))
         raise CaseError(
-            f"{path}:{line}: needed is a number for each of the {len(names)} columns, separated by "
+            f"{path}:{line}: expected a number for each of the {len(names)} columns, separated by "
             "commas; decimals are written with a point"
         )
     return names, table
@@ -334,7 +334,7 @@ def _unordered(path: Path, mesh: Mesh) -> Sensitivities:
     dim = mesh.dim
     width = len(rows[0]) if rows else 0
     if width not in {6, 2 * dim} or any(len(row) != width for row in rows):
-        raise CaseError(f"{path}: needed are rows x, y, z, dJ/dx, dJ/dy, dJ/dz of numbers")
+        raise CaseError(f"{path}: expected rows x, y, z, dJ/dx, dJ/dy, dJ/dz of numbers")
     table = np.array(rows)
     values = table[:, width // 2 : width // 2 + dim]
     _require_finite(path, table)

@@ -111,7 +111,7 @@ def sweep(
     """
     asked = read_designs(case, designs)
     if workers is not None and workers < 1:
-        raise CaseError(f"workers is {workers}; needed is 1 or more")
+        raise CaseError(f"workers is {workers}; expected 1 or more")
     if mesh is None:
         if case.mesh_file is None:
             raise CaseError("the case names no mesh; give MESH_FILENAME, or mesh=")

@@ -152,7 +152,7 @@ def _read_csv(case: Case, path: Path) -> Designs:
     lines = _filled(text)
     if len(lines) < 2:
         raise CaseError(
-            f"{path}: has no designs; needed are a line with the names of the columns, as "
+            f"{path}: has no designs; expected a line with the names of the columns, as "
             "BLADE.translate.y, and a line of values for each design"
         )
     (first, head), *rest = lines

@@ -59,7 +59,7 @@ def read_cgns(path: Path) -> Mesh:
         dim, physical = base.whole(2).tolist()
         if dim not in (2, 3) or not dim <= physical <= 3:
             raise base.fault(
-                f"has cells of dimension {dim} and {physical} coordinates; needed are 2 or 3, and "
+                f"has cells of dimension {dim} and {physical} coordinates; expected 2 or 3, and "
                 "as many coordinates or more: export the volume mesh"
             )
         zones = [read_zone(node, dim, physical) for node in base.children("Zone_t")]

@@ -177,14 +177,14 @@ class Node:
         data = self.value()
         if data.dtype.kind not in "iu":
             raise self.fault(
-                f"has a value of type {data.dtype}; needed is I4 or I8: export it again"
+                f"has a value of type {data.dtype}; expected I4 or I8: export it again"
             )
         try:
             return data.astype(np.int64).reshape(shape)
         except ValueError:
             wanted = " x ".join("n" if size < 0 else str(size) for size in shape)
             raise self.fault(
-                f"has {data.size} numbers of shape {data.shape}; needed are {wanted}: export the "
+                f"has {data.size} numbers of shape {data.shape}; expected {wanted}: export the "
                 "mesh again"
             ) from None
 

@@ -127,7 +127,7 @@ def _points(zone: Node, shape: tuple[int, ...], count: int) -> tuple[FloatArray,
         values = nodes[axis].value()
         if values.dtype.kind != "f" or values.dtype.itemsize not in (4, 8):
             raise nodes[axis].fault(
-                f"is of type {values.dtype}; needed is R4 or R8: export it again"
+                f"is of type {values.dtype}; expected R4 or R8: export it again"
             )
         if values.shape != shape[::-1]:
             raise nodes[axis].fault(

@@ -188,7 +188,7 @@ KINDS: dict[type, str] = {
 def control_point(values: Sequence[float]) -> str:
     """Return why numbers are no index of a control point; empty if they are."""
     whole = all(value == int(value) and value >= -1 for value in values)
-    return "" if whole else "needed are whole numbers from 0, or -1 for all"
+    return "" if whole else "expected whole numbers from 0, or -1 for all"
 
 
 def a_plane(value: float) -> str:
@@ -200,7 +200,7 @@ def a_term(values: Sequence[float]) -> str:
     """Return why numbers are no term of a shape function; empty if they are."""
     k, n = values
     whole = k == int(k) and n == int(n) and 1 <= k <= n
-    return "" if whole else "needed are whole numbers, and a term from 1 to how many there are"
+    return "" if whole else "expected whole numbers, and a term from 1 to how many there are"
 
 
 def a_peak(value: float) -> str:
