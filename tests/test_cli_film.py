@@ -135,7 +135,7 @@ def test_inverted_cells_are_code_3_and_the_film_is_written(tmp_path, capsys):
         (["-o", "a.mp4", "--size", "321x200"], r"must be even; take 322x200"),
         (["-o", "there.gif"], r"there.gif exists already; choose another name"),
         (["-o", "no/a.gif"], r"the folder no does not exist; create it first"),
-        (["-o", "a.gif", "--fps", "0"], r"0 images a second cannot be shown"),
+        (["-o", "a.gif", "--fps", "0"], r"0 images per second cannot be shown"),
         (["-o", "a.gif", "--set", "STEPS"], r"is not of the form KEY=VALUE"),
     ],
 )

@@ -153,5 +153,5 @@ def test_a_signal_ends_it_and_resume_goes_on(folder, number):
         child.send_signal(number)
         _, err = child.communicate(timeout=60)
     assert child.returncode == 128 + number
-    assert "of 400 designs, and --resume goes on" in err
+    assert "of 400 designs, and --resume continues" in err
     assert err.count("\n") == 1

@@ -125,7 +125,7 @@ def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]
         if entry.key not in KEYS:
             problems.append((entry.line, _unknown(entry.key)))
         elif first is not entry:
-            sentence = f"{entry.key} is given in line {first.line} already; keep one of the two"
+            sentence = f"{entry.key} is in line {first.line} already; keep one of the two"
             problems.append((entry.line, sentence))
     if not entries and not problems:
         raise CaseError(f"{path}: has no `KEY= value` line; `slideviz keys` lists the keys")

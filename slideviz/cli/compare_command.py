@@ -28,9 +28,9 @@ def add_compare(calls: argparse._SubParsersAction) -> None:
     call = calls.add_parser(
         "compare",
         help=about,
-        description=f"Deform {about}. It says first what it will compute, and what cannot be.",
-        epilog="exit codes: 0 compared (also when cells are inverted: the table says it); 1 no "
-        "combination could be computed; 130 cancelled, what was finished is in the table",
+        description=f"Deform {about}. It first lists what it will compute, and what is impossible.",
+        epilog="exit codes: 0 compared (also if cells are inverted: see the table); 1 no "
+        "combination could be computed; 130 cancelled, finished rows are in the table",
     )
     add_shared(call, "case")
     call.add_argument(

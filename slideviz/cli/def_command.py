@@ -62,8 +62,8 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     assert file is not None
     if not file.exists() and (arguments.case.parent / file).exists():
         raise CaseError(
-            f"{file}: is not in the working folder, but beside {arguments.case}; as SU2 does, this "
-            f"takes paths from the working folder: go to {arguments.case.parent} first"
+            f"{file}: is not in the working folder, but beside {arguments.case}; paths are "
+            f"relative to the working folder, as in SU2: change to {arguments.case.parent} first"
         )
     if not file.exists() and "MESH_FILENAME" not in config.given:
         hints = [text for text in config.case.warnings if "did you mean MESH_FILENAME?" in text]
@@ -98,7 +98,7 @@ def _run_def(arguments: argparse.Namespace) -> int:
     config, mesh = read_configuration(arguments)
     output, kind = config.case.mesh_out, config.case.mesh_out_format
     assert output is not None
-    remedy = "choose another name in MESH_OUT_FILENAME, or say --force to write over it"
+    remedy = "choose another name in MESH_OUT_FILENAME, or add --force to write over it"
     replaces = config.case.mesh_file if arguments.force else None
     place = OutputPath(
         output, "MESH_OUT_FILENAME", False, is_mesh=kind is None, replaces=replaces, remedy=remedy

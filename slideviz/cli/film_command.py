@@ -50,7 +50,7 @@ def add_film(calls: argparse._SubParsersAction) -> None:
         "--size", type=size, metavar="WxH", help="pixels (1280x800; GIF 800x500; PNG 1600x1000)"
     )
     call.add_argument(
-        "--fps", type=float, metavar="N", help="images a second (10; fewer if there are few)"
+        "--fps", type=float, metavar="N", help="images per second (10; fewer if there are few)"
     )
     call.add_argument(
         "--hold", type=float, default=1.5, metavar="S", help="the last image stays S seconds (1.5)"
@@ -66,7 +66,7 @@ def add_film(calls: argparse._SubParsersAction) -> None:
         "--color",
         choices=tuple(QUANTITIES),
         default="size-skew",
-        help="what the colors say (size-skew)",
+        help="what the colors show (size-skew)",
     )
     add_zoom(call)
     add_changes(call)
@@ -75,8 +75,8 @@ def add_film(calls: argparse._SubParsersAction) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="show beside it a second run with this change, as SLIDING_MODE=none; repeated: one "
-        "run with all of them",
+        help="show a second run beside it with this change, such as SLIDING_MODE=none; repeat it "
+        "for more changes of that run",
     )
     add_shared(call, "zone")
     add_shared(call, "quiet")

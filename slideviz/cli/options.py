@@ -28,7 +28,7 @@ def add_reference(call: argparse.ArgumentParser, case_help: str) -> None:
         "--reference",
         type=Path,
         metavar="UNDEFORMED",
-        help="mesh to compare with; without it only the shape of cells is rated",
+        help="mesh to compare with; without it only the shape of cells is measured",
     )
     call.add_argument("--case", type=Path, metavar="CASE", help=case_help)
 
@@ -214,8 +214,8 @@ def add_zoom(call: argparse.ArgumentParser) -> None:
         type=zoom,
         default="auto",
         metavar="X,Y[,Z],WIDTH",
-        help="middle and width of what is seen; `all` is the whole mesh, `auto` (default) too, "
-        "unless what moves is tiny in it",
+        help="center and width of the picture; `all` is the whole mesh, as is `auto` (default), "
+        "unless the moving body is tiny in it",
     )
 
 

@@ -24,7 +24,7 @@ def add_quality(calls: argparse._SubParsersAction) -> None:
         "--metric",
         choices=tuple(METRICS),
         default="knupp",
-        help="rbf-slide: hexahedra as that program rates them (default: knupp)",
+        help="rbf-slide: hexahedra as that program measures them (default: knupp)",
     )
     add_shared(call, "zone")
     add_shared(call, "json")

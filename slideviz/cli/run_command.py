@@ -63,7 +63,7 @@ def add_run(calls: argparse._SubParsersAction) -> None:
         call, "stream", help="for meshes larger than memory (SU2): only the boundary is in memory"
     )
     call.add_argument(
-        "--resume", action="store_true", help="go on where a run with --stream was stopped"
+        "--resume", action="store_true", help="continue an interrupted run with --stream"
     )
     add_shared(call, "quiet")
     call.add_argument("--force", action="store_true", help="allow writing over the input mesh")
@@ -143,7 +143,7 @@ def _require_output_paths(
         is_mesh=_format_of(output, case) is None,
         replaces=case.mesh_file if arguments.force else None,
         remedy="choose another name with -o or MESH_OUT_FILENAME"
-        + (", or say --force to write over it" if may_force else ""),
+        + (", or add --force to write over it" if may_force else ""),
     )
     if arguments.steps_file:
         _require_series(arguments.steps_file)

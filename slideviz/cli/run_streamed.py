@@ -126,7 +126,7 @@ def is_to_be_streamed(
     able = _is_su2(output, kind) and not _needing_memory(arguments)
     why = missing_memory(case) if able else ""
     if arguments.resume:
-        why = why or "--resume is there for runs with --stream"
+        why = why or "--resume needs a run with --stream"
     if why and not arguments.quiet:
         say("note", f"{why}; it is streamed")
     return bool(why)
@@ -163,7 +163,9 @@ def run_streamed(
     made = [path for path in (output, qualities) if path]
     if arguments.resume and (known := finished(about, made)):
         arguments.begun(REPLACED)
-        note(f"{output}: is finished, of this case, mesh and version; nothing is done")
+        note(
+            f"{output}: the run of this case, mesh and version is finished; there is nothing to do"
+        )
         save_report(arguments, known[0])
         return report_warnings(*known, quiet=arguments.quiet)
     with Bar(not arguments.quiet, begun=arguments.begun) as bar:

@@ -12,9 +12,9 @@ from slideviz.terms import FILE_FORMATS
 def add_sample(calls: argparse._SubParsersAction) -> None:
     """Add the command ``sample`` to the parser."""
     call = calls.add_parser("sample", help="write a sample case")
-    call.add_argument("name", nargs="?", help="which one; none: list them")
+    call.add_argument("name", nargs="?", help="name of the sample; without it, list all")
     call.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder (default: NAME)")
-    call.add_argument("--size", type=count, metavar="N", help="size; what it counts is in the list")
+    call.add_argument("--size", type=count, metavar="N", help="size; the list says what it counts")
     call.add_argument(
         "--format",
         type=str.lower,

@@ -63,7 +63,7 @@ def add_section(calls: argparse._SubParsersAction) -> None:
     view.add_argument(
         "--unrolled",
         action="store_true",
-        help="what has an axis laid flat, a cylinder to (z, r theta), the default",
+        help="lay sections with an axis flat, a cylinder to (z, r theta); the default",
     )
     view.add_argument("--3d", action="store_true", dest="in_space", help="show it in space")
     add(

@@ -31,19 +31,20 @@ def add_sweep(calls: argparse._SubParsersAction) -> None:
         "sweep",
         help="a run for each row of a table of designs",
         description="Deform a mesh by each design of a table, on all cores or on a Dask cluster, "
-        "and write a table of quality, errors and times. Columns are numbers of the motions, as "
-        "BLADE.translate.y or motion2.angle_deg, and keys of the case, as STEPS; `--columns` "
+        "and write a table of quality, errors and times. Columns are numbers of the motions, such "
+        "as BLADE.translate.y or motion2.angle_deg, and keys of the case, such as STEPS; "
+        "`--columns` "
         "lists them.",
-        epilog="exit codes: 0 done (also when cells are inverted or a design failed: the table "
-        "says it); 1 no design could be computed; 130 cancelled, 143 ended by SIGTERM: what was "
-        "finished is in the table, and --resume goes on",
+        epilog="exit codes: 0 done (also if cells are inverted or a design failed: see the "
+        "table); 1 no design could be computed; 130 cancelled, 143 ended by SIGTERM: finished "
+        "designs are in the table, and --resume continues",
     )
     add_shared(call, "case")
     call.add_argument("table", type=Path, nargs="?", help="the table of designs (CSV)")
     call.add_argument(
         "-o", "--output", type=Path, metavar="DIR", help="folder (default: NAME_swept)"
     )
-    call.add_argument("--columns", action="store_true", help="list the columns there can be")
+    call.add_argument("--columns", action="store_true", help="list the possible columns")
     call.add_argument("--meshes", action="store_true", help="write the mesh of each design")
     call.add_argument(
         "--workers", type=count, metavar="N", help="processes (default: one for each core)"
@@ -51,8 +52,10 @@ def add_sweep(calls: argparse._SubParsersAction) -> None:
     call.add_argument(
         "--scheduler", metavar="ADDRESS", help="work on a Dask cluster, as tcp://node1:8786"
     )
-    call.add_argument("--resume", action="store_true", help="go on with a sweep that was stopped")
-    call.add_argument("--force", action="store_true", help="begin anew where there are results")
+    call.add_argument("--resume", action="store_true", help="continue an interrupted sweep")
+    call.add_argument(
+        "--force", action="store_true", help="start again, and replace existing results"
+    )
     add_shared(call, "set")
     add_shared(call, "zone")
     add_shared(call, "json", help="report as JSON; - is the terminal")
@@ -76,7 +79,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     if arguments.columns:
         return _print_columns(case)
     if arguments.table is None:
-        raise CaseError("the table of designs is missing; `--columns` lists what it can have")
+        raise CaseError("the table of designs is missing; `--columns` lists the possible columns")
     designs = read_designs(case, arguments.table)
     mesh_file = require_mesh_file(arguments, case)
     folder = arguments.output or Path(f"{arguments.case.stem}_swept")
@@ -177,7 +180,7 @@ def _pulled(
             found.append(row)
             earlier += row.earlier
             so_far = f"{len(found)} of {counted(total, 'design')}"
-            keep_partial(results, f"{results} has {so_far}, and --resume goes on")
+            keep_partial(results, f"{results} has {so_far}, and --resume continues")
             fresh = len(found) - earlier
             left = (time.monotonic() - begin) / fresh * (total - len(found)) if fresh else None
             bar.count(len(found), total, "designs:", left)

@@ -96,7 +96,7 @@ def check_film(
         )
     if film_options.fps is not None and not 0.1 <= film_options.fps <= FASTEST[kind]:
         raise SlidevizError(
-            f"{film_options.fps:g} images a second cannot be shown; "
+            f"{film_options.fps:g} images per second cannot be shown; "
             f"0.1 to {FASTEST[kind]:g} can ({kind})"
         )
     if not 0.0 <= film_options.hold <= 600.0:

@@ -119,7 +119,7 @@ class ToolBar(QToolBar):
 
     def _add_color(self, store: Store) -> None:
         self.addWidget(QLabel(" Color by "))
-        tip = "What the colors of the view say; the panel Display has their range."
+        tip = "What the colors of the view show; the panel Display has their range."
         self.color = Choice(labels(COLOR_BY), tip, "color_by")
         self.color.chosen.connect(lambda value: store.change(changes.set_view, color_by=value))
         self.addWidget(self.color)

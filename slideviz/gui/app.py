@@ -94,7 +94,7 @@ def _keep_private(*folders: Path) -> None:
                 private_folder(folder)
         private_file(settings)
     except OSError as problem:
-        log.warning("others may read what is kept: %s", problem)
+        log.warning("others may read the saved session: %s", problem)
 
 
 def _run_when_read(window: MainWindow) -> None:

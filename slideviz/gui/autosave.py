@@ -68,7 +68,7 @@ class SessionRecovery(QObject):
         """Find the sessions to restore, and traces of crashes in a folder; offer the first one."""
         self.waiting, problems = find_sessions(self.autosave.path.parent)
         for path in old_crashes(crashes) if crashes is not None else ():
-            log.warning("slideviz crashed; where it was is in %s", path)
+            log.warning("slideviz crashed; the trace is in %s", path)
             self._trace = path.read_text(encoding="utf-8", errors="replace")
         for problem in problems:
             log.warning("%s", problem)
@@ -113,7 +113,7 @@ class SessionRecovery(QObject):
         self.window.show_opened(replace(opened, session=session))
         self._restore_designs(found)
         self.autosave.replace(found)
-        self.window.say("Session restored. Runs are not kept; Run computes them again")
+        self.window.say("Session restored. Runs are not saved; Run computes them again")
 
     def _restore_designs(self, found: LeftSession) -> None:
         """Show the restored table of designs, or the error of its file.
@@ -142,7 +142,7 @@ HALF_WRITTEN_S = 60.0
 SOURCE = "saved as: "
 """Begin of the remark in a session's file that names the case file it belongs to."""
 
-CURRENT = "the results of the designs are of this case"
+CURRENT = "the results of the designs belong to this case"
 """The remark in a session's file that says so."""
 
 _URI = "file://"
@@ -252,7 +252,7 @@ class Autosave(QObject):
 
     def _failed(self, error: Exception) -> None:
         # Tried again at the next change.
-        log.warning("the session could not be kept for a restart: %s", error)
+        log.warning("the session could not be saved for a restart: %s", error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -370,5 +370,5 @@ def _put_aside(path: Path, why: str) -> str:
     try:
         path.rename(kept)
     except OSError as problem:
-        return f"{path}: a kept session cannot be read ({why}), nor renamed ({problem})."
-    return f"A kept session cannot be read ({why}); it is still there, as {kept}."
+        return f"{path}: a saved session cannot be read ({why}), nor renamed ({problem})."
+    return f"A saved session cannot be read ({why}); it is still there, as {kept}."

@@ -94,7 +94,7 @@ def _fill_panels(window: MainWindow, menu: QMenu) -> None:
 # fmt: off
 
 _NO_STEPS = "There are no steps yet: run the case first."
-_EXPORT = Menu("export", "&Export", "Take away pictures, films, tables and meshes.", (
+_EXPORT = Menu("export", "&Export", "Export pictures, films, tables and meshes.", (
     Command("save_picture", "&Picture…", "Make a picture of the view for a paper or a slide.",
             lambda window: window.exports.picture(), ("Ctrl+P",), "picture", has_mesh),
     Command("copy_picture", "&Copy picture",
@@ -118,7 +118,7 @@ _EXPORT = Menu("export", "&Export", "Take away pictures, films, tables and meshe
 _FILE = Menu("file", "&File", entries=(
     Command("open", "&Open…", "Open a mesh, or a case with its mesh.",
             lambda window: window.files.ask_and_open(), (KEY.Open,), "open"),
-    Menu("open_recent", "Open &recent", "Open one of the files used last.", fill=_fill_recent),
+    Menu("open_recent", "Open &recent", "Open a recent file.", fill=_fill_recent),
     Menu("open_sample", "Open sa&mple", "Open a case that comes with the program.", (
         Command("sample_of_size", "Of another &size…", "Open a sample with fewer or more cells.",
                 lambda window: window.files.ask_and_open_sample()),
@@ -137,12 +137,12 @@ _FILE = Menu("file", "&File", entries=(
 ))
 
 _EDIT = Menu("edit", "&Edit", entries=(
-    Command("undo", "Undo", "Take back the last change.",
+    Command("undo", "Undo", "Undo the last change.",
             lambda w: _again(w, w.store.undo, w.store.can_undo, "Undone"),
             (KEY.Undo,), "undo", lambda now: bool(now.undo),
             title_now=lambda now: f"Undo {now.undo}".rstrip(),
             tip_now=lambda now: now.undo and f"Undo {now.undo}"),
-    Command("redo", "Redo", "Make the change again that was taken back.",
+    Command("redo", "Redo", "Redo the change that was undone.",
             lambda w: _again(w, w.store.redo, w.store.can_redo, "Done again"),
             (KEY.Redo, "Ctrl+Y"), "redo", lambda now: bool(now.redo),
             title_now=lambda now: f"Redo {now.redo}".rstrip(),
@@ -154,19 +154,19 @@ _RUN = Menu("run", "&Run", entries=(
             lambda window: window.start_run(), ("F5",), "run",
             lambda now: now.ready and not now.busy,
             button_tip="Deform the mesh with these settings (Ctrl+R).", button_key="Ctrl+R"),
-    Command("cancel", "&Cancel", "Stop what runs; the steps that are done are kept.",
+    Command("cancel", "&Cancel", "Stop the running job; finished steps are kept.",
             lambda window: window.running.cancel(), image="cancel", enabled=lambda now: now.busy,
-            button_tip="Stop within a second (Esc); the steps that are done stay.",
+            button_tip="Stop within a second (Esc); finished steps are kept.",
             button_key="Esc"),
     None,
     Command("designs", "&Designs…",
-            "Run a table of designs, each with other numbers of the motions or other settings, "
-            "and see their quality; or hide the panel for it.",
+            "Show or hide the panel of designs: a table of runs with other numbers of the motions "
+            "or other settings, and their quality.",
             lambda window: window.dock_manager.toggle("designs"), ("F6",), enabled=has_mesh,
             tip_now=why_not(has_mesh, "There is no mesh yet: open one first.")),
 ))
 
-_COLORS = Menu("colors", "&Colors", "From which value to which the colors range.", (
+_COLORS = Menu("colors", "&Colors", "The range of values that the colors show.", (
     Command("fit_colors", "Fit to this step",
             "Let the colors range over the values of the step that is shown, and of the other "
             "one in a comparison.",
@@ -175,11 +175,11 @@ _COLORS = Menu("colors", "&Colors", "From which value to which the colors range.
             button_tip="From the lowest to the highest value of what is shown now (R); of all "
             "steps: Shift+R."),
     Command("fit_all_colors", "Fit to all steps",
-            "Let the colors range over the values of all steps, so that they say the same in a "
-            "film.",
+            "Let the colors range over the values of all steps, so that they mean the same in a "
+            "whole film.",
             lambda window: window.store.change(fit_colors, every=True),
             ("Shift+R",), enabled=colored_by_value),
-    Command("usual_colors", "As ever", "Let the colors range as they do at first.",
+    Command("usual_colors", "As ever", "Use the default range of the colors.",
             lambda window: window.store.change(changes.set_view, color_range=None),
             enabled=lambda now: colored_by_value(now) and now.session.view.color_range is not None,
             title_now=lambda now: usual_range(now.session)),
@@ -208,7 +208,7 @@ STEPS = Menu("steps", "&Steps", "Show another step of the deformation.", (
     Command("step_previous", "Step back", "Show the step before this one.",
             lambda window: window.player.step(-1), ("Alt+Left",), enabled=has_steps,
             button_tip="One step back (Alt+Left)"),
-    Command("step_play", "Play or pause", "Show the steps one after the other, or stop that.",
+    Command("step_play", "Play or pause", "Play the steps one after the other, or pause.",
             lambda window: window.player.toggle(), ("Space",), enabled=has_steps,
             button_tip="Play the steps (Space)"),
     Command("step_next", "Step on", "Show the step after this one.",
@@ -226,9 +226,9 @@ def _theme(theme: str, tip: str) -> Command:
 
 
 _THEMES = Menu("theme", "&Theme", "Light or dark colors.", (
-    _theme("system", "Take light or dark colors as the desktop does."),
-    _theme("light", "Take light colors."),
-    _theme("dark", "Take dark colors."),
+    _theme("system", "Use light or dark colors as the desktop does."),
+    _theme("light", "Use light colors."),
+    _theme("dark", "Use dark colors."),
 ), one_of=True)
 
 
@@ -275,20 +275,20 @@ _VIEW = Menu("view", "&View", entries=(
     STEPS,
     None,
     _THEMES,
-    Command("full_screen", "F&ull screen", "Fill the screen with the window, or end that.",
+    Command("full_screen", "F&ull screen", "Fill the screen with the window, or leave full screen.",
             lambda window: window.toggle_full_screen(), ("F11",)),
     Menu("panels", "&Panels", "Show and hide the panels around the view.", (
         Command("next_panel", "&Next panel",
-                "Bring the next panel to the front, behind a tab or not, and go there.",
+                "Go to the next panel, also behind a tab.",
                 lambda window: window.dock_manager.bring_next(), ("Ctrl+PgDown",)),
         Command("previous_panel", "&Previous panel",
-                "Bring the panel before to the front, behind a tab or not, and go there.",
+                "Go to the previous panel, also behind a tab.",
                 lambda window: window.dock_manager.bring_next(-1), ("Ctrl+PgUp",)),
         Command("hide_panels", "&Hide or show all",
-                "Hide every panel, so that the view has all the room, or show them again.",
+                "Hide every panel, so that the view has all the space, or show them again.",
                 lambda window: window.dock_manager.toggle_all(), ("F9",)),
         Command("restore_layout", "&Restore layout",
-                "Put every panel back to where it was at first.",
+                "Move every panel back to its first place.",
                 lambda window: window.dock_manager.restore_layout()),
     ), fill=_fill_panels),
 ))

@@ -241,7 +241,9 @@ class Files(QObject):
         if path is None or not is_source(path, session.mesh):
             return path
         self.window.banner.show_error(
-            SlidevizError(f"{path} is the mesh itself, which is read meanwhile; give another name")
+            SlidevizError(
+                f"{path} is the mesh itself, which is still being read; give another name"
+            )
         )
         return None
 
@@ -286,8 +288,8 @@ class Files(QObject):
         self.window.say(f"Saved {path}")
         if case.mesh_file is not None and not case.mesh_file.is_file():
             self.window.banner.show_message(
-                f"Saved. But its mesh {case.mesh_file} is not there any more: the case cannot be "
-                "opened without it. Put it back, or save the mesh under that name (step 0)."
+                f"Saved. But its mesh {case.mesh_file} no longer exists: the case cannot be "
+                f"opened without it. Put it back, or save the mesh under that name (step 0)."
             )
         return True
 

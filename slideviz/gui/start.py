@@ -91,7 +91,7 @@ class StartPage(QScrollArea):
         picture.setPixmap(logo().pixmap(QSize(64, 64)))
         title = rich_label(
             "<span style='font-size:22pt; font-weight:600'>slideviz</span><br>"
-            "Deform CFD meshes, and see at once where and why they suffer"
+            "Deform CFD meshes, and see at once where and why their quality falls"
         )
         title.setWordWrap(True)
         return in_row(picture, 10, title, wide=[title])
@@ -210,7 +210,7 @@ class RecentButton(QPushButton):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         when = when_changed(path)
         self.setEnabled(bool(when))
-        self.setToolTip(wrapped(str(path) if when else f"{path} is not there any more."))
+        self.setToolTip(wrapped(str(path) if when else f"{path} no longer exists."))
         self.setAccessibleName(f"{path.name} in {path.parent}, {when or 'missing'}")
         name, time = rich_label(f"<b>{html.escape(path.name)}</b>"), QLabel(when or "missing")
         folder = str(path.parent).replace(str(Path.home()), "~", 1)

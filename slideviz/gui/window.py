@@ -181,8 +181,12 @@ class MainWindow(Services):
         self.mesh_text = QLabel()
         self._measured: Mesh | None = None
         self.preparing = QLabel("Compiling, once… ")
-        about = "The numerics are compiled, once after each installation. What needs them waits."
-        self.preparing.setToolTip(wrapped(about))
+        self.preparing.setToolTip(
+            wrapped(
+                "slideviz compiles its numerics, once after each installation. Jobs that need "
+                "them wait."
+            )
+        )
         self.preparing.hide()
         self.statusBar().addPermanentWidget(self.preparing)
         self.statusBar().addPermanentWidget(self.mesh_text)

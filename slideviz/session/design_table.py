@@ -225,13 +225,15 @@ def values_of(text: str) -> list[str]:
         parts = text.split(":")
         if not all(found) or (len(parts) > 1 and all(is_number(part.strip()) for part in parts)):
             raise CaseError(
-                f"“{text.strip()}” is neither values, as 1, 2, 5, nor a range “a to b in n”, "
-                "as -8 to 0 in 9"
+                f"“{text.strip()}” is neither values, such as 1, 2, 5, nor a range “a to b in n”, "
+                f"such as -8 to 0 in 9"
             )
         return list(dict.fromkeys(found))
     first, last, count = match.groups()
     if not (is_number(first) and is_number(last)) or not 2 <= int(count) <= MOST:
-        raise CaseError("A range has two numbers and how many values it has, as -8 to 0 in 9")
+        raise CaseError(
+            "A range has two numbers and the number of its values, such as -8 to 0 in 9"
+        )
     values = np.linspace(float(first), float(last), int(count))
     step = abs(values[1] - values[0])
     for decimals in range(18):  # no more digits than needed: not 0.30000000000000004

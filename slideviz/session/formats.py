@@ -80,5 +80,5 @@ def lost_in(end: str, mesh: Mesh) -> list[str]:
     elif mesh.zones > 1 and mesh.origin.ending != end:
         lost.append(OTHER_ZONES)
     if mesh.origin.ending == ".cgns":
-        lost.append("what else was in the CGNS file, such as its zones and solutions")
+        lost.append("other contents of the CGNS file, such as its zones and solutions")
     return lost

@@ -156,7 +156,7 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
         if not any(moves(motion, name) for motion in case.motions)
     ]
     if case.motions and all(moves_nothing(motion) for motion in case.motions):
-        found.append(Requirement("Nothing moves yet: type how far in the motion.", "motion"))
+        found.append(Requirement("Nothing moves yet: enter the values of the motion.", "motion"))
     for place, motion in enumerate(case.motions):
         if isinstance(motion, FromFile) and not motion.path.is_file():
             found.append(Requirement(_lacks_file(motion.path), "motion", motion=place))

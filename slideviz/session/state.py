@@ -114,8 +114,8 @@ __all__ = [
 
 
 IN_FILE = (
-    "Not for this mesh, which stays in its file: in memory are only its boundary, its worst cells "
-    "and those of sections."
+    "Not available for this mesh, which stays in its file: only its boundary, its worst cells and "
+    "those of sections are in memory."
 )
 """The message where something cannot be done with a mesh too large for memory."""
 

@@ -160,7 +160,7 @@ def test_all_problems_at_once_in_order(read):
         "1: unknown key 'STEP'; did you mean STEPS?",
         "2: CURVED: 'perhaps' is not one of YES | NO",
         "3: 'foo' is not `KEY= value`",
-        "5: STEPS is given in line 4 already; keep one of the two",
+        "5: STEPS is in line 4 already; keep one of the two",
         "6: GAMMA: it has no value; expected a number above 0",
     ]
 

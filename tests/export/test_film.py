@@ -95,7 +95,7 @@ def test_an_mp4_has_the_size_the_time_and_the_steps(tmp_path, frames):
     assert meta["size"] == SMALL
     assert meta["codec"] == "h264"
     assert "yuv420p" in meta["pix_fmt"]
-    assert meta["fps"] == 10, "players stumble over fewer images a second"
+    assert meta["fps"] == 10, "players stumble over fewer images per second"
     assert len(images) == 3 * 2 + 10
     assert meta["duration"] == pytest.approx(3 / 5 + 1.0, abs=0.01)
     assert differ(images[0], images[-1]) > 1000
@@ -252,10 +252,10 @@ def test_what_fails_while_drawing_leaves_nothing(tmp_path, frames, square):
         (
             "a.gif",
             FilmOptions(fps=60),
-            r"60 images a second cannot be shown; 0\.1 to 50 can \(\.gif\)",
+            r"60 images per second cannot be shown; 0\.1 to 50 can \(\.gif\)",
         ),
-        ("a.mp4", FilmOptions(fps=-1), r"-1 images a second cannot be shown"),
-        ("a.mp4", FilmOptions(fps=float("nan")), r"nan images a second cannot be shown"),
+        ("a.mp4", FilmOptions(fps=-1), r"-1 images per second cannot be shown"),
+        ("a.mp4", FilmOptions(fps=float("nan")), r"nan images per second cannot be shown"),
         ("a.mp4", FilmOptions(hold=-1), r"cannot stay for -1 s; 0 to 600 s can"),
         ("a.mp4", FilmOptions(between=-1), r"-1 images between two steps; 0 to 1000 are possible"),
         ("no/a.mp4", FilmOptions(), r"the folder .*no does not exist; create it first"),

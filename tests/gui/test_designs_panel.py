@@ -354,7 +354,7 @@ def test_a_stop_keeps_what_is_there(passage, qtbot, in_a_thread):
     qtbot.waitUntil(lambda: len(panel.table.results) > 1, timeout=60_000)
     QTest.mouseClick(panel.stop, LEFT)
     qtbot.waitUntil(lambda: not panel.runner.busy, timeout=60_000)
-    assert panel.said.label.text() == "Stopped; the results stay."
+    assert panel.said.label.text() == "Stopped; the results are kept."
     assert 1 < len(panel.table.results) < 500
 
 
@@ -370,7 +370,7 @@ def test_results_are_not_lost_without_a_question(
     answers("ask_table", file)
     asked = answers("ask_unsaved", "cancel")
     QTest.mouseClick(panel.load, LEFT)
-    lost = "What comes now takes away the result of a design. Ctrl+Z brings that back."
+    lost = "The next step removes the result of a design. Ctrl+Z brings that back."
     assert asked == [(f"Save the table of designs first?\n{lost}", ["table"])]
     assert panel.table.rows == (("1",), ("2",))
     answers("ask_unsaved", "discard")

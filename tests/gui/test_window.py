@@ -366,7 +366,7 @@ def test_a_displacement_file_and_what_is_typed_are_checked_at_once(opened, tmp_p
     QTest.keyClick(field, Qt.Key.Key_Escape)
     assert field.text() == before
     said = opened.window.statusBar().currentMessage()
-    assert said == f"Not taken: “1..5” is not a number; the value is still {before}."
+    assert said == f"Invalid: “1..5” is not a number; the value is still {before}."
 
 
 def test_motions_are_reordered_changed_and_removed_and_need_a_moving_boundary(opened):

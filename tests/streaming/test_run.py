@@ -169,7 +169,10 @@ def test_resume_does_nothing_where_the_run_is_finished(tmp_path, monkeypatch, ca
     call = [word for word in call if word not in ("-q", "-o", "out.su2b")]
     call += ["other.json", "--set", "MESH_OUT_FILENAME=out.su2b"]
     assert run(call) == code
-    done = "slideviz: note: out.su2b: is finished, of this case, mesh and version; nothing is done"
+    done = (
+        "slideviz: note: out.su2b: the run of this case, mesh and version is finished; there "
+        "is nothing to do"
+    )
     found = capsys.readouterr().err
     assert done in found.splitlines()
     assert "there already" not in found
@@ -179,7 +182,7 @@ def test_resume_does_nothing_where_the_run_is_finished(tmp_path, monkeypatch, ca
 def test_resume_says_that_it_streams(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     made(tmp_path, "square", 8)
-    said = "slideviz: note: --resume is there for runs with --stream; it is streamed\n"
+    said = "slideviz: note: --resume needs a run with --stream; it is streamed\n"
     for more, is_said in ((["--resume"], True), (["--resume", "--stream"], False)):
         assert run(["run", "square.cfg", "-o", "out.su2b", "--steps", "1", *more]) == 0
         assert (said in capsys.readouterr().err) is is_said

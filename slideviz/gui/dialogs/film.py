@@ -76,10 +76,11 @@ class FilmForm(QWidget):
         self.frames = len(renderer.session.frames)
         self._make_size()
         self._make_pace()
-        self.white = check_box("White background", "Else the background of the view.")
+        self.white = check_box("White background", "Without it, the background of the view.")
         self.white.setChecked(True)
         self.fill = check_box(
-            "Fill the images with the mesh", "Else they show what the view shows of the mesh."
+            "Fill the images with the mesh",
+            "Without it, they show the same part of the mesh as the view.",
         )
         self.fill.setChecked(renderer.fills)
         self.mark = check_box("Marked cell", "Its outline, with its number and its value.")

@@ -45,7 +45,7 @@ PANELS = (
     ("Worst cells: remove the mark", "Esc", ""),
     ("Worst cells: copy", "Ctrl+C", "The selected rows, or all."),
     ("Histogram: show all cells", "Esc", ""),
-    ("A field: take back what was typed, do it again", "Ctrl+Z, Ctrl+Y", ""),
+    ("A field: undo and redo typing", "Ctrl+Z, Ctrl+Y", ""),
     ("A list: its menu", "Menu", ""),
 )
 """The keys of the panels, for the panel that has the focus: action, keys, what it does."""

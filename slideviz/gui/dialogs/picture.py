@@ -70,7 +70,10 @@ OPTIONS = {
     "edges": (SHOWN["edges"].name, SHOWN["edges"].tip),
     "triad": ("Directions of the axes", "Small arrows in the lower left corner."),
     "title": ("Title with the quality", "Run and step, with minimum, mean and inverted cells."),
-    "fill": ("Fill the picture with the mesh", "Else it shows what the view shows of the mesh."),
+    "fill": (
+        "Fill the picture with the mesh",
+        "Without it, it shows the same part of the mesh as the view.",
+    ),
     "marked": ("Marked cell", "Its outline, with its number and its value."),
     "both": ("Both runs beside each other", "As the two views, with one legend."),
 }
@@ -291,7 +294,7 @@ def _kinds(renderer: OffscreenRenderer) -> str:
     if mesh is None or mesh.dim != 2:
         return "Saved as PNG; the view of a 3D mesh consists of pixels."
     if len(mesh.cells) > MOST_CELLS:
-        return f"Saved as PNG; SVG and PDF have room for {MOST_CELLS:,} cells."
+        return f"Saved as PNG; SVG and PDF can have at most {MOST_CELLS:,} cells."
     return (
         "Saved as PNG, or as SVG or PDF with sharp lines at any size; these two show cells and "
         "boundaries, without points, neighbouring passages and axes."

@@ -95,13 +95,13 @@ class BoundariesPanel(Panel):
         self.guess_text = hint_label()
         self.keep = push_button(
             "Keep all",
-            "Take every guessed role as right.",
+            "Confirm every guessed role.",
             lambda: self.store.change(changes.confirm),
             "keep",
         )
         guesses = in_row(self.guess_text, self.keep, wide=[self.guess_text])
         self.idle_text = hint_label()
-        self.idle_text.setToolTip("The panel Method has what they do.")
+        self.idle_text.setToolTip("The panel Method says what they do.")
         parts = (self.table, self.idle_text, guesses)
         in_column(*parts, wide=[self.table], spacing=4, on=self, margins=(6, 6, 6, 4))
         self.setFocusProxy(self.table)

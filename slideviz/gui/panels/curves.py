@@ -82,7 +82,7 @@ class CurvesPanel(Panel):
         self.save = push_button("Save…", "Save the plot as PNG, SVG or PDF.", self._save)
         self.whole = check_box(
             "0–1",
-            "All qualities there can be, instead of those of the curves.",
+            "Show all possible qualities instead of those of the curves.",
             lambda _: self.canvas.ask(),
             "whole_quality",
         )
@@ -128,7 +128,7 @@ class CurvesPanel(Panel):
     def _missing(self, session: Session, kind: str) -> str:
         """Return why the session has no plot of a kind; an empty text if it has one."""
         if session.mesh is None:
-            return "Open a mesh first: here are the curves of its runs."
+            return "Open a mesh first. Then this panel shows the curves of its runs."
         if kind == "span" and session.in_file:
             return IN_FILE
         if kind == "steps" and not curves.step_runs(session):

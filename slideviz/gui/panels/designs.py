@@ -64,7 +64,7 @@ class DesignsJob(QObject):
         self.runner.doing.connect(self._doing)
         self.runner.kept.connect(self._kept)
         self.runner.finished.connect(lambda _: self._end(""))
-        self.runner.cancelled.connect(lambda: self._end("Stopped; the results stay."))
+        self.runner.cancelled.connect(lambda: self._end("Stopped; the results are kept."))
         self.runner.failed.connect(lambda error: self._end(str(error), wrong=True))
 
     def start(self, case: Case, mesh: Mesh, table: DesignTable) -> None:
@@ -150,16 +150,16 @@ class DesignsPanel(Panel):
 
     def _make_foot(self) -> QHBoxLayout:
         self.load = push_button(
-            "Load…", "Read the designs from a CSV file: a head, and a row for each.", self._load
+            "Load…",
+            "Read the designs from a CSV file: a header line, and a row for each design.",
+            self._load,
         )
         self.remove = push_button("Remove", "Remove the selected designs.", self._remove)
         self.save = push_button(
             "Save table…", "Save designs and results as CSV.", self.save_table, "save_designs"
         )
         self.run = push_button("Run", RUN, self.start, "run_designs")
-        self.stop = push_button(
-            "Stop", "Stop; the results that are there stay.", self.runner.cancel
-        )
+        self.stop = push_button("Stop", "Stop; the results so far are kept.", self.runner.cancel)
         self.bar = QuietBar()
         self.bar.setRange(0, 1000)
         self.bar.setTextVisible(False)
@@ -189,7 +189,7 @@ class DesignsPanel(Panel):
         """Offer the columns of the session's case."""
         self.rows.show_columns(session.case, session.mesh)
         if self.table.results and not self.runner.busy and not self._left().results:
-            self._say("The settings have changed since: Run does all designs again.")
+            self._say("The settings have changed since: Run computes all designs again.")
         self._sync()
 
     def _left(self) -> DesignTable:
@@ -311,7 +311,7 @@ class DesignsPanel(Panel):
         if lost <= 0 or self.table is self.written:
             return True
         what = f"the results of {lost:,} designs" if lost > 1 else "the result of a design"
-        text = f"Save the table of designs first?\nWhat comes now takes away {what}.{more}"
+        text = f"Save the table of designs first?\nThe next step removes {what}.{more}"
         answer = questions.ask_unsaved(self, text, ["table"])
         return self.save_table() if answer == "table" else answer == "discard"
 

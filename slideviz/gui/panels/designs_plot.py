@@ -26,7 +26,7 @@ from slideviz.plots.designs import (
 from slideviz.plots.style import Style
 from slideviz.session.design_table import DesignTable
 
-EMPTY = "Here are the curves of quality: give the designs, and run them."
+EMPTY = "This plot shows curves of quality: add designs, and run them."
 FAILED = "No design has a result yet: those that were run failed."
 
 
@@ -55,9 +55,7 @@ class DesignPlot(QWidget):
         """Called with the number of the design whose point was clicked."""
         self._table = DesignTable()
         self._shown: int | None = None
-        self.across = Choice(
-            {}, "The number that the plot has along its horizontal axis.", "across"
-        )
+        self.across = Choice({}, "The number on the horizontal axis of the plot.", "across")
         words = {name: text.partition(" [")[0].capitalize() for name, text in RESULTS.items()}
         self.what = Choice(words, "The result that the plot shows.", "what")
         self.save = push_button(

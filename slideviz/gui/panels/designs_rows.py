@@ -121,9 +121,9 @@ class DesignsModel(QAbstractTableModel):
 
 ABOUT = (
     "Each row is a design: a run with other numbers of the motions, or other settings. Choose a "
-    "number, give its values, and add them; another number is combined with all that there are, "
-    "and more values of the same come below. A click on a design that was run, here or in the "
-    "plot, shows its mesh."
+    "number, enter its values, and add them. Another number is combined with all designs of the "
+    "table, and more values of the same number are added below. A click on a design that was run, "
+    "here or in the plot, shows its mesh."
 )
 RANGE = "-8 to 0 in 9, or 1, 2, 5"
 """Placeholder of the field for values."""
@@ -145,13 +145,13 @@ class DesignRows(QWidget):
         self.values = TextField()
         self.values.setObjectName("values")
         self.values.setPlaceholderText(RANGE)
-        self.values.setToolTip("A range, as -8 to 0 in 9, or values with commas between them.")
+        self.values.setToolTip("A range, such as -8 to 0 in 9, or values separated by commas.")
         self.column.chosen.connect(lambda _: self.values.clear())
         self.values.returnPressed.connect(add)
         self.add = push_button(
             "Add",
-            "Give each design there is each of these values; of a number that varies already, "
-            "designs with the new values come below.",
+            "Combine each design of the table with each of these values. If the number varies "
+            "already, designs with the new values are added below.",
             add,
         )
         self.add.setMaximumWidth(64)

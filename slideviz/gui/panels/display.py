@@ -38,7 +38,7 @@ from slideviz.session.store import Store
 from slideviz.terms import COLOR_BY, COLOR_MAPS, POINTS_SHOWN, SHOWN, Shown, labels
 
 TIPS = {
-    "map": "The colors of values; all are told apart by color-blind people.",
+    "map": "The colors of values; color-blind people can distinguish all of them.",
     "range": "The values at the ends of the color bar.",
     "fit": COMMANDS["fit_colors"].button_tip,
 }
@@ -160,7 +160,7 @@ class DisplayPanel(Panel):
 
     def _make_colors(self) -> None:
         self.color_by = self._choice("display_color_by", labels(COLOR_BY), "color_by")
-        self.color_by.setToolTip("What the colors of the view say.")
+        self.color_by.setToolTip("What the colors of the view show.")
         self.form.addRow("Color by", self.color_by)
         self.map = self._choice("color_map", labels(COLOR_MAPS), "color_map")
         self.map.setIconSize(QSize(64, 12))
@@ -182,8 +182,8 @@ class DisplayPanel(Panel):
         self.points = self._choice("points", labels(POINTS_SHOWN), "points")
         self.points.setToolTip(
             wrapped(
-                "Draw nodes as points: those of the boundaries with what they may do, or the "
-                "control nodes that the step was interpolated with."
+                "Draw nodes as points: boundary nodes by the way they may move, or the control "
+                "nodes of the step."
             )
         )
         self.form.addRow("Points", self.points)

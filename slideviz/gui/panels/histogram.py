@@ -155,7 +155,7 @@ class HistogramPanel(Panel):
         self.log.setChecked(True)
         self.whole = check_box(
             "0–1",
-            "All values there can be, instead of those that the cells have.",
+            "Show all possible values instead of those of the cells.",
             name="whole_range",
         )
         for box in (self.log, self.whole):
@@ -183,7 +183,9 @@ class HistogramPanel(Panel):
         if session.frame is None:
             self._counts = FrameCounts()
             self.range_text.hide()
-            self.area.say("Open a mesh first: here is how many of its cells have which quality.")
+            self.area.say(
+                "Open a mesh first. Then this panel shows how many cells have which quality."
+            )
             return
         self.canvas.locked = session.in_file
         self.canvas.setToolTip(IN_FILE if session.in_file else BRUSH)

@@ -53,8 +53,9 @@ class MotionForm(QWidget):
     def _make_fields(self) -> None:
         self.marker = Choice(
             {},
-            "What moves. To move some boundaries as one body, about their common centroid, "
-            "select them in the table of boundaries: they are offered here then.",
+            "The boundaries that move. To move some of them as one body, about their common "
+            "centroid, select them in the table of boundaries first; then you can choose them "
+            "here.",
         )
         self.kind = Choice(KINDS)
         self.vector = VectorField(
@@ -72,7 +73,9 @@ class MotionForm(QWidget):
             allowed=_above_minus_100,
             tip="How much larger the radius becomes, in percent: 3 is 3 % outwards.",
         )
-        self.distance = NumberField(tip="How far outwards besides, in the mesh's length unit.")
+        self.distance = NumberField(
+            tip="How far it also moves outwards, in the mesh's length unit."
+        )
         first = {what: ABOUT[what] for what in ("centroid", "point")}
         self.about = Choice(first, "What stays in place while it turns or grows.")
         self.point = VectorField(tip="The point that stays in place.")
@@ -89,8 +92,8 @@ class MotionForm(QWidget):
             0.0, a_plane, tip="The plane of control points, counted from 0 along j; -1 is all."
         )
         self.amount = NumberField(
-            tip="How far control points move, in the mesh's length unit: with the thickness, the "
-            "last ones forwards and the first ones as far backwards."
+            tip="How far control points move, in the mesh's length unit. With the thickness, the "
+            "last ones move forwards, and the first ones as far backwards."
         )
         self.side = Choice({side: term.label for side, term in SIDES.items()}, "Which side moves.")
         self.side.explain({side: term.tip for side, term in SIDES.items()})

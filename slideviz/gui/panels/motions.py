@@ -233,7 +233,7 @@ class MotionPanel(Panel):
         try:
             motions = read_motions(QApplication.clipboard().text().replace("\\\n", " "))
         except SlidevizError as error:
-            said = SlidevizError(f"What was copied is no motion: {error}")
+            said = SlidevizError(f"The clipboard has no motion: {error}")
             main_window(self).banner.show_error(said)
             return
         for motion in motions:

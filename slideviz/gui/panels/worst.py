@@ -63,7 +63,7 @@ class WorstPanel(Panel):
         self.stack.addWidget(self.table)
         self.back = push_button(
             "Whole mesh",
-            "Look again at all that was seen before flying to a cell.",
+            "Return to the view before the flight to a cell.",
             # The mark stays: that is how the cell is found in the whole mesh.
             fly_back,
         )
@@ -106,7 +106,7 @@ class WorstPanel(Panel):
             widget.setVisible(there)
         if not there:
             self.info.hide()
-            self.words.setText("Open a mesh first: here are its worst cells.")
+            self.words.setText("Open a mesh first. Then this panel lists its worst cells.")
             self.model.show(None)
             self._seen = ()
         elif is_seen(self) and self._key(session) != self._seen:

@@ -240,7 +240,9 @@ class WorstTable(QTableView):
         self.setFont(letters)
         self.verticalHeader().hide()
         self.verticalHeader().setDefaultSectionSize(22)
-        self.setToolTip("Click a cell to fly there; again, or Esc, to take the mark away.")
+        self.setToolTip(
+            "Click a cell to fly there. Click it again, or press Esc, to remove the mark."
+        )
         header = self.horizontalHeader()
         header.setHighlightSections(False)
         header.setFont(letters)

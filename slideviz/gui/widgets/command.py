@@ -234,7 +234,7 @@ def why_not(able: Callable[[CommandState], bool], why: str) -> Callable[[Command
 
     The reason is ``why``, unless the mesh stays in its file or a job runs.
     """
-    wait = "Wait for the end of what runs, or cancel it."
+    wait = "Wait for the running job, or cancel it."
 
     def words(now: CommandState) -> str:
         if able(now):

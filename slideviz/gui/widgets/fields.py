@@ -90,7 +90,7 @@ def _say_kept(field: QWidget, problem: str, value: str) -> None:
     """Say in the status bar that a field was left with an invalid text."""
     window = main_window(field)
     if window is not None:
-        window.say(f"Not taken: {problem}; the value is still {value}.")
+        window.say(f"Invalid: {problem}; the value is still {value}.")
 
 
 def _own_step(field: QLineEdit, event: QEvent) -> bool | None:
