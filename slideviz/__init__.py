@@ -27,7 +27,6 @@ if TYPE_CHECKING:
         Scale,
         Translate,
     )
-    from slideviz.case.reduction import Reduction
     from slideviz.design.deformer import Deformer
     from slideviz.design.sweeps.sweep import sweep
     from slideviz.errors import ConditionWarning, SlidevizError, ToleranceWarning
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import Cells, Marker, Mesh
     from slideviz.mesh.quality import Quality, quality
     from slideviz.mesh.quality_derivative import QualityDerivative
+    from slideviz.rbf.reduction import Reduction
     from slideviz.solver.deform import Step, deform
 
 _HOME = {
@@ -57,7 +57,7 @@ _HOME = {
     "Quality": "mesh.quality",
     "QualityDerivative": "mesh.quality_derivative",
     "Radial": "case.model",
-    "Reduction": "case.reduction",
+    "Reduction": "rbf.reduction",
     "Rotate": "case.model",
     "Scale": "case.model",
     "SlidevizError": "errors",

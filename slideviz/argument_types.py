@@ -21,7 +21,7 @@ from typing import get_origin as origin_of
 import numpy as np
 from numpy.typing import ArrayLike
 
-from slideviz.errors import ArgumentError
+from slideviz.errors import ArgumentError, CaseError, not_one_of
 
 P = ParamSpec("P")
 Result = TypeVar("Result")
@@ -81,8 +81,13 @@ def check_types(function: Callable[P, Result]) -> Callable[P, Result]:
 def check_fields(value: Any) -> None:
     """Raise ArgumentError where a field of a dataclass is not as annotated, as `check_types` does.
 
-    Lists and arrays that fit a tuple become tuples. Enumerations, the fields with metadata, are
-    checked by `slideviz.case.reduction`.
+    Lists and arrays that fit a tuple become tuples. A field with metadata is an enumeration with
+    these terms; its default is always allowed.
+
+    Raises
+    ------
+    CaseError
+        An enumeration has another value.
     """
     kind: Any = type(value)
     fields, hints = value.__dataclass_fields__, _annotations(kind)
@@ -95,6 +100,17 @@ def check_fields(value: Any) -> None:
     for name, field in given:
         if isinstance(field, list | np.ndarray) and origin_of(hints[name]) is not np.ndarray:
             object.__setattr__(value, name, _plain(field))
+    for name, field in fields.items():
+        chosen, known = getattr(value, name), field.metadata
+        if known and chosen not in (*known, field.default):
+            raise CaseError(f"{name}: {not_one_of(chosen, known)}")
+
+
+class CheckedFields:
+    """A dataclass that checks its fields when it is made (`check_fields`)."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 def _plain(value: Any) -> Any:
@@ -117,10 +133,12 @@ def _require(called: str, owner: object, given: Iterable[tuple[str, object]]) ->
 @cache
 def _annotations(owner: Any) -> dict[str, Any]:
     """Return the annotations of a function or class, without those that only mypy can know."""
-    found, scope = {}, vars(sys.modules[owner.__module__])
-    for name, text in get_annotations(owner).items():
-        with suppress(NameError):
-            found[name] = eval(text, scope)
+    found = {}
+    for each in reversed(getattr(owner, "__mro__", (owner,))):
+        scope = vars(sys.modules[each.__module__])
+        for name, text in get_annotations(each).items():
+            with suppress(NameError):
+                found[name] = eval(text, scope)
     return found
 
 

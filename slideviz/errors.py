@@ -6,6 +6,8 @@ The command line and the window show it as it is.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
 
 
@@ -74,3 +76,22 @@ def printable(path: str | Path) -> str:
 def path_error(path: Path, message: str) -> MeshError:
     """Return the error ``path: message``."""
     return MeshError(f"{printable(path)}: {message}")
+
+
+def shown(text: str) -> str:
+    """Return the text in quotes for a message, cut to 60 characters."""
+    return repr(text if len(text) <= 60 else f"{text[:57]}...")
+
+
+def not_one_of(value: object, known: Iterable[str]) -> str:
+    """Return the message that a value is none of the known ones, and which is most similar."""
+    words = list(known)
+    quoted = shown(value) if isinstance(value, str) else repr(value)
+    return f"{quoted} is not one of {' | '.join(words)}{nearest(str(value), words)}"
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return ``; did you mean X?`` with the known name most similar to ``name``; "" if none is."""
+    by_lower = {other.lower(): other for other in known}
+    close = get_close_matches(name.lower(), list(by_lower), n=1, cutoff=0.6)
+    return f"; did you mean {by_lower[close[0]]}?" if close else ""

@@ -5,11 +5,11 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.closest import ClosestPoints
+from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import write_sample
 from tests import builders
 from tests.slow import one_of_each_fast

@@ -13,13 +13,13 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.motion import displacements
-from slideviz.case.reduction import Reduction
 from slideviz.cli import run as command
 from slideviz.errors import DeformError, Note
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf.frames import make_frame
 from slideviz.rbf.images import misfits
 from slideviz.rbf.problem import Solution
+from slideviz.rbf.reduction import Reduction
 from slideviz.session import changes
 from slideviz.session.node_types import NodeTypes
 from slideviz.session.opening import open_mesh

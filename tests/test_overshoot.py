@@ -8,9 +8,9 @@ from builders import annulus, far_field, grid, layered, square
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.errors import UnsoundError
 from slideviz.rbf import methods
+from slideviz.rbf.reduction import Reduction
 from slideviz.streaming import output
 from slideviz.streaming.run import stream
 

@@ -14,10 +14,10 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import corners
+from slideviz.rbf.reduction import Reduction
 from slideviz.solver.setup import make_setup
 
 FOLDER = Path(__file__).parents[1] / ".." / "shared" / "meshes" / "su2"

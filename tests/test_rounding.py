@@ -7,7 +7,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case
-from slideviz.case.reduction import Reduction
+from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import write_sample
 from tests.slow import one_of_each_fast
 

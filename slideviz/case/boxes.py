@@ -11,8 +11,7 @@ import numpy as np
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import BoxMotion, Case, Ffd, FfdThickness, FfdTwist, moves, named
-from slideviz.case.words import nearest
-from slideviz.errors import CaseError, Note, SlidevizError
+from slideviz.errors import CaseError, Note, SlidevizError, nearest
 from slideviz.ffd.box import (
     CARTESIAN,
     Box,

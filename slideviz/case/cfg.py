@@ -26,8 +26,7 @@ from slideviz.case.lines import (
     require_some_key,
 )
 from slideviz.case.model import Case, FromFile
-from slideviz.case.words import nearest, shown
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, nearest, shown
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import ROLES
 

@@ -25,8 +25,7 @@ from slideviz.case.model import (
     named,
 )
 from slideviz.case.motion_text import read_motions, write_motions
-from slideviz.case.words import nearest
-from slideviz.errors import CaseError, Note
+from slideviz.errors import CaseError, Note, nearest
 from slideviz.terms import ROLES, SLIDES
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.case.lines import Problem, listed, read_text
-from slideviz.case.words import COMMENT_SIGNS, number, shown
-from slideviz.errors import CaseError
+from slideviz.case.words import COMMENT_SIGNS, number
+from slideviz.errors import CaseError, shown
 from slideviz.mesh.model import FloatArray, IntArray, frozen_array
 
 _COMMENT = re.compile(f"[{COMMENT_SIGNS}][^\n]*")

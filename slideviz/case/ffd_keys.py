@@ -8,17 +8,8 @@ from typing import Any
 from slideviz.case.key import MOTION, NO_DEFAULT, Key, setting
 from slideviz.case.model import Case
 from slideviz.case.values import POINT, Kind, one_of
-from slideviz.case.words import (
-    Word,
-    groups_of,
-    is_none,
-    list_of,
-    name_text,
-    number,
-    shown,
-    words_of,
-)
-from slideviz.errors import CaseError
+from slideviz.case.words import Word, groups_of, is_none, list_of, name_text, number, words_of
+from slideviz.errors import CaseError, shown
 from slideviz.terms import FFD_BLENDINGS, FFD_SYSTEMS
 
 Definition = tuple[str, tuple[float, ...]]

@@ -9,8 +9,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from slideviz.case.words import COMMENT_SIGNS, shown, without_comment
-from slideviz.errors import CaseError
+from slideviz.case.words import COMMENT_SIGNS, without_comment
+from slideviz.errors import CaseError, shown
 from slideviz.system.file_checks import require_length
 
 Problem = tuple[int, str]

@@ -11,9 +11,9 @@ from typing import Any
 
 from slideviz.case.key import METHOD, NO_DEFAULT, REDUCTION, Key, other_method, setting
 from slideviz.case.model import Case
-from slideviz.case.reduction import Reduction
 from slideviz.case.values import MAX_STEPS, YES_NO, Kind, one_of, real, whole
 from slideviz.errors import CaseError
+from slideviz.rbf.reduction import Reduction
 from slideviz.terms import (
     DATA_REDUCTIONS,
     KERNELS,

@@ -10,11 +10,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.argument_types import check_fields, check_types
-from slideviz.case.reduction import AUTO, Reduction, require_chosen
-from slideviz.case.words import nearest, not_one_of
-from slideviz.errors import CaseError
-from slideviz.mesh.model import frozen_array
+from slideviz.argument_types import CheckedFields, check_types
+from slideviz.errors import CaseError, nearest, not_one_of
+from slideviz.mesh.model import DEFAULT_FEATURE_ANGLE_DEG, frozen_array
+from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.terms import (
     FFD_BLENDINGS,
     FFD_SYSTEMS,
@@ -45,18 +44,15 @@ Target = str | tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Translate:
+class Translate(CheckedFields):
     """Shift a marker by ``vector`` (d,), in the mesh's length unit."""
 
     marker: Target
     vector: tuple[float, ...]
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class Rotate:
+class Rotate(CheckedFields):
     """Rotate a marker by ``angle_deg`` about an axis through ``point`` (right-handed; any length).
 
     In 2D the axis is z: positive angles turn counter-clockwise. Several markers have one common
@@ -68,24 +64,18 @@ class Rotate:
     point: Point = "centroid"
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class Scale:
+class Scale(CheckedFields):
     """Scale a marker about ``point`` by ``factors``: one for all axes, or one for each."""
 
     marker: Target
     factors: tuple[float, ...]
     point: Point = "centroid"
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class Radial:
+class Radial(CheckedFields):
     """Push a marker away from an axis: each radius r becomes ``factor`` r + ``distance``.
 
     ``factor`` 1.03 is 3 % outwards. The axis goes through ``point`` (d,) along ``axis``; in 2D it
@@ -98,12 +88,9 @@ class Radial:
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     point: tuple[float, ...] = (0.0, 0.0, 0.0)
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class FromFile:
+class FromFile(CheckedFields):
     """Displace nodes as a file lists: node index, then the Cartesian displacement.
 
     ``marker`` empty: the file serves all moving markers (RBF-SliDe's DEFORMATION_FILENAME).
@@ -113,12 +100,12 @@ class FromFile:
     marker: Target = ""
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         object.__setattr__(self, "path", Path(self.path))
 
 
 @dataclass(frozen=True)
-class Ffd:
+class Ffd(CheckedFields):
     """Move control points of a box for free-form deformation, and with them the nodes inside.
 
     ``box`` is the name of a box of the mesh or of ``Case.ffd_boxes``, ``index`` the control point
@@ -132,12 +119,9 @@ class Ffd:
     index: tuple[int, int, int]
     vector: tuple[float, float, float]
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class HicksHenne:
+class HicksHenne(CheckedFields):
     """Raise one side of an airfoil outwards by a bump (Hicks and Henne 1978).
 
     It is ``height`` at ``peak``, a part of the ``chord`` between two x, and 0 at its ends. Nodes
@@ -151,13 +135,9 @@ class HicksHenne:
     side: Side = field(default="upper", metadata=SIDES)
     chord: tuple[float, float] = (0.0, 1.0)
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-        require_chosen(self)
-
 
 @dataclass(frozen=True)
-class Cst:
+class Cst(CheckedFields):
     """Add ``height`` times a class and shape function to y of one side of an airfoil (Kulfan 2008).
 
     The function is the square root of t times (1 - t), times Bernstein polynomial k of n (from 1)
@@ -170,13 +150,9 @@ class Cst:
     side: Side = field(default="upper", metadata=SIDES)
     chord: tuple[float, float] = (0.0, 1.0)
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-        require_chosen(self)
-
 
 @dataclass(frozen=True)
-class Bump:
+class Bump(CheckedFields):
     """Raise all sides of an airfoil towards +y by a bump; otherwise as `HicksHenne`."""
 
     marker: Target
@@ -184,45 +160,34 @@ class Bump:
     peak: float = 0.5
     chord: tuple[float, float] = (0.0, 1.0)
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class FfdCamber:
-    """Shift a column of control points of a box as one, and with it the nodes inside.
-
-    ``index`` (i, j) is the column, which goes along z; in 2D that of i, along y. -1 takes all.
-    """
-
+class _FfdColumn(CheckedFields):
     marker: Target
     box: str
     index: tuple[int, int]
     amount: float
 
-    def __post_init__(self) -> None:
-        check_fields(self)
+
+@dataclass(frozen=True)
+class FfdCamber(_FfdColumn):
+    """Shift a column of control points of a box as one, and with it the nodes inside.
+
+    ``index`` (i, j) is the column, which goes along z; in 2D that of i, along y. -1 takes all.
+    """
 
 
 @dataclass(frozen=True)
-class FfdThickness:
+class FfdThickness(_FfdColumn):
     """Stretch a column of control points of a box, and with it the nodes inside.
 
     Its first control point goes by -``amount``, its last one by ``amount``. ``index`` as in
     `FfdCamber`.
     """
 
-    marker: Target
-    box: str
-    index: tuple[int, int]
-    amount: float
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class FfdTwist:
+class FfdTwist(CheckedFields):
     """Rotate a plane j of control points of a box in 3D, and with it the nodes inside.
 
     It turns by ``angle_deg`` about the axis through ``point`` (right-handed; any length). A
@@ -236,12 +201,9 @@ class FfdTwist:
     point: tuple[float, ...] = (0.0, 0.0, 0.0)
     axis: tuple[float, float, float] = (0.0, 1.0, 0.0)
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True, eq=False)
-class Prescribed:
+class Prescribed(CheckedFields):
     """Displace nodes (k,) by vectors (k, d), given by a program; it cannot be in a case file.
 
     Nodes are ascending, each once. Nodes of the markers that are not among them stay in place.
@@ -252,7 +214,7 @@ class Prescribed:
     marker: Target = ""
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        super().__post_init__()
         nodes = frozen_array(self.nodes, np.int64)
         vectors = frozen_array(self.vectors, np.float64)
         if nodes.ndim != 1 or vectors.ndim != 2 or len(nodes) != len(vectors):
@@ -284,7 +246,7 @@ def moves(motion: Motion, marker: str) -> bool:
 
 
 @dataclass(frozen=True)
-class Case:
+class Case(CheckedFields):
     """A deformation case, the content of a ``.cfg`` file.
 
     Markers of the mesh that are not in ``roles`` are fixed. Paths are absolute, or relative to the
@@ -295,7 +257,7 @@ class Case:
     * ``direction``, ``curved``: RBF-SliDe's, without effect: both are found from the mesh.
       ``direction`` is 0, 1, 2 for x, y, z or r, theta, z, or None.
     * ``feature_angle_deg``: the angle in degrees from which a bend in a boundary is an edge; the
-      default is ``DEFAULT_FEATURE_ANGLE_DEG`` of `slideviz.mesh.topology`.
+      default is ``DEFAULT_FEATURE_ANGLE_DEG`` of `slideviz.mesh.model`.
     * ``steps``: 0, or "auto", finds the number of steps; ``steps_gain`` is when to stop.
     * ``influence_factor``: the support radius over the extent of the mesh; 0, or "auto", fits it
       to the motion. ``support_radius``, if not None, is used instead: a length.
@@ -343,7 +305,7 @@ class Case:
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     direction: int | None = None
-    feature_angle_deg: float = 40.0
+    feature_angle_deg: float = DEFAULT_FEATURE_ANGLE_DEG
     curved: bool = False
     steps: Annotated[int, 'a whole number, or "auto"'] = 1
     steps_gain: float = 0.02
@@ -363,8 +325,7 @@ class Case:
         for name in ("steps", "influence_factor"):
             if str(getattr(self, name)).lower() == "auto":  # as in a case file
                 object.__setattr__(self, name, 0)
-        check_fields(self)
-        require_chosen(self)
+        super().__post_init__()
         for marker, role in self.roles.items():
             if role not in ROLES:
                 raise CaseError(f"roles: {marker!r}: {not_one_of(role, ROLES)}")

@@ -30,18 +30,8 @@ from slideviz.case.model import (
     named,
 )
 from slideviz.case.values import Kind, axis_text, path_text, read_axis, read_vector, vector_text
-from slideviz.case.words import (
-    Word,
-    counted,
-    is_none,
-    name_text,
-    nearest,
-    not_one_of,
-    number,
-    shown,
-    words_of,
-)
-from slideviz.errors import CaseError
+from slideviz.case.words import Word, counted, is_none, name_text, number, words_of
+from slideviz.errors import CaseError, nearest, not_one_of, shown
 from slideviz.terms import MOTION_KINDS, SIDES, MotionKind
 
 VERBS = tuple(MOTION_KINDS)

@@ -12,18 +12,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from slideviz.case.words import (
-    Word,
-    check_writable,
-    is_none,
-    list_of,
-    name_text,
-    not_one_of,
-    number,
-    shown,
-    words_of,
-)
-from slideviz.errors import CaseError
+from slideviz.case.words import Word, check_writable, is_none, list_of, name_text, number, words_of
+from slideviz.errors import CaseError, not_one_of, shown
 from slideviz.terms import AXES, Term, labels
 
 Entry = Literal["text", "choice", "switch", "real", "whole", "axis", "point"]

@@ -14,8 +14,8 @@ from slideviz.case.key import VIEW, Key
 from slideviz.case.model import Case
 from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.case.values import NAMES, Kind, choice, vector_text, whole
-from slideviz.case.words import list_of, number, shown
-from slideviz.errors import CaseError
+from slideviz.case.words import list_of, number
+from slideviz.errors import CaseError, shown
 from slideviz.terms import COLOR_BY, COLOR_MAPS, POINTS_SHOWN, SHOWN
 
 HIDDEN = "hidden"

@@ -11,9 +11,8 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, shown
 
 COMMENT_SIGNS = "%#$"
 _WORD = re.compile(r'"(?P<quoted>(?:[^"]|"")*)"|(?P<sign>[(),;])|(?P<plain>[^\s(),;"]+)|(?P<bad>")')
@@ -165,28 +164,9 @@ def check_writable(text: str) -> None:
         ) from problem
 
 
-def shown(text: str) -> str:
-    """Return the text in quotes for a message, cut to 60 characters."""
-    return repr(text if len(text) <= 60 else f"{text[:57]}...")
-
-
 def counted(number: int, what: str) -> str:
     """Return a number with a noun in singular or plural: 1 step, 2,000 steps."""
     return f"{number} {what}" if number == 1 else f"{number:,} {what}s"
-
-
-def not_one_of(value: object, known: Iterable[str]) -> str:
-    """Return the message that a value is none of the known ones, and which is most similar."""
-    words = list(known)
-    quoted = shown(value) if isinstance(value, str) else repr(value)
-    return f"{quoted} is not one of {' | '.join(words)}{nearest(str(value), words)}"
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Return ``; did you mean X?`` with the known name most similar to ``name``; "" if none is."""
-    by_lower = {other.lower(): other for other in known}
-    close = get_close_matches(name.lower(), list(by_lower), n=1, cutoff=0.6)
-    return f"; did you mean {by_lower[close[0]]}?" if close else ""
 
 
 def wrong_by(part: float, *, bounded: bool) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from slideviz import __version__
-from slideviz.case.words import nearest
+from slideviz.errors import nearest
 
 COMMANDS = {
     "run": "run_command",

@@ -8,8 +8,7 @@ import sys
 
 def window(arguments: argparse.Namespace) -> int:
     """Open the window, with a file if one is given; return the exit code."""
-    from slideviz.case.words import nearest
-    from slideviz.errors import CaseError
+    from slideviz.errors import CaseError, nearest
     from slideviz.export.offscreen import missing_screen
 
     if arguments.file is not None and not arguments.file.exists():

@@ -52,7 +52,7 @@ def choose_steps(
     parts, solutions, points = _reference(case, mesh, replace(setup, target=targets[0]), report)
     # The other methods choose nothing but the number of steps.
     others = list(targets[1:]) if case.method == "rbf" else []
-    if others and setup.reduction is not None and setup.reduction.level != "none":
+    if others and setup.reduction is not None and setup.reduction.multilevel:
         others += targets[:-1]  # a further level can raise errors of those before
     for target in others:
         further = _further(mesh, replace(setup, target=target), parts, solutions, report)

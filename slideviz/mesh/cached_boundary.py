@@ -8,8 +8,8 @@ import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.fans import find_pieces
-from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
-from slideviz.mesh.topology import DEFAULT_FEATURE_ANGLE_DEG, Boundary, find_boundary
+from slideviz.mesh.model import DEFAULT_FEATURE_ANGLE_DEG, Cells, IntArray, Marker, Mesh
+from slideviz.mesh.topology import Boundary, find_boundary
 
 _MOST_PARTS = 64
 """Most parts that `smooth_parts` returns; a surface with more is rough, its edges no borders."""

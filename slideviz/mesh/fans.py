@@ -16,15 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.mesh.model import FloatArray, IntArray, frozen_array, sealed
-from slideviz.mesh.topology import (
+from slideviz.mesh.model import (
     DEFAULT_FEATURE_ANGLE_DEG,
-    TINY,
-    Boundary,
-    corner_vectors,
-    facet_vectors,
-    unit,
+    FloatArray,
+    IntArray,
+    frozen_array,
+    sealed,
 )
+from slideviz.mesh.topology import TINY, Boundary, corner_vectors, facet_vectors, unit
 from slideviz.system.jit_cache import njit
 
 

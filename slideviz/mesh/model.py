@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+DEFAULT_FEATURE_ANGLE_DEG = 40.0
+"""Angle in degrees between smoothly joined facets; also the default in `Case.feature_angle_deg`."""
+
 
 def sealed(values: NDArray) -> NDArray:
     """Return a read-only view of ``values``, which the caller must not write to afterwards."""

@@ -19,8 +19,6 @@ from slideviz.mesh.unique_rows import row_groups, sorted_in_rows
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
-DEFAULT_FEATURE_ANGLE_DEG = 40.0
-"""Angle in degrees between smoothly joined facets; also the default in `Case.feature_angle_deg`."""
 TINY = float(np.finfo(float).tiny)
 """Smallest normal float: a divisor in place of 0."""
 

@@ -88,7 +88,7 @@ class GreedyFit:
         self._level = GreedyLevel(problem, self._among, self.found)
         self._known = problem.beginning()
         self._given, self._used = problem.stages[done:], list[int]()
-        self._one_level = self._settings.level == "none"
+        self._one_level = not self._settings.multilevel
 
     def _new_level(self) -> None:
         """Begin a level, which has to meet what the levels before it lack."""
@@ -172,14 +172,16 @@ class GreedyFit:
 
     def _level_goal(self, errors: FloatArray) -> float:
         """Return the error at which a level is complete that begins with ``errors`` (c,)."""
-        return float(errors.max(initial=0.0)) * self._settings.level_ratio
+        return float(errors.max(initial=0.0)) * self._settings.level_tolerance
 
     def _level_done(self, errors: FloatArray, goal: float) -> bool:
         """Return whether the level is complete (section 2.5.2, 5.3.2); never for a single level."""
-        if self._settings.level == "size":
+        if not self._settings.multilevel:
+            return False
+        if self._settings.criterion == "size":
             return self._level.nodes >= self._settings.level_size
         some = len(self._level.chosen) > 0
-        return self._settings.level == "ratio" and some and errors.max() < goal
+        return some and bool(errors.max() < goal)
 
     def _full(self) -> bool:
         """Return whether as many nodes as MAX_CONTROL_NODES allows are chosen."""
@@ -228,7 +230,7 @@ class GreedyFit:
         level, among = self._level, self._among
         open_ = among.has_row(~level.excluded)
         weighted, largest = errors * among.tie_breaker, float(errors.max())
-        floor = 0.0 if self._settings.pick != "block" else STALE * largest
+        floor = 0.0 if self._settings.selection != "block" else STALE * largest
         floor = max(floor, self._settings.tolerance)
         while True:
             count, pooled = self._pool(np.where(open_, weighted, -1.0), residual)

@@ -14,7 +14,8 @@ from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import matrix
 from slideviz.rbf.exact import condition_with_terms, gathered, row_keys, saddle_fit
 from slideviz.rbf.kernels import KERNELS, PLAIN
-from slideviz.rbf.problem import GreedySettings, Interpolant, Problem
+from slideviz.rbf.problem import Interpolant, Problem
+from slideviz.rbf.reduction import Reduction
 from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise, solve_lower
 
 POOL = 768
@@ -126,7 +127,7 @@ def tie_breaker(coords: FloatArray) -> FloatArray:
 def pool(
     errors: FloatArray,
     vectors: FloatArray,
-    settings: GreedySettings,
+    settings: Reduction,
     *,
     chosen: int,
     chosen_in_level: int,
@@ -151,14 +152,14 @@ def pool(
     if not eligible:
         return 0, np.empty(0, np.int64)
     worst = int(np.argmax(errors))
-    if settings.pick == "one":
+    if settings.selection == "one":
         return 1, np.array([worst])
-    if settings.pick == "double":
+    if settings.selection == "double":
         return _double(errors, vectors, worst, settings.tolerance)
     count = int(np.clip(chosen // 4, 4, BLOCK_LIMIT))
     size = min(eligible, POOL // per_node, max(POOL_START, POOL_SHARE * count))
     order = np.argsort(-errors, kind="stable")[:size]
-    if settings.level == "size":
+    if settings.multilevel and settings.criterion == "size":
         count = min(count, max(1, settings.level_size - chosen_in_level))
     if settings.max_nodes is not None:
         count = min(count, max(1, settings.max_nodes - chosen))

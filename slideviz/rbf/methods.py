@@ -23,7 +23,6 @@ from slideviz.rbf.exact import ExactFit
 from slideviz.rbf.field import Correction
 from slideviz.rbf.greedy import GreedyFit
 from slideviz.rbf.problem import (
-    GAMMA,
     CarriedError,
     Cycle,
     Interpolant,
@@ -32,6 +31,7 @@ from slideviz.rbf.problem import (
     Problem,
     Solution,
 )
+from slideviz.rbf.reduction import GAMMA
 from slideviz.system.threads import in_parts
 
 ROUNDING = 1e-14

@@ -8,18 +8,13 @@ from dataclasses import dataclass
 from dataclasses import field as made_by
 from functools import cached_property
 from time import perf_counter
-from typing import Literal
 
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import Basis, Tick, connected, no_tick
 from slideviz.rbf.field import Field, RadialField
-from slideviz.terms import Selection
-
-GAMMA = 25.0
-"""Radius of the boundary correction over the largest error (Eq. 2.31), where nothing else is set;
-``slideviz.case.model.Reduction.gamma`` has the same default."""
+from slideviz.rbf.reduction import Reduction
 
 Project = Callable[[IntArray, FloatArray], FloatArray]
 """Takes nodes (m,) and displacements (m, d); returns those that bring the nodes back on their
@@ -46,27 +41,6 @@ class PhaseTimer:
             yield lambda fraction: self.report(name, fraction)
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
-
-
-@dataclass(frozen=True)
-class GreedySettings:
-    """Settings of the greedy selection of control nodes (thesis section 2.5)."""
-
-    tolerance: float
-    """Largest error at the boundary, of all steps together, that is left to the correction; in the
-    mesh's length unit."""
-    pick: Selection = "block"
-    """Nodes added in a cycle: a growing number of them, the worst and the worst with an error in an
-    opposite direction, or the worst one."""
-    level: Literal["none", "size", "ratio"] = "none"
-    """Single level, or levels that end at ``level_size`` nodes, or when the error has fallen by the
-    factor ``level_ratio``."""
-    level_size: int = 16
-    level_ratio: float = 0.5
-    max_nodes: int | None = None
-    """Stop at so many control nodes even if the error is larger."""
-    gamma: float = GAMMA
-    """Correction radius over largest error (Eq. 2.31)."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +93,7 @@ class Problem:
     shift: FloatArray
     """`coords`, `shift` (n, d), (d,): current positions in the frame, and one period in it (zero:
     none), for the correction."""
-    reduction: GreedySettings | None = None
+    reduction: Reduction | None = None
     """None: all candidates are control nodes."""
     before: Solution | None = None
     """Of the step before; None in the first step."""
@@ -157,7 +131,7 @@ class Problem:
         ``max_nodes`` allows, for then no node could be added where the error changes.
         """
         settings, before = self.reduction, self.before
-        if settings is None or before is None or settings.level != "none":
+        if settings is None or before is None or settings.multilevel:
             return np.empty(0, np.int64)
         full = settings.max_nodes is not None and len(before.control) >= settings.max_nodes
         return before.control[:0] if full else before.control

@@ -20,10 +20,10 @@ from scipy.interpolate import RectBivariateSpline
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile
-from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
 from slideviz.formats.su2b.write import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
+from slideviz.rbf.reduction import Reduction
 from slideviz.samples.passage import (
     BladeSection,
     Grid,

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile
-from slideviz.case.words import nearest
-from slideviz.errors import CaseError, MeshError
+from slideviz.errors import CaseError, MeshError, nearest
 from slideviz.formats.su2b.write import ZoneContent, file_head, zone_blocks
 from slideviz.mesh.model import Mesh
 from slideviz.samples.airfoil import airfoil_case, airfoil_mesh

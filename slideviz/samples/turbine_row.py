@@ -20,9 +20,9 @@ from scipy.ndimage import map_coordinates
 from scipy.spatial import Delaunay, cKDTree
 
 from slideviz.case.model import Case, Scale, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
+from slideviz.rbf.reduction import Reduction
 from slideviz.samples.vane import AHEAD, CHORD, LENGTH, camber, camber_line, pitch, vane_layers
 from slideviz.system.jit_cache import njit
 

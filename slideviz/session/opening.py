@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.case.model import BoxMotion, Case
-from slideviz.case.reduction import Reduction
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
+from slideviz.rbf.reduction import Reduction
 from slideviz.session.saving import view_from_case
 from slideviz.session.state import Guess, Run, Session, StepFrame, ViewState
 from slideviz.terms import ColorBy, Role

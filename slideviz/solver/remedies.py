@@ -9,10 +9,10 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.case.motion import displacements
-from slideviz.case.reduction import Reduction
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
+from slideviz.rbf.reduction import Reduction
 from slideviz.terms import SLIDES
 
 MOST_NAMES = 2

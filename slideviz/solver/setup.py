@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,8 +20,9 @@ from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.frames import Frame, hold_on_axis
 from slideviz.rbf.frames import corners as corners_of
 from slideviz.rbf.methods import SLIDING_METHODS
-from slideviz.rbf.problem import GreedySettings, PhaseTimer, Problem, Solution
+from slideviz.rbf.problem import PhaseTimer, Problem, Solution
 from slideviz.rbf.projection import Tracks, find_tracks
+from slideviz.rbf.reduction import Reduction
 from slideviz.solver.domain import Domain, find_domain
 from slideviz.solver.prescribed import fitted_radius, largest_of, prescribe, support_radius
 
@@ -68,14 +69,14 @@ def sliding_gap(points: FloatArray, facets: IntArray, classes: Classes) -> float
     return float(gaps[gaps > 0.0].min(initial=np.inf))
 
 
-def needed_by_layers(reduction: GreedySettings | None, gap: float) -> float:
+def needed_by_layers(reduction: Reduction | None, gap: float) -> float:
     """Return the tolerance that layers need where that of the reduction is larger; else 0."""
     return LAYER * gap if reduction is not None and reduction.tolerance > LAYER * gap else 0.0
 
 
 def find_reduction(
     case: Case, extent: float, largest: float, candidates: int, gap: float
-) -> GreedySettings | None:
+) -> Reduction | None:
     """Return the settings of the selection of control nodes; None where all candidates are taken.
 
     Parameters
@@ -87,30 +88,20 @@ def find_reduction(
     gap : float
         The smallest distance between a moving and a sliding node (`sliding_gap`).
     """
-    given = case.reduction
-    if given is None or case.method != "rbf":
+    reduction = case.reduction
+    if reduction is None or case.method != "rbf":
         return None
-    if given.auto:
-        if candidates <= EXACT_NODES or not largest > 0.0:
-            return None
+    if not reduction.auto:
+        tolerance = reduction.relative * extent if reduction.relative else reduction.tolerance
+    elif candidates <= EXACT_NODES or not largest > 0.0:
+        return None
+    else:
         tolerance = max(min(AUTO_TOLERANCE * largest, LAYER * gap), SMALLEST * largest)
-        given = replace(given, tolerance=tolerance, relative=None)
-    level: Literal["none", "size", "ratio"] = "none"
-    if given.multilevel:
-        level = "size" if given.criterion == "size" else "ratio"
-    return GreedySettings(
-        tolerance=given.relative * extent if given.relative else given.tolerance,
-        pick=given.selection,
-        level=level,
-        level_size=given.level_size,
-        level_ratio=given.level_tolerance,
-        max_nodes=given.max_nodes,
-        gamma=given.gamma,
-    )
+    return replace(reduction, tolerance=tolerance, relative=None, auto=False)
 
 
 def loose_warnings(
-    case: Case, reduction: GreedySettings | None, largest: float, extent: float, gap: float
+    case: Case, reduction: Reduction | None, largest: float, extent: float, gap: float
 ) -> list[str]:
     """Return a warning where the tolerance is too large for the motion, or AUTO's for layers."""
     if reduction is None or not largest > 0.0:
@@ -157,7 +148,7 @@ class Setup(Domain):
     basis: Basis
     candidates: int
     """Nodes that could be control nodes; periodic images count as one."""
-    reduction: GreedySettings | None
+    reduction: Reduction | None
     """Settings of the greedy selection; None: all candidates are control nodes."""
     layers: float
     """As of a ``Step``."""

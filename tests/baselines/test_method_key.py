@@ -12,9 +12,9 @@ from slideviz.case.cfg import set_key
 from slideviz.case.check import effective, idle_settings
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Rotate
-from slideviz.case.reduction import Reduction
 from slideviz.cli import run
 from slideviz.errors import CaseError, DeformError
+from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import SAMPLES, sample, write_sample
 from slideviz.solver import deform as solver
 from slideviz.terms import METHODS

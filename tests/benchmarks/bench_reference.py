@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.reduction import Reduction
+from slideviz.rbf.reduction import Reduction
 from tests.benchmarks.measured import call
 from tests.benchmarks.rbf_slide import GROUP, SHARED, asked, greedy_rows, load, write_whole_boundary
 

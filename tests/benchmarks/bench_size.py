@@ -11,7 +11,7 @@ from time import process_time
 import pytest
 
 import slideviz as sv
-from slideviz.case.reduction import Reduction
+from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import write_sample
 from tests.benchmarks.measured import call
 

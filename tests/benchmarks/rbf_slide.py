@@ -17,7 +17,7 @@ import numpy as np
 import slideviz as sv
 from slideviz.case.displacement import read_displacements
 from slideviz.case.model import Case, FromFile
-from slideviz.case.reduction import Reduction
+from slideviz.rbf.reduction import Reduction
 
 SHARED = Path(__file__).parents[3] / "shared"
 MESHES = SHARED / "meshes" / "thesis"

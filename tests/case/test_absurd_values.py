@@ -9,9 +9,9 @@ import slideviz as sv
 from slideviz.case.key import METHOD, REDUCTION, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.errors import ArgumentError, CaseError, UnsoundError
 from slideviz.rbf.kernels import KERNELS
+from slideviz.rbf.reduction import Reduction
 from tests import builders
 from tests.slow import one_of_each_fast
 

@@ -8,8 +8,8 @@ import pytest
 from slideviz.case.check import contradictions
 from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.case.motion import check_case, require_valid
-from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
+from slideviz.rbf.reduction import Reduction
 
 UP = Translate("UPPER", (0.0, 0.1))
 

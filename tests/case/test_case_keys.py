@@ -6,8 +6,8 @@ from slideviz.case.cfg import describe_keys, set_key
 from slideviz.case.key import GROUPS
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, FromFile, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
+from slideviz.rbf.reduction import Reduction
 
 # MARKER_PERIODIC is not in the thesis's example file, but RBF-SliDe needs it.
 RBF_SLIDE = {

@@ -12,8 +12,8 @@ from slideviz.case.cfg import read_case, write_case
 from slideviz.case.model import Case, Ffd, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.case.motion import moved_points
 from slideviz.case.motion_text import read_motions, write_motions
-from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
+from slideviz.rbf.reduction import Reduction
 from slideviz.terms import FFD_BLENDINGS, PERIODIC_MODES, ROLES, SLIDING
 
 finite = st.floats(allow_nan=False, allow_infinity=False)

@@ -14,10 +14,10 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Scale, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.design.accuracy_warnings import warn_of_condition, warn_of_error_estimate
 from slideviz.design.frozen.solve import full_factor
 from slideviz.errors import ConditionWarning, DeformError, Note, ToleranceWarning
+from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import sample
 from slideviz.solver.stepping import _doubt_warning, _dropped_warning
 from tests import builders

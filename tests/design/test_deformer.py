@@ -9,7 +9,6 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.errors import (
     CaseError,
     ConditionWarning,
@@ -18,6 +17,7 @@ from slideviz.errors import (
     ToleranceWarning,
     UnsoundError,
 )
+from slideviz.rbf.reduction import Reduction
 from tests import builders
 from tests.test_laws import box, box_case, sector, sector_case
 

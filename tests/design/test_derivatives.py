@@ -12,12 +12,12 @@ import pytest
 import slideviz as sv
 from slideviz.baselines import multigrid
 from slideviz.case.model import Case, Rotate, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.design.frozen import fit
 from slideviz.design.frozen.interpolation import WAYS
 from slideviz.errors import DeformError
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.rbf.methods import SLIDING_METHODS
+from slideviz.rbf.reduction import Reduction
 from slideviz.terms import SLIDING
 from tests import builders
 from tests.slow import one_of_each_fast

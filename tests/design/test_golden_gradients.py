@@ -17,16 +17,10 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case
-from slideviz.case.reduction import Reduction
 from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.rbf.reduction import Reduction
 from tests import builders
-from tests.design.test_derivatives import (
-    REDUCED,
-    SHAPES,
-    alike,
-    motions,
-    wave,
-)
+from tests.design.test_derivatives import REDUCED, SHAPES, alike, motions, wave
 from tests.test_laws import METHODS, box, box_case, sector, sector_case
 
 RECORD = Path(__file__).with_name("gradients.csv")

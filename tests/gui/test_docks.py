@@ -10,12 +10,12 @@ from qtpy.QtGui import QWheelEvent
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QWidget
 
-from slideviz.case.reduction import Reduction
 from slideviz.gui.docks import LEFT_WIDTH, RIGHT_WIDTH
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField
 from slideviz.gui.window import MainWindow
+from slideviz.rbf.reduction import Reduction
 from slideviz.session import changes
 
 pytestmark = pytest.mark.usefixtures("unpainted")

@@ -5,10 +5,10 @@ from qtpy.QtTest import QTest
 
 from slideviz.case.key import REDUCTION
 from slideviz.case.keys import KEYS
-from slideviz.case.reduction import Reduction
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberBox, NumberField, Switch
 from slideviz.gui.widgets.vector_field import VectorField
+from slideviz.rbf.reduction import Reduction
 from slideviz.session import changes
 
 pytestmark = pytest.mark.usefixtures("unpainted")

@@ -13,13 +13,13 @@ from qtpy.QtWidgets import QApplication, QMenu, QToolButton
 
 from slideviz import Case, read
 from slideviz.case.model import FromFile, Rotate, Scale, Translate
-from slideviz.case.reduction import AUTO, Reduction
 from slideviz.errors import Note
 from slideviz.gui.panels.worst_table import CELL
 from slideviz.gui.viewport import player as player_module
 from slideviz.gui.viewport.player import plain, result_parts, step_ms
 from slideviz.gui.widgets.fields import NumberField
 from slideviz.mesh.quality import INVERTED, Quality
+from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.session import changes, jobs
 from slideviz.session.inspect import worst_cells
 from slideviz.session.run_messages import ended

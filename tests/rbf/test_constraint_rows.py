@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.case.model import Case, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.rbf import exact, level
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import Basis, matrix
 from slideviz.rbf.exact import ExactFit
 from slideviz.rbf.greedy import GreedyFit
 from slideviz.rbf.level import GrowingFactor, newton
+from slideviz.rbf.reduction import Reduction
 from slideviz.rbf.solve import NOTHING, extend, factorise
 from slideviz.samples.table import write_sample
 from tests import builders

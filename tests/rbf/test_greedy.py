@@ -9,9 +9,9 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, FromFile, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf import evaluate as evaluation
+from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import sample, write_sample
 
 KINDS = {

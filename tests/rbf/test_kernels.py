@@ -8,10 +8,10 @@ from scipy.sparse.linalg import onenormest
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate
-from slideviz.case.reduction import Reduction
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
+from slideviz.rbf.reduction import Reduction
 from slideviz.rbf.solve import _norm, condition, saddle_condition, solve_saddle
 from slideviz.samples.table import sample, write_sample
 from tests import builders

@@ -7,11 +7,11 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.cli import run
 from slideviz.errors import DeformError
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf.level import LOSSES, LevelLimit
+from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import write_sample
 from tests import builders
 

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.case.model import Case, Scale, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.rbf.classify import FansAround, _clusters
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.evaluate import Basis, no_tick
 from slideviz.rbf.level import TIE, tie_breaker
 from slideviz.rbf.methods import correct, correction_of
-from slideviz.rbf.problem import GreedySettings, Problem
+from slideviz.rbf.problem import Problem
+from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import sample
 from tests import builders
 from tests.test_laws import METHODS
@@ -105,7 +105,7 @@ def problem_of(points, same_as=None, shift=(0.0, 0.0)):
         cartesian=lambda coords: coords,
         coords=points,
         shift=np.array(shift),
-        reduction=GreedySettings(1.0, gamma=4.0),
+        reduction=Reduction(1.0, gamma=4.0),
     )
 
 

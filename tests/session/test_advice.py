@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from slideviz.case.model import Case, Rotate, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.cli.run_outcome import advice_for
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import INVERTED, quality
+from slideviz.rbf.reduction import Reduction
 from slideviz.session.motions import largest_prescribed
 from slideviz.session.run_messages import ended, exact_cost, help_for, inverted_words, loose_words
 from slideviz.session.state import Run, StepFrame

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from slideviz.case.model import Translate
-from slideviz.case.reduction import Reduction
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
+from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import sample
 from slideviz.session import changes
 from slideviz.session.node_types import NOTHING, NodeTypes

@@ -8,9 +8,9 @@ import pytest
 
 from slideviz.case.model import Rotate
 from slideviz.case.motion_words import describe
-from slideviz.case.reduction import Reduction
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
+from slideviz.rbf.reduction import Reduction
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.runs_table import COLUMNS, best, described, table_text, write_table

@@ -9,8 +9,8 @@ from slideviz.case.key import METHOD, PERIODICITY, QUALITY, REDUCTION
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.case.motion_words import describe, motion_labels
-from slideviz.case.reduction import Reduction
 from slideviz.mesh.quality import quality
+from slideviz.rbf.reduction import Reduction
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.panes import choices

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
-from slideviz.case.reduction import AUTO
 from slideviz.mesh.quality import INVERTED, quality
+from slideviz.rbf.reduction import AUTO
 from slideviz.sections.model import Section
 from slideviz.sections.threshold import ONLY_INVERTED
 from slideviz.session import changes

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.reduction import AUTO, Reduction
 from slideviz.cli.run_outcome import advice_for
 from slideviz.mesh.quality import quality
+from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.samples.table import sample
 from slideviz.session.run_messages import help_for
 from slideviz.session.state import Run, StepFrame

@@ -10,8 +10,8 @@ import pytest
 from PIL import Image
 
 from slideviz.case.model import Translate
-from slideviz.case.reduction import Reduction
 from slideviz.errors import CaseError
+from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import sample
 from slideviz.study.combinations import COMPARED_METHODS, MODES, combinations, compare
 from slideviz.study.montage import NOT_KEPT, montage

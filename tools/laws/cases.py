@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from slideviz.case.model import Case, Motion, Radial, Rotate, Scale, Translate
-from slideviz.case.reduction import Reduction
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.kernels import KERNELS, PLAIN
+from slideviz.rbf.reduction import Reduction
 from slideviz.terms import SLIDING, Role
 from tools.laws.draw import Rng
 from tools.laws.made import Made, Period

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from slideviz.case.model import Translate
 from slideviz.rbf.kernels import KERNELS
-from slideviz.rbf.problem import GAMMA
+from slideviz.rbf.reduction import GAMMA
 from slideviz.solver.steps import Step
 from tools.laws.attempt import told, tried
 from tools.laws.cases import Run

@@ -13,7 +13,7 @@ from slideviz.design.frozen.tape import Array, function, length, take, value
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.field import Correction, share
 from slideviz.rbf.methods import NEGLIGIBLE
-from slideviz.rbf.problem import GAMMA
+from slideviz.rbf.reduction import GAMMA
 from slideviz.solver.setup import Setup
 
 

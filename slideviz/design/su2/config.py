@@ -16,12 +16,12 @@ from slideviz.case.key import MOTION
 from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, require_no_mesh
 from slideviz.case.model import Case
-from slideviz.case.reduction import Reduction
 from slideviz.case.values import YES_NO, real, whole
-from slideviz.case.words import list_of, nearest, not_one_of, number, shown
+from slideviz.case.words import list_of, number
 from slideviz.design.su2.variables import DesignVariable, misspelt, read_variables, supported
-from slideviz.errors import CaseError, Note
+from slideviz.errors import CaseError, Note, nearest, not_one_of, shown
 from slideviz.rbf.kernels import SHAPE
+from slideviz.rbf.reduction import Reduction
 from slideviz.terms import FILE_FORMATS, ROLES, Role
 
 KERNELS = {

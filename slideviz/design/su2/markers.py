@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from slideviz.case.check import unknown_markers
-from slideviz.case.words import nearest
 from slideviz.design.su2.config import ROLE_KEYS, Su2Config
+from slideviz.errors import nearest
 from slideviz.mesh.model import Mesh
 
 PASSED_OVER = {*ROLE_KEYS, "MARKER_DEFORM_MESH"}

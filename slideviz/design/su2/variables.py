@@ -12,8 +12,8 @@ from difflib import get_close_matches
 from typing import Literal
 
 from slideviz.case.lines import Entry, Problem
-from slideviz.case.words import Word, counted, groups_of, list_of, nearest, number, words_of
-from slideviz.errors import CaseError, Note
+from slideviz.case.words import Word, counted, groups_of, list_of, number, words_of
+from slideviz.errors import CaseError, Note, nearest
 
 Group = Literal["nothing", "boxes", "ffd", "file", "grid", "surface", "naca", "parabolic"]
 """What SU2 does with a list of variables; the first kind decides it for all of them."""

@@ -29,8 +29,8 @@ from slideviz.case.model import (
     named,
 )
 from slideviz.case.motion_text import VERB_OF
-from slideviz.case.words import nearest, number, shown
-from slideviz.errors import CaseError
+from slideviz.case.words import number
+from slideviz.errors import CaseError, nearest, shown
 
 Value = str | float
 """A number of a motion, or the text of a key's value; an empty text means the case's own value."""

@@ -13,7 +13,6 @@ from slideviz.case.key import Form, Key
 from slideviz.case.keys import BY_WEIGHT, KEYS, no_pair
 from slideviz.case.method_keys import get_reduction, nothing_slides, put_reduction
 from slideviz.case.model import Case
-from slideviz.case.reduction import AUTO, Reduction
 from slideviz.case.values import Entry, Kind
 from slideviz.gui.widgets.build import (
     PanelScroll,
@@ -30,6 +29,7 @@ from slideviz.gui.widgets.fields import NumberBox, NumberField, Switch, number_t
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import FieldWatch, Panel
 from slideviz.gui.widgets.vector_field import VectorField, a_direction
+from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.session import changes
 from slideviz.session.motions import found_text, largest_prescribed, support_key, support_of
 from slideviz.session.opening import suggested_reduction

@@ -1,37 +1,19 @@
-"""The settings of data reduction, and the check of dataclass fields that are enumerations."""
+"""The settings of data reduction: which of the boundary nodes are control nodes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
 
-from slideviz.argument_types import check_fields
-from slideviz.case.words import not_one_of
-from slideviz.errors import CaseError
+from slideviz.argument_types import CheckedFields
 from slideviz.terms import LEVEL_CRITERIA, SELECTIONS, LevelCriterion, Selection
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
-
-def require_chosen(given: DataclassInstance) -> None:
-    """Raise where a field that is an enumeration has another value.
-
-    Such a field has the terms of the enumeration as its metadata. Its default is always allowed.
-
-    Raises
-    ------
-    CaseError
-        A value is neither one of the terms nor the default.
-    """
-    for each in fields(given):
-        value, terms = getattr(given, each.name), each.metadata
-        if terms and value not in (*terms, each.default):
-            raise CaseError(f"{each.name}: {not_one_of(value, terms)}")
+GAMMA = 25.0
+"""Radius of the boundary correction over the largest error (Eq. 2.31), where nothing else is set,
+with data reduction and without."""
 
 
 @dataclass(frozen=True)
-class Reduction:
+class Reduction(CheckedFields):
     """Settings of the greedy selection of control nodes (thesis sections 2.5 and 5.3)."""
 
     tolerance: float = 1e-3
@@ -50,17 +32,12 @@ class Reduction:
     """The tolerance as a part of the mesh's largest extent, instead of ``tolerance``."""
     max_nodes: int | None = None
     """Stop at so many control nodes, whatever the error."""
-    gamma: float = 25.0
-    """Radius of the correction over the largest error (thesis Eq. 2.31); the default is
-    `slideviz.rbf.problem.GAMMA`, which holds without data reduction, too."""
+    gamma: float = GAMMA
+    """Radius of the correction over the largest error (thesis Eq. 2.31)."""
     auto: bool = False
     """Select only where the boundary has many nodes, to a tolerance that is a part of the largest
     displacement, whatever ``tolerance`` and ``relative`` are (`slideviz.solver.setup` has both
     numbers)."""
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        require_chosen(self)
 
 
 AUTO = Reduction(auto=True)
