@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from slideviz.cli.options import add_shared
 
 if TYPE_CHECKING:
-    from slideviz.cli.report import MeshCounts
     from slideviz.ffd.box import Box
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
+    from slideviz.streaming.quality import CellCounts
 
 
 def add_info(calls: argparse._SubParsersAction) -> None:
@@ -27,24 +27,18 @@ def add_info(calls: argparse._SubParsersAction) -> None:
 
 def info(arguments: argparse.Namespace) -> int:
     """Print what is in a mesh file, or write it as JSON; return the exit code."""
+    from slideviz.cli.mesh_source import open_mesh
     from slideviz.cli.output_paths import OutputPath, require_output_paths
+    from slideviz.streaming.quality import CellCounts
 
     require_output_paths(arguments, OutputPath(arguments.json, "--json"))
-    if arguments.stream:
-        from slideviz.cli.report import MeshCounts
-        from slideviz.cli.streamed import streamed_quality
-
-        with streamed_quality(arguments) as (skin, whole, _):
-            counts = MeshCounts(whole.points, whole.unused, whole.types)
-            return _told(arguments, skin, counts, whole.quality)
-    from slideviz import quality, read
-    from slideviz.cli.report import MeshCounts
-
-    mesh = read(arguments.mesh, zone=arguments.zone)
-    return _told(arguments, mesh, MeshCounts.of(mesh), quality(mesh))
+    with open_mesh(arguments) as opened:
+        counts = CellCounts(opened.source)
+        found = opened.quality(arguments, counts)
+        return _report(arguments, opened.source.mesh, counts, found)
 
 
-def _told(arguments: argparse.Namespace, mesh: Mesh, counts: MeshCounts, found: Quality) -> int:
+def _report(arguments: argparse.Namespace, mesh: Mesh, counts: CellCounts, found: Quality) -> int:
     """Print or write what is in a mesh, and return the exit code.
 
     Parameters

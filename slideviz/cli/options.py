@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from slideviz.case.model import Case
-    from slideviz.mesh.model import Mesh
     from slideviz.scene.moved import Zoom
     from slideviz.terms import Role
 
@@ -33,27 +32,7 @@ def add_reference(call: argparse.ArgumentParser, case_help: str) -> None:
     call.add_argument("--case", type=Path, metavar="CASE", help=case_help)
 
 
-def reference_of(
-    arguments: argparse.Namespace, mesh: Mesh, case: Case | None
-) -> tuple[Path, Mesh] | None:
-    """Return the undeformed mesh and its file, of ``--reference`` or else of ``--case``; or None.
-
-    The mesh of a case is used only where it has the same cells as ``mesh``: the case may have been
-    given only for its periodic boundaries.
-    """
-    from slideviz import read
-
-    if arguments.reference is not None:
-        return arguments.reference, read(arguments.reference, zone=arguments.zone)
-    if case is None or case.mesh_file is None or not case.mesh_file.is_file():
-        return None
-    zone = arguments.zone or case.zone
-    base = read(case.mesh_file, zone=zone, file_format=case.mesh_format)
-    same = base.points.shape == mesh.points.shape and base.cells.same_as(mesh.cells)
-    return (case.mesh_file, base) if same else None
-
-
-def words_of(reference: Path | None) -> str:
+def reference_words(reference: Path | None) -> str:
     """Return the line on the undeformed mesh that the quality refers to, or that there is none."""
     return f"{NONE}; {REMEDY}" if reference is None else f"reference: {reference}"
 
@@ -137,7 +116,7 @@ def require_mesh_file(arguments: argparse.Namespace, case: Case) -> Path:
     return case.mesh_file
 
 
-def given_case(arguments: argparse.Namespace) -> Case | None:
+def optional_case(arguments: argparse.Namespace) -> Case | None:
     """Return the case of the option ``--case``, or None."""
     from slideviz import Case
     from slideviz.cli.output_paths import add_case_inputs

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import add_reference, add_shared, given_case, reference_of, words_of
+from slideviz.cli.options import add_reference, add_shared, optional_case, reference_words
 from slideviz.terms import METRICS
 
 if TYPE_CHECKING:
@@ -44,36 +44,34 @@ def quality(arguments: argparse.Namespace) -> int:
 
     Returns the exit code.
     """
-    from slideviz import quality as rate
-    from slideviz import read, write
+    from slideviz import write
+    from slideviz.cli.mesh_source import open_mesh
     from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.cli.report import cell_data, worst_cells
-    from slideviz.cli.streamed import require_no_file, streamed_quality
+    from slideviz.cli.report import WORST, cell_data
+    from slideviz.errors import CaseError
 
-    if arguments.stream:
-        require_no_file(arguments)
-    is_table = arguments.output is not None and arguments.output.suffix.lower() == ".csv"
-    case = given_case(arguments)
+    output = arguments.output
+    if arguments.stream and output is not None:
+        raise CaseError("-o needs the mesh in memory; leave it out, or --stream")
+    is_table = output is not None and output.suffix.lower() == ".csv"
+    case = optional_case(arguments)
     require_output_paths(
         arguments,
-        OutputPath(arguments.output, "-o", is_mesh=not is_table),
+        OutputPath(output, "-o", is_mesh=not is_table),
         OutputPath(arguments.json, "--json"),
     )
-    if arguments.stream:
-        with streamed_quality(arguments, case) as (skin, whole, path):
-            return _told(arguments, skin.name, whole.quality, whole.worst, path)
-    mesh = read(arguments.mesh, zone=arguments.zone)
-    base = reference_of(arguments, mesh, case)
-    found = rate(mesh, reference=base[1] if base else None, metric=arguments.metric)
-    if is_table:
-        _write_csv(arguments.output, found)
-    elif arguments.output:
-        write(arguments.output, mesh, cell_data=cell_data(arguments.output, found))
-    path = base[0] if base else None
-    return _told(arguments, mesh.name, found, worst_cells(mesh, found), path)
+    with open_mesh(arguments, case) as opened:
+        mesh, found = opened.source.mesh, opened.quality(arguments)
+        if is_table:
+            _write_csv(output, found)
+        elif output:
+            write(output, mesh, cell_data=cell_data(output, found))
+        worst = found.worst(WORST)
+        rows = list(zip(worst.tolist(), opened.source.types(worst).tolist(), strict=True))
+        return _report(arguments, mesh.name, found, rows, opened.reference)
 
 
-def _told(
+def _report(
     arguments: argparse.Namespace,
     name: str,
     found: Quality,
@@ -97,7 +95,7 @@ def _told(
     report |= {"reference": str(reference) if reference else None}
     if not save_json(arguments.json, report):
         print(f"{arguments.mesh}: size-skew, metric {found.metric}")
-        print(f"  {words_of(reference)}")
+        print(f"  {reference_words(reference)}")
         print(quality_lines(found))
         print("worst cells:")
         print(table([(w["cell"], w["type"], f"{w['quality']:.6f}") for w in report["worst"]]))

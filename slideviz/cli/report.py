@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -13,12 +12,12 @@ from typing import Any
 from slideviz.case.method_keys import automatic_radius, get_reduction
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, Note
-from slideviz.mesh.check import unused_nodes
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.session.formats import holds_quality
 from slideviz.solver.deform import Step, folded_at
+from slideviz.streaming.quality import CellCounts
 from slideviz.system.atomic import atomic_write
 
 LISTED = 100
@@ -118,11 +117,6 @@ def _fields(value: object, keys: Iterable[str]) -> dict[str, Any]:
     return {key: getattr(value, key) for key in keys}
 
 
-def inverted_cells(quality: Quality) -> list[int]:
-    """Return the numbers of the first ``LISTED`` inverted cells."""
-    return [int(i) for i in quality.inverted_cells(LISTED)]
-
-
 def quality_report(name: str, quality: Quality, worst: Sequence[tuple[int, int]]) -> dict[str, Any]:
     """Return the JSON object of ``quality --json``; ``worst`` has numbers and types of cells."""
     counts, edges = quality.histogram()
@@ -130,7 +124,7 @@ def quality_report(name: str, quality: Quality, worst: Sequence[tuple[int, int]]
         "mesh": name,
         **quality.summary(),
         "metric": quality.metric,
-        "inverted_cells": inverted_cells(quality),
+        "inverted_cells": quality.inverted_cells(LISTED).tolist(),
         "worst": [
             {"cell": cell, "type": ELEMENTS[vtk].name, "quality": float(quality.values[cell])}
             for cell, vtk in worst
@@ -139,28 +133,8 @@ def quality_report(name: str, quality: Quality, worst: Sequence[tuple[int, int]]
     }
 
 
-def worst_cells(mesh: Mesh, quality: Quality, count: int = WORST) -> list[tuple[int, int]]:
-    """Return numbers and VTK types of the cells of lowest quality, worst first."""
-    return [(int(cell), int(mesh.cells.types[cell])) for cell in quality.worst(count)]
-
-
-@dataclass(frozen=True)
-class MeshCounts:
-    """The number of points of a mesh, of those that no cell uses, and of cells by VTK type."""
-
-    points: int
-    unused: int
-    types: Mapping[int, int]
-
-    @classmethod
-    def of(cls, mesh: Mesh) -> MeshCounts:
-        """Return the counts of a mesh in memory."""
-        types = {vtk: len(ids) for vtk, (ids, _) in mesh.cells.by_type.items()}
-        return cls(len(mesh.points), len(unused_nodes(mesh)), types)
-
-
 def info_report(
-    mesh: Mesh, pairs: Sequence[Any], counts: MeshCounts, quality: Quality
+    mesh: Mesh, pairs: Sequence[Any], counts: CellCounts, quality: Quality
 ) -> dict[str, Any]:
     """Return the JSON object of ``info --json``; ``mesh`` may be only the skin of the mesh."""
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,14 +20,24 @@ from slideviz.cli.options import (
     require_mesh_file,
     size,
 )
-from slideviz.cli.run_outcome import CELLS, advice_for, report_outcome, write_qualities
-from slideviz.cli.run_streamed import is_to_be_streamed, require_streamable, run_streamed
-from slideviz.cli.terminal import holding
+from slideviz.cli.run_outcome import (
+    CELLS,
+    QUALITY_BYTES,
+    advice_for,
+    finished,
+    note_finished,
+    report_outcome,
+    report_warnings,
+    save_report,
+    write_qualities,
+)
+from slideviz.cli.terminal import holding, say
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
     from slideviz.solver.deform import Step
+    from slideviz.streaming.run import RunResult
     from slideviz.terms import FileFormat, Metric
 
 KEPT_BYTES = 1_000_000_000
@@ -77,23 +88,66 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from slideviz import quality, read, write
-    from slideviz.cli.output_paths import qualities_path, warn_of_losses
-    from slideviz.cli.report import cell_data, folded_cells, run_report
-    from slideviz.scene.moved import require_detail
+    from slideviz.cli.output_paths import REPLACED, qualities_path
+    from slideviz.cli.report import run_report
 
     begin = time.perf_counter()
     case = read_case(arguments)
-    mesh_file = require_mesh_file(arguments, case)
+    require_mesh_file(arguments, case)
     output = arguments.output or case.mesh_out or _default_output(case)
     kind = _format_of(output, case)
     qualities = qualities_path(output) if case.generate_quality else None
     require_streamable(arguments, case, output, kind)
     _require_output_paths(arguments, case, output, qualities)
-    if is_to_be_streamed(arguments, case, output, kind):
-        return run_streamed(arguments, case, begin, output, qualities, kind)
+    streamed = is_to_be_streamed(arguments, case, output, kind)
+    about = _about(case) if streamed else ""
+    made = [path for path in (output, qualities) if path]
+    if arguments.resume and (known := finished(about, made)):
+        arguments.begun(REPLACED)
+        if not arguments.quiet:
+            done = "the run of this case, mesh and version is finished; there is nothing to do"
+            say("note", f"{output}: {done}")
+        save_report(arguments, known[0])
+        return report_warnings(*known, quiet=arguments.quiet)
+    done = (_stream if streamed else _deform)(arguments, case, output, kind)
+    found, before, seconds = done.quality, done.undeformed, dict(done.seconds)
+    if qualities:
+        seconds["write"] -= time.perf_counter()
+        write_qualities(qualities, found)
+        seconds["write"] += time.perf_counter()
+    if arguments.picture:
+        _draw(arguments, case, done, output.name)
+    seconds["total"] = time.perf_counter() - begin
+    folded = done.folded
+    report = run_report(
+        case, done.mesh, done.steps, seconds, quality=found, undeformed=before, folded=folded
+    )
+    advice = advice_for(case, done.steps[-1].layers, None if streamed else done.mesh, found)
+    if streamed:
+        note_finished(about, made, report, folded, advice)
+    files = {"mesh": output, CELLS: qualities}
+    return report_outcome(arguments, report, files, found, before, folded, advice=advice)
+
+
+def _about(case: Case) -> str:
+    from slideviz.streaming.run import about_run
+
+    return about_run(case)
+
+
+def _deform(
+    arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
+) -> RunResult:
+    """Deform a mesh in memory, and write it."""
+    from slideviz import quality, read, write
+    from slideviz.cli.output_paths import warn_of_losses
+    from slideviz.cli.report import cell_data, folded_cells
+    from slideviz.scene.moved import require_detail
+    from slideviz.streaming.run import RunResult
+
+    assert case.mesh_file is not None
     seconds = {"read": -time.perf_counter()}
-    mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
+    mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
     warn_of_losses(output, mesh, kind)
     if arguments.picture:
         require_detail(arguments.zoom, mesh)
@@ -108,23 +162,99 @@ def _run(arguments: argparse.Namespace) -> int:
     data = cell_data(output, found)
     force = arguments.force
     write(output, last.mesh, overwrite=force, cell_data=data, base=mesh, file_format=kind)
-    if qualities:
-        write_qualities(qualities, found)
     seconds["write"] += time.perf_counter()
-    if arguments.picture:
-        from slideviz.export.offscreen_renderer import PICTURE_SIZE, picture
-        from slideviz.session.opening import of_runs
-        from slideviz.session.state import Run, StepFrame
-
-        named = StepFrame(replace(last.mesh, name=output.name), found, last)
-        session = of_runs(StepFrame(mesh, before), [Run(1, case, (named,), "done")])
-        picture(session, arguments.picture, arguments.picture_size or PICTURE_SIZE, arguments.zoom)
-    seconds["total"] = time.perf_counter() - begin
     folded = folded_cells(steps, mesh, found)
-    report = run_report(case, mesh, steps, seconds, quality=found, undeformed=before, folded=folded)
-    advice = advice_for(case, steps[-1].layers, mesh, found)
-    files = {"mesh": output, CELLS: qualities}
-    return report_outcome(arguments, report, files, found, before, folded, advice=advice)
+    return RunResult(mesh, tuple(steps), found, before, folded, seconds)
+
+
+def _stream(
+    arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
+) -> RunResult:
+    """Deform a mesh from file to file, with only its boundary in memory."""
+    from slideviz.cli.progress import Bar
+    from slideviz.cli.report import LISTED
+    from slideviz.streaming.run import stream
+    from slideviz.system.ranks import SERIAL
+
+    with Bar(not arguments.quiet, begun=arguments.begun) as bar:
+        return stream(
+            case,
+            output,
+            file_format=kind,
+            report=bar.phase,
+            note=partial(say, "" if arguments.quiet else "note"),
+            warn=partial(say, "warning"),
+            resume=arguments.resume,
+            replaces=case.mesh_file if arguments.force else None,
+            listed=LISTED,
+            later=QUALITY_BYTES if case.generate_quality else 0,
+            ranks=arguments.ranks or SERIAL,
+        )
+
+
+def _draw(arguments: argparse.Namespace, case: Case, done: RunResult, name: str) -> None:
+    """Write the picture of the quality after the last step."""
+    from slideviz.export.offscreen_renderer import PICTURE_SIZE, picture
+    from slideviz.session.opening import of_runs
+    from slideviz.session.state import Run, StepFrame
+
+    last = done.steps[-1]
+    named = StepFrame(replace(last.mesh, name=name), done.quality, last)
+    session = of_runs(StepFrame(done.mesh, done.undeformed), [Run(1, case, (named,), "done")])
+    picture(session, arguments.picture, arguments.picture_size or PICTURE_SIZE, arguments.zoom)
+
+
+def require_streamable(
+    arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
+) -> None:
+    """Raise where ``--stream`` or ``--resume`` is given for a run that cannot be streamed.
+
+    Raises
+    ------
+    CaseError, MeshError
+        An option or the method needs the mesh in memory, or mesh or output are no SU2 meshes.
+    """
+    if not (arguments.stream or arguments.resume):
+        return
+    from slideviz.errors import CaseError
+    from slideviz.streaming.run import require_stream
+
+    for name in _needing_memory(arguments):
+        option = f"--{name.replace('_', '-')}"
+        raise CaseError(f"{option} needs the mesh in memory; leave it out, or --stream")
+    if not (arguments.output or case.mesh_out or case.mesh_out_format):
+        require_stream(case)  # the name of the result is that of the mesh then
+    if not _is_su2(output, kind):
+        raise CaseError(
+            f"{output}: a streamed run writes SU2 meshes; end its name in .su2, or .su2b for the "
+            "binary form"
+        )
+    require_stream(case)
+
+
+def is_to_be_streamed(
+    arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
+) -> bool:
+    """Return whether to stream a run: if asked for, or possible and memory is too small for it."""
+    from slideviz.streaming.resources import missing_memory
+
+    if arguments.stream:
+        return True
+    able = _is_su2(output, kind) and not _needing_memory(arguments)
+    why = missing_memory(case) if able else ""
+    if arguments.resume:
+        why = why or "--resume needs a run with --stream"
+    if why and not arguments.quiet:
+        say("note", f"{why}; it is streamed")
+    return bool(why)
+
+
+def _needing_memory(arguments: argparse.Namespace) -> list[str]:
+    return [name for name in ("picture", "steps_dir", "steps_file") if getattr(arguments, name)]
+
+
+def _is_su2(output: Path, kind: FileFormat | None) -> bool:
+    return (kind or output.suffix.lower().removeprefix(".")) in ("su2", "su2b")
 
 
 def _require_output_paths(

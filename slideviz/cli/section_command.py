@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from slideviz.case.section_shapes import SECTION_SHAPES, names
-from slideviz.cli.options import NONE, add_reference, add_shared, given_case, reference_of, words_of
+from slideviz.cli.options import NONE, add_reference, add_shared, optional_case, reference_words
 from slideviz.cli.section_options import limits, neighbours, pixels, section_reader
 from slideviz.terms import COLOR_MAPS, METRICS, QUANTITIES
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from slideviz.case.model import Case
     from slideviz.mesh.model import FloatArray, Mesh
     from slideviz.mesh.periodic import Pair
@@ -125,11 +127,11 @@ def section(arguments: argparse.Namespace) -> int:
 
     _check_usage(arguments)
     require_picture_name(arguments.output)
-    case = given_case(arguments)
+    case = optional_case(arguments)
     require_output_paths(
         arguments, OutputPath(arguments.output, "-o"), OutputPath(arguments.json, "--json")
     )
-    scene = (_streamed if arguments.stream else _in_memory)(arguments, case)
+    scene = _scene(arguments, case)
     mesh, chosen = scene.mesh, scene.chosen
     painted = paint(mesh, scene.found, arguments.color, scene.base)
     painted = replace(painted, color_map=arguments.map)
@@ -159,28 +161,33 @@ def section(arguments: argparse.Namespace) -> int:
     return _report(arguments, scene, shown)
 
 
-def _in_memory(arguments: argparse.Namespace, case: Case | None) -> _Scene:
-    from slideviz import quality, read
+def _scene(arguments: argparse.Namespace, case: Case | None) -> _Scene:
+    """Return the cells that the section can cut; of a 2D mesh all, which are shown around it."""
+    import numpy as np
 
-    mesh = read(arguments.mesh, zone=arguments.zone)
-    known = reference_of(arguments, mesh, case)
-    path, base = known or (None, None)
-    found = quality(mesh, reference=base, metric=arguments.metric)
-    chosen, matrices = _section_and_passages(arguments, mesh, base, case)
-    outer = mesh.points[mesh.cells.nodes]
-    return _Scene(mesh, base, found, chosen, matrices, outer, path)
+    from slideviz.cli.mesh_source import open_mesh, progress_of
+    from slideviz.errors import CaseError
+    from slideviz.session.passages import keeps
+    from slideviz.streaming.quality import quality_blocks
+    from slideviz.streaming.source import cut_cells, join_blocks
 
-
-def _streamed(arguments: argparse.Namespace, case: Case | None) -> _Scene:
-    from slideviz.cli.section_streamed import cells_near, skins
-
-    with skins(arguments, case) as (seen, base):
-        mesh = seen.skin
-        chosen, matrices = _section_and_passages(arguments, mesh, base, case)
-        near, before, found = cells_near(
-            mesh, seen.mesh, seen.base_zone, arguments.metric, chosen, matrices
-        )
-    return _Scene(near, before, found, chosen, matrices, mesh.points, seen.reference)
+    with open_mesh(arguments, case) as opened:
+        mesh, path = opened.source.mesh, opened.reference
+        if mesh.dim == 2 and arguments.stream:
+            raise CaseError(
+                f"{mesh.name} is 2D, where all cells are shown around the cut; leave out --stream"
+            )
+        chosen, matrices = _section_and_passages(arguments, mesh, opened.read_base, case)
+        ways = [matrix for matrix in matrices.values() if not keeps(chosen, matrix)]
+        if len(ways) < len(matrices):
+            ways.append(np.eye(4))
+        with progress_of(arguments, "quality") as tick:
+            blocks = quality_blocks(opened.source, arguments.metric, tick)
+            near = join_blocks(blocks) if mesh.dim == 2 else cut_cells(blocks, chosen, ways)
+    near = near.part_of(mesh)
+    assert near.quality is not None
+    outer = mesh.points if mesh.part is not None else mesh.points[mesh.cells.nodes]
+    return _Scene(near.mesh, near.base, near.quality, chosen, matrices, outer, path)
 
 
 def _report(arguments: argparse.Namespace, scene: _Scene, shown: SectionInRun) -> int:
@@ -205,7 +212,7 @@ def _report(arguments: argparse.Namespace, scene: _Scene, shown: SectionInRun) -
         print(f"{Path(mesh.name).name}: {chosen.describe(mesh.dim)}")
         print(f"  {shown.paint.sentence(shown.ids)}, worst is cell {summary['worst_cell']}")
         if shown.note or scene.reference:
-            print(f"  {words_of(scene.reference)}")
+            print(f"  {reference_words(scene.reference)}")
         print(f"  {arguments.output}")
     return INVERTED if summary["inverted"] else DONE
 
@@ -220,7 +227,10 @@ def _check_usage(arguments: argparse.Namespace) -> None:
 
 
 def _section_and_passages(
-    arguments: argparse.Namespace, mesh: Mesh, base: Mesh | None, case: Case | None
+    arguments: argparse.Namespace,
+    mesh: Mesh,
+    read_base: Callable[[], Mesh | None],
+    case: Case | None,
 ) -> tuple[Section, dict[int, FloatArray]]:
     """Return the section that is asked for, and the transformation (4, 4) of each passage.
 
@@ -238,7 +248,7 @@ def _section_and_passages(
     pair: Pair | None = None
     if not asked.axis or arguments.copies:
         # Of the undeformed mesh: a deformed one need not be exactly periodic.
-        pair = find_period(base or mesh, case)
+        pair = find_period(read_base() or mesh, case)
     if not asked.axis and case is not None:
         chosen = replace(chosen, direction=case.axis, origin=case.origin)
     elif not asked.axis and pair is not None and pair.kind == "rotational":

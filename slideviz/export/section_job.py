@@ -20,7 +20,7 @@ from slideviz.plots.section_picture import (
 from slideviz.scene.passages import Period, matrices
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
-from slideviz.sections.threshold import CellsInRange
+from slideviz.sections.polygons import CellsInRange
 from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
 from slideviz.session.panes import shown_views
 from slideviz.session.passages import show_passages

@@ -22,8 +22,7 @@ from slideviz.scene.mesh import FADED, is_faded
 from slideviz.scene.sections import BAND, NAME, RIM, WIDTHS, shown_sections
 from slideviz.sections.cut import Cutter
 from slideviz.sections.line import box_around, trace
-from slideviz.sections.polygons import Polygons
-from slideviz.sections.threshold import CellsInRange
+from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.session.state import Session
 from slideviz.terms import COLOR_BY, ROLES
 

@@ -17,8 +17,7 @@ from slideviz.sections.model import Section
 from slideviz.session import jobs
 from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
 from slideviz.session.panes import shown_views
-from slideviz.session.section_cuts import is_awaited
-from slideviz.session.slabs import keep_slab, plain, read_slab
+from slideviz.session.section_cuts import cut_key, is_awaited, keep_slab, read_slab
 from slideviz.session.state import Session, StepFrame
 from slideviz.session.store import Store
 
@@ -119,13 +118,13 @@ class SectionReader(BackgroundJob):
     def _awaited(self) -> list[tuple[StepFrame, Section]]:
         """Return the sections whose cells are still to be read, each with the frame it cuts."""
         return [
-            (view.frame, plain(section))
+            (view.frame, cut_key(section))
             for view in shown_views(self.store.session)
             for section in view.view.sections
             if view.frame is not None
             and section.shown
             and is_awaited(view.frame.mesh, section)
-            and (view.frame.mesh, plain(section)) not in self._unreadable
+            and (view.frame.mesh, cut_key(section)) not in self._unreadable
         ]
 
     def _start(self) -> None:

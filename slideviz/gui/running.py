@@ -15,8 +15,7 @@ from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.widgets.banner import NO_ANSWERS, Banner
 from slideviz.session import changes, jobs
-from slideviz.session.jobs import JobProgress
-from slideviz.session.jobs_large import compute_in_file
+from slideviz.session.jobs import JobProgress, compute_in_file
 from slideviz.session.run_messages import (
     help_for,
     in_window_words,

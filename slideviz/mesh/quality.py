@@ -7,7 +7,7 @@ corner Jacobians over that of the undeformed cell. ``f_skew`` is that of `slidev
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
@@ -37,7 +37,118 @@ from slideviz.terms import Metric
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["INVERTED", "UNPROVEN", "VALID", "Quality", "corner_jacobians", "quality"]
+__all__ = [
+    "INVERTED",
+    "UNPROVEN",
+    "VALID",
+    "Quality",
+    "QualityTotals",
+    "corner_jacobians",
+    "lowest",
+    "quality",
+    "quality_totals",
+]
+
+
+PIECE = 1 << 22
+"""Values of cells that are summed up at a time, at most."""
+FINE = 10_000
+"""Intervals of 0 to 1 in which cells are counted by quality; bars of a histogram join some."""
+
+
+@dataclass(frozen=True, eq=False)
+class QualityTotals:
+    """Counts and size-skew qualities of all cells of a mesh, summed up."""
+
+    cells: int
+    min: float
+    mean: float
+    inverted: int
+    unproven: int
+    fine_counts: IntArray
+    """(FINE,) or (0,): the number of cells, without inverted ones, in equal intervals of their
+    quality from 0 to 1."""
+    worst: IntArray
+    """(k,): the numbers of the cells of lowest value, worst first, ties by number."""
+
+
+def quality_totals(
+    values: FloatArray,
+    status: NDArray[np.uint8],
+    release: Callable[[], object] = lambda: None,
+    worst: int = 0,
+) -> QualityTotals:
+    """Return the totals of the size-skew qualities and statuses (m,) of all cells of a mesh.
+
+    Parameters
+    ----------
+    release : callable
+        Called after each piece was read (`PIECE`): arrays in a file may not fit into memory.
+    worst : int
+        The number of worst cells wanted; with 0, they are not counted in fine intervals, either.
+    """
+    least, inverted, unproven = np.inf, 0, 0
+    counts = np.zeros(FINE if worst else 0, np.int64)
+
+    def add(piece: slice) -> None:
+        nonlocal least, inverted, unproven
+        some, states = values[piece], status[piece]
+        bad = states == INVERTED
+        least = min(least, float(some.min(initial=np.inf)))
+        inverted += int(np.count_nonzero(bad))
+        unproven += int(np.count_nonzero(states == UNPROVEN))
+        if worst:
+            places = np.minimum((some[~bad] * FINE).astype(np.int64), FINE - 1)
+            counts[:] += np.bincount(places, minlength=FINE)
+        release()
+
+    mean = pairwise_sum(values, add) / max(len(values), 1)
+    some = lowest(values, worst, release=release)
+    return QualityTotals(len(values), least, mean, inverted, unproven, counts, some)
+
+
+def pairwise_sum(
+    values: FloatArray, visit: Callable[[slice], object], first: int = 0, last: int | None = None
+) -> float:
+    """Return the sum of ``values[first:last]``, piece by piece, with the bits of ``numpy.sum``.
+
+    NumPy sums up halves of halves, the first of each a multiple of 8 long, and so does this.
+    ``visit`` is called with the slice of each piece after it was read.
+    """
+    last = len(values) if last is None else last
+    half = (last - first) // 2 // 8 * 8
+    if last - first > PIECE:
+        middle = first + half
+        return pairwise_sum(values, visit, first, middle) + pairwise_sum(
+            values, visit, middle, last
+        )
+    found = float(values[first:last].sum())
+    visit(slice(first, last))
+    return found
+
+
+def lowest(
+    values: FloatArray,
+    count: int,
+    only: NDArray[np.bool_] | None = None,
+    release: Callable[[], object] = lambda: None,
+) -> IntArray:
+    """Return the indices (k,) of the ``count`` lowest values (m,), ascending, ties by index.
+
+    ``only`` (m,) is a mask of those that count; ``release`` as for `quality_totals`.
+    """
+    found = np.empty(0, np.int64)
+    for first in range(0, len(values) if count > 0 else 0, PIECE):
+        part = values[first : first + PIECE]
+        if only is not None:
+            part = np.where(only[first : first + PIECE], part, np.inf)
+        limit = np.partition(part, count - 1)[count - 1] if len(part) > count else np.inf
+        found = np.concatenate([found, first + np.flatnonzero(part <= limit)])
+        if only is not None:
+            found = found[only[found]]
+        found = found[np.argsort(values[found], kind="stable")[:count]]
+        release()
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +173,8 @@ class Quality:
     whole mesh (minimum, mean, counts, histogram, worst cells) leave them out."""
     derivative: QualityDerivative | None = None
     """By the points, if it was asked for."""
+    of_mesh: QualityTotals | None = None
+    """Those of all cells of the mesh, where the arrays are of a part of them or in a file."""
 
     def __len__(self) -> int:
         return len(self.values)
@@ -72,44 +185,65 @@ class Quality:
         return slice(None) if self.halo is None else ~self.halo
 
     @cached_property
+    def totals(self) -> QualityTotals:
+        """Return counts, minimum and mean of all cells, without those of the halo."""
+        if self.of_mesh is not None:
+            return self.of_mesh
+        return quality_totals(self.values[self.counted], self.status[self.counted])
+
+    @property
     def cells(self) -> int:
         """Return the number of cells, without those of the halo."""
-        return len(self.values[self.counted])
+        return self.totals.cells
 
-    @cached_property
+    @property
     def min(self) -> float:
         """Return the lowest value."""
-        return float(self.values[self.counted].min())
+        return self.totals.min
 
-    @cached_property
+    @property
     def mean(self) -> float:
         """Return the arithmetic mean of the values."""
-        return float(self.values[self.counted].mean())
+        return self.totals.mean
 
-    @cached_property
+    @property
     def inverted(self) -> int:
         """Return the number of inverted cells."""
-        return self._with(INVERTED)
+        return self.totals.inverted
 
     @property
     def unproven(self) -> int:
         """Return the number of cells that are neither proved valid nor found inverted."""
-        return self._with(UNPROVEN)
+        return self.totals.unproven
 
     @property
     def valid(self) -> int:
         """Return the number of cells that are proved valid."""
-        return self._with(VALID)
+        return self.cells - self.inverted - self.unproven
 
-    def _with(self, status: int) -> int:
-        """Return the number of cells with a status, without those of the halo."""
-        return int(np.count_nonzero(self.status[self.counted] == status))
+    def take(self, ids: IntArray) -> Quality:
+        """Return the quality of the cells ``ids`` (k,), in that order."""
+        halo = None if self.halo is None else self.halo[ids]
+        values, size, skew, status, signs = (one[ids] for one in self._arrays)
+        return Quality(values, size, skew, status, signs, self.metric, halo)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Quality]) -> Quality:
+        """Return the quality of the cells of some parts, one after the other."""
+        if len(parts) == 1:
+            return parts[0]
+        arrays = zip(*(part._arrays for part in parts), strict=True)
+        values, size, skew, status, signs = map(np.concatenate, arrays)
+        return cls(values, size, skew, status, signs, parts[0].metric)
+
+    @property
+    def _arrays(self) -> tuple[NDArray, ...]:
+        return self.values, self.size, self.skew, self.status, self.signs
 
     @check_types
     def worst(self, n: int) -> IntArray:
         """Return the ids of the ``n`` cells of lowest value, worst first, ties by id."""
-        ids = np.arange(len(self))[self.counted]
-        return ids[np.argsort(self.values[ids], kind="stable")[: max(n, 0)]]
+        return lowest(self.values, n, None if self.halo is None else ~self.halo)
 
     @check_types
     def inverted_cells(self, n: int | None = None) -> IntArray:

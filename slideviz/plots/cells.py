@@ -10,11 +10,10 @@ import numpy as np
 from slideviz.color_scheme import INVERTED_COLOR, PAPER
 from slideviz.mesh.model import FloatArray
 from slideviz.plots.ticks import bar_ticks
-from slideviz.sections.cut import Cutter
+from slideviz.sections.cut import Cutter, transformed
 from slideviz.sections.line import Box, trace
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons, joined
-from slideviz.session.passages import moved
 
 MANY = 200_000
 """Number of polygons above which they are pixels in SVG and PDF too, as viewers would fail."""
@@ -149,7 +148,9 @@ def surroundings(
     if cutter.dim == 3:
         return None
     own = cutter.all_cells(points)
-    return joined([own.with_points(moved(own.points, matrix)) for matrix in matrices.values()])
+    return joined(
+        [own.with_points(transformed(own.points, matrix)) for matrix in matrices.values()]
+    )
 
 
 def window(cut: Box, around: Polygons, ratio: float) -> Box:

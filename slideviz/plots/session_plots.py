@@ -11,7 +11,7 @@ import numpy as np
 
 from slideviz.case.motion_words import deformation
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.mesh.quality import INVERTED
+from slideviz.mesh.quality import FINE, INVERTED
 from slideviz.plots.draw import GreedyRun, StepRun
 from slideviz.plots.histogram import draw_distribution
 from slideviz.plots.section_curve import Colors, CurveRow, curve_of, position_label
@@ -24,7 +24,6 @@ from slideviz.sections.model import Section
 from slideviz.session.changes import show_frame
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Run, Session, StepFrame
-from slideviz.session.whole import FINE, PartQuality
 from slideviz.terms import QUANTITIES, ColorBy, Quantity, quantity_of
 
 if TYPE_CHECKING:
@@ -363,10 +362,10 @@ def distribution(
     ``undeformed`` is needed for displacements.
     """
     edges = np.linspace(*limits, BINS + 1)
-    if isinstance(frame.quality, PartQuality):
-        totals = frame.quality.all
+    totals = frame.quality.of_mesh
+    if totals is not None:
         places = np.clip(np.searchsorted(edges, _MIDDLES, "right") - 1, 0, BINS - 1)
-        counts = np.bincount(places, totals.counts, BINS).astype(np.int64)
+        counts = np.bincount(places, totals.fine_counts, BINS).astype(np.int64)
         return Distribution(counts, edges, totals.inverted)
     return Distribution.of(_values(frame, what, undeformed), edges)
 
@@ -375,8 +374,9 @@ def spread(
     frame: StepFrame, what: ColorBy, undeformed: Mesh | None = None
 ) -> tuple[float, float] | None:
     """Return the lowest and the highest value of the cells of a frame; None if all are inverted."""
-    if isinstance(frame.quality, PartQuality):
-        there = _MIDDLES[np.flatnonzero(frame.quality.all.counts)]
+    totals = frame.quality.of_mesh
+    if totals is not None:
+        there = _MIDDLES[np.flatnonzero(totals.fine_counts)]
         return (float(there[0]), float(there[-1])) if len(there) else None
     values = _values(frame, what, undeformed)
     right = values[np.isfinite(values)]

@@ -17,12 +17,12 @@ from slideviz.scene.marked_cells import IN_FRONT
 from slideviz.scene.passages import Period, matrices
 from slideviz.scene.sections import Instances, PolygonActor, plain_color
 from slideviz.scene.stage import Stage
+from slideviz.sections.cut import transformed
 from slideviz.sections.model import Section
-from slideviz.sections.polygons import Polygons
+from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import Label
-from slideviz.sections.threshold import CellsInRange
 from slideviz.session.colors import with_drawable_colors
-from slideviz.session.passages import keeps, moved
+from slideviz.session.passages import keeps
 from slideviz.session.section_cuts import Cuts, cut_frame, is_awaited
 from slideviz.session.state import Session
 from slideviz.terms import quantity_of
@@ -220,7 +220,7 @@ class FlatScene:
             return None
         own = self._all.points
         parts = [
-            moved(own, np.array(instance.user_matrix))
+            transformed(own, np.array(instance.user_matrix))
             for instance in self._instances.drawn.values()
         ]
         parts.append(own)

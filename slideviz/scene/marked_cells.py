@@ -16,7 +16,7 @@ from slideviz.scene import actors
 from slideviz.scene.actors import VALUES, part_shape
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
-from slideviz.session.inspect import inverted_cells, middles, nodes_of
+from slideviz.session.inspect import middles, nodes_of
 from slideviz.session.state import Session, StepFrame
 
 OUTLINE, FACES, DOT = "mark:outline", "mark:faces", "mark:dot"
@@ -162,7 +162,7 @@ class InvertedLayer(Layer):
     def _draw(self, frame: StepFrame, cut: list[IntArray]) -> None:
         """Draw the rings of a frame's inverted cells, only of those in ``cut`` if there is any."""
         own, count = frame.extra or frame, frame.quality.inverted
-        cells = inverted_cells(own)
+        cells = own.quality.inverted_cells()
         if cut:
             cells = cells[np.isin(cells, np.concatenate(cut))]
             count = len(cells)

@@ -15,7 +15,7 @@ from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
 from slideviz.scene.actors import CELL, POINT, VALUES, Band, DrawnBoundary, part_shape, see_through
 from slideviz.scene.stage import Layer, Stage
-from slideviz.sections.threshold import cells_in_range
+from slideviz.sections.polygons import cells_in_range
 from slideviz.session.state import Session, StepFrame
 from slideviz.terms import ROLES
 

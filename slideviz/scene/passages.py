@@ -13,7 +13,8 @@ from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
 from slideviz.scene.mesh import BoundaryLayer, CellLayer, ThresholdLayer
 from slideviz.scene.stage import KeyedLayer, Stage
-from slideviz.session.passages import find_period, moved, passages, passages_around
+from slideviz.sections.cut import transformed
+from slideviz.session.passages import find_period, passages, passages_around
 from slideviz.session.state import Session
 
 PALER = 0.45
@@ -122,7 +123,7 @@ class PassageLayer(KeyedLayer):
         drawn = [*self._cells.shapes(), *self._boundaries.shapes()]
         every = [np.asarray(shape.points) for shape in drawn]
         ends = outermost(np.concatenate(every))
-        return [pv.PolyData(moved(ends, matrix)) for matrix in self._matrices.values()]
+        return [pv.PolyData(transformed(ends, matrix)) for matrix in self._matrices.values()]
 
     def update(self, old: Session | None, new: Session) -> None:
         """Draw another state of the session, after the layers whose data sets are shared."""

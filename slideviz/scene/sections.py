@@ -16,10 +16,11 @@ from slideviz.scene.actors import VALUES
 from slideviz.scene.mesh import recolored
 from slideviz.scene.passages import Period, matrices
 from slideviz.scene.stage import Layer, Stage
+from slideviz.sections.cut import transformed
 from slideviz.sections.line import Box, box_around, trace
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
-from slideviz.session.passages import keeps, moved
+from slideviz.session.passages import keeps
 from slideviz.session.section_cuts import Cuts, can_cut, cut_frame, is_awaited
 from slideviz.session.state import Session, StepFrame
 
@@ -143,7 +144,7 @@ class SectionLayer(Layer):
     def _find_box(self, mesh: Mesh, neighbours: dict[int, FloatArray]) -> Box:
         """Return the corners of the box around a 2D mesh and its neighbouring passages."""
         own = mesh.points[self.cuts.cutter(mesh).used]
-        every = [own, *(moved(own, matrix) for matrix in neighbours.values())]
+        every = [own, *(transformed(own, matrix) for matrix in neighbours.values())]
         boxes = [box_around(points) for points in every]
         low = np.min([box[0] for box in boxes], axis=0)
         return low, np.max([box[1] for box in boxes], axis=0)

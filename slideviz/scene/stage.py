@@ -12,7 +12,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene.actors import LIFT, VALUES, draw_fine_edges, lookup_table
 from slideviz.scene.color_legend import STRIP
-from slideviz.sections.threshold import CellsInRange
+from slideviz.sections.polygons import CellsInRange
 from slideviz.session.state import Session, StepFrame
 
 USUAL_DPI = 72.0

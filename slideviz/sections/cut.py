@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 
@@ -12,8 +13,7 @@ from slideviz.mesh.elements import ELEMENTS, ElementType
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import padded
 from slideviz.sections.model import Section
-from slideviz.sections.polygons import Polygons, offsets_of
-from slideviz.sections.threshold import CellsInRange
+from slideviz.sections.polygons import CellsInRange, Polygons, offsets_of
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 
@@ -171,12 +171,31 @@ class Cutter:
         )
 
 
-def sides_of(cells: Cells, level: FloatArray) -> np.ndarray:
-    """Return a mask (m,) of the cells that have nodes with ``level`` (n,) below 0, and others."""
-    found, negative = np.zeros(len(cells), bool), level < 0
-    for ids, nodes in cells.by_type.values():
-        found[ids] = _patterns(nodes, negative) > 0
-    return found
+def crossed_cells(
+    mesh: Mesh, section: Section, matrices: Iterable[FloatArray], near: float = 0.0
+) -> np.ndarray:
+    """Return a mask (m,) of the cells with nodes on both sides of a section, or on it.
+
+    Parameters
+    ----------
+    matrices : iterable of (4, 4)
+        Transformations of the mesh: cells count that are cut after any of them.
+    near : float
+        Nodes at most so far from the section are on it.
+    """
+    crossed = np.zeros(len(mesh.cells), bool)
+    for matrix in matrices:
+        level = np.nan_to_num(section.distance(transformed(mesh.points, matrix)), nan=np.inf)
+        level[np.abs(level) <= near] = 0.0
+        at, starts = level[mesh.cells.connectivity], mesh.cells.offsets[:-1]
+        low, high = np.minimum.reduceat(at, starts), np.maximum.reduceat(at, starts)
+        crossed |= (low <= 0) & (high >= 0)
+    return crossed
+
+
+def transformed(points: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Return points (n, d) after a transformation (4, 4), (n, d)."""
+    return (padded(points) @ matrix[:3, :3].T + matrix[:3, 3])[:, : points.shape[1]]
 
 
 def _patterns(nodes: IntArray, negative: np.ndarray) -> np.ndarray:

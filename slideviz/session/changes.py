@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from slideviz.case.model import Case, FromFile, Motion, named
-from slideviz.sections.threshold import ONLY_INVERTED
+from slideviz.sections.polygons import ONLY_INVERTED
 from slideviz.session.opening import guess_by_name, has_ffd, with_periodicity
 from slideviz.session.state import PanelPlace, Run, Session, StepFrame, ViewState
 from slideviz.terms import SHOWN, ColorBy, Role

@@ -15,7 +15,7 @@ import numpy as np
 from slideviz.errors import SlidevizError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.quality import INVERTED, corner_jacobians, quality
+from slideviz.mesh.quality import INVERTED, corner_jacobians, lowest, quality
 from slideviz.mesh.surfaces import padded
 from slideviz.session.state import StepFrame
 from slideviz.system.atomic import atomic_write
@@ -91,12 +91,8 @@ def worst_cells(
     if frame.extra is not None:
         return _listed(frame, frame.extra, at, count)
     values = frame.values(what)
-    count = min(count, frame.quality.cells)
-    limit = np.partition(values[frame.quality.counted], count - 1)[count - 1]
-    near = np.flatnonzero(values <= limit)
-    if frame.quality.halo is not None:
-        near = near[~frame.quality.halo[near]]
-    cells = near[np.argsort(values[near], kind="stable")[:count]]
+    halo = frame.quality.halo
+    cells = lowest(values, count, None if halo is None else ~halo)
     history = np.stack([each.values(what)[cells] for each in frames])
     types = frame.mesh.cells.types[cells]
     return WorstCells(
@@ -131,14 +127,6 @@ def _listed(frame: StepFrame, extra: StepFrame, at: int, count: int) -> WorstCel
         "size-skew",
         numbers,
     )
-
-
-def inverted_cells(frame: StepFrame) -> IntArray:
-    """Return the ascending numbers (k,) of the inverted cells of a frame, without its halo."""
-    bad = frame.quality.status == INVERTED
-    if frame.quality.halo is not None:
-        bad &= ~frame.quality.halo
-    return np.flatnonzero(bad)
 
 
 def middles(mesh: Mesh, cells: IntArray) -> FloatArray:

@@ -27,7 +27,7 @@ from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.session.formats import holds_quality
-from slideviz.session.large import first_frame, is_large, read_boundary
+from slideviz.session.large import first_frame, frame_of, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.opening import open_mesh
 from slideviz.session.passages import find_period
@@ -347,6 +347,37 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         _precompute(frame)
         report(frame)
         going_on()
+
+
+def compute_in_file(
+    case: Case, first: StepFrame, output: Path, report: Report, stopped: Stopped
+) -> None:
+    """Deform a mesh from file to file; report the progress, and the last step as a `StepFrame`.
+
+    ``first`` is the undeformed frame, of the boundary.
+
+    Raises
+    ------
+    Cancelled
+        It was stopped; a file that was at ``output`` is as before.
+    """
+    from slideviz.session.inspect import WORST
+    from slideviz.solver.steps import Progress
+    from slideviz.streaming.run import stream
+
+    phases = {**PHASES, "read": "reading the boundary", "write": "copying the file"}
+
+    def progress(now: Progress) -> None:
+        raise_if_cancelled(stopped)
+        report(JobProgress(f"From file to file: {phases.get(now.phase, now.phase)}", overall(now)))
+
+    skin = first.mesh
+    assert skin.source is not None
+    done = stream(case.change(mesh_file=skin.source), output, report=progress, worst=WORST)
+    step = done.steps[-1]
+    now = skin.with_points(step.mesh.points)
+    frame = frame_of(now, skin, output, done.quality.totals, case.quality_metric)
+    report(replace(frame, step=replace(step, mesh=now)))
 
 
 _STARTS = {"classify": 0.0, "solve": 0.1, "evaluate": 0.5, "project": 0.7}

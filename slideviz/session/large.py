@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-from slideviz.formats.su2b.layout import BinaryFile, find_zone
+from slideviz.formats.su2b.layout import open_zone
 from slideviz.formats.su2b.read import is_su2b
 from slideviz.mesh.model import Mesh
-from slideviz.mesh.quality import quality
+from slideviz.mesh.quality import QualityTotals, quality
+from slideviz.session.inspect import WORST
 from slideviz.session.results import StepFrame
-from slideviz.session.whole import PartQuality, QualityTotals, measure_all, worst_frame
 from slideviz.solver.deform import free_memory
+from slideviz.streaming.quality import measure_mesh
 from slideviz.streaming.resources import NEEDED
 from slideviz.streaming.skin import read_skin
+from slideviz.streaming.source import CellBlock, FileSource
 from slideviz.terms import Metric
 
 LARGE_CELLS = 5_000_000
@@ -35,11 +39,10 @@ def is_large(path: Path, zone: int | None) -> bool:
     """
     if path.suffix.lower() != ".su2b" or not is_su2b(path):
         return False
-    with path.open("rb") as file:
-        place = find_zone(BinaryFile(path, file), zone)
+    with open_zone(path, zone) as (_, place):
+        cells = place.cells.count
     if place.dim == 2:  # all of its cells are what is drawn
         return False
-    cells = place.cells.count
     return cells > LARGE_CELLS or NEEDED["su2b"] * path.stat().st_size > free_memory()
 
 
@@ -63,10 +66,23 @@ def read_boundary(path: Path, zone: int | None, tick: Callable[[float], object])
 
 
 def first_frame(skin: Mesh, metric: Metric, tick: Callable[[float], object]) -> StepFrame:
-    """Return the undeformed frame of a mesh by its ``skin``, with the quality of all its cells."""
+    """Return the undeformed frame of a mesh by its ``skin``, with the quality of all its cells.
+
+    Raises
+    ------
+    MeshError
+        The file has a mistake.
+    OSError
+        It cannot be read, or there is no disk space for 9 bytes for each cell.
+    """
     assert skin.source is not None
-    totals = measure_all(skin.source, skin.zone, metric, tick)
-    return frame_of(skin, skin, skin.source, totals, metric)
+    folder = Path(tempfile.gettempdir())
+    with ExitStack() as stack:
+        source = FileSource.open(stack, (skin.source, skin.zone))
+        found = measure_mesh(
+            stack, folder, source, metric=metric, worst=WORST, may_fold=True, tick=tick
+        )
+    return frame_of(skin, skin, skin.source, found.totals, metric)
 
 
 def frame_of(now: Mesh, skin: Mesh, file: Path, totals: QualityTotals, metric: Metric) -> StepFrame:
@@ -82,6 +98,14 @@ def frame_of(now: Mesh, skin: Mesh, file: Path, totals: QualityTotals, metric: M
         The qualities of all its cells.
     """
     assert skin.source is not None
-    extra = worst_frame(skin.source, skin.zone, file, totals.worst, metric)
-    found = PartQuality.of(quality(now, skin, metric), totals)
-    return StepFrame(now, found, extra=extra, file=file)
+    with ExitStack() as stack:
+        source = FileSource.open(stack, (skin.source, skin.zone), moved=file)
+        worst = source.with_points(source.elements(totals.worst))
+    found = replace(quality(now, skin, metric), of_mesh=totals)
+    return StepFrame(now, found, extra=block_frame(worst, skin, metric), file=file)
+
+
+def block_frame(block: CellBlock, skin: Mesh, metric: Metric) -> StepFrame:
+    """Return some cells of a mesh as a frame, with their quality; ``skin`` is the mesh's."""
+    block = block.part_of(skin)
+    return StepFrame(block.mesh, quality(block.mesh, block.base, metric), base=block.base)

@@ -13,11 +13,9 @@ from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import Pair, find_pairs, pair_up
-from slideviz.mesh.surfaces import padded
-from slideviz.sections.cut import Cutter
+from slideviz.sections.cut import Cutter, transformed
 from slideviz.sections.model import Section
-from slideviz.sections.polygons import Polygons
-from slideviz.sections.threshold import CellsInRange
+from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.session.opening import guess_by_name
 
 WHOLE_NUMBER = 1e-3
@@ -116,16 +114,11 @@ def _power(pair: Pair, number: int) -> FloatArray:
     return matrix
 
 
-def moved(points: FloatArray, matrix: FloatArray) -> FloatArray:
-    """Return points (n, d) after a transformation (4, 4), (n, d)."""
-    return (padded(points) @ matrix[:3, :3].T + matrix[:3, 3])[:, : points.shape[1]]
-
-
 def keeps(section: Section, matrix: FloatArray) -> bool:
     """Return whether a transformation (4, 4) takes a section onto itself."""
     axis, origin = section.basis[2], np.asarray(section.origin)
     turned = matrix[:3, :3] @ axis
-    step = moved(origin[None], matrix)[0] - origin
+    step = transformed(origin[None], matrix)[0] - origin
     off = section.shape.keeps(section, turned, step)
     size = max(section.radius, float(np.linalg.norm(origin)), float(np.linalg.norm(step)))
     return bool(np.linalg.norm(np.cross(turned, axis)) <= _SAME and off <= _SAME * size)
@@ -147,7 +140,7 @@ def show_passages(
     for number, matrix in matrices.items():
         if keeps(section, matrix):
             base = cutter.show(points, section, only) if base is None else base
-            found[number] = base.with_points(moved(base.points, matrix))
+            found[number] = base.with_points(transformed(base.points, matrix))
         else:
-            found[number] = cutter.show(moved(points, matrix), section, only)
+            found[number] = cutter.show(transformed(points, matrix), section, only)
     return found

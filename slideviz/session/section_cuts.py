@@ -1,24 +1,142 @@
-"""The cuts of sections through the frame that is shown: made once, and shared by all views."""
+"""The cuts of sections through the frame that is shown: made once, and shared by all views.
+
+Of a mesh too large for memory, only the cells that a section cuts (a slab) are read. The cells are
+divided into groups in the order of the file. When the first section is cut, the whole file is read
+to find a bounding ball of each group. After that, only the groups are read whose balls the section
+meets.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from slideviz.mesh.model import Cells, FloatArray, Mesh
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
+from slideviz.mesh.quality import Quality
 from slideviz.mesh.surfaces import padded
-from slideviz.sections.cut import Cutter
-from slideviz.sections.model import SHAPES, Section, Triple
-from slideviz.sections.polygons import Polygons
+from slideviz.sections.cut import Cutter, transformed
+from slideviz.sections.model import ON_SECTION, SHAPES, Section, Triple
+from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.sections.shape import round_middle, triple
-from slideviz.sections.threshold import CellsInRange
-from slideviz.session.passages import moved
+from slideviz.session.large import block_frame
 from slideviz.session.results import StepFrame
-from slideviz.session.slabs import slab_of
 from slideviz.session.state import Session
-from slideviz.system.threads import in_parts
+from slideviz.streaming.source import CellBlock, FileSource, cut_cells
+from slideviz.system.threads import Tick, in_parts
+
+GROUP = 4096
+"""Number of cells of a group."""
+MOST = 1 << 18
+"""Most cells that are read at a time."""
+KEPT_SLABS = 8
+"""Most slabs of a frame that are cached."""
+
+
+@dataclass(frozen=True, eq=False)
+class Groups:
+    """Bounding balls of groups of `GROUP` cells, in the order of the file."""
+
+    centres: FloatArray
+    """(g, 3)."""
+    radii: FloatArray
+    """(g,)."""
+    scale: float
+    """The diagonal of the mesh's bounding box."""
+
+    @classmethod
+    def of(cls, source: FileSource, tick: Tick) -> Groups:
+        """Return the balls of a deformed mesh; the whole file is read."""
+        lows, highs = [], []
+        for block in source.blocks(tick, MOST):
+            mesh = block.mesh
+            at, starts = mesh.points[mesh.cells.connectivity], mesh.cells.offsets[:-1:GROUP]
+            lows.append(np.minimum.reduceat(at, starts))
+            highs.append(np.maximum.reduceat(at, starts))
+        low, high = np.concatenate(lows), np.concatenate(highs)
+        scale = float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
+        return cls((low + high) / 2.0, np.linalg.norm(high - low, axis=1) / 2.0, scale)
+
+    def met_by(self, section: Section) -> IntArray:
+        """Return the numbers (k,) of the groups that a section may cut."""
+        # The distance from the section changes at most as much as one moves.
+        reach = self.radii * (1.0 + 1e-9) + ON_SECTION * self.scale
+        return np.flatnonzero(np.abs(section.distance(self.centres)) <= reach)
+
+
+_GROUPS: WeakKeyDictionary[Mesh, Groups] = WeakKeyDictionary()
+_SLABS: WeakKeyDictionary[Mesh, dict[Section, StepFrame]] = WeakKeyDictionary()
+
+
+def cut_key(section: Section) -> Section:
+    """Return a section with defaults for all that does not change which cells it cuts."""
+    return replace(section, name="", shown=True, flat=False, whole=False)
+
+
+def slab_of(mesh: Mesh, section: Section) -> StepFrame | None:
+    """Return the slab of cells of a large mesh that a section cuts; None until it was read."""
+    return _SLABS.get(mesh, {}).get(cut_key(section))
+
+
+def keep_slab(mesh: Mesh, section: Section, slab: StepFrame) -> None:
+    """Cache the slab of cells that a section cuts, for `slab_of`."""
+    kept = _SLABS.setdefault(mesh, {})
+    while len(kept) >= KEPT_SLABS:
+        kept.pop(next(iter(kept)))
+    kept[cut_key(section)] = slab
+
+
+def read_slab(
+    frame: StepFrame, section: Section, report: Tick, going_on: Callable[[], object]
+) -> StepFrame:
+    """Return the slab of cells that a section cuts: a frame of its own, with their quality.
+
+    Raises
+    ------
+    MeshError
+        A file has changed, and has mistakes.
+    OSError
+        It cannot be read.
+    """
+    skin, metric = frame.mesh, frame.quality.metric
+    assert skin.source is not None
+    with ExitStack() as stack:
+        source = FileSource.open(stack, (skin.source, skin.zone), moved=frame.file or skin.source)
+        groups = _GROUPS.get(skin)
+        if groups is None:
+
+            def tick(part: float) -> None:
+                going_on()
+                report(0.8 * part)
+
+            groups = _GROUPS[skin] = Groups.of(source, tick)
+
+        def blocks() -> Iterator[CellBlock]:
+            for first, count in _runs(groups.met_by(section), source.n_cells):
+                going_on()
+                yield source.between(first, count)
+
+        slab = cut_cells(blocks(), section, near=ON_SECTION * groups.scale)
+    if len(slab.ids):
+        return block_frame(slab, skin, metric)
+    mesh, values, codes = slab.mesh, np.empty(0), np.empty(0, np.uint8)
+    none = Quality(values, values, values, codes, np.empty(0, np.int8), metric)
+    return StepFrame(mesh, none, base=mesh)
+
+
+def _runs(groups: IntArray, cells: int) -> Iterator[tuple[int, int]]:
+    """Yield first cell and number of cells of each run of consecutive groups, of `MOST` cells."""
+    most = MOST // GROUP
+    breaks = np.flatnonzero(np.diff(groups) != 1) + 1
+    for run in np.split(groups, breaks):
+        for k in range(0, len(run), most):
+            part = run[k : k + most]
+            first = int(part[0]) * GROUP
+            yield first, min(first + len(part) * GROUP, cells) - first
 
 
 def cell_points(mesh: Mesh) -> FloatArray:
@@ -139,7 +257,7 @@ class Cuts:
         if key not in self._found:
             while len(self._found) >= KEPT:
                 self._found.pop(next(iter(self._found)))
-            points = mesh.points if matrix is None else moved(mesh.points, matrix)
+            points = mesh.points if matrix is None else transformed(mesh.points, matrix)
             self._found[key] = cutter.show(points, section, only)
         return self._found[key]
 

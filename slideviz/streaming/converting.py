@@ -14,9 +14,9 @@ from slideviz.formats.binary_copy import BinaryLayout, binary_layout, write_layo
 from slideviz.formats.files import format_of
 from slideviz.formats.su2.text import Text, find_text
 from slideviz.formats.su2.write import require_text_names, text_of_parts
-from slideviz.formats.su2b.elements import element_blocks, elements_between
+from slideviz.formats.su2b.elements import element_blocks
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone, find_zones
-from slideviz.formats.su2b.read import read_elements
+from slideviz.formats.su2b.read import read_markers
 from slideviz.formats.su2b.write import (
     OTHER_ZONES,
     file_head,
@@ -25,10 +25,10 @@ from slideviz.formats.su2b.write import (
     require_binary_names,
     sentence_of_lost,
 )
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker
-from slideviz.streaming.measuring import Scratch
+from slideviz.mesh.model import Cells, FloatArray, IntArray
 from slideviz.streaming.resources import require_disk_space, text_size
 from slideviz.streaming.skin import index_of, read_skin
+from slideviz.streaming.source import FileSource, Scratch
 from slideviz.streaming.stream_input import part_of
 from slideviz.system.atomic import atomic_write
 from slideviz.system.threads import Tick
@@ -38,59 +38,43 @@ NEAR = 256
 """Elements with at most so many others between them are read in one piece."""
 
 
-def text_of_binary(
-    source: BinaryFile, place: ZonePlace, after: BinaryFile, folder: Path
-) -> Iterator[bytes]:
-    """Yield one zone of an SU2 binary mesh as an SU2 text, with the points in ``after``.
+def text_of_binary(source: FileSource, folder: Path) -> Iterator[bytes]:
+    """Yield an SU2 binary mesh as an SU2 text.
 
-    Parameters
-    ----------
-    source, place
-        The binary mesh, and the zone in it.
-    after : BinaryFile
-        A file with the new points where ``source`` has the old ones.
-    folder : Path
-        Where a scratch file is made if the cells are not in order in the binary file.
+    A scratch file is made in ``folder`` if the cells are not in order in the binary file.
     """
-    kind = source.point(place.dim)
 
     def points(i: int, j: int) -> FloatArray:
-        rows = after.array(place.points + i * kind.itemsize, j - i, kind, "the points")
-        return np.ascontiguousarray(rows["x"], np.float64)
+        return np.ascontiguousarray(source.points.rows(i, j - i)["x"], np.float64)
 
     with ExitStack() as stack:
-        where = _places(stack, source, place, folder)
+        where = _places(stack, source, folder)
 
         def cells(i: int, j: int) -> Cells:
             if where is None:
-                block = elements_between(source, place, place.cells, place.dim, i, j - i)
+                block = source.elements_at(i, j - i)
                 return Cells.from_types(block.types, block.nodes)
-            return _gathered(source, place, where[i:j])
+            return _gathered(source, where[i:j])
 
-        markers = tuple(
-            Marker(
-                m.name, read_elements(source, place, m.elements, place.dim - 1, lambda _: None)[0]
-            )
-            for m in place.markers
-        )
         yield from text_of_parts(
-            place.dim, (place.cells.count, cells), (place.n_points, points), markers
+            source.place.dim,
+            (source.n_cells, cells),
+            (source.n_points, points),
+            read_markers(source.file, source.place),
         )
 
 
-def _places(
-    stack: ExitStack, source: BinaryFile, place: ZonePlace, folder: Path
-) -> IntArray | None:
+def _places(stack: ExitStack, source: FileSource, folder: Path) -> IntArray | None:
     """Return the place of each cell among the elements of a file (m,); None where all are in order.
 
     They are in a scratch file in ``folder``, removed when ``stack`` closes.
     """
-    scratch: Scratch | None = None
-    for block in element_blocks(source, place, place.cells, place.dim):
+    place, scratch = source.place, None
+    for block in element_blocks(source.file, place, place.cells, place.dim):
         here = slice(block.first, block.first + len(block.ids))
         ids = index_of(block.ids)
         if scratch is None and not (isinstance(ids, slice) and ids == here):
-            scratch = Scratch(stack, folder, place.cells.count, np.int64)
+            scratch = Scratch(stack, folder, source.n_cells, np.int64)
             scratch.array[: block.first] = np.arange(block.first)
         if scratch is not None:
             scratch.array[ids] = np.arange(here.start, here.stop)
@@ -98,15 +82,14 @@ def _places(
     return None if scratch is None else scratch.array
 
 
-def _gathered(source: BinaryFile, place: ZonePlace, where: IntArray) -> Cells:
+def _gathered(source: FileSource, where: IntArray) -> Cells:
     """Return the elements at the places ``where`` (k,), in that order."""
     ordered = np.sort(where)
     cuts = np.flatnonzero(np.diff(ordered) > NEAR) + 1
     types, flats = [], []
     for part in np.split(ordered, cuts):
-        first, count = int(part[0]), int(part[-1] - part[0]) + 1
-        block = elements_between(source, place, place.cells, place.dim, first, count)
-        some = Cells.from_types(block.types, block.nodes).take(part - first)
+        block = source.elements_at(int(part[0]), int(part[-1] - part[0]) + 1)
+        some = Cells.from_types(block.types, block.nodes).take(part - part[0])
         types.append(some.types)
         flats.append(some.connectivity)
     found = Cells.from_types(np.concatenate(types), np.concatenate(flats))
@@ -220,9 +203,9 @@ def _to_text(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tic
 
 def _text_blocks(binary: BinaryFile, places: Sequence[ZonePlace], folder: Path) -> Iterator[bytes]:
     if len(places) == 1:
-        yield from text_of_binary(binary, places[0], binary, folder)
+        yield from text_of_binary(FileSource.of(binary, places[0]), folder)
         return
     yield f"NZONE= {len(places)}\n".encode()
     for number, place in enumerate(places, 1):
         yield f"IZONE= {number}\n".encode()
-        yield from text_of_binary(binary, place, binary, folder)
+        yield from text_of_binary(FileSource.of(binary, place), folder)

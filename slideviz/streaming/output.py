@@ -13,19 +13,21 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
 from slideviz.errors import MeshError
-from slideviz.formats.su2b.elements import element_block
-from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.formats.su2b.partial import Partial, partial_copy, partial_file
 from slideviz.rbf.problem import PhaseTimer
 from slideviz.streaming.converting import text_of_binary
 from slideviz.streaming.interior import InteriorDisplacer
-from slideviz.streaming.measuring import MeasuredBlock, PointFiles, QualityCollector, measured
-from slideviz.streaming.orientation import facet_sums, require_consistent_orientation
+from slideviz.streaming.quality import (
+    MeasuredBlock,
+    RunCollector,
+    facet_sums,
+    require_consistent_orientation,
+)
+from slideviz.streaming.source import FileSource, PointTable
 from slideviz.streaming.stream_input import StreamInput, text_blocks
 from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_no_input
@@ -49,7 +51,7 @@ class Output:
     def __init__(
         self,
         stack: ExitStack,
-        given: StreamInput,
+        mesh_input: StreamInput,
         metric: Metric,
         output: Path,
         timer: PhaseTimer,
@@ -60,31 +62,29 @@ class Output:
         resume: bool,
         replaces: Path | None,
     ) -> None:
-        self._stack, self._given, self._path, self._watch = stack, given, output, timer
+        self._stack, self._input, self._path, self._timer = stack, mesh_input, output, timer
         self._metric, self._ranks, self._is_text, self._replaces = metric, ranks, is_text, replaces
-        self._mesh_file, self._zone = given.path, given.zone
-        source = BinaryFile(given.path, stack.enter_context(given.path.open("rb")))
-        self._place = find_zone(source, given.zone)
-        self.files = PointFiles(source, source, self._place)
-        """The undeformed and the deformed points. Before the first call of a method that writes or
-        measures, the deformed ones are the undeformed."""
-        about = f"{about} {is_text} {parts(self._place.n_points)[0]}"
+        self._mesh_file, self._zone = mesh_input.path, mesh_input.zone
+        self.source = FileSource.open(stack, (mesh_input.path, mesh_input.zone))
+        """The undeformed mesh."""
+        points, n_points = self.source.points, self.source.n_points
+        about = f"{about} {is_text} {parts(n_points)[0]}"
         if is_text:
             require_no_input(output, MeshError, replaces)
-            made = partial_file(output, given.path.stat().st_size, about, resume=resume)
+            made = partial_file(output, mesh_input.path.stat().st_size, about, resume=resume)
         else:
             made = partial_copy(
                 output,
-                given.path,
+                mesh_input.path,
                 about,
-                (_byte(source, self._place, 0), _byte(source, self._place, self._place.n_points)),
+                (points.byte(0), points.byte(n_points)),
                 resume=resume,
                 replaces=replaces,
                 ranks=ranks,
             )
         self._partial = stack.enter_context(made)
         self._is_ready = self._is_oriented = False
-        self._rating: QualityCollector | None = None
+        self._collector: RunCollector | None = None
 
     def _opened(self) -> Partial:
         """Return the file for the deformed points, after waiting until it can be written.
@@ -92,19 +92,17 @@ class Output:
         It is a copy of the mesh file; where the output is a text, it has only points.
         """
         if not self._is_ready:
-            with self._watch.phase("write") as tick:
+            with self._timer.phase("write") as tick:
                 self._partial.ready(tick)
                 self._check(self._partial, tick)
-            after = self.files.before.of(self._partial.file)
-            self.files = PointFiles(self.files.before, after, self._place)
             self._is_ready = True
         return self._partial
 
     def _check(self, partial: Partial, tick: Callable[[float], object]) -> None:
         """Take the parts as not done from the first one on whose bytes do not have its checksum."""
-        done = parts(self._place.n_points)[: partial.done]
-        given = self._mesh_file, self._zone, partial.path
-        with self._ranks.sharing(checking, *given) as do:
+        done = parts(self.source.n_points)[: partial.done]
+        arguments = self._mesh_file, self._zone, partial.path
+        with self._ranks.sharing(checking, *arguments) as do:
             for k, found in enumerate(do(done)):
                 if found != partial.sums[k]:
                     partial.note(partial.sums[:k])
@@ -113,10 +111,10 @@ class Output:
 
     def found(self) -> str:
         """Return a sentence on how much a stopped run has left to go on with."""
-        done, total = self._opened().done, len(parts(self._place.n_points))
+        done, total = self._opened().done, len(parts(self.source.n_points))
         if done:
             return f"{self._path.name}: goes on after {done} of {total} parts"
-        if self._given.is_reused:
+        if self._input.is_reused:
             return (
                 f"{self._path.name}: goes on with the text as it was read; no part is written yet"
             )
@@ -131,20 +129,20 @@ class Output:
         Points that are not ``final`` are those of a trial number of steps: all are written, and a
         stopped run does not go on with them.
         """
-        partial, total = self._opened(), self._place.n_points
+        partial, total = self._opened(), self.source.n_points
         if not final and partial.done:
             partial.note([])
         # Ranks must see what others write, and none write a page back with old bytes of others.
         synced = final or self._ranks.size > 1
-        given = self._mesh_file, self._zone, partial.path, displacer.without_cells(), synced
-        with self._watch.phase("evaluate") as tick, self._ranks.sharing(moving, *given) as do:
+        arguments = self._mesh_file, self._zone, partial.path, displacer.without_cells(), synced
+        with self._timer.phase("evaluate") as tick, self._ranks.sharing(moving, *arguments) as do:
             todo = parts(total, partial.done)
             for (_, end), checksum in zip(todo, do(todo), strict=True):
                 if final:
                     partial.note([*partial.sums, checksum])
                 tick(end / total)
 
-    def rating(self, listed: int) -> QualityCollector:
+    def measure(self, listed: int) -> RunCollector:
         """Return the quality of all cells, before and after, with ``listed`` inverted ones.
 
         Raises
@@ -152,21 +150,21 @@ class Output:
         MeshError
             Cells are numbered in both directions, and some are folded.
         """
-        partial, count = self._opened(), self._place.cells.count
-        metric = self._metric
-        if self._rating is None:
-            self._rating = QualityCollector(self._stack, self._path.parent, count, metric)
-        self._rating.reset()
-        given = self._mesh_file, self._zone, partial.path, metric, listed
-        with self._watch.phase("quality") as tick, self._ranks.sharing(measuring, *given) as do:
+        partial, count = self._opened(), self.source.n_cells
+        metric, folder = self._metric, self._path.parent
+        if self._collector is None:
+            self._collector = RunCollector(self._stack, folder, count, metric)
+        self._collector.reset()
+        arguments = self._mesh_file, self._zone, partial.path, metric, listed
+        with self._timer.phase("quality") as tick, self._ranks.sharing(measuring, *arguments) as do:
             for (_, end), found in zip(parts(count), do(parts(count)), strict=True):
-                self._rating.add(found, listed)
+                self._collector.add(found, listed)
                 tick(end / count)
-        if self._rating.has_both_orientations and not self._is_oriented:
+        if len(self._collector.after.signs) > 1 and not self._is_oriented:
             with self._ranks.sharing(facet_sums, self._mesh_file, self._zone) as do:
-                require_consistent_orientation(do(parts(count)), self.files.before.name)
+                require_consistent_orientation(do(parts(count)), self.source.file.name)
             self._is_oriented = True
-        return self._rating
+        return self._collector
 
     def finish(self, ffd: bytes | None) -> None:
         """Write the output where it is a text; ``ffd`` are its boxes, None: those of the mesh.
@@ -176,18 +174,19 @@ class Output:
         if not self._is_text:
             return
         partial, written = self._opened(), 0
-        before, after = self.files.before, self.files.after
-        if self._given.text is None:
+        source, place = self.source.file, self.source.place
+        if self._input.text is None:
             folder = Path(os.path.realpath(self._path)).parent
-            blocks = text_of_binary(before, self._place, after, folder)
+            moved = FileSource.of(source, place, source.of(partial.file))
+            blocks = text_of_binary(moved, folder)
         else:
-            blocks = text_blocks(self._given, before, self._place, partial.path, ffd)
-        with self._watch.phase("write") as tick:
+            blocks = text_blocks(self._input, source, place, partial.path, ffd)
+        with self._timer.phase("write") as tick:
             with atomic_write(self._path, replaces=self._replaces) as file:
                 for block in blocks:
                     file.write(block)
                     written += len(block)
-                    tick(min(1.0, written / self._given.text_size(self._place)))
+                    tick(min(1.0, written / self._input.text_size(place)))
             tick(1.0)
         partial.remove()
 
@@ -207,21 +206,18 @@ def moving(
     Undeformed points are read from a zone of ``path``, deformed ones written to ``partial``; with
     ``synced`` they are on the disk when the function returns.
     """
-    with path.open("rb") as file:
-        source, place = _zone(path, file, zone)
+    with ExitStack() as stack:
+        points = FileSource.open(stack, (path, zone)).points
         out = os.open(partial, os.O_WRONLY | os.O_NOFOLLOW | (os.O_DSYNC if synced else 0))
         try:
-            yield lambda part: move(source, place, displacer, out, part)
+            yield lambda part: move(points, displacer, out, part)
         finally:
             os.close(out)
 
 
-def move(
-    source: BinaryFile, place: ZonePlace, displacer: InteriorDisplacer, out: int, part: Part
-) -> int:
+def move(table: PointTable, displacer: InteriorDisplacer, out: int, part: Part) -> int:
     """Write the deformed points of a part to a file descriptor; return the CRC-32 of its bytes."""
-    at = _byte(source, place, part[0])
-    rows = source.array(at, part[1] - part[0], source.point(place.dim), "the points")
+    at, rows = table.byte(part[0]), table.rows(part[0], part[1] - part[0])
     points = rows["x"].astype(np.float64)
     for now in displacer.after_steps(np.arange(*part), points):
         points = now
@@ -237,16 +233,9 @@ def move(
 @contextmanager
 def checking(path: Path, zone: int | None, partial: Path) -> Iterator[Callable[[Part], int]]:
     """Context with a function that returns the CRC-32 of a part as it is in the file."""
-    with path.open("rb") as file, partial.open("rb") as other:
-        source, place = _zone(path, file, zone)
-        kind, written = source.point(place.dim), source.of(other)
-
-        def check(part: Part) -> int:
-            at = _byte(source, place, part[0])
-            rows = written.array(at, part[1] - part[0], kind, "the points")
-            return zlib.crc32(rows.view(np.uint8).data)
-
-        yield check
+    with ExitStack() as stack:
+        points = FileSource.open(stack, (path, zone), moved=partial).points
+        yield lambda part: zlib.crc32(points.rows(part[0], part[1] - part[0]).view(np.uint8).data)
 
 
 @contextmanager
@@ -254,23 +243,8 @@ def measuring(
     path: Path, zone: int | None, partial: Path, metric: Metric, listed: int
 ) -> Iterator[Callable[[Part], MeasuredBlock]]:
     """Context with a function that measures the quality of the cells of a part."""
-    with path.open("rb") as file, partial.open("rb") as other:
-        source, place = _zone(path, file, zone)
-        files = PointFiles(source, source.of(other), place)
-
-        def measure(part: Part) -> MeasuredBlock:
-            size = part[1] - part[0]
-            block = element_block(source, place, place.cells, place.dim, part[0], size)
-            return measured(block, *files.cells_of(block), metric, listed)
-
-        yield measure
-
-
-def _zone(path: Path, file: BinaryIO, zone: int | None) -> tuple[BinaryFile, ZonePlace]:
-    source = BinaryFile(path, file)
-    return source, find_zone(source, zone)
-
-
-def _byte(source: BinaryFile, place: ZonePlace, point: int) -> int:
-    """Return the place of the point with the number ``point`` in the file, in bytes."""
-    return place.points + point * source.point(place.dim).itemsize
+    with ExitStack() as stack:
+        source = FileSource.open(stack, (path, zone), moved=partial)
+        yield lambda part: MeasuredBlock.of(
+            source.between(part[0], part[1] - part[0]), metric, listed
+        )

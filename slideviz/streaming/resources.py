@@ -11,7 +11,7 @@ from slideviz.errors import MeshError
 from slideviz.formats.binary_copy import BinaryLayout
 from slideviz.formats.files import format_of
 from slideviz.formats.su2.text import find_text
-from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone
+from slideviz.formats.su2b.layout import ZonePlace, open_zone
 from slideviz.formats.su2b.partial import names_of
 from slideviz.solver.deform import free_memory
 from slideviz.system.atomic import reason_of
@@ -98,11 +98,9 @@ def bytes_of_text(layout: BinaryLayout, is_text: bool, later: int) -> int:
 
 def bytes_of_binary(path: Path, zone: int | None, *, is_text: bool, later: int) -> int:
     """Return the most bytes on the disk at a time in the run of a binary mesh (`bytes_of_text`)."""
-    with path.open("rb") as file:
-        source = BinaryFile(path, file)
-        place = find_zone(source, zone)
-    result = text_size(place) if is_text else source.size
-    points = place.n_points * source.point(place.dim).itemsize if is_text else 0
+    with open_zone(path, zone) as (source, place):
+        result = text_size(place) if is_text else source.size
+        points = place.n_points * source.point(place.dim).itemsize if is_text else 0
     cells = place.cells.count
     return result + CELL_BYTES * cells + max(points, later * cells)
 

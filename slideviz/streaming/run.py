@@ -30,8 +30,8 @@ from slideviz.solver.growth import Farthest, stray_warning
 from slideviz.solver.setup import make_setup
 from slideviz.solver.stepping import Stepping
 from slideviz.streaming.interior import InteriorDisplacer
-from slideviz.streaming.measuring import folded_steps
 from slideviz.streaming.output import Output
+from slideviz.streaming.quality import folded_steps
 from slideviz.streaming.stream_input import open_for_run, require_su2
 from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import give_back
@@ -56,20 +56,20 @@ class RemainingTime:
 
     Parameters
     ----------
-    tell : callable
+    report : callable
         Called with each `Progress`, its ``left`` filled in.
     stages : str
         Names of `SECONDS`, in order.
     """
 
-    def __init__(self, tell: Callable[[Progress], None], *stages: str) -> None:
-        self._tell, self._rest = tell, list(stages)
+    def __init__(self, report: Callable[[Progress], None], *stages: str) -> None:
+        self._report, self._left_stages = report, list(stages)
         self._spent = self._usual = 0.0
         self._begin, self._part = monotonic(), 0.0
 
     def next(self) -> None:
         """Begin the next stage."""
-        done = self._rest.pop(0)
+        done = self._left_stages.pop(0)
         if done != "solve":
             self._spent += monotonic() - self._begin
             self._usual += SECONDS[done]
@@ -77,18 +77,18 @@ class RemainingTime:
 
     def __call__(self, progress: Progress) -> None:
         """Pass a progress on, with the seconds that are left."""
-        stage = self._rest[0]
+        stage = self._left_stages[0]
         if stage == "solve":
             self._part = (progress.step - 1) / progress.total
             if progress.phase == "classify":  # which is done once, and not for each step
                 self._begin = monotonic()
         elif progress.phase == ("read" if stage == "text" else stage):
             self._part = max(self._part, progress.fraction)
-        self._tell(replace(progress, left=self._left()))
+        self._report(replace(progress, left=self._left()))
 
     def _left(self) -> float | None:
         """Return an estimate of the seconds that are left; None before there is enough evidence."""
-        stage, now = self._rest[0], monotonic() - self._begin
+        stage, now = self._left_stages[0], monotonic() - self._begin
         spent, usual = self._spent, self._usual
         if stage != "solve":
             spent, usual = spent + now, usual + SECONDS[stage] * self._part
@@ -98,24 +98,25 @@ class RemainingTime:
         own = max(pace * SECONDS[stage] - now, 0.0)
         if self._part >= SURE:
             own = now * (1.0 - self._part) / self._part
-        return own + pace * sum(SECONDS[later] for later in self._rest[1:])
+        return own + pace * sum(SECONDS[later] for later in self._left_stages[1:])
 
 
-Tell = Callable[[Progress], None]
+ReportProgress = Callable[[Progress], None]
 
 
 @dataclass(frozen=True, eq=False)
-class StreamedRun:
-    """The outcome of a streamed run."""
+class RunResult:
+    """The outcome of a run, in memory or from file to file."""
 
-    skin: Mesh
-    """The undeformed points of the skin; it has no cells, and its markers have no elements."""
+    mesh: Mesh
+    """The undeformed mesh; of one in a file the points of its skin, without cells and elements of
+    markers."""
     steps: tuple[Step, ...]
-    """Their meshes are the deformed skin, their ``node_counts`` those of the whole mesh."""
+    """Their meshes are the deformed ``mesh``, their ``node_counts`` those of the whole mesh."""
     quality: Quality
     undeformed: Quality
-    """`quality`, `undeformed`: quality of all cells after and before the run; without ``size`` and
-    ``skew``."""
+    """`quality`, `undeformed`: quality of all cells after and before the run; of a mesh in a file
+    without ``size`` and ``skew``."""
     folded: dict[int, tuple[int, int]]
     """dict of int to (int, int): VTK type of inverted cells, and the step after which they are
     first inverted, by cell number; at most ``listed``, those with the lowest numbers."""
@@ -128,15 +129,16 @@ def stream(
     output: Path,
     *,
     file_format: FileFormat | None = None,
-    tell: Tell = lambda _: None,
+    report: ReportProgress = lambda _: None,
     note: Callable[[str], object] = lambda _: None,
     warn: Callable[[str], object] = lambda _: None,
     resume: bool = False,
     replaces: Path | None = None,
     listed: int = 100,
+    worst: int = 0,
     later: int = 0,
     ranks: SerialPool = SERIAL,
-) -> StreamedRun:
+) -> RunResult:
     """Deform the mesh of a case from file to file, with only its skin in memory; return numbers.
 
     Parameters
@@ -145,7 +147,7 @@ def stream(
         The file of the deformed mesh, written whole or not at all.
     file_format : {"su2", "su2b"}, optional
         The format of ``output``; None: by its ending.
-    tell : callable
+    report : callable
         Called often with a ``Progress``; an exception it raises ends the run at once.
     note : callable
         Called with a sentence on what ``resume`` found.
@@ -157,6 +159,8 @@ def stream(
         An input file that the output may overwrite.
     listed : int
         Most inverted cells whose first inverted step is found.
+    worst : int
+        As for `slideviz.mesh.quality.quality_totals`.
     later : int
         Bytes for each cell that the caller writes beside the output afterwards: the disk must
         have room for them, too.
@@ -177,11 +181,11 @@ def stream(
     total = max(1, case.steps)
     is_text = (file_format or output.suffix.lower().removeprefix(".")) == "su2"
     first = "text" if require_su2(path, case.mesh_format) == "su2" else "read"
-    remaining = RemainingTime(tell, first, "solve", "evaluate", "quality", *("write",) * is_text)
+    remaining = RemainingTime(report, first, "solve", "evaluate", "quality", *("write",) * is_text)
     timer = PhaseTimer(lambda phase, part: remaining(Progress(total, total, phase, part)))
     with ExitStack() as stack:
         with timer.phase("read") as tick:
-            given = stack.enter_context(
+            mesh_input = stack.enter_context(
                 open_for_run(
                     output,
                     path,
@@ -198,7 +202,7 @@ def stream(
             )
         out = Output(
             stack,
-            given,
+            mesh_input,
             case.quality_metric,
             output,
             timer,
@@ -213,7 +217,7 @@ def stream(
 
         def read() -> Mesh:
             with timer.phase("read") as tick:
-                skin = given.skin(tick, ranks)
+                skin = mesh_input.skin(tick, ranks)
             remaining.next()
             return skin
 
@@ -222,28 +226,30 @@ def stream(
         remaining.next()
         out.displace(displacer, final=True)
         remaining.next()
-        rating = out.rating(listed)
-        folded = folded_steps(displacer, out.files, rating.inverted)
+        measured = out.measure(listed)
+        folded = folded_steps(displacer, out.source, measured.inverted)
         moved = displacer.steps[-1].mesh.origin.ffd
         if is_text:
             remaining.next()
         out.finish(None if moved is displacer.skin.origin.ffd else moved)
-    return StreamedRun(
+    return RunResult(
         displacer.skin,
-        _of_whole(displacer, rating.farthest),
-        rating.quality(),
-        rating.undeformed(),
+        _of_whole(displacer, measured.farthest),
+        measured.after.quality(worst),
+        measured.before.quality(),
         folded,
         timer.seconds,
     )
 
 
-def _solved(case: Case, read: Callable[[], Mesh], out: Output, tell: Tell) -> InteriorDisplacer:
+def _solved(
+    case: Case, read: Callable[[], Mesh], out: Output, report: ReportProgress
+) -> InteriorDisplacer:
     """Read and deform the skin; return what displaces the rest of the mesh.
 
     With STEPS= auto, trials write the points of the whole mesh to ``out`` to rate it.
     """
-    timer = PhaseTimer(lambda phase, part: tell(Progress(1, max(1, case.steps), phase, part)))
+    timer = PhaseTimer(lambda phase, part: report(Progress(1, max(1, case.steps), phase, part)))
     skin = read()
     assert skin.part is not None
     give_back()
@@ -263,9 +269,9 @@ def _solved(case: Case, read: Callable[[], Mesh], out: Output, tell: Tell) -> In
 
         def rate(steps: Sequence[Step]) -> Quality:
             out.displace(InteriorDisplacer(skin, lean, steps), final=False)
-            return out.rating(0).quality()
+            return out.measure(0).after.quality()
 
-        steps = tuple(all_steps(Stepping(case, skin, setup, tell, timer.seconds, rate)))
+        steps = tuple(all_steps(Stepping(case, skin, setup, report, timer.seconds, rate)))
     return InteriorDisplacer(skin, lean, steps)
 
 

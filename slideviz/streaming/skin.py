@@ -22,8 +22,8 @@ from slideviz.formats.su2.keyword_blocks import boxes_elsewhere
 from slideviz.formats.su2.text import Text
 from slideviz.formats.su2.text import boundaries_elsewhere as text_boundaries_elsewhere
 from slideviz.formats.su2b.elements import BLOCK, ElementBlock, element_block, require_used
-from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone
-from slideviz.formats.su2b.read import boundaries_elsewhere, point_block, read_elements
+from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zone
+from slideviz.formats.su2b.read import boundaries_elsewhere, point_block, read_markers
 from slideviz.mesh.check import LARGEST, first_fault
 from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import (
@@ -102,15 +102,8 @@ def read_skin(
     OSError
         It cannot be read.
     """
-    with path.open("rb") as file:
-        source = BinaryFile(path, file)
-        place = find_zone(source, zone)
-        markers = [
-            Marker(
-                m.name, read_elements(source, place, m.elements, place.dim - 1, lambda _: None)[0]
-            )
-            for m in place.markers
-        ]
+    with open_zone(path, zone) as (source, place):
+        markers = read_markers(source, place)
         used = np.zeros(place.n_points, bool)
         for marker in markers:
             used[marker.nodes] = True
@@ -190,9 +183,7 @@ def _cells_near(
     ``boundary`` (k,) are the boundary's nodes; the function's argument is the place of the block's
     first cell.
     """
-    with path.open("rb") as file:
-        source = BinaryFile(path, file)
-        place = find_zone(source, zone)
+    with open_zone(path, zone) as (source, place):
         on = np.zeros(place.n_points, bool)
         on[boundary] = True
 
@@ -291,9 +282,7 @@ def _points_near(
     Its argument is the number of the block's first point, and ascending nodes (k,) in the block. It
     returns their points (k, d) and the outermost points of the block.
     """
-    with path.open("rb") as file:
-        source = BinaryFile(path, file)
-        place = find_zone(source, zone)
+    with open_zone(path, zone) as (source, place):
 
         def read(task: tuple[int, IntArray]) -> tuple[FloatArray, Outer]:
             first, nodes = task

@@ -20,7 +20,7 @@ from slideviz.formats.su2.lines import Piece
 from slideviz.formats.su2.text import Text, find_text
 from slideviz.formats.su2.write import box_edits, moved_rows, patched_blocks, require_text_names
 from slideviz.formats.su2b.copying import checksums
-from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone
+from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zone
 from slideviz.formats.su2b.partial import BINARY, finish_head, partial_file
 from slideviz.formats.su2b.write import (
     OTHER_ZONES,
@@ -233,18 +233,16 @@ def _lost_in_text(output: Path, path: Path, zone: int | None) -> str:
     MeshError
         The name of a boundary cannot be written in a text.
     """
-    with path.open("rb") as file:
-        source = BinaryFile(path, file)
-        place = find_zone(source, zone)
-    name = printable(path.name)
+    with open_zone(path, zone) as (source, place):
+        name = printable(path.name)
     require_text_names(name, (marker.name for marker in place.markers))
     return sentence_of_lost(output, name, [OTHER_ZONES] * (source.zones > 1), ".su2b")
 
 
 def text_blocks(
-    given: StreamInput, source: BinaryFile, place: ZonePlace, after: Path, ffd: bytes | None
+    mesh_input: StreamInput, source: BinaryFile, place: ZonePlace, after: Path, ffd: bytes | None
 ) -> Iterator[bytes]:
-    """Yield the text of ``given`` block by block, with the coordinates in the file ``after``.
+    """Yield the text of ``mesh_input`` block by block, with the coordinates in the file ``after``.
 
     Parameters
     ----------
@@ -255,14 +253,14 @@ def text_blocks(
     ffd : bytes or None
         Boxes for free-form deformation, in place of those in the text; None keeps these.
     """
-    text = given.text
+    text = mesh_input.text
     assert text is not None
     raw, kind = text.lines.raw, source.point(place.dim)
     edits: Sequence[tuple[int, int, bytes]] = ()
     if ffd is not None:
         bounds = text.zone.bounds
         edits = box_edits(raw, text.unknown, text.lines.byte(bounds.end), ffd)
-    with given.path.open("rb") as old, after.open("rb") as new:
+    with mesh_input.path.open("rb") as old, after.open("rb") as new:
 
         def rows(piece: Piece) -> bytes:
             at, size = place.points + piece.row * kind.itemsize, piece.rows * kind.itemsize

@@ -41,21 +41,21 @@ class SerialPool:
 
     @contextmanager
     def sharing(
-        self, make: WorkerFactory[Task, Result], *given: Any
+        self, make: WorkerFactory[Task, Result], *arguments: Any
     ) -> Iterator[RunTasks[Task, Result]]:
         """Context with a function that does tasks and yields their results in order.
 
         Parameters
         ----------
         make : callable
-            A function at the top level of a module. Each rank calls it with ``given``; it returns a
-            context manager with the function that does one task, in any thread, and opens the files
-            it needs by itself.
-        given : object
+            A function at the top level of a module. Each rank calls it with ``arguments``; it
+            returns a context manager with the function that does one task, in any thread, and opens
+            the files it needs by itself.
+        arguments : object
             Arguments of ``make``; they, tasks and results are pickled if there are several ranks.
         """
         threads = cores()
-        with make(*given) as work, at_most(1), ThreadPoolExecutor(threads) as pool:
+        with make(*arguments) as work, at_most(1), ThreadPoolExecutor(threads) as pool:
             try:
                 yield lambda tasks: submit_ahead(pool, threads, work, tasks)
             finally:
@@ -127,19 +127,19 @@ class Ranks(SerialPool):
 
     @contextmanager
     def sharing(
-        self, make: WorkerFactory[Task, Result], *given: Any
+        self, make: WorkerFactory[Task, Result], *arguments: Any
     ) -> Iterator[RunTasks[Task, Result]]:
         """Context with a function that does tasks on all ranks and yields their results in order.
 
         Only rank 0 calls it; `SerialPool.sharing` has the parameters.
         """
-        content = pickle.dumps((make, given), 5)
+        content = pickle.dumps((make, arguments), 5)
         self._send_all(True)
         self._broadcast(content)
         try:
             with (
                 limited(self.threads) as limit,
-                make(*given) as work,
+                make(*arguments) as work,
                 # The other threads of this one wait for messages, which must not wait for it.
                 ThreadPoolExecutor(1, "slideviz-rank", limit) as pool,
             ):
@@ -154,12 +154,12 @@ class Ranks(SerialPool):
         with limited(self.threads) as limit:
             limit()
             while self._received(0.01)[1] is not None:
-                make, given = pickle.loads(self._broadcast(b""))
+                make, arguments = pickle.loads(self._broadcast(b""))
                 with ExitStack() as stack:
-                    self._serve(stack, make, given)
+                    self._serve(stack, make, arguments)
 
     def _serve(
-        self, stack: ExitStack, make: WorkerFactory[Any, Any], given: tuple[Any, ...]
+        self, stack: ExitStack, make: WorkerFactory[Any, Any], arguments: tuple[Any, ...]
     ) -> None:
         """Do the tasks of one `sharing` context, and send each result or error to rank 0.
 
@@ -167,7 +167,7 @@ class Ranks(SerialPool):
         """
         fault, work = None, None
         try:
-            work = stack.enter_context(make(*given))
+            work = stack.enter_context(make(*arguments))
         except Exception as problem:
             fault = self._portable(problem)
         while (order := self._received(0.001)[1]) is not None:
@@ -190,7 +190,7 @@ class Ranks(SerialPool):
         idle = list(range(1, self.size))
         own: Future[None] | None = None
         found: dict[int, tuple[Any, BaseException | None]] = {}
-        given = done = 0
+        begun = done = 0
 
         def do(index: int) -> None:
             try:
@@ -199,14 +199,14 @@ class Ranks(SerialPool):
                 found[index] = None, problem
 
         while done < len(tasks):
-            while given < min(len(tasks), done + AHEAD * self.size) and (idle or own is None):
+            while begun < min(len(tasks), done + AHEAD * self.size) and (idle or own is None):
                 if own is None:
-                    own = pool.submit(do, given)
+                    own = pool.submit(do, begun)
                 else:
                     rank = idle.pop()
                     self._owing.add(rank)
-                    self.comm.send((given, tasks[given]), rank)
-                given += 1
+                    self.comm.send((begun, tasks[begun]), rank)
+                begun += 1
             rank, answer = self._received(0.001, own)
             if own is not None and own.done():
                 own = None

@@ -24,10 +24,11 @@ from slideviz.scene.flat_scene import FlatScene
 from slideviz.scene.mesh import looks_inside
 from slideviz.scene.pick import to_display
 from slideviz.scene.sections import plain_color
+from slideviz.sections.cut import transformed
 from slideviz.sections.model import Section
 from slideviz.session import changes, section_cuts
 from slideviz.session.opening import open_mesh
-from slideviz.session.passages import find_period, moved
+from slideviz.session.passages import find_period
 from slideviz.session.section_cuts import KEPT, Cuts
 from slideviz.session.state import Session, StepFrame
 
@@ -276,7 +277,9 @@ def test_a_click_on_a_section_of_a_neighbour_is_none_on_glass(scene, stator):
     session = opened(scene, stator.mesh, stator.case, passages=1, color_by="size-skew")
     scene.update(changes.add_section(session, section))
     twin = scene.plotter.actors["section:0:1"]
-    points = moved(middles(scene.sections.drawn["section:0"].polygons), np.array(twin.user_matrix))
+    points = transformed(
+        middles(scene.sections.drawn["section:0"].polygons), np.array(twin.user_matrix)
+    )
     asked = []
     for x, y in to_display(scene.plotter, points)[::7]:
         scene.update(session)
@@ -366,7 +369,7 @@ def test_neighbours_show_the_section_too(scene, stator):
     base, twin = scene.sections.drawn["section:0"].shown, scene.plotter.actors["section:0:1"]
     assert twin.GetMapper() is base.mapper
     pair = find_period(stator.mesh, stator.case)
-    turned = moved(np.asarray(base.shape.points), np.array(twin.user_matrix))
+    turned = transformed(np.asarray(base.shape.points), np.array(twin.user_matrix))
     angle = np.arctan2(turned[:, 1], turned[:, 0]).mean()
     own = np.arctan2(*np.asarray(base.shape.points)[:, 1::-1].T).mean()
     assert angle - own == pytest.approx(pair.angle, rel=1e-6)
@@ -518,7 +521,7 @@ def test_flat_neighbours_can_be_picked(scene, flat_plotter, stator):
     flat.fit()
     big = int(np.argmax(areas(flat.polygons)))
     twin = np.array(flat_plotter.actors["flat:1"].user_matrix)
-    at = moved(middles(flat.polygons)[big][None], twin)
+    at = transformed(middles(flat.polygons)[big][None], twin)
     assert flat.pick_cell(*to_display(flat_plotter, at)[0]) == flat.polygons.cells[big]
 
 
@@ -536,7 +539,7 @@ def test_flat_neighbours_lie_one_period_on(scene, flat_plotter, stator):
     twins = {n: a for n, a in flat_plotter.actors.items() if n.startswith("flat:")}
     assert len(twins) == 2
     radii = [
-        np.hypot(*moved(flat.polygons.points, np.array(twin.user_matrix))[:, :2].T)
+        np.hypot(*transformed(flat.polygons.points, np.array(twin.user_matrix))[:, :2].T)
         for twin in twins.values()
     ]
     own = np.hypot(*flat.polygons.points[:, :2].T)

@@ -11,7 +11,7 @@ from slideviz.errors import SlidevizError
 from slideviz.gui.panels.histogram import HistogramPanel
 from slideviz.gui.widgets import plot_canvas
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.sections.threshold import ONLY_INVERTED
+from slideviz.sections.polygons import ONLY_INVERTED
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame

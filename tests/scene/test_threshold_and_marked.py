@@ -16,7 +16,7 @@ from slideviz.scene.marked_cells import DOT, FACES, OUTLINE
 from slideviz.scene.pick import to_display
 from slideviz.scene.scene import Scene
 from slideviz.sections.model import Section
-from slideviz.sections.threshold import ONLY_INVERTED
+from slideviz.sections.polygons import ONLY_INVERTED
 from slideviz.session import changes
 from slideviz.session.inspect import nodes_of
 from slideviz.session.opening import open_mesh

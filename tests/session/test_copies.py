@@ -6,16 +6,9 @@ import pytest
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.periodic import match
-from slideviz.sections.cut import Cutter
+from slideviz.sections.cut import Cutter, transformed
 from slideviz.sections.model import Section
-from slideviz.session.passages import (
-    find_period,
-    keeps,
-    moved,
-    passages,
-    passages_around,
-    show_passages,
-)
+from slideviz.session.passages import find_period, keeps, passages, passages_around, show_passages
 from tests.builders import cube, grid, passage, ring, sector
 from tests.oracles.sections import cut_cells
 
@@ -32,8 +25,8 @@ def test_a_copy_begins_where_the_one_before_ends():
         assert sorted(copies) == [-2, -1, 0, 1, 2]
         assert np.array_equal(copies[0], np.eye(4))
         for number in (-2, -1, 0, 1):
-            ends = moved(mesh.points[pair.nodes[:, 1]], copies[number])
-            starts = moved(mesh.points[pair.nodes[:, 0]], copies[number + 1])
+            ends = transformed(mesh.points[pair.nodes[:, 1]], copies[number])
+            starts = transformed(mesh.points[pair.nodes[:, 0]], copies[number + 1])
             assert np.abs(ends - starts).max() < 1e-12
 
 
@@ -41,9 +34,9 @@ def test_a_2d_mesh_has_copies_in_its_plane():
     mesh = sector()
     pair = find_period(mesh)
     copies = passages(pair, 1)
-    ends = moved(mesh.points[pair.nodes[:, 1]], copies[0])
+    ends = transformed(mesh.points[pair.nodes[:, 1]], copies[0])
     assert ends.shape[1] == 2
-    assert moved(mesh.points[pair.nodes[:, 0]], copies[1]) == pytest.approx(ends)
+    assert transformed(mesh.points[pair.nodes[:, 0]], copies[1]) == pytest.approx(ends)
 
 
 @pytest.mark.parametrize(("angle", "around"), [(30.0, 12), (360 / 41, 41), (120.0, 3)])
@@ -52,7 +45,7 @@ def test_the_whole_wheel_has_every_passage_once(angle, around):
     assert passages_around(pair) == around
     copies = passages(pair, "wheel")
     assert sorted(copies) == list(range(-((around - 1) // 2), around // 2 + 1))
-    at = np.array([moved(np.array([[1.0, 0, 0]]), m)[0] for m in copies.values()])
+    at = np.array([transformed(np.array([[1.0, 0, 0]]), m)[0] for m in copies.values()])
     angles = np.sort(np.arctan2(at[:, 1], at[:, 0]))
     assert np.diff(angles) == pytest.approx(np.radians(angle))
     # No passage twice, however many are asked for.
@@ -121,7 +114,7 @@ def test_one_section_cuts_all_passages(section):
     )
     assert any(len(piece) for number, piece in found.items() if number)
     for number, matrix in passages(match(mesh, "per1", "per2"), 2).items():
-        there = mesh.with_points(moved(mesh.points, matrix))
+        there = mesh.with_points(transformed(mesh.points, matrix))
         assert found[number].cell_ids.tolist() == cut_cells(there, section)
         if not section.whole:
             assert np.abs(section.distance(found[number].points)).max(initial=0) < 1e-12

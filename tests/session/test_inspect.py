@@ -8,7 +8,7 @@ import pytest
 from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality
-from slideviz.sections.threshold import ONLY_INVERTED, cells_in_range
+from slideviz.sections.polygons import ONLY_INVERTED, cells_in_range
 from slideviz.session import inspect
 from slideviz.session.state import StepFrame
 

@@ -8,7 +8,7 @@ from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.reduction import AUTO
 from slideviz.sections.model import Section
-from slideviz.sections.threshold import ONLY_INVERTED
+from slideviz.sections.polygons import ONLY_INVERTED
 from slideviz.session import changes
 from slideviz.session.colors import fit_colors
 from slideviz.session.opening import open_mesh

@@ -379,7 +379,7 @@ def test_an_error_leaves_nothing(tmp_path, monkeypatch):
             raise RuntimeError
 
     with pytest.raises(RuntimeError):
-        stream(case, out, tell=stop)
+        stream(case, out, report=stop)
     assert out.read_bytes() == b"older"
     assert not list(tmp_path.glob(".*"))
     monkeypatch.setattr(interior, "overshoot_of_rest", lambda *_: "would go too far")
@@ -695,7 +695,7 @@ def test_the_bar_tells_the_phase_and_what_is_left_of_it(tmp_path, monkeypatch):
     ]
     monkeypatch.undo()
     case, told = made(tmp_path, "square", 8, ("STEPS=1",)), []
-    stream(case, tmp_path / "out.su2b", tell=told.append)
+    stream(case, tmp_path / "out.su2b", report=told.append)
     ends = {now.phase: now.fraction for now in told}
     assert {phase: ends[phase] for phase in ("read", "write", "evaluate", "quality")} == (
         dict.fromkeys(("read", "write", "evaluate", "quality"), 1.0)

@@ -326,7 +326,7 @@ def test_an_error_leaves_nothing(tmp_path, monkeypatch, small):
                 raise RuntimeError
 
         with pytest.raises(RuntimeError):
-            stream(case, out, tell=stop)
+            stream(case, out, report=stop)
         assert out.read_bytes() == b"older"
         assert not list(tmp_path.glob(".*"))
 

@@ -95,39 +95,6 @@ def require_used(source: BinaryFile, table: ElementTable, used: int) -> None:
         )
 
 
-def elements_between(
-    source: BinaryFile, place: ZonePlace, table: ElementTable, dim: int, first: int, count: int
-) -> ElementBlock:
-    """Return ``count`` elements of a table, of dimension ``dim``, from place ``first`` on.
-
-    Unlike `element_block`, it compares their offsets only with each other.
-
-    Raises
-    ------
-    MeshError
-        An element has a wrong offset, type, dimension or node; the message has the byte.
-    """
-    at = table.offsets + first * source.width
-    offsets = _whole_numbers(source.array(at, count + 1, source.conn, "the offsets"))
-    start = int(offsets[0])
-    if start < 0 or (np.diff(offsets) <= 0).any() or int(offsets[-1]) > table.length:
-        raise source.error(at, "offsets of elements do not rise; the file is damaged")
-    begin = table.entries + start * source.width
-    found = source.array(begin, int(offsets[-1]) - start, source.conn, "the elements")
-    block = _split_list(source, table, first, begin, _whole_numbers(found), offsets - start)
-    _check_nodes(source, place, block, begin, offsets - start)
-    _check_dim(source, block, dim, begin, offsets - start)
-    return block
-
-
-def element_at(
-    source: BinaryFile, place: ZonePlace, table: ElementTable, at: int
-) -> tuple[int, IntArray, int]:
-    """Return type, nodes (k,) and index of the element at place ``at`` of a table of cells."""
-    block = elements_between(source, place, table, place.dim, at, 1)
-    return int(block.types[0]), block.nodes, int(block.ids[0])
-
-
 def _whole_numbers(values: NDArray) -> IntArray:
     """Return unsigned counts (k,) as int64; those that are too large for it become negative."""
     return np.asarray(values.astype(np.uint64, copy=False).view(np.int64))

@@ -10,6 +10,8 @@ made by it, so that a file that is cut off or was changed costs no memory.
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
@@ -222,6 +224,14 @@ def find_zone(source: BinaryFile, number: int | None) -> ZonePlace:
             f"{source.name}: there is no zone {chosen}, for the file has {has}; choose one of these"
         )
     return zones[chosen - 1]
+
+
+@contextmanager
+def open_zone(path: Path, number: int | None) -> Iterator[tuple[BinaryFile, ZonePlace]]:
+    """Context with an open file, and where the zone of that number is (see `find_zone`)."""
+    with path.open("rb") as file:
+        source = BinaryFile(path, file)
+        yield source, find_zone(source, number)
 
 
 def _zone(source: BinaryFile, begin: int, number: int) -> ZonePlace:

@@ -15,7 +15,14 @@ import numpy as np
 from slideviz.errors import MeshError, printable
 from slideviz.formats.su2.scan import Progress
 from slideviz.formats.su2b.elements import BLOCK, element_blocks
-from slideviz.formats.su2b.layout import MAGIC, BinaryFile, ElementTable, ZonePlace, find_zone
+from slideviz.formats.su2b.layout import (
+    MAGIC,
+    BinaryFile,
+    ElementTable,
+    ZonePlace,
+    find_zone,
+    open_zone,
+)
 from slideviz.mesh.check import first_fault
 from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
@@ -58,9 +65,7 @@ def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
     OSError
         It cannot be read.
     """
-    with path.open("rb") as file:
-        source = BinaryFile(path, file)
-        place = find_zone(source, zone)
+    with open_zone(path, zone) as (source, place):
         whole = place.cells.count + place.n_points + sum(m.elements.count for m in place.markers)
         done = 0
 
@@ -74,10 +79,7 @@ def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
         for first, block in point_blocks(source, place):
             points[first : first + len(block)] = block
             tick(len(block))
-        markers = tuple(
-            Marker(m.name, read_elements(source, place, m.elements, place.dim - 1, tick)[0])
-            for m in place.markers
-        )
+        markers = read_markers(source, place, tick)
         form = BinaryForm(
             source.width,
             source.order,
@@ -102,6 +104,16 @@ def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
     return replace(mesh, interfaces=find_interfaces(mesh, others))
 
 
+def read_markers(
+    source: BinaryFile, place: ZonePlace, tick: Callable[[int], None] = lambda _: None
+) -> tuple[Marker, ...]:
+    """Return the markers of a zone; ``tick`` is called with the number of elements of a block."""
+    return tuple(
+        Marker(m.name, read_elements(source, place, m.elements, place.dim - 1, tick)[0])
+        for m in place.markers
+    )
+
+
 def boundaries_elsewhere(
     source: BinaryFile, place: ZonePlace
 ) -> Iterator[tuple[int, str, FloatArray]]:
@@ -112,9 +124,9 @@ def boundaries_elsewhere(
         try:
             zone = find_zone(source, number)
             nodes = [
-                (m.name, read_elements(source, zone, m.elements, zone.dim - 1, _untold)[0].nodes)
-                for m in zone.markers
-                if zone.dim == place.dim and m.elements.count
+                (marker.name, marker.nodes)
+                for marker in (read_markers(source, zone) if zone.dim == place.dim else ())
+                if len(marker.cells)
             ]
             places = [np.empty((len(some), zone.dim)) for _, some in nodes]
             for first, block in point_blocks(source, zone) if nodes else ():
@@ -125,10 +137,6 @@ def boundaries_elsewhere(
             continue
         for (name, _), points in zip(nodes, places, strict=True):
             yield number, name, points
-
-
-def _untold(_: int) -> None:
-    """Take the number of elements of a block."""
 
 
 def point_blocks(

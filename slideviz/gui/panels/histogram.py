@@ -20,7 +20,7 @@ from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write
 from slideviz.gui.widgets.plot_image import Draw
 from slideviz.gui.widgets.theme import alarm
 from slideviz.plots.session_plots import FrameCounts, draw_histogram, first_value, shown_measure
-from slideviz.sections.threshold import ONLY_INVERTED, cells_in_range, range_words
+from slideviz.sections.polygons import ONLY_INVERTED, cells_in_range, range_words
 from slideviz.session import changes
 from slideviz.session.state import IN_FILE, Session, StepFrame
 from slideviz.session.store import Store

@@ -10,7 +10,7 @@ import slideviz as sv
 from slideviz.cli import run
 from slideviz.errors import MeshError
 from slideviz.samples.table import write_sample
-from slideviz.streaming import measuring, quality_blocks, skin
+from slideviz.streaming import quality, skin, source
 from slideviz.system.cleanup import PREFIX
 from tests.builders import grid
 from tests.formats.test_su2b import WHOLE, change
@@ -23,7 +23,8 @@ def small(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scratch").mkdir()
     monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path / "scratch"))
-    monkeypatch.setattr(quality_blocks, "CELLS", 29)
+    for module in (source, quality):
+        monkeypatch.setattr(module, "CELLS", 29)
     monkeypatch.setattr(skin, "BLOCK", 31)
     return tmp_path
 
@@ -168,16 +169,16 @@ def test_cells_numbered_both_ways_or_folded_are_refused(small, capsys):
 
 def test_another_order_of_the_reference_is_told(small):
     meshes(small, "mixed")
-    source = Path("base.su2b")
-    mesh = sv.read(source)
-    assert quality_blocks.has_cells_of((source, None), (Path("moved.su2b"), None))
+    path = Path("base.su2b")
+    mesh = sv.read(path)
+    assert source.has_cells_of((path, None), (Path("moved.su2b"), None))
     order = np.arange(len(mesh.cells))[::-1].copy()
     form = replace(mesh.origin, order=order)
     sv.write("turned.su2b", replace(mesh, origin=form))
     again = sv.read("turned.su2b")
     assert again.cells.same_as(mesh.cells)
     with pytest.raises(MeshError, match="has its cells in another order than"):
-        quality_blocks.has_cells_of((source, None), (Path("turned.su2b"), None))
+        source.has_cells_of((path, None), (Path("turned.su2b"), None))
 
 
 def test_numbers_of_cells_are_in_files_that_end(small):
@@ -185,19 +186,9 @@ def test_numbers_of_cells_are_in_files_that_end(small):
     from contextlib import ExitStack
 
     with ExitStack() as stack:
-        whole = quality_blocks.measure_mesh(stack, Path("scratch"), (Path("mesh.su2b"), None))
+        mesh = source.FileSource.open(stack, (Path("mesh.su2b"), None))
+        counts = quality.CellCounts(mesh)
+        quality.measure_mesh(stack, Path("scratch"), mesh, counts=counts)
         assert len(list(Path("scratch").glob(f"{PREFIX}*"))) == 2
-        assert whole.types == {9: 16}
+        assert counts.types == {9: 16}
     assert not list(Path("scratch").iterdir())
-
-
-@pytest.mark.parametrize("count", [0, 7, 129, 1000, 99_991])
-def test_a_sum_by_pieces_has_the_bits_of_one(monkeypatch, count):
-    monkeypatch.setattr(measuring, "PIECE", 500)
-    values, seen = np.random.default_rng(count).random(count), np.zeros(count, int)
-
-    def look(part):
-        seen[part] += 1
-
-    assert measuring.summed(values, look) == values.sum()
-    assert (seen == 1).all()

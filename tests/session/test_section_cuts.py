@@ -9,9 +9,9 @@ from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
-from slideviz.session import slabs
+from slideviz.session import section_cuts
 from slideviz.session.results import StepFrame
-from slideviz.session.slabs import Groups, keep_slab, read_slab, slab_of
+from slideviz.session.section_cuts import Groups, keep_slab, read_slab, slab_of
 from slideviz.streaming.skin import read_skin
 from tests.slow import one_of_each_fast
 
@@ -69,7 +69,7 @@ def framed(path, moved):
 @pytest.mark.parametrize(("kind", "group"), one_of_each_fast(range(8), [1, 7, 4096]))
 def test_the_same_cells_and_polygons_as_in_memory(files, kind, group, monkeypatch):
     mesh, moved, path, file = files
-    monkeypatch.setattr(slabs, "GROUP", group)
+    monkeypatch.setattr(section_cuts, "GROUP", group)
     section = sections(mesh)[kind]
     slab = read_slab(framed(path, file), section, lambda _: None, lambda: None)
     there = Cutter.of(moved).cut(moved.points, section)
@@ -97,12 +97,12 @@ def test_the_same_values_as_in_memory(files, what):
 def test_a_ball_holds_the_cells_of_its_group(files, monkeypatch):
     from contextlib import ExitStack
 
-    from slideviz.session.whole import open_points
+    from slideviz.streaming.source import FileSource
 
     mesh, moved, path, file = files
-    monkeypatch.setattr(slabs, "GROUP", 13)
+    monkeypatch.setattr(section_cuts, "GROUP", 13)
     with ExitStack() as stack:
-        found = Groups.of(open_points(stack, path, None, file), lambda _: None)
+        found = Groups.of(FileSource.open(stack, (path, None), moved=file), lambda _: None)
     assert len(found.radii) == -(-len(mesh.cells) // 13)
     for cell in range(len(mesh.cells)):
         begin, end = mesh.cells.offsets[cell : cell + 2]

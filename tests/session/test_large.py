@@ -1,15 +1,17 @@
 """Numbers of a mesh read block by block are those of the mesh in memory."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.mesh.quality import quality
+from slideviz.mesh import quality as quality_module
+from slideviz.mesh.quality import FINE, INVERTED, lowest, pairwise_sum, quality, quality_totals
 from slideviz.samples.table import sample
 from slideviz.session.inspect import WORST, cell_info, worst_cells
-from slideviz.session.large import frame_of
+from slideviz.session.large import first_frame, frame_of
 from slideviz.session.results import StepFrame
-from slideviz.session.whole import PartQuality, QualityAccumulator, measure_all, totals_of
 from slideviz.streaming.skin import read_skin
 
 
@@ -27,38 +29,60 @@ def folded(tmp_path_factory):
     return mesh, moved, folder
 
 
+def totals_of(found):
+    return quality_totals(found.values, found.status, worst=WORST)
+
+
 def test_numbers_of_all_cells(folded):
     mesh, moved, _ = folded
     found = quality(moved, mesh)
     assert found.inverted > 3
-    part = PartQuality.of(quality(mesh), totals_of(found))
-    for name in ("cells", "inverted", "unproven", "valid", "min"):
+    part = replace(quality(mesh), of_mesh=totals_of(found))
+    for name in ("cells", "inverted", "unproven", "valid", "min", "mean"):
         assert getattr(part, name) == getattr(found, name), name
-    assert part.mean == pytest.approx(found.mean, rel=1e-14)
-    for bins in (10, 20, 25):
-        np.testing.assert_array_equal(part.histogram(bins)[0], found.histogram(bins)[0])
-    np.testing.assert_array_equal(part.all.worst, found.worst(WORST))
+    np.testing.assert_array_equal(part.totals.worst, found.worst(WORST))
+    fine = np.histogram(found.values[found.status != INVERTED], FINE, (0.0, 1.0))[0]
+    np.testing.assert_array_equal(part.totals.fine_counts, fine)
 
 
-@pytest.mark.parametrize("size", [1, 17, 100, 1000])
-def test_blocks_in_any_order_give_the_same(folded, size):
+@pytest.mark.parametrize("size", [17, 100, 1000])
+def test_pieces_of_any_size_give_the_same(folded, monkeypatch, size):
     mesh, moved, _ = folded
     found = quality(moved, mesh)
-    made = QualityAccumulator()
-    starts = list(range(0, len(found), size))
-    for first in np.random.default_rng(2).permutation(starts):
-        part = slice(first, first + size)
-        made.add(np.arange(len(found))[part], found.values[part], found.status[part])
-    np.testing.assert_array_equal(made.totals().worst, found.worst(WORST))
-    assert made.totals().mean == pytest.approx(found.mean, rel=1e-13)
-    np.testing.assert_array_equal(made.totals().counts, totals_of(found).counts)
+    wanted = totals_of(found)
+    monkeypatch.setattr(quality_module, "PIECE", size)
+    made = totals_of(found)
+    assert (made.cells, made.min, made.mean) == (wanted.cells, wanted.min, wanted.mean)
+    assert (made.inverted, made.unproven) == (wanted.inverted, wanted.unproven)
+    np.testing.assert_array_equal(made.worst, np.argsort(found.values, kind="stable")[:WORST])
+    np.testing.assert_array_equal(made.fine_counts, wanted.fine_counts)
+    some = np.random.default_rng(size).random(len(found)) < 0.3
+    ids = np.flatnonzero(some)
+    order = ids[np.argsort(found.values[ids], kind="stable")]
+    np.testing.assert_array_equal(lowest(found.values, 7, some), order[:7])
+    np.testing.assert_array_equal(lowest(found.values, len(found), some), order)
+    assert not len(lowest(found.values, 0))
+
+
+@pytest.mark.parametrize("count", [0, 7, 129, 1000, 99_991])
+def test_a_sum_by_pieces_has_the_bits_of_one(monkeypatch, count):
+    monkeypatch.setattr(quality_module, "PIECE", 500)
+    values, seen = np.random.default_rng(count).random(count), np.zeros(count, int)
+
+    def visit(part):
+        seen[part] += 1
+
+    assert pairwise_sum(values, visit) == values.sum()
+    assert (seen == 1).all()
 
 
 def test_an_undeformed_mesh_is_measured_in_its_file(folded):
     mesh, _, folder = folded
     told = []
-    found, totals = quality(mesh), measure_all(folder / "mesh.su2b", None, "knupp", told.append)
-    assert (totals.cells, totals.min) == (found.cells, found.min)
+    skin = read_skin(folder / "mesh.su2b", None)
+    found, totals = quality(mesh), first_frame(skin, "knupp", told.append).quality.totals
+    assert (totals.cells, totals.min, totals.mean) == (found.cells, found.min, found.mean)
+    np.testing.assert_array_equal(totals.worst, found.worst(WORST))
     assert told[-1] == 1.0
 
 

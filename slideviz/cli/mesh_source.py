@@ -1,0 +1,132 @@
+"""The mesh that info, quality and section look at: in memory, or with ``--stream`` in its file."""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
+    from slideviz.mesh.model import Mesh
+    from slideviz.mesh.quality import Quality
+    from slideviz.streaming.quality import CellCounts
+    from slideviz.streaming.source import MeshSource
+    from slideviz.streaming.stream_input import StreamInput
+    from slideviz.terms import FileFormat, Metric
+
+
+@dataclass(frozen=True, eq=False)
+class OpenMesh:
+    """A mesh that a command looks at, and the undeformed one if there is a reference."""
+
+    source: MeshSource
+    reference: Path | None
+    """The file of the undeformed mesh."""
+    read_base: Callable[[], Mesh | None]
+    """Returns the undeformed mesh or, of a mesh in its file, its boundary."""
+    stack: ExitStack
+    """Closes files, and removes temporary ones."""
+
+    def quality(self, arguments: argparse.Namespace, counts: CellCounts | None = None) -> Quality:
+        """Return the quality of all cells, and add these to ``counts``."""
+        from slideviz.streaming.quality import measure_mesh
+
+        folder = Path(tempfile.gettempdir())
+        metric: Metric = getattr(arguments, "metric", "knupp")
+        with progress_of(arguments, "quality") as tick:
+            return measure_mesh(
+                self.stack, folder, self.source, metric=metric, counts=counts, tick=tick
+            )
+
+
+@contextmanager
+def progress_of(arguments: argparse.Namespace, phase: str) -> Iterator[Callable[[float], None]]:
+    """Context with a function that shows the fraction done of a phase, with ``--stream``."""
+    from slideviz.cli.progress import Bar
+    from slideviz.solver.steps import Progress
+
+    with Bar(arguments.stream) as bar:
+        yield lambda part: bar.phase(Progress(1, 1, phase, part))
+
+
+@contextmanager
+def open_mesh(arguments: argparse.Namespace, case: Case | None = None) -> Iterator[OpenMesh]:
+    """Context with the mesh of a command, and the undeformed one.
+
+    That is of ``--reference`` or else of ``--case``, but only where it has the same cells: the case
+    may have been given only for its periodic boundaries. Binary copies of texts are in the folder
+    for temporary files until the context ends.
+
+    Raises
+    ------
+    MeshError
+        The mesh has a mistake or, with ``--stream``, is of no format that can be streamed; or
+        ``--reference`` has other cells.
+    """
+    from slideviz.errors import MeshError
+    from slideviz.formats.files import read
+    from slideviz.streaming.stream_input import open_read_only
+
+    folder, reference = Path(tempfile.gettempdir()), getattr(arguments, "reference", None)
+    with ExitStack() as stack:
+        with progress_of(arguments, "read") as tick:
+
+            def opened(
+                path: Path, zone: int | None, kind: FileFormat | None = None
+            ) -> Mesh | StreamInput:
+                if not arguments.stream:
+                    return read(path, zone=zone, file_format=kind)
+                return stack.enter_context(open_read_only(path, zone, tick, folder, kind))
+
+            mesh = opened(arguments.mesh, arguments.zone)
+            skin = _in_memory(mesh, tick)
+            base = None
+            if reference is not None:
+                base = opened(reference, arguments.zone)
+                if arguments.stream and not _same_cells(mesh, base):
+                    raise MeshError(
+                        f"{reference} cannot be the reference of {skin.name}: it must have the "
+                        "same cells; give the undeformed mesh"
+                    )
+            elif case is not None and case.mesh_file is not None and case.mesh_file.is_file():
+                base = opened(case.mesh_file, arguments.zone or case.zone, case.mesh_format)
+                base = base if _same_cells(mesh, base) else None
+                reference = None if base is None else case.mesh_file
+        source = _source(stack, mesh, base, skin)
+        yield OpenMesh(source, reference, lambda: None if base is None else _in_memory(base), stack)
+
+
+def _in_memory(mesh: Mesh | StreamInput, tick: Callable[[float], object] = lambda _: None) -> Mesh:
+    from slideviz.mesh.model import Mesh
+
+    return mesh if isinstance(mesh, Mesh) else mesh.skin(tick)
+
+
+def _same_cells(mesh: Mesh | StreamInput, base: Mesh | StreamInput) -> bool:
+    from slideviz.mesh.model import Mesh
+    from slideviz.streaming.source import has_cells_of
+
+    if isinstance(mesh, Mesh) and isinstance(base, Mesh):
+        return base.points.shape == mesh.points.shape and base.cells.same_as(mesh.cells)
+    assert not isinstance(mesh, Mesh)
+    assert not isinstance(base, Mesh)
+    return has_cells_of((mesh.path, mesh.zone), (base.path, base.zone))
+
+
+def _source(
+    stack: ExitStack, mesh: Mesh | StreamInput, base: Mesh | StreamInput | None, skin: Mesh
+) -> MeshSource:
+    from slideviz.mesh.model import Mesh
+    from slideviz.streaming.source import FileSource, MemorySource
+
+    if isinstance(mesh, Mesh):
+        assert base is None or isinstance(base, Mesh)
+        return MemorySource(mesh, base)
+    assert not isinstance(base, Mesh)
+    zone = None if base is None else (base.path, base.zone)
+    return FileSource.open(stack, (mesh.path, mesh.zone), zone, skin=skin)

@@ -1,0 +1,356 @@
+"""The quality of all cells of a mesh, measured block by block, whatever its source.
+
+Cells of negative volume are numbered the other way round, or folded. For a mesh in memory,
+`mesh.orientation` compares neighbours. A mesh in a file is only proved to have no folded cell: each
+facet gets a hash of its nodes, with the sign of the direction in which its cell traverses it, after
+cells of negative volume were turned round. Two cells that are numbered alike traverse their common
+facet in opposite directions, so their hashes cancel. The sum over all facets that are in no marker
+is then 0 (modulo 2**64) where no cell is folded; where one is, it is 0 with a probability of about
+2**-63.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.errors import MeshError
+from slideviz.formats.su2b.read import read_markers
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.mesh.orientation import corner_sums, facets_of
+from slideviz.mesh.quality import INVERTED, Quality, quality, quality_totals
+from slideviz.solver.deform import folded_at
+from slideviz.solver.growth import Farthest, farthest_node
+from slideviz.streaming.interior import InteriorDisplacer
+from slideviz.streaming.skin import Index, index_of
+from slideviz.streaming.source import CELLS, CellBlock, FileSource, MeshSource, Scratch
+from slideviz.system.ranks import SERIAL
+from slideviz.system.threads import Tick
+from slideviz.terms import Metric
+
+Hashes = NDArray[np.uint64]
+
+
+def orientations_of(signs: NDArray[np.int8]) -> NDArray[np.int8]:
+    """Return which of -1 and 1 occur in ``signs`` (k,): (1,), or both, (2,)."""
+    return np.unique([signs.min(), signs.max()])
+
+
+class QualityCollector:
+    """Quality of all cells of a mesh in a file, collected block by block, in scratch files.
+
+    They are in ``folder``, 9 bytes for each cell, and are removed when ``stack`` closes.
+    """
+
+    def __init__(self, stack: ExitStack, folder: Path, count: int, metric: Metric) -> None:
+        self._metric = metric
+        self._files = [Scratch(stack, folder, count, kind) for kind in (float, np.uint8)]
+        self._values, self._status = (file.array for file in self._files)
+        self.signs = np.zeros(0, np.int8)
+        """Orientations that occur: 1, -1 (numbered the other way round), or both."""
+
+    def add(
+        self,
+        ids: Index,
+        values: FloatArray,
+        status: NDArray[np.uint8],
+        signs: NDArray[np.int8],
+    ) -> None:
+        """Add the values, statuses and signs of the cells ``ids`` (k,)."""
+        self._values[ids], self._status[ids] = values, status
+        self.signs = orientations_of(np.concatenate([self.signs, signs]))
+        self._release()
+
+    def quality(self, worst: int = 0) -> Quality:
+        """Return the quality of all cells, without size and skew; ``worst`` as `quality_totals`."""
+        none = np.empty(0)
+        totals = quality_totals(self._values, self._status, self._release, worst)
+        return Quality(
+            self._values, none, none, self._status, self.signs, self._metric, of_mesh=totals
+        )
+
+    def _release(self) -> None:
+        for file in self._files:
+            file.release()
+
+
+def quality_blocks(
+    source: MeshSource, metric: Metric, tick: Tick = lambda _: None, *, may_fold: bool = False
+) -> Iterator[CellBlock]:
+    """Yield all cells of a mesh with their quality, in the order of the file.
+
+    With ``may_fold``, cells numbered in both directions are not looked at.
+
+    Raises
+    ------
+    MeshError
+        A file has a mistake, or cells are numbered in both directions and some are folded.
+    """
+    signs = np.zeros(0, np.int8)
+    for block in source.blocks(tick):
+        found = quality(block.mesh, block.base, metric)
+        if isinstance(source, FileSource) and not may_fold:
+            known, signs = len(signs), orientations_of(np.concatenate([signs, found.signs]))
+            if known < 2 == len(signs):
+                also = "rate a deformed mesh with --reference UNDEFORMED, " * (source.base is None)
+                parts = [
+                    (k, min(k + CELLS, source.n_cells)) for k in range(0, source.n_cells, CELLS)
+                ]
+                with SERIAL.sharing(facet_sums, *source.zone) as do:
+                    require_consistent_orientation(do(parts), source.file.name, also)
+        yield replace(block, quality=found)
+
+
+class CellCounts:
+    """Counts the cells of a mesh by their VTK types, and its points that no cell uses."""
+
+    def __init__(self, source: MeshSource) -> None:
+        self._used = np.zeros(source.n_points, bool)
+        self._types = np.zeros(256, np.int64)
+
+    def add(self, block: CellBlock) -> None:
+        """Count the cells of a block."""
+        self._used[block.nodes[block.mesh.cells.nodes]] = True
+        self._types += np.bincount(block.mesh.cells.types, minlength=256)
+
+    @property
+    def points(self) -> int:
+        """Return the number of points."""
+        return len(self._used)
+
+    @property
+    def unused(self) -> int:
+        """Return the number of points that no cell uses."""
+        return int(np.count_nonzero(~self._used))
+
+    @property
+    def types(self) -> dict[int, int]:
+        """Return the number of cells of each VTK type."""
+        return {vtk: int(self._types[vtk]) for vtk in np.flatnonzero(self._types).tolist()}
+
+
+def measure_mesh(
+    stack: ExitStack,
+    folder: Path,
+    source: MeshSource,
+    *,
+    metric: Metric = "knupp",
+    worst: int = 0,
+    counts: CellCounts | None = None,
+    may_fold: bool = False,
+    tick: Tick = lambda _: None,
+) -> Quality:
+    """Return the quality of all cells of a mesh.
+
+    Of a mesh in a file it is without size and skew, and its arrays are in scratch files.
+
+    Parameters
+    ----------
+    stack : ExitStack
+        Removes the scratch files when it closes.
+    folder : Path
+        Where they are made: 9 bytes for each cell.
+    worst : int
+        As for `quality_totals`.
+    counts : CellCounts, optional
+        Counts all cells, too.
+    may_fold : bool
+        As for `quality_blocks`.
+
+    Raises
+    ------
+    MeshError
+        As by `quality_blocks`.
+    """
+    collector: QualityCollector | None = None
+    for block in quality_blocks(source, metric, tick, may_fold=may_fold):
+        found = block.quality
+        assert found is not None
+        if isinstance(source, FileSource):
+            collector = collector or QualityCollector(stack, folder, source.n_cells, metric)
+            collector.add(index_of(block.ids), found.values, found.status, found.signs[:1])
+        if counts is not None:
+            counts.add(block)
+    if collector is not None:
+        return collector.quality(worst)
+    assert found is not None
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredBlock:
+    """The quality of a block of cells, undeformed and deformed, without its meshes."""
+
+    ids: Index
+    """(k,) int64 or slice: the numbers of the cells."""
+    values: FloatArray
+    before: FloatArray
+    """`values`, `before` (k,): quality of the deformed and of the undeformed cells."""
+    status: NDArray[np.uint8]
+    old: NDArray[np.uint8]
+    """`status`, `old` (k,): status (``Quality.status``) of the deformed and of the undeformed
+    cells."""
+    signs: NDArray[np.int8]
+    """(1,) or (2,) int8: orientations that occur: 1, -1 (numbered the other way round), or both."""
+    inverted: dict[int, tuple[int, IntArray]]
+    """dict of int to (int, (n,) int64): VTK type and nodes of inverted cells, by their number:
+    those with the lowest numbers."""
+    farthest: Farthest
+    """The node that went farthest."""
+
+    @classmethod
+    def of(cls, block: CellBlock, metric: Metric, listed: int) -> MeasuredBlock:
+        """Return the quality of a block, with the ``listed`` inverted cells of lowest numbers."""
+        base, mesh = block.base, block.mesh
+        assert base is not None
+        before, after = quality(base, metric=metric), quality(mesh, base, metric)
+        ends, inverted = mesh.cells.offsets, np.flatnonzero(after.status == INVERTED)
+        first = inverted[np.argsort(block.ids[inverted])][:listed].tolist()
+        nodes = {k: block.nodes[mesh.cells.connectivity[ends[k] : ends[k + 1]]] for k in first}
+        return cls(
+            index_of(block.ids),
+            after.values,
+            before.values,
+            after.status,
+            before.status,
+            orientations_of(before.signs),
+            {int(block.ids[k]): (int(mesh.cells.types[k]), nodes[k]) for k in first},
+            farthest_node(base.points, mesh.points, block.nodes),
+        )
+
+
+class RunCollector:
+    """The quality of all cells before and after a run, collected block by block."""
+
+    def __init__(self, stack: ExitStack, folder: Path, count: int, metric: Metric) -> None:
+        self.after, self.before = (QualityCollector(stack, folder, count, metric) for _ in range(2))
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the blocks that were added, before others are."""
+        self.inverted: dict[int, tuple[int, IntArray]] = {}
+        """VTK type and nodes of inverted cells, by their number: those with the lowest numbers."""
+        self.farthest = Farthest(-1.0, 0, np.empty(0))
+        """The node that went farthest."""
+
+    def add(self, found: MeasuredBlock, listed: int) -> None:
+        """Add a block; the ``listed`` inverted cells with the lowest numbers so far are kept."""
+        self.after.add(found.ids, found.values, found.status, found.signs)
+        self.before.add(found.ids, found.before, found.old, found.signs)
+        self.farthest = self.farthest.further(found.farthest)
+        self.inverted = dict(sorted((self.inverted | found.inverted).items())[:listed])
+
+
+@contextmanager
+def facet_sums(path: Path, zone: int | None) -> Iterator[Callable[[tuple[int, int]], int]]:
+    """Context with a function that sums the signed hashes of the inner facets of some cells.
+
+    Its argument is the first of these cells and the one after the last, by place in the file.
+    """
+    with ExitStack() as stack:
+        source = FileSource.open(stack, (path, zone))
+        markers = read_markers(source.file, source.place)
+        hashes = [_marker_hashes(marker.cells) for marker in markers]
+        marked = np.unique(np.concatenate(hashes or [_NONE]))
+
+        def add(part: tuple[int, int]) -> int:
+            block = source.between(part[0], part[1] - part[0])
+            cells = block.mesh.cells
+            turned = corner_sums(block.mesh) < 0
+            total = 0
+            numbered = Cells.from_types(cells.types, block.nodes[cells.connectivity])
+            for owner, facet, turn in facets_of(numbered):
+                hashes = _hashes(facet)
+                inside = ~_is_among(hashes, marked)
+                signed = np.where(turn ^ turned[owner], hashes, np.negative(hashes))
+                total += int(signed[inside].sum(dtype=np.uint64))
+            return total
+
+        yield add
+
+
+def require_consistent_orientation(found: Iterable[int], name: str, also: str = "") -> None:
+    """Raise where the sums of the hashes of all parts of the cells do not add up to 0.
+
+    Parameters
+    ----------
+    found : iterable of int
+        The sum of each part, of `facet_sums`.
+    name : str
+        The mesh, for the message.
+    also : str
+        One more remedy for the message.
+
+    Raises
+    ------
+    MeshError
+        They do not: some cell is folded, or a part of the boundary is in no marker.
+    """
+    if sum(found) % 2**64:
+        raise MeshError(
+            f"{name}: some cells are numbered the other way round than others, and others are "
+            "folded, or a part of the boundary is in no marker, which only the whole mesh can "
+            f"tell; {also}run it without --stream, or mesh again"
+        )
+
+
+def folded_steps(
+    displacer: InteriorDisplacer, source: FileSource, cells: Mapping[int, tuple[int, IntArray]]
+) -> dict[int, tuple[int, int]]:
+    """Return VTK type and first step with an inverted cell, by cell number.
+
+    Parameters
+    ----------
+    cells : mapping of int to (int, (n,) int64)
+        VTK type and nodes of each cell to follow, by its number.
+    """
+    if not cells:
+        return {}
+    types = [vtk for vtk, _ in cells.values()]
+    nodes, flat = np.unique(
+        np.concatenate([nodes for _, nodes in cells.values()]), return_inverse=True
+    )
+    points = (source.base or source.points).at(nodes)
+    part = Mesh(points, Cells.from_types(types, flat))
+    moved = displacer.after_steps(nodes, points)
+    steps = [
+        replace(step, mesh=part.with_points(now))
+        for step, now in zip(displacer.steps, moved, strict=True)
+    ]
+    when = folded_at(steps, part, np.arange(len(cells)))
+    return dict(zip(cells, zip(types, when.tolist(), strict=True), strict=True))
+
+
+_NONE = np.empty(0, np.uint64)
+
+
+def _marker_hashes(cells: Cells) -> Hashes:
+    """Return the hashes (f,) of the elements of a marker, in no particular order."""
+    out = [_NONE]
+    for _, nodes in cells.by_type.values():
+        out.append(_hashes(np.sort(nodes, axis=1)))
+    return np.concatenate(out)
+
+
+def _hashes(facets: IntArray) -> Hashes:
+    """Return a hash (f,) of each facet (f, k) of ascending nodes: splitmix64, node by node."""
+    out = np.zeros(len(facets), np.uint64)
+    for column in facets.T:
+        out += column.astype(np.uint64) + np.uint64(0x9E3779B97F4A7C15)
+        out = (out ^ (out >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        out = (out ^ (out >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        out ^= out >> np.uint64(31)
+    return out
+
+
+def _is_among(hashes: Hashes, some: Hashes) -> NDArray[np.bool_]:
+    """Return a mask (n,) of the hashes (n,) that are among ``some`` (k,), which is ascending."""
+    if not len(some):
+        return np.zeros(len(hashes), bool)
+    at = np.minimum(np.searchsorted(some, hashes), len(some) - 1)
+    return np.asarray(some[at] == hashes)

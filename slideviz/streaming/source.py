@@ -1,0 +1,383 @@
+"""The cells of a mesh with their points, block by block: of a mesh in memory, or of one in a file.
+
+A mesh in memory is one block. What is told of all cells (their quality, those that a section cuts)
+is found by the blocks, whichever source they come from.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.errors import MeshError
+from slideviz.formats.su2b.elements import ElementBlock, element_block, element_blocks
+from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zone
+from slideviz.mesh.elements import SIZES
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part, frozen_array
+from slideviz.mesh.quality import Quality
+from slideviz.sections.cut import crossed_cells
+from slideviz.sections.model import Section
+from slideviz.system.cleanup import draft, open_temporary
+from slideviz.system.threads import Tick
+
+CELLS = 1 << 17
+"""Cells of a block of a file: one block is in memory at a time."""
+READ = 1 << 20
+"""Points that are read from a file at a time, at most."""
+SPARSE = 8
+"""All points between the lowest and highest node of a block of cells are read, used or not, where
+they are at most so many times as many as its cells."""
+Zone = tuple[Path, int | None]
+"""A file and the number of a zone in it, the first where it is None."""
+
+
+@dataclass(frozen=True, eq=False)
+class CellBlock:
+    """Some cells of a mesh with their points."""
+
+    ids: IntArray
+    """(k,): the numbers of the cells in the whole mesh."""
+    nodes: IntArray
+    """(n,): the numbers of the block's points in the whole mesh, ascending."""
+    mesh: Mesh
+    """These points and cells; of a mesh in a file, without boundaries."""
+    base: Mesh | None = None
+    """The same cells in the undeformed mesh; None where there is no reference."""
+    quality: Quality | None = None
+    """The quality of the cells, where it was measured."""
+
+    def take(self, which: IntArray) -> CellBlock:
+        """Return the cells at the places ``which`` (k,), with their points alone."""
+        cells = self.mesh.cells.take(which)
+        flat = np.searchsorted(cells.nodes, cells.connectivity)
+        mesh = Mesh(
+            self.mesh.points[cells.nodes], Cells.from_types(cells.types, flat), name=self.mesh.name
+        )
+        return CellBlock(
+            self.ids[which],
+            self.nodes[cells.nodes],
+            mesh,
+            None if self.base is None else mesh.with_points(self.base.points[cells.nodes]),
+            None if self.quality is None else self.quality.take(which),
+        )
+
+    def part_of(self, whole: Mesh) -> CellBlock:
+        """Return the block with the name and the zone of the mesh that it is a part of."""
+        n_points, n_cells = len(whole.points), len(whole.cells)
+        if whole.part is not None:
+            n_points, n_cells = whole.part.n_points, whole.part.n_cells
+        part = Part(
+            frozen_array(self.nodes, np.int64), frozen_array(self.ids, np.int64), n_points, n_cells
+        )
+        mesh = replace(self.mesh, name=whole.name, zone=whole.zone, zones=whole.zones, part=part)
+        base = None if self.base is None else mesh.with_points(self.base.points)
+        return replace(self, mesh=mesh, base=base)
+
+
+_NO_CELLS = (
+    np.empty(0, np.int64),
+    np.empty(0, np.int64),
+    Mesh(np.empty((0, 3)), Cells.from_types([], [])),
+)
+
+
+def join_blocks(blocks: Iterable[CellBlock]) -> CellBlock:
+    """Return the cells of some blocks as one, by ascending number."""
+    every = list(blocks) or [CellBlock(*_NO_CELLS)]
+    one, meshes = every[0], [block.mesh for block in every]
+    ids = np.concatenate([block.ids for block in every])
+    order = np.argsort(ids, kind="stable")
+    nodes, first = np.unique(np.concatenate([block.nodes for block in every]), return_index=True)
+    flat = [block.nodes[block.mesh.cells.connectivity] for block in every]
+    types = np.concatenate([mesh.cells.types for mesh in meshes])
+    cells = Cells.from_types(types, np.searchsorted(nodes, np.concatenate(flat))).take(order)
+    mesh = Mesh(np.concatenate([mesh.points for mesh in meshes])[first], cells, name=one.mesh.name)
+    bases = [block.base.points for block in every if block.base is not None]
+    qualities = [block.quality for block in every if block.quality is not None]
+    return CellBlock(
+        ids[order],
+        nodes,
+        mesh,
+        mesh.with_points(np.concatenate(bases)[first]) if bases else None,
+        Quality.joined(qualities).take(order) if qualities else None,
+    )
+
+
+def cut_cells(
+    blocks: Iterable[CellBlock],
+    section: Section,
+    matrices: Iterable[FloatArray] = (np.eye(4),),
+    near: float = 0.0,
+) -> CellBlock:
+    """Return the cells of some blocks that a section can cut, after any transformation.
+
+    Parameters
+    ----------
+    matrices : iterable of (4, 4)
+        The transformations of the points.
+    near : float
+        Nodes at most so far from the section are on it.
+
+    Returns
+    -------
+    CellBlock
+        The cells with nodes on both sides of the section, or on it; perhaps none.
+    """
+    ways = list(matrices)
+    return join_blocks(
+        block.take(np.flatnonzero(crossed_cells(block.mesh, section, ways, near)))
+        for block in blocks
+    )
+
+
+class MeshSource(Protocol):
+    """The cells of a mesh, and perhaps of the undeformed one, in blocks."""
+
+    @property
+    def mesh(self) -> Mesh:
+        """Return what of the mesh is in memory: all of it, or its boundary and the cells at it."""
+
+    @property
+    def n_cells(self) -> int:
+        """Return the number of its cells."""
+
+    @property
+    def n_points(self) -> int:
+        """Return the number of its points."""
+
+    def blocks(self, tick: Tick) -> Iterator[CellBlock]:
+        """Yield all cells, block by block."""
+
+    def types(self, ids: IntArray) -> NDArray[np.uint8]:
+        """Return the VTK types (k,) of the cells ``ids`` (k,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class MemorySource:
+    """A mesh in memory: one block."""
+
+    mesh: Mesh
+    base: Mesh | None = None
+
+    @property
+    def n_cells(self) -> int:
+        """Return the number of its cells."""
+        return len(self.mesh.cells)
+
+    @property
+    def n_points(self) -> int:
+        """Return the number of its points."""
+        return len(self.mesh.points)
+
+    def blocks(self, tick: Tick = lambda _: None) -> Iterator[CellBlock]:
+        """Yield the mesh as one block."""
+        yield CellBlock(np.arange(self.n_cells), np.arange(self.n_points), self.mesh, self.base)
+        tick(1.0)
+
+    def types(self, ids: IntArray) -> NDArray[np.uint8]:
+        """Return the VTK types (k,) of the cells ``ids`` (k,)."""
+        return np.asarray(self.mesh.cells.types[ids])
+
+
+@dataclass(frozen=True, eq=False)
+class PointTable:
+    """The points of a zone of an SU2 binary mesh, or of a file with the same layout."""
+
+    file: BinaryFile
+    place: ZonePlace
+
+    def byte(self, node: int) -> int:
+        """Return the place of the point with the number ``node`` in the file, in bytes."""
+        return self.place.points + node * self.file.point(self.place.dim).itemsize
+
+    def rows(self, first: int, count: int) -> NDArray:
+        """Return points as they are in the file: coordinates ``x`` (count, d) and more."""
+        kind = self.file.point(self.place.dim)
+        return self.file.array(self.byte(first), count, kind, "the points")
+
+    def at(self, nodes: IntArray) -> FloatArray:
+        """Return the points (k, d) of ascending nodes (k,); neighbours are read in one piece."""
+        out = np.empty((len(nodes), self.place.dim))
+        a = 0
+        while a < len(nodes):
+            first = int(nodes[a])
+            b = int(np.searchsorted(nodes, first + READ))
+            count = int(nodes[b - 1]) + 1 - first
+            rows = self.rows(first, count)
+            out[a:b] = rows["x"] if b - a == count else rows["x"][nodes[a:b] - first]
+            a = b
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class FileSource:
+    """A mesh in an SU2 binary file, of which one block is in memory at a time."""
+
+    file: BinaryFile
+    place: ZonePlace
+    """`file`, `place`: its cells."""
+    points: PointTable
+    base: PointTable | None
+    """`points`, `base`: its points, and the undeformed ones if there is a reference."""
+    zone: Zone
+    """The file of the undeformed mesh, or else of its points."""
+    skin: Mesh | None = None
+
+    @classmethod
+    def open(
+        cls,
+        stack: ExitStack,
+        zone: Zone,
+        reference: Zone | None = None,
+        moved: Path | None = None,
+        skin: Mesh | None = None,
+    ) -> FileSource:
+        """Return the mesh in a file, which ``stack`` closes.
+
+        Parameters
+        ----------
+        reference : file and zone, optional
+            The undeformed mesh, which has the same cells (see `has_cells_of`).
+        moved : Path, optional
+            A file with the points, as ``zone`` has the undeformed ones; in place of ``reference``.
+        """
+        source, place = stack.enter_context(open_zone(*zone))
+        points = PointTable(source, place)
+        if moved is not None:
+            other = source.of(stack.enter_context(moved.open("rb")))
+            return cls(source, place, PointTable(other, place), points, zone, skin)
+        base = (
+            None if reference is None else PointTable(*stack.enter_context(open_zone(*reference)))
+        )
+        return cls(source, place, points, base, reference or zone, skin)
+
+    @classmethod
+    def of(cls, file: BinaryFile, place: ZonePlace, points: BinaryFile | None = None) -> FileSource:
+        """Return a mesh in an open file; ``points`` has the points where ``file`` has others."""
+        return cls(file, place, PointTable(points or file, place), None, (Path(), None))
+
+    @property
+    def mesh(self) -> Mesh:
+        """Return the boundary of the mesh and the cells at it."""
+        assert self.skin is not None
+        return self.skin
+
+    @property
+    def n_cells(self) -> int:
+        """Return the number of its cells."""
+        return self.place.cells.count
+
+    @property
+    def n_points(self) -> int:
+        """Return the number of its points."""
+        return self.place.n_points
+
+    def blocks(self, tick: Tick = lambda _: None, size: int | None = None) -> Iterator[CellBlock]:
+        """Yield all cells in the order of the file, at most ``size`` at a time (`CELLS`)."""
+        if not self.n_cells:
+            raise MeshError(f"{self.file.name} has no cells; a quality needs at least one")
+        place = self.place
+        for block in element_blocks(self.file, place, place.cells, place.dim, size or CELLS):
+            yield self.with_points(block)
+            tick((block.first + len(block.types)) / self.n_cells)
+
+    def between(self, first: int, count: int) -> CellBlock:
+        """Return ``count`` cells from the place ``first`` in the file on."""
+        return self.with_points(self.elements_at(first, count))
+
+    def elements_at(self, first: int, count: int) -> ElementBlock:
+        """Return ``count`` cells from the place ``first`` in the file on, without points."""
+        place = self.place
+        return element_block(self.file, place, place.cells, place.dim, first, count)
+
+    def with_points(self, block: ElementBlock) -> CellBlock:
+        """Return cells of the file with their points.
+
+        Where their nodes lie close to each other, the points between are among them (`SPARSE`).
+        """
+        low, high = int(block.nodes.min()), int(block.nodes.max()) + 1
+        if high - low <= SPARSE * len(block.types):
+            nodes, flat = np.arange(low, high), block.nodes - low
+        else:
+            nodes, flat = np.unique(block.nodes, return_inverse=True)
+        cells = Cells.from_types(block.types, flat)
+        mesh = Mesh(self.points.at(nodes), cells, name=self.file.name)
+        base = None if self.base is None else mesh.with_points(self.base.at(nodes))
+        return CellBlock(block.ids, nodes, mesh, base)
+
+    def types(self, ids: IntArray) -> NDArray[np.uint8]:
+        """Return the VTK types (k,) of the cells ``ids`` (k,)."""
+        return self.elements(ids).types
+
+    def elements(self, ids: IntArray) -> ElementBlock:
+        """Return the cells ``ids`` (k,), in that order."""
+        place = self.place
+        found = [self.elements_at(int(cell), 1) for cell in ids]
+        if any(int(one.ids[0]) != cell for one, cell in zip(found, ids, strict=True)):
+            # Cells are not in order in the file: read all of it.
+            kept: dict[int, ElementBlock] = {}
+            for block in element_blocks(self.file, place, place.cells, place.dim):
+                ends = np.concatenate([[0], np.cumsum(SIZES[block.types])])
+                for k in np.flatnonzero(np.isin(block.ids, ids)).tolist():
+                    nodes = block.nodes[ends[k] : ends[k + 1]].copy()
+                    kept[int(block.ids[k])] = ElementBlock(0, block.types[k : k + 1], nodes, ids)
+            found = [kept[int(cell)] for cell in ids]
+        types = np.concatenate([one.types for one in found])
+        return ElementBlock(0, types, np.concatenate([one.nodes for one in found]), ids)
+
+
+def has_cells_of(mesh: Zone, other: Zone) -> bool:
+    """Return whether two SU2 binary meshes have the same cells, by types and nodes.
+
+    Raises
+    ------
+    MeshError
+        Their cells are in different orders in the files, so they cannot be compared.
+    """
+    with open_zone(*mesh) as (one, place), open_zone(*other) as (two, there):
+        same = place.dim == there.dim and place.n_points == there.n_points
+        if not same or place.cells.count != there.cells.count:
+            return False
+        both = (
+            element_blocks(file, at, at.cells, at.dim, CELLS)
+            for file, at in ((one, place), (two, there))
+        )
+        for first, second in zip(*both, strict=True):
+            if not np.array_equal(first.ids, second.ids):
+                raise MeshError(
+                    f"{two.name} has its cells in another order than {one.name}, so they cannot "
+                    "be compared block by block; run it without --stream"
+                )
+            if not (
+                np.array_equal(first.types, second.types)
+                and np.array_equal(first.nodes, second.nodes)
+            ):
+                return False
+    return True
+
+
+class Scratch:
+    """An array (count,) in a temporary file, which is removed when ``stack`` closes."""
+
+    def __init__(self, stack: ExitStack, folder: Path, count: int, kind: type) -> None:
+        path = stack.enter_context(draft(folder))
+        with open_temporary(path, new=True) as file:
+            size = max(count * np.dtype(kind).itemsize, 1)
+            file.truncate(size)
+            if hasattr(os, "posix_fallocate"):  # else a full disk would end the process
+                os.posix_fallocate(file.fileno(), 0, size)
+            self._map = mmap.mmap(file.fileno(), 0)
+        self.array: NDArray = np.frombuffer(self._map, kind, count)
+
+    def release(self) -> None:
+        """Give the memory of the array back to the system; its values stay in the file."""
+        if hasattr(mmap, "MADV_DONTNEED"):  # other systems than Linux do it in their own time
+            self._map.madvise(mmap.MADV_DONTNEED)
