@@ -105,8 +105,8 @@ def _run(arguments: argparse.Namespace) -> int:
     if arguments.resume and (known := finished(about, made)):
         arguments.begun(REPLACED)
         if not arguments.quiet:
-            done = "the run of this case, mesh and version is finished; there is nothing to do"
-            say("note", f"{output}: {done}")
+            why = "the run of this case, mesh and version is finished; there is nothing to do"
+            say("note", f"{output}: {why}")
         save_report(arguments, known[0])
         return report_warnings(*known, quiet=arguments.quiet)
     done = (_stream if streamed else _deform)(arguments, case, output, kind)
