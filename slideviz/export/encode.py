@@ -145,15 +145,15 @@ def _start_ffmpeg(
     """Return a process of ffmpeg that reads raw images and writes an MP4; its messages: ``log``."""
     import imageio_ffmpeg
 
-    given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate)]
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate)]
     # BT.709 colors, declared in the file: otherwise players guess by the size.
-    said = ":".join(f"{name}=bt709" for name in ("colorspace", "color_primaries", "color_trc"))
-    colors = f"scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,setparams={said}"
+    bt709 = ":".join(f"{name}=bt709" for name in ("colorspace", "color_primaries", "color_trc"))
+    colors = f"scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,setparams={bt709}"
     made = ["-vf", colors, "-c:v", "libx264", "-preset", "veryfast", "-crf", "16"]
     made += ["-movflags", "+faststart", "-f", "mp4"]
     try:
         return subprocess.Popen(
-            [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-y", *given, "-i", "-", *made, path],
+            [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-y", *source, "-i", "-", *made, path],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=log,

@@ -327,9 +327,9 @@ def aim_at_largest(
 def require_pair(size: tuple[int, int]) -> None:
     """Raise SlidevizError if a film's size is too narrow for two runs side by side."""
     options = image_options(size, both=True)
-    room = panes(options, options.gap)[0].size[0]
-    if room < _NARROWEST:
-        least = size[0] + 2 * (_NARROWEST - room)
+    width = panes(options, options.gap)[0].size[0]
+    if width < _NARROWEST:
+        least = size[0] + 2 * (_NARROWEST - width)
         raise SlidevizError(
             f"{size[0]}x{size[1]} pixels are too narrow for two runs beside each other; take "
             f"{least + least % 2} or more in width, or less in height"
@@ -369,8 +369,8 @@ def _blend(
     """
     points = (1.0 - part) * start.mesh.points + part * end.mesh.points
     mesh = end.mesh.with_points(points)
-    found = quality(mesh, reference=first.mesh, metric=end.quality.metric, going_on=going_on)
-    return StepFrame(mesh, found, end.step)
+    blended = quality(mesh, reference=first.mesh, metric=end.quality.metric, going_on=going_on)
+    return StepFrame(mesh, blended, end.step)
 
 
 def _showing(session: Session, frame: StepFrame) -> Session:
@@ -405,8 +405,8 @@ def _titles_of_runs(
     """
     pair, what = len(runs) == 2, runs[0].view.color_by
 
-    def words(session: Session, place: str, found: Quality) -> str:
-        run, text = session.run_shown, caption(place, found, what)
+    def words(session: Session, place: str, stats: Quality) -> str:
+        run, text = session.run_shown, caption(place, stats, what)
         if pair and run is not None:
             return f"{run.name}{DETAIL if detail else ''}\n{text}"
         return text + (DETAIL if detail else "")
@@ -426,7 +426,7 @@ def _titles_of_runs(
             words(one, film_frame.words, film_frame.frame.quality)
             for one, film_frame in zip(runs, film_frames, strict=True)
         ]
-        found, part = fitting([*texts, longest], letters)
-        return found[:-1], part
+        shortened, part = fitting([*texts, longest], letters)
+        return shortened[:-1], part
 
     return write

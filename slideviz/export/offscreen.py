@@ -69,7 +69,9 @@ def font_scale(size: tuple[int, int]) -> float:
     return max(size[1] / _NORMAL_HEIGHT, 0.6)
 
 
-def write_title(plotter: Any, words: str, scheme: ColorScheme, letters: float, room: float) -> None:
+def write_title(
+    plotter: Any, words: str, scheme: ColorScheme, letters: float, height: float
+) -> None:
     """Draw a title of one line or two at the left of the upper edge.
 
     It is left-aligned so that a film's title does not move when its number of digits changes.
@@ -81,8 +83,8 @@ def write_title(plotter: Any, words: str, scheme: ColorScheme, letters: float, r
     scheme : ColorScheme
     letters : float
         Size of the letters.
-    room : float
-        Height in pixels of the room in which the title is vertically centred.
+    height : float
+        Height in pixels of the strip in which the title is vertically centred.
     """
     import pyvista as pv
 
@@ -94,7 +96,7 @@ def write_title(plotter: Any, words: str, scheme: ColorScheme, letters: float, r
     title.prop.SetBackgroundOpacity(0.7)
     title.prop.SetVerticalJustificationToCentered()
     title.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
-    high = 1.0 - 0.5 * room / plotter.window_size[1]
+    high = 1.0 - 0.5 * height / plotter.window_size[1]
     title.GetPositionCoordinate().SetValue(CAPTION_AT, high)
     plotter.add_actor(title, name="title", reset_camera=False, render=False)
 

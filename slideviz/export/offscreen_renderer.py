@@ -214,13 +214,13 @@ class OffscreenRenderer:
         self.pose(options)
         camera, (width, height) = self._plotter.camera, options.size
         unit = 2.0 * camera.parallel_scale / height
-        found = []
+        ranges = []
         for centre, length, shift in zip(
             camera.focal_point[:2], (width, height), camera.GetWindowCenter(), strict=True
         ):
             low = centre - 0.5 * length * (1.0 - shift) * unit
-            found.append((float(low), float(low + length * unit)))
-        return found[0], found[1]
+            ranges.append((float(low), float(low + length * unit)))
+        return ranges[0], ranges[1]
 
     def write(self, options: PictureOptions, file: Path) -> None:
         """Write the picture as a PNG file, whole or not at all.
@@ -249,10 +249,10 @@ class OffscreenRenderer:
         plotter = self._plotter
         plotter.remove_actor("title", reset_camera=False, render=False)
         if words:
-            room = options.title_room * options.scale
+            title_height = options.title_room * options.scale
             # A film's title is longer, and has smaller letters than the rest.
             letters = TITLE * size * options.scale / (LETTERS if options.film else 1.0)
-            write_title(plotter, words, self._scene.scheme, letters, room)
+            write_title(plotter, words, self._scene.scheme, letters, title_height)
         name_mark(plotter, self._scene, options.scale)
         return image_of(plotter, options.background == "transparent")
 

@@ -37,12 +37,12 @@ LONGEST = "step {0}.00 of {0}, interpolated"
 """The longest text of a place in a film, by which the form of its titles is chosen once."""
 
 
-def caption(name: str, found: Quality, color_by: ColorBy = "size-skew") -> str:
+def caption(name: str, quality: Quality, color_by: ColorBy = "size-skew") -> str:
     """Return a line with a name and the size-skew quality: min, mean, inverted cells."""
     what = "" if color_by == "size-skew" else "size-skew "
-    text = f"{printable(name)}: {what}min {found.min:.4f}, mean {found.mean:.4f}"
-    if found.inverted:
-        text += f", {found.inverted} of {found.cells} cells inverted"
+    text = f"{printable(name)}: {what}min {quality.min:.4f}, mean {quality.mean:.4f}"
+    if quality.inverted:
+        text += f", {quality.inverted} of {quality.cells} cells inverted"
     return text
 
 
@@ -50,8 +50,8 @@ def place_words(position: float, steps: int) -> str:
     """Return the position in a run in words: a step, or between two; empty for an only step."""
     if position == 0:
         return "undeformed"
-    whole = position == int(position)
-    if whole:
+    is_step = position == int(position)
+    if is_step:
         return f"step {position:.0f} of {steps}" if steps > 1 else ""
     return f"step {position:.2f} of {steps}, interpolated"
 
@@ -67,8 +67,8 @@ def names_of(session: Session) -> list[str]:
         return ["Deformed"]
     number, words = f"Run {run.number}", run_words(run)
     others = differences_from_all(run, session.runs)
-    found = [f"{number}, {words}, {others}"] if others else []
-    return [*found, f"{number}, {words}", number]
+    full = [f"{number}, {words}, {others}"] if others else []
+    return [*full, f"{number}, {words}", number]
 
 
 def title_words(
@@ -95,15 +95,15 @@ def title_words(
         return caption(f"{name}, {place}" if place else name, frame.quality, what)
 
     if place == "undeformed":
-        full, *rest = ("Undeformed",)
+        full, *shorter = ("Undeformed",)
     else:
-        full, *rest = names_of(session)
+        full, *shorter = names_of(session)
     shown = "" if place == "undeformed" else place
-    for name in (full, *rest[:-1]):
+    for name in (full, *shorter[:-1]):
         if max(len(titled(name, longest)), len(titled(name, shown))) <= letters:
             return titled(name, shown)
     least = f": min {frame.quality.min:.3f}"
-    for name in (full, *rest):
+    for name in (full, *shorter):
         for where in (f", {shown}" if shown else "", ""):
             text = f"{name}{where}{least}"
             if len(text) <= letters:
@@ -148,7 +148,7 @@ def pair_titles(pair: Sequence[Session], quality: bool) -> list[str]:
     if not quality:
         return names
     several = any(len(one.frames) > 2 for one in pair)
-    found = []
+    titles = []
     for one, name in zip(pair, names, strict=True):
         frame, steps = one.frame, len(one.frames) - 1
         assert frame is not None
@@ -156,8 +156,8 @@ def pair_titles(pair: Sequence[Session], quality: bool) -> list[str]:
         place = (f"step {at} of {steps}" if several else "") if at else "undeformed"
         place = "" if name == "Undeformed" else place
         numbers = caption(place, frame.quality, one.view.color_by).removeprefix(": ")
-        found.append(f"{name}\n{numbers}")
-    return found
+        titles.append(f"{name}\n{numbers}")
+    return titles
 
 
 def fitting(titles: Sequence[str], letters: float) -> tuple[list[str], float]:

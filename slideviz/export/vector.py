@@ -125,8 +125,8 @@ class _Paint:
         """Return the color arguments of a LineCollection of the lines that a section cuts."""
         if self.values is None:
             return {"colors": PAPER.cell}
-        found = self.colors
-        return {"array": self.values[cut.cells], "cmap": found.cmap, "norm": found.norm}
+        scale = self.colors
+        return {"array": self.values[cut.cells], "cmap": scale.cmap, "norm": scale.norm}
 
 
 def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: float) -> None:

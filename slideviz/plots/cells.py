@@ -103,8 +103,8 @@ def _thickness(axes: Any, cells: Polygons) -> FloatArray:
     """Return the drawn thickness (q,) of each polygon in points: its area by its diagonal."""
     low, high = axes.get_xlim()
     points_per_length = 72.0 * axes.bbox.width / axes.figure.dpi / (high - low)
-    found: FloatArray = np.abs(_normals(cells)[:, 2]) / _sizes(cells) * points_per_length
-    return found
+    thickness: FloatArray = np.abs(_normals(cells)[:, 2]) / _sizes(cells) * points_per_length
+    return thickness
 
 
 def _normals(cells: Polygons) -> FloatArray:
@@ -147,9 +147,9 @@ def surroundings(
     """
     if cutter.dim == 3:
         return None
-    own = cutter.all_cells(points)
+    cells = cutter.all_cells(points)
     return joined(
-        [own.with_points(transformed(own.points, matrix)) for matrix in matrices.values()]
+        [cells.with_points(transformed(cells.points, matrix)) for matrix in matrices.values()]
     )
 
 
@@ -168,14 +168,14 @@ def window(cut: Box, around: Polygons, ratio: float) -> Box:
     low, high = cut
     size = high - low
     wanted = np.maximum(size, [size[1] * ratio, size[0] / ratio])
-    found = np.stack([(low + high - wanted) / 2.0, (low + high + wanted) / 2.0])
+    box = np.stack([(low + high - wanted) / 2.0, (low + high + wanted) / 2.0])
     corners = around.points[around.connectivity, :2]
     ends = np.stack([corners.min(axis=0), corners.max(axis=0)])
     # Where the mesh ends on one side, the box is shifted to show more of the other.
-    shift = np.maximum(ends[0] - found[0], 0.0) - np.maximum(found[1] - ends[1], 0.0)
+    shift = np.maximum(ends[0] - box[0], 0.0) - np.maximum(box[1] - ends[1], 0.0)
     fits = ends[1] - ends[0] >= wanted
-    found = np.where(fits, found + shift, np.stack([ends[0], ends[1]]))
-    return found[0], found[1]
+    box = np.where(fits, box + shift, np.stack([ends[0], ends[1]]))
+    return box[0], box[1]
 
 
 def draw_around(axes: Any, around: Polygons, section: Section, box: Box) -> None:

@@ -71,14 +71,14 @@ def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurv
             values = table.rows[number - 1]
             groups.setdefault(values[:at] + values[at + 1 :], []).append(row)
     others = [name for name in table.columns if name != column]
-    found = []
-    for rest, rows in groups.items():
+    curves = []
+    for fixed, rows in groups.items():
         places = _numbers(place_of[table.rows[row.design - 1][at]] for row in rows)
         order = np.argsort(places, kind="stable")
         name = "min" if what == "quality" else what
-        found.append(
+        curves.append(
             DesignCurve(
-                ", ".join(rest),
+                ", ".join(fixed),
                 np.array([row.design for row in rows])[order],
                 places[order],
                 _numbers(getattr(row, name) for row in rows)[order],
@@ -88,7 +88,7 @@ def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurv
                 ",\n".join(others),
             )
         )
-    return found
+    return curves
 
 
 def failed_designs(table: DesignTable, column: str) -> dict[int, float]:

@@ -209,8 +209,8 @@ def _apart(places: np.ndarray) -> list[int]:
     if last < 1:
         return list(range(last + 1))
     least = _ROOM * (places[last] - places[0])
-    found = [0]
+    chosen = [0]
     for k in range(1, last):
-        if min(places[k] - places[found[-1]], places[last] - places[k]) >= least:
-            found.append(k)
-    return [*found, last]
+        if min(places[k] - places[chosen[-1]], places[last] - places[k]) >= least:
+            chosen.append(k)
+    return [*chosen, last]

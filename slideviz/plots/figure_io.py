@@ -64,19 +64,19 @@ def fitted(words: str, inches: float, size: float) -> tuple[str, float]:
     """
     from matplotlib.textpath import TextPath
 
-    room, found = 72.0 * inches, []
+    points, wrapped = 72.0 * inches, []
     widths = {
         line: float(TextPath((0.0, 0.0), line, size=1.0).get_extents().width)
         for line in words.split("\n")
         if line.strip()
     }
-    size = min(size, max(room / max(widths.values(), default=1.0), SMALLEST))
+    size = min(size, max(points / max(widths.values(), default=1.0), SMALLEST))
     for line in words.split("\n"):
-        lines = math.ceil(widths.get(line, 0.0) * size / room - 1e-9)
+        lines = math.ceil(widths.get(line, 0.0) * size / points - 1e-9)
         # With a margin, as some of the wrapped lines have more wide letters than others.
-        most = int(0.93 * len(line) * room / (widths[line] * size)) if lines > 1 else len(line)
-        found += textwrap.wrap(line, max(most, 8)) or [""]
-    return "\n".join(found), size
+        most = int(0.93 * len(line) * points / (widths[line] * size)) if lines > 1 else len(line)
+        wrapped += textwrap.wrap(line, max(most, 8)) or [""]
+    return "\n".join(wrapped), size
 
 
 def figure_bytes(figure: Any, kind: str, dpi: float = 300.0, transparent: bool = False) -> bytes:

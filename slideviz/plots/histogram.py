@@ -53,11 +53,11 @@ def histogram(
     outlines = []
     for index, run in enumerate(runs):
         values = run.values if run.inverted is None else np.where(run.inverted, np.nan, run.values)
-        found = Distribution.of(values, edges)
+        counts = Distribution.of(values, edges)
         # A legend outside the axes is common to several, with other numbers of inverted cells.
-        counted = found.inverted > 0 and style.legend
-        label = f"{run.label} ({found.inverted} inverted)" if counted else run.label
-        outlines.append(Outline(label, found, place(run.series, index)))
+        counted = counts.inverted > 0 and style.legend
+        label = f"{run.label} ({counts.inverted} inverted)" if counted else run.label
+        outlines.append(Outline(label, counts, place(run.series, index)))
     draw_distribution(axes, None, outlines, f"{metric} quality [-]", log, style)
 
 
@@ -148,12 +148,12 @@ def _colors(bars: Bars, paler: bool, style: Style) -> list[tuple[float, ...]]:
     """Return the color (red, green, blue) of each bar."""
     from matplotlib.colors import to_rgb
 
-    given = bars.colors if bars.colors is not None else [style.series(0).color]
-    own = np.array([to_rgb(color) for color in given])
+    chosen = bars.colors if bars.colors is not None else [style.series(0).color]
+    rgbs = np.array([to_rgb(color) for color in chosen])
     if paler:
-        own += _PALER * (np.array(to_rgb(style.scheme.background)) - own)
+        rgbs += _PALER * (np.array(to_rgb(style.scheme.background)) - rgbs)
     count = len(bars.distribution.counts)
-    return [tuple(rgb) for rgb in np.broadcast_to(own, (count, 3))]
+    return [tuple(rgb) for rgb in np.broadcast_to(rgbs, (count, 3))]
 
 
 def _counts_axis(axes: Axes, bars: Bars | None, outlines: Sequence[Outline], log: bool) -> None:
@@ -186,21 +186,21 @@ def _strip(
     """
     left, low = ends
     axes.axvspan(left, low, color=style.alarm, alpha=0.13, linewidth=0)
-    room = _STEMS * (low - left)
+    width = _STEMS * (low - left)
     if bars is not None and bars.distribution.inverted:
         height = bars.distribution.inverted - foot
-        axes.bar(left, height, room, bottom=foot, align="edge", color=style.alarm)
+        axes.bar(left, height, width, bottom=foot, align="edge", color=style.alarm)
     for index, outline in enumerate(outlines):
         number = outline.distribution.inverted
         if number:
             look = _look(outline, style)
-            apart = room / (len(outlines) + 1)
+            apart = width / (len(outlines) + 1)
             at = left + apart * (index + 1)
             axes.plot([at, at], [foot, number], **look)
             across = [at - 0.35 * apart, at + 0.35 * apart]
             axes.plot(across, [number, number], **(look | {"linestyle": "solid"}))
     axes.text(
-        low - 0.5 * ((low - left) - room),
+        low - 0.5 * ((low - left) - width),
         0.97,
         "inverted",
         transform=axes.get_xaxis_transform(),

@@ -110,14 +110,14 @@ def draw_curves(
     style_axes(axes, style, *labels)
     good = np.concatenate([row.curve.values for row in rows])
     low, high = rounded_out(float(good.min()), float(good.max()))
-    room = 0.06 * (high - low)
-    axes.set_ylim(low - room, high + room)
+    margin = 0.06 * (high - low)
+    axes.set_ylim(low - margin, high + margin)
     ends = np.concatenate([row.curve.ends for row in rows])
     side = 0.02 * float(np.ptp(ends)) or 1.0
     axes.set_xlim(ends.min() - side, ends.max() + side)
     last = rows[-1].curve
     if colors is not None:
-        _areas(axes, last, colors, low - room)
+        _areas(axes, last, colors, low - margin)
     if last.inverted.any():
         _folded(axes, last, style)
     for index, row in enumerate(rows):
@@ -135,8 +135,8 @@ def draw_curves(
 
 def steps(curve: Curve) -> tuple[FloatArray, FloatArray]:
     """Return positions and values, (n,) each, of a polyline of steps; NaN where it breaks."""
-    whole = float(np.ptp(curve.ends)) if len(curve.ends) else 0.0
-    breaks = np.flatnonzero(curve.ends[1:, 0] - curve.ends[:-1, 1] > GAP * whole) + 1
+    length = float(np.ptp(curve.ends)) if len(curve.ends) else 0.0
+    breaks = np.flatnonzero(curve.ends[1:, 0] - curve.ends[:-1, 1] > GAP * length) + 1
     x, y = curve.ends.ravel(), np.repeat(curve.values, 2)
     return np.insert(x, 2 * breaks, np.nan), np.insert(y, 2 * breaks, np.nan)
 

@@ -68,15 +68,15 @@ class Paint:
 
         If they are only those of ``of`` cells that a threshold leaves, ``shown`` is its text.
         """
-        found = self.summary(cells)
+        facts = self.summary(cells)
         end = "max" if self.label == "displacement" else "min"
         number = ".4g" if self.label == "displacement" else ".4f"
         count = f"{len(cells):,} cell{'s' if len(cells) > 1 else ''} cut"
         if of is not None:
             count = f"{len(cells):,} of {of:,} cells cut (shown: {shown})"
-        if found["inverted"]:
-            count += f", {found['inverted']:,} inverted"
-        return f"{self.label}: {end} {found[end]:{number}}, mean {found['mean']:{number}}; {count}"
+        if facts["inverted"]:
+            count += f", {facts['inverted']:,} inverted"
+        return f"{self.label}: {end} {facts[end]:{number}}, mean {facts['mean']:{number}}; {count}"
 
 
 def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = None) -> Paint:

@@ -96,19 +96,19 @@ def laid_flat(
         # A 2D mesh, or a plane at z = 0.
         return joined(list(pieces.values())), (Label("x", "x"), Label("y", "y"))
     shape = section.shape
-    own = shape.middle_angle(section, pieces[min(pieces, key=abs)]) if beside is None else beside
+    middle = shape.middle_angle(section, pieces[min(pieces, key=abs)]) if beside is None else beside
     middles: dict[int, float | None] = {}
-    found: dict[int, Polygons] = {}
+    laid: dict[int, Polygons] = {}
     for numbers in (
         sorted(number for number in pieces if number >= 0),
         sorted((number for number in pieces if number < 0), reverse=True),
     ):
         # Each passage is unrolled next to the one before, from the mesh itself outwards.
-        near = middles[min(found)] if found else own
+        near = middles[min(laid)] if laid else middle
         for number in numbers:
-            found[number] = shape.flatten(section, pieces[number], near, own)
+            laid[number] = shape.flatten(section, pieces[number], near, middle)
             near = middles[number] = shape.middle_angle(section, pieces[number], near)
-    flat = joined([found[number] for number in sorted(found)])
+    flat = joined([laid[number] for number in sorted(laid)])
     return flat.by_depth(), shape.flat_labels(section)
 
 
@@ -129,12 +129,12 @@ def arranged(size: FloatArray, inches: tuple[float, float], count: int) -> tuple
     """
     width, height = inches
     high = {upright: height * (HIGHER[upright] if count > 1 else 1.0) for upright in (True, False)}
-    rooms = {
+    areas = {
         True: ((width - SIDES - BAR) / count, high[True] - ENDS),
         False: (width - SIDES, (high[False] - BAR) / count - ENDS),
     }
-    scale = {key: float((np.maximum(room, 0.1) / size).min()) for key, room in rooms.items()}
-    fits = count == 1 or rooms[True][0] >= _NARROWEST
+    scale = {key: float((np.maximum(area, 0.1) / size).min()) for key, area in areas.items()}
+    fits = count == 1 or areas[True][0] >= _NARROWEST
     upright = fits and 1.05 * scale[True] >= scale[False]
     return upright, scale[upright]
 
@@ -254,10 +254,10 @@ class SectionInRun:
     @property
     def numbers(self) -> str:
         """Return step, minimum and mean of the cut cells in words, with the note."""
-        found = self.paint.sentence(self.ids) if self.drawn else "no cell is cut"
+        text = self.paint.sentence(self.ids) if self.drawn else "no cell is cut"
         if self.place:
-            found = f"{self.place}: {found.removeprefix(f'{self.paint.label}: ')}"
-        return "; ".join(part for part in (found, self.note) if part)
+            text = f"{self.place}: {text.removeprefix(f'{self.paint.label}: ')}"
+        return "; ".join(part for part in (text, self.note) if part)
 
 
 def require_picture_name(file: Path) -> None:
@@ -307,26 +307,26 @@ def draw_section(shown: Sequence[SectionInRun], section: Section, style: Section
         raise CaseError(f"{section.describe()}: it cuts no cell, so there is nothing to draw")
     alone = len(shown) == 1
     figure = empty_figure(style.inches, style.pixels_per_inch, "compressed")
-    lines = all(piece.sizes.max() == 2 for piece in every)
+    is_curve = all(piece.sizes.max() == 2 for piece in every)
     if style.title:
         in_plane = not any(piece.points[:, 2].any() for piece in every)
         what = section.describe(2 if in_plane else 3)
         words = ", ".join(part for part in (shown[0].name * alone, what) if part)
-        named = [f"{one.name}, {one.numbers}" for one in shown] if lines else []
-        _head(figure, style.name, words, rest=[shown[0].numbers] if alone else named)
-    if lines:
+        named = [f"{one.name}, {one.numbers}" for one in shown] if is_curve else []
+        _head(figure, style.name, words, lines=[shown[0].numbers] if alone else named)
+    if is_curve:
         _curves(figure, shown, section)
     else:
         _cells(figure, shown, section, style)
     return figure
 
 
-def _head(figure: Any, name: str, words: str, *, rest: Sequence[str]) -> None:
+def _head(figure: Any, name: str, words: str, *, lines: Sequence[str]) -> None:
     """Set the title of a figure; a long name at its begin is shortened."""
     if len(name) > _LONGEST:
         name = f"{name[: _LONGEST // 2]}…{name[-_LONGEST // 2 :]}"
-    said = "\n".join([f"{name}: {words}" if name else words, *rest])
-    fits, size = fitted(said, figure.get_size_inches()[0] - 0.2, TITLE)
+    text = "\n".join([f"{name}: {words}" if name else words, *lines])
+    fits, size = fitted(text, figure.get_size_inches()[0] - 0.2, TITLE)
     figure.suptitle(fits, fontsize=size)
 
 
@@ -366,9 +366,9 @@ def _cells(
     for axes, one in zip(every, shown, strict=True):
         axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         if len(shown) > 1:
-            said = f"{one.name}\n{one.numbers}" if style.title else one.name
-            room = (width - SIDES - BAR) / 2.0 if upright else width - SIDES
-            words, size = fitted(said, room, LETTERS)
+            text = f"{one.name}\n{one.numbers}" if style.title else one.name
+            available = (width - SIDES - BAR) / 2.0 if upright else width - SIDES
+            words, size = fitted(text, available, LETTERS)
             axes.set_title(words, fontsize=size)
     paint = shown[0].paint
     colors = color_scale(paint.color_map, paint.limits)

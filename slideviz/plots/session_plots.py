@@ -48,13 +48,13 @@ def step_runs(session: Session) -> list[StepRun]:
     They are in the order of their numbers: the solid line of the first is drawn below dashed ones,
     so that it shows where lines coincide.
     """
-    found = []
+    runs = []
     first = session.first
     for run in sorted(session.runs, key=lambda run: run.number):
         if first is None or not run.frames:
             continue
         frames = (first, *run.frames)
-        found.append(
+        runs.append(
             StepRun(
                 run.label,
                 np.arange(len(frames)),
@@ -63,7 +63,7 @@ def step_runs(session: Session) -> list[StepRun]:
                 series_of(run),
             )
         )
-    return found
+    return runs
 
 
 def greedy_run(session: Session) -> GreedyRun | None:
@@ -232,11 +232,11 @@ class FrameCounts:
             WeakKeyDictionary()
         )
 
-    def limits(self, session: Session, whole: bool) -> Range:
+    def limits(self, session: Session, full_range: bool) -> Range:
         """Return the limits of the axis: round numbers around the cells' values.
 
         They are the same for all steps of the shown run, so that bars can be compared during play.
-        ``whole``: all values that are possible (of the displacement, from 0).
+        ``full_range``: all values that are possible (of the displacement, from 0).
         """
         what = shown_measure(session)
         shown = [*session.frames, *(run.last for run in session.runs if run.last is not None)]
@@ -244,12 +244,15 @@ class FrameCounts:
             kept = self._spreads.setdefault(frame, {})
             if what not in kept:
                 kept[what] = spread(frame, what, session.mesh)
-        found = [ends for frame in shown if (ends := self._spreads[frame][what]) is not None]
-        low, high = min((e[0] for e in found), default=0.0), max((e[1] for e in found), default=1.0)
+        spreads = [ends for frame in shown if (ends := self._spreads[frame][what]) is not None]
+        low, high = (
+            min((e[0] for e in spreads), default=0.0),
+            max((e[1] for e in spreads), default=1.0),
+        )
         if what != "displacement":
             # A smaller range would enlarge meaningless differences.
-            return (0.0, 1.0) if whole else rounded_out(min(low, high - LEAST_SPREAD), high)
-        return rounded_out(0.0 if whole else low, high)
+            return (0.0, 1.0) if full_range else rounded_out(min(low, high - LEAST_SPREAD), high)
+        return rounded_out(0.0 if full_range else low, high)
 
     def of(self, session: Session, frame: StepFrame, limits: Range) -> Distribution:
         """Return the distribution of a frame's values between limits."""
@@ -261,7 +264,13 @@ class FrameCounts:
 
 
 def draw_histogram(
-    counts: FrameCounts, session: Session, figure: Figure, style: Style, *, log: bool, whole: bool
+    counts: FrameCounts,
+    session: Session,
+    figure: Figure,
+    style: Style,
+    *,
+    log: bool,
+    full_range: bool,
 ) -> None:
     """Draw the histogram of a session into a figure; nothing without a mesh.
 
@@ -273,13 +282,13 @@ def draw_histogram(
     style : Style
     log : bool
         Whether the axis of the counts is logarithmic.
-    whole : bool
+    full_range : bool
         Whether the other axis shows all possible values, not only those of the cells.
     """
     if session.frame is None:
         return
     what = shown_measure(session)
-    limits = counts.limits(session, whole)
+    limits = counts.limits(session, full_range)
     shown, run = counts.of(session, session.frame, limits), session.run_shown
     label = "undeformed" if session.view.frame == 0 or run is None else run.label
     term = QUANTITIES[what]

@@ -83,9 +83,9 @@ class Style:
         return "#ff5d6c" if self.dark else INVERTED_COLOR
 
 
-def place(given: int | None, index: int) -> int:
-    """Return the number of a series: ``given``, or if None its index in the plot."""
-    return index if given is None else given
+def place(series: int | None, index: int) -> int:
+    """Return the number of a series: ``series``, or if None its index in the plot."""
+    return index if series is None else series
 
 
 def _brightness(color: str) -> int:

@@ -64,10 +64,10 @@ def bar_ticks(
     for count in range(most, 0, -1):
         step = round_step(width, count)
         form = _fine_enough(ends, step)
-        room = _BETWEEN * width * max(part(form % end) for end in (low, high))
-        if step >= room:
+        gap = _BETWEEN * width * max(part(form % end) for end in (low, high))
+        if step >= gap:
             inner = ticks(low, high, count)
-            kept = inner[(inner >= low + room) & (inner <= high - room)]
+            kept = inner[(inner >= low + gap) & (inner <= high - gap)]
             return np.concatenate([ends[:1], kept, ends[1:]]), form
     return ends, form
 
@@ -93,8 +93,8 @@ def _is_power(step: float) -> bool:
 def rounded_out(low: float, high: float, most: int = 12) -> tuple[float, float]:
     """Return the smallest range of round numbers that contains ``low`` to ``high``."""
     if not high > low:
-        room = max(abs(low), 1e-12) * 0.01
-        low, high = low - room, high + room
+        margin = max(abs(low), 1e-12) * 0.01
+        low, high = low - margin, high + margin
     step = round_step(high - low, most)
     first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
     digits = max(0, 1 - math.floor(math.log10(step)))

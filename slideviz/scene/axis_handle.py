@@ -51,9 +51,9 @@ def frame_of(section: Section, patch: Patch) -> list[FloatArray]:
     shape = axis_shape(section)
     girth = shape.girth(section, (patch.along[0] + patch.along[1]) / 2.0)
     size = (patch.angles[1] - patch.angles[0]) * girth, patch.along[1] - patch.along[0]
-    room = _ROOM * float(np.hypot(*size))
-    low, high = patch.along[0] - room, patch.along[1] + room
-    first, last = patch.angles[0] - room / girth, patch.angles[1] + room / girth
+    margin = _ROOM * float(np.hypot(*size))
+    low, high = patch.along[0] - margin, patch.along[1] + margin
+    first, last = patch.angles[0] - margin / girth, patch.angles[1] + margin / girth
     closed = patch.whole or last - first > TURN
     if closed:
         first, last = patch.angles[0], patch.angles[0] + TURN
@@ -90,10 +90,10 @@ def pixel_and_slope(
     """
     shape, lever = axis_shape(section), axis_shape(section).lever(section, place[1])
     # Outwards, around and along the section: one of the three is hardly foreshortened.
-    ways = shape.ways(section.sized(size), place[0])
+    directions = shape.ways(section.sized(size), place[0])
     (here,) = shape.surface(section, np.array([place]), size)
     step = 1e-3 * section.size * lever
-    at = pixels_of(np.concatenate([here[None], here + step * ways]))
+    at = pixels_of(np.concatenate([here[None], here + step * directions]))
     slopes = (at[1:] - at[0]) / step
     scale = float(np.linalg.norm(slopes, axis=1).max())
     steep = float(np.linalg.norm(slopes[0])) < _STEEP * scale

@@ -60,10 +60,10 @@ class BoxLayer(KeyedLayer):
             for name, box in moved.items()
         }
         colors = self.stage.scheme.text, ROLES["moving"].color
-        for name, color, found in zip((BASE, MOVED), colors, (every, changed), strict=True):
-            if not found:
+        for name, color, lattice in zip((BASE, MOVED), colors, (every, changed), strict=True):
+            if not lattice:
                 continue
-            shape = lattice_shape(list(found.values()), mesh.dim, lift)
+            shape = lattice_shape(list(lattice.values()), mesh.dim, lift)
             self._add(shape, name, color)
             if mesh.dim == 3:
                 behind = self._add(shape, BEHIND if name == BASE else f"{MOVED}:behind", color)

@@ -82,21 +82,21 @@ class Camera:
         ``clouds`` are further arrays of points (n, 3) to be seen, such as those of other steps.
         """
         self.shift()
-        found = self._whole(clouds)
-        if found is None:
+        extent = self._whole(clouds)
+        if extent is None:
             return
-        centre, half, depth = found
+        centre, half, depth = extent
         self.aim(centre, half, depth)
         self._fitted = self.place
 
     def fit_part(self, clouds: Sequence[FloatArray]) -> None:
         """Fit the given points, arrays (n, 3), to the view; the direction stays."""
         self.shift()
-        whole = self._whole()
-        if whole is None or not clouds:
+        extent = self._whole()
+        if extent is None or not clouds:
             return
         centre, half, _ = self._around(clouds)
-        self.aim(centre, max(half, 1e-9 * whole[1]), 2.0 * whole[2])
+        self.aim(centre, max(half, 1e-9 * extent[1]), 2.0 * extent[2])
 
     def _whole(self, clouds: Iterable[FloatArray] = ()) -> tuple[Any, float, float] | None:
         """Return centre (3,), half view height and diagonal of all that is drawn; None if nothing.
@@ -134,8 +134,8 @@ class Camera:
 
     def sees_detail(self) -> bool:
         """Return whether the view is zoomed in: its height is below `DETAIL` of the fitted one."""
-        found = self._whole()
-        return found is not None and self._camera.parallel_scale < DETAIL * found[1]
+        extent = self._whole()
+        return extent is not None and self._camera.parallel_scale < DETAIL * extent[1]
 
     @property
     def fitted(self) -> bool:

@@ -230,8 +230,8 @@ def place_bar(plotter: Any, title: str, below: float, scale: float) -> Rect:
     part = max(min(0.68, free - bottom), 0.2)
     bar.SetHeight(part)
     _number(bar, max(part * height - _HEAD * scale, 1.0) / scale)
-    room = _AIR * scale
-    return _rect(plotter, bottom * height - room, (bottom + part) * height + room, scale)
+    margin = _AIR * scale
+    return _rect(plotter, bottom * height - margin, (bottom + part) * height + margin, scale)
 
 
 def _number(bar: Any, length: float) -> None:

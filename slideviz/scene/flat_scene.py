@@ -141,13 +141,13 @@ class FlatScene:
         self.stage.edges(prop, "edges" in view.drawn, view.color_by == "role")
 
     def _draw_neighbours(self, section: Section) -> None:
-        found: dict[int, FloatArray] = {}
+        by_passage: dict[int, FloatArray] = {}
         if self.session.view.passages:
             pair = self._period.of(self.session)
             for number, matrix in matrices(self.session, pair).items():
                 if pair is not None and keeps(section, matrix):
-                    found[number] = flat_matrix(section, pair, number, matrix)
-        self._instances.show(found)
+                    by_passage[number] = flat_matrix(section, pair, number, matrix)
+        self._instances.show(by_passage)
 
     def _style_mark(self) -> None:
         prop, mapper = self._mark.actor.prop, self._mark.mapper
@@ -218,12 +218,12 @@ class FlatScene:
         """
         if self._all is None or not len(self._all):
             return None
-        own = self._all.points
+        points = self._all.points
         parts = [
-            transformed(own, np.array(instance.user_matrix))
+            transformed(points, np.array(instance.user_matrix))
             for instance in self._instances.drawn.values()
         ]
-        parts.append(own)
+        parts.append(points)
         low = np.min([part.min(axis=0) for part in parts], axis=0)
         high = np.max([part.max(axis=0) for part in parts], axis=0)
         return low[:2], high[:2]
@@ -231,11 +231,11 @@ class FlatScene:
     def fit(self) -> None:
         """Make the section (and that of ``beside``) fill the view."""
         scenes = [self] if self.beside is None else [self, self.beside]
-        found = [box for box in (scene.bounds() for scene in scenes) if box is not None]
-        if not found:
+        boxes = [box for box in (scene.bounds() for scene in scenes) if box is not None]
+        if not boxes:
             return
-        low = np.min([box[0] for box in found], axis=0)
-        high = np.max([box[1] for box in found], axis=0)
+        low = np.min([box[0] for box in boxes], axis=0)
+        high = np.max([box[1] for box in boxes], axis=0)
         width, height = self.stage.plotter.window_size
         extent = np.maximum(high - low, 1e-300)
         half = max(extent[1], extent[0] * height / max(width, 1)) / 2.0 / FILL

@@ -118,8 +118,8 @@ class GhostLayer(Layer):
 
     def _rim_color(self, color: str) -> tuple[float, float, float]:
         """Return a color that contrasts with a ghost's own: mixed with that of the text."""
-        own, text = (np.array(pv.Color(one).float_rgb) for one in (color, self.stage.scheme.text))
-        red, green, blue = (0.5 * (own + text)).tolist()
+        base, text = (np.array(pv.Color(one).float_rgb) for one in (color, self.stage.scheme.text))
+        red, green, blue = (0.5 * (base + text)).tolist()
         return red, green, blue
 
     def _draw_undeformed(self, session: Session) -> None:
@@ -185,12 +185,12 @@ def is_apart(points: FloatArray, surface: Surface, session: Session) -> bool:
     mesh = session.mesh
     assert mesh is not None
     at = mesh.points[surface.nodes]
-    way = float(np.abs(points - at).max())
+    displacement = float(np.abs(points - at).max())
     still = STILL * float(np.ptp(at, axis=0).max())
     if session.view.frame == 0 or session.frame is None:
-        return way > still
+        return displacement > still
     left = float(np.abs(points - session.frame.mesh.points[surface.nodes]).max())
-    return left > max(still, ARRIVED * way)
+    return left > max(still, ARRIVED * displacement)
 
 
 def rim_goes_along(points: FloatArray, surface: Surface, mesh: Mesh) -> bool:
@@ -198,8 +198,8 @@ def rim_goes_along(points: FloatArray, surface: Surface, mesh: Mesh) -> bool:
 
     The rim of a wall that a free-form box dents stays in place; a closed surface has no rim.
     """
-    way = np.abs(points - mesh.points[surface.nodes]).max(axis=1)
-    return bool(way[surface.rim].max(initial=0.0) > 0.5 * way.max())
+    length = np.abs(points - mesh.points[surface.nodes]).max(axis=1)
+    return bool(length[surface.rim].max(initial=0.0) > 0.5 * length.max())
 
 
 def is_planned(session: Session) -> bool:
@@ -269,10 +269,10 @@ def circles(middles: FloatArray, radius: float) -> FloatArray:
     In 3D there are three about each, in the planes of the axes.
     """
     angle = np.linspace(0.0, 2.0 * np.pi, PIECES + 1)
-    dim, found = middles.shape[1], []
+    dim, rings = middles.shape[1], []
     for one in range(dim):
         for other in range(one + 1, dim):
             round_ = np.zeros((PIECES + 1, dim))
             round_[:, one], round_[:, other] = radius * np.cos(angle), radius * np.sin(angle)
-            found.append(round_)
-    return (middles[:, None, None] + np.array(found)).reshape(-1, dim)
+            rings.append(round_)
+    return (middles[:, None, None] + np.array(rings)).reshape(-1, dim)

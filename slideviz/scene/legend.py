@@ -82,8 +82,8 @@ class LegendLayer(KeyedLayer):
         self._placed = size
         rect = lines_room(plotter, self._end, scale)
         if self._bar is not None:
-            room = place_bar(plotter, *self._bar, scale)
-            rect = (*room[:3], rect[3]) if self._has_lines else room
+            bar_rect = place_bar(plotter, *self._bar, scale)
+            rect = (*bar_rect[:3], rect[3]) if self._has_lines else bar_rect
         if self._plate is not None:
             self._plate.place(rect)
 

@@ -57,11 +57,11 @@ class MarkLayer(Layer):
                 self.stage.remove(name)
             self.clear()
             return
-        own, at = frame.place_of(cell)
+        containing, at = frame.place_of(cell)
         if cell != self.cell:
-            self._add(own.mesh, at)
+            self._add(containing.mesh, at)
         if cell != self.cell or old is None or old.frame is not new.frame:
-            self._place(own.mesh, at)
+            self._place(containing.mesh, at)
         self.cell = cell
         if FACES in self._drawn:
             shape = self._shapes[FACES]
@@ -161,8 +161,8 @@ class InvertedLayer(Layer):
 
     def _draw(self, frame: StepFrame, cut: list[IntArray]) -> None:
         """Draw the rings of a frame's inverted cells, only of those in ``cut`` if there is any."""
-        own, count = frame.extra or frame, frame.quality.inverted
-        cells = own.quality.inverted_cells()
+        in_memory, count = frame.extra or frame, frame.quality.inverted
+        cells = in_memory.quality.inverted_cells()
         if cut:
             cells = cells[np.isin(cells, np.concatenate(cut))]
             count = len(cells)
@@ -172,7 +172,9 @@ class InvertedLayer(Layer):
             cells = cells[np.linspace(0, len(cells) - 1, MOST).astype(np.int64)]
         if not len(cells):
             return  # a mesh in its file has few of them in memory, or none
-        self._shape = pv.PolyData(lifted(middles(own.mesh, cells), 4.0 * self.stage.lift(own.mesh)))
+        self._shape = pv.PolyData(
+            lifted(middles(in_memory.mesh, cells), 4.0 * self.stage.lift(in_memory.mesh))
+        )
         actor = self.stage.add(self._shape, NAME, lighting=False, pickable=False)
         size = next(size for least, size in reversed(SIZES) if len(cells) >= least)
         actor.prop.color = INVERTED_COLOR

@@ -155,8 +155,8 @@ class BoundaryLayer(Layer):
         self._lift = self.stage.lift(session.mesh)
         for surface in surfaces:
             self.drawn[surface.name] = self._add(surface, session.mesh.points)
-        found = enclosing_of(session.mesh, surfaces)
-        self._closed, self._enclosed = found.closed, found.inner
+        enclosing = enclosing_of(session.mesh, surfaces)
+        self._closed, self._enclosed = enclosing.closed, enclosing.inner
 
     def clear(self) -> None:
         """Forget the mesh; the scene removes its actors."""
@@ -433,16 +433,16 @@ class CoarseLayer(Layer):
         made_of = session.frame, session.view.color_by
         again, self._made_of = made_of != self._made_of, made_of
         for name, one in self.drawn.items():
-            whole = self._boundaries.drawn[name].actor
+            full = self._boundaries.drawn[name].actor
             if again:
                 actors.place(one.shape, session.frame.mesh.points[one.surface.nodes])
             if again and session.view.color_by != "role":
                 one.shape.cell_data[VALUES] = self.stage.values_of(session, one.surface.owner)
-            one.actor.prop.DeepCopy(whole.prop)
+            one.actor.prop.DeepCopy(full.prop)
             one.actor.prop.show_edges = False
-            see_through(one.actor, whole.prop.opacity)
-            one.actor.mapper.scalar_visibility = whole.mapper.scalar_visibility
-            one.actor.visibility, whole.visibility = whole.visibility, False
+            see_through(one.actor, full.prop.opacity)
+            one.actor.mapper.scalar_visibility = full.mapper.scalar_visibility
+            one.actor.visibility, full.visibility = full.visibility, False
         props = [one.actor.prop for one in self._sections.drawn.values()]
         self._edged = [prop for prop in props if prop.show_edges or prop in self._edged]
         for prop in self._edged:

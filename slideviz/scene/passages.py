@@ -60,11 +60,11 @@ def matrices(session: Session, pair: Pair | None) -> dict[int, FloatArray]:
     count = session.view.passages
     if pair is None or count == 0:
         return {}
-    whole = passages_around(pair) is not None
-    if count < 0 and not whole:
+    is_wheel = passages_around(pair) is not None
+    if count < 0 and not is_wheel:
         count = UNENDING
-    found = passages(pair, "wheel" if count < 0 else count)
-    return {number: matrix for number, matrix in found.items() if number != 0}
+    by_number = passages(pair, "wheel" if count < 0 else count)
+    return {number: matrix for number, matrix in by_number.items() if number != 0}
 
 
 def outermost(points: FloatArray) -> FloatArray:
@@ -75,10 +75,10 @@ def outermost(points: FloatArray) -> FloatArray:
     rank = np.arange(DIRECTIONS) + 0.5
     height, turn = 1.0 - 2.0 * rank / DIRECTIONS, np.pi * (1.0 + 5.0**0.5) * rank
     across = np.sqrt(1.0 - height**2)
-    ways = np.column_stack([across * np.cos(turn), across * np.sin(turn), height])
+    directions = np.column_stack([across * np.cos(turn), across * np.sin(turn), height])
     # Scaled by the extents, so that they are evenly spread for a long or flat mesh too.
-    ways /= np.maximum(np.ptp(points, axis=0), 1e-300)
-    return np.asarray(points[np.unique((ways @ points.T).argmax(axis=1))])
+    directions /= np.maximum(np.ptp(points, axis=0), 1e-300)
+    return np.asarray(points[np.unique((directions @ points.T).argmax(axis=1))])
 
 
 class PassageLayer(KeyedLayer):
@@ -141,12 +141,12 @@ class PassageLayer(KeyedLayer):
 
     def _sources(self) -> dict[str, tuple[Any, Any]]:
         """Return data set and actor of everything that the passages repeat, by name."""
-        found = {name: (one.shape, one.actor) for name, one in self._boundaries.drawn.items()}
+        sources = {name: (one.shape, one.actor) for name, one in self._boundaries.drawn.items()}
         if self._cells.shape is not None:
-            found[CELLS] = self._cells.shape, self._cells.actor
+            sources[CELLS] = self._cells.shape, self._cells.actor
         if self._threshold.actor is not None:
-            found[THRESHOLD] = self._threshold.shape, self._threshold.actor
-        return found
+            sources[THRESHOLD] = self._threshold.shape, self._threshold.actor
+        return sources
 
     def draw(self, session: Session) -> None:
         """Replace the actors of all passages."""
@@ -193,8 +193,8 @@ class PassageLayer(KeyedLayer):
                 mapper.dataset = shape
             mapper.scalar_visibility = actor.mapper.scalar_visibility
             prop.DeepCopy(actor.prop)
-            own = np.array(actor.prop.color.float_rgb)
-            prop.color = tuple(own + PALER * (plain - own))
+            color = np.array(actor.prop.color.float_rgb)
+            prop.color = tuple(color + PALER * (plain - color))
             prop.edge_opacity = 0.5 * actor.prop.edge_opacity
             for copy in self._actors[name]:
                 copy.visibility = actor.visibility
@@ -202,14 +202,14 @@ class PassageLayer(KeyedLayer):
 
     def _pale_table(self) -> None:
         """Set the passages' table of colors: the stage's, paler, over the same range."""
-        own = self.stage.table
-        key = (own.cmap.name, tuple(own.scalar_range), self.stage.scheme)
+        table = self.stage.table
+        key = (table.cmap.name, tuple(table.scalar_range), self.stage.scheme)
         if key == self._table_key:
             return
         self._table_key = key
         plain = 255.0 * np.array(pv.Color(self.stage.scheme.cell).float_rgb)
-        values = np.asarray(own.values, float).copy()
+        values = np.asarray(table.values, float).copy()
         values[:, :3] += PALER * (plain - values[:, :3])
         self._table.values = values.round().astype(np.uint8)
-        self._table.scalar_range = own.scalar_range
-        self._table.nan_color = own.nan_color
+        self._table.scalar_range = table.scalar_range
+        self._table.nan_color = table.nan_color

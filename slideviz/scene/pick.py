@@ -28,7 +28,7 @@ def to_display(plotter: Any, points: FloatArray) -> FloatArray:
 
 def nearest_line(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary]) -> str | None:
     """Return the name of a 2D mesh's boundary nearest to a pixel; None if none is in `REACH`."""
-    best, found = REACH, None
+    best, name = REACH, None
     at = np.array([x, y])
     for one in drawn:
         seen = to_display(plotter, np.asarray(one.shape.points))
@@ -38,8 +38,8 @@ def nearest_line(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary
         part = np.clip(np.einsum("ij,ij->i", at - a, along) / length2, 0.0, 1.0)
         distance = float(np.linalg.norm(a + part[:, None] * along - at, axis=1).min())
         if distance < best:
-            best, found = distance, one.surface.name
-    return found
+            best, name = distance, one.surface.name
+    return name
 
 
 def front_surface(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary]) -> str | None:
@@ -112,5 +112,5 @@ def front_cell(
         picker.AddPickList(actor)
         owners[actor] = owner
     picker.Pick(x, y, 0.0, plotter.renderer)
-    found = owners.get(picker.GetActor())
-    return int(found[picker.GetCellId()]) if found is not None else None
+    cells = owners.get(picker.GetActor())
+    return int(cells[picker.GetCellId()]) if cells is not None else None

@@ -293,8 +293,8 @@ class Scene:
         frame = self.session.frame
         if frame is None or not frame.has(cell):
             return
-        own, at = frame.place_of(cell)
-        middle, size = surroundings(own.mesh, at)
+        containing, at = frame.place_of(cell)
+        middle, size = surroundings(containing.mesh, at)
         mesh = frame.mesh
         low, high = mesh.bounds
         depth = float(np.linalg.norm(high - low))

@@ -157,15 +157,15 @@ class SectionLayer(Layer):
 
         The mesh itself has number 0 and no matrix.
         """
-        found: dict[str, tuple[Section, int, FloatArray | None]] = {}
+        by_name: dict[str, tuple[Section, int, FloatArray | None]] = {}
         neighbours = self._neighbours(session)
         for index, section in shown_sections(session):
             for kind, wanted in _kinds(section, session).items():
-                found[f"{kind}{index}"] = wanted, 0, None
+                by_name[f"{kind}{index}"] = wanted, 0, None
                 for number, matrix in neighbours.items():
                     if not keeps(section, matrix) and not session.in_file:
-                        found[f"{kind}{index}:{number}"] = wanted, number, matrix
-        return found
+                        by_name[f"{kind}{index}:{number}"] = wanted, number, matrix
+        return by_name
 
     def _draw(
         self,
@@ -218,11 +218,11 @@ def _kinds(section: Section, session: Session) -> dict[str, Section]:
     In 2D, whole cells are drawn above a line in their colors, and a line above its wider rim.
     """
     section = replace(section, name="")
-    found = {NAME: section}
+    kinds = {NAME: section}
     if session.mesh is not None and session.mesh.dim == 2:
         line = replace(section, whole=False)
-        found |= {BAND: line, RIM: line} if section.whole else {RIM: line}
-    return found
+        kinds |= {BAND: line, RIM: line} if section.whole else {RIM: line}
+    return kinds
 
 
 def shown_sections(session: Session) -> Iterator[tuple[int, Section]]:

@@ -57,7 +57,7 @@ def test_few_runs_are_all_compared_and_unfinished_ones_not(many):
 def legend(session, **view):
     figure = Figure()
     session = changes.set_view(session, **view)
-    draw_histogram(FrameCounts(), session, figure, ON_LIGHT, log=True, whole=False)
+    draw_histogram(FrameCounts(), session, figure, ON_LIGHT, log=True, full_range=False)
     return figure.axes[0].get_legend()
 
 

@@ -236,7 +236,7 @@ class HistogramPanel(Panel):
     def drawing(self) -> Draw:
         """Return a function that draws the histogram of the shown step into a figure."""
         log, whole = self.log.isChecked(), self.whole.isChecked()
-        return partial(draw_histogram, self._counts, self.store.session, log=log, whole=whole)
+        return partial(draw_histogram, self._counts, self.store.session, log=log, full_range=whole)
 
     # What the user does ----------------------------------------------------------------
 

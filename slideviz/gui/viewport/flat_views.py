@@ -67,23 +67,25 @@ class FlatViews(QWidget):
         """Show a section of the mesh of each 3D view, the views made or dropped as needed."""
         assert session.mesh is not None
         other = second_session(session)
-        own = session, self.viewing.scene.sections.cuts
-        theirs = None if other is None else (other, self.viewing.second_cuts)
+        first_pane = session, self.viewing.scene.sections.cuts
+        second_pane = None if other is None else (other, self.viewing.second_cuts)
         if session.mesh.dim == 2:
-            self._show_curve([own] if theirs is None else [own, theirs], section)
+            self._show_curve(
+                [first_pane] if second_pane is None else [first_pane, second_pane], section
+            )
             return
         if not isinstance(self.first, FlatView):
-            self.first = self._make(own[1])
-        if theirs is None:
+            self.first = self._make(first_pane[1])
+        if second_pane is None:
             self._drop_second()
         elif self.second is None:
-            self.second = self._make(theirs[1])
+            self.second = self._make(second_pane[1])
             self.first.link(self.second)
-        if theirs is None or self.second is None:
+        if second_pane is None or self.second is None:
             self.first.show_section(session, section)
             return
         self.first.show_section(session, section, pane_name(session))
-        self.second.show_section(theirs[0], section, pane_name(theirs[0]))
+        self.second.show_section(second_pane[0], section, pane_name(second_pane[0]))
         stacked = self.extent is not None and is_larger_stacked(
             self.extent, (self.width(), self.height())
         )
@@ -153,18 +155,18 @@ def pane_name(session: Session) -> str:
     return f"Run {session.shown}" if session.view.frame and session.shown else "Undeformed"
 
 
-def is_larger_stacked(extent: tuple[float, float], room: tuple[int, int]) -> bool:
+def is_larger_stacked(extent: tuple[float, float], available: tuple[int, int]) -> bool:
     """Return whether two equal flat sections are drawn larger one above the other than in a row.
 
     Parameters
     ----------
     extent : (float, float)
         Width and height of one section, in the mesh's length unit.
-    room : (int, int)
+    available : (int, int)
         Width and height of both views together, in pixels.
     """
     wide, high = (max(length, 1e-300) for length in extent)
-    width, height = room
+    width, height = available
     beside = min(0.5 * width / wide, (height - FRAME_PX) / high)
     above = min(width / wide, (0.5 * height - FRAME_PX) / high)
     return above > beside
@@ -172,10 +174,10 @@ def is_larger_stacked(extent: tuple[float, float], room: tuple[int, int]) -> boo
 
 def _direction(swapped: bool, stacked: bool) -> QHBoxLayout.Direction:
     """Return the layout direction from the first flat view to the second."""
-    ways = QHBoxLayout.Direction
+    directions = QHBoxLayout.Direction
     if stacked:
-        return ways.BottomToTop if swapped else ways.TopToBottom
-    return ways.RightToLeft if swapped else ways.LeftToRight
+        return directions.BottomToTop if swapped else directions.TopToBottom
+    return directions.RightToLeft if swapped else directions.LeftToRight
 
 
 NOTHING = "The section cuts no cell."

@@ -80,9 +80,9 @@ class TitleBar(QFrame):
             self.label.setText(self._text)
             self.setToolTip(self._text)
             return
-        room = max(self.label.width() - 28, 20)
+        width = max(self.label.width() - 28, 20)
         metrics = self.label.fontMetrics()
-        self.label.setText(metrics.elidedText(self._text, Qt.TextElideMode.ElideRight, room))
+        self.label.setText(metrics.elidedText(self._text, Qt.TextElideMode.ElideRight, width))
         self.setToolTip(f"{self._text}\nClick to show something else here")
 
     def resizeEvent(self, event: QResizeEvent) -> None:

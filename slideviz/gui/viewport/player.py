@@ -257,11 +257,11 @@ class ResultsLabel(QLabel):
             self.setText("")
             self.setToolTip("")
             return
-        room = self.width() - 2
-        shown = next((form for form in self._forms if self._width_of(form) <= room), None)
+        width = self.width() - 2
+        shown = next((form for form in self._forms if self._width_of(form) <= width), None)
         if shown is None:
             shown = list(self._forms[-1])
-            while shown and self._width_of(shown) > room:
+            while shown and self._width_of(shown) > width:
                 shown.pop()
         self.setText(SEPARATOR.join(shown))
         full = self._forms[0]

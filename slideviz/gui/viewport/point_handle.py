@@ -338,8 +338,8 @@ class AxisHandle(PointHandle[tuple[Section, PlaceOnSection]]):
 
     def arrow(self) -> FloatArray:
         """Return the unit vector in which the ball moves if the section grows."""
-        way = self._ball()[1]
-        return way / np.linalg.norm(way)
+        slope = self._ball()[1]
+        return slope / np.linalg.norm(slope)
 
     def place_of(self, where: QPoint) -> FloatArray:
         """Return a position in the widget, (2,), in pixels from the lower left."""
@@ -434,8 +434,8 @@ class Overlay:
         """Draw points at pixels (k, 2), those of ``held`` marked, with arrows along ``arrow``."""
         ratio = self.view.devicePixelRatioF()
         key = [np.round(at, 2).tolist() for at in points], [np.round(at, 2).tolist() for at in held]
-        way = None if arrow is None else arrow.round(4).tolist()
-        placed = (*key, way, ratio, scheme)
+        direction = None if arrow is None else arrow.round(4).tolist()
+        placed = (*key, direction, ratio, scheme)
         if placed == self._placed:
             return
         self._placed = placed

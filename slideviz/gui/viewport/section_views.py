@@ -147,7 +147,7 @@ class SectionViews(QSplitter):
         if self.flats is None:
             self.flats = FlatViews(self.viewing, self.scheme, self._multi_samples)
             self.flats.closed.connect(lambda: self.want_flat(False))
-        whole = self.viewing.scene.camera.sees_all()
+        sees_all = self.viewing.scene.camera.sees_all()
         if made:
             self.addWidget(self.flats)
         self.flats.show_section(session, section)
@@ -157,7 +157,7 @@ class SectionViews(QSplitter):
         if made or kind != self._kind:
             self._kind = kind
             self._arrange(self.flats.extent, compared)
-            if whole:
+            if sees_all:
                 self.viewing.fit()
 
     def _arrange(self, extent: tuple[float, float] | None, compared: bool) -> None:
@@ -177,11 +177,11 @@ class SectionViews(QSplitter):
         flats, self.flats = self.flats, None
         if flats is None:
             return
-        whole = self.viewing.scene.camera.sees_all()
+        sees_all = self.viewing.scene.camera.sees_all()
         flats.close_views()
         flats.setParent(None)
         flats.deleteLater()
-        if whole:
+        if sees_all:
             self.viewing.fit()
 
     def set_scheme(self, scheme: ColorScheme) -> None:
@@ -200,17 +200,17 @@ class SectionViews(QSplitter):
         self._closed = True
 
 
-def arrangement_for(extent: tuple[float, float], room: tuple[int, int]) -> tuple[bool, float]:
+def arrangement_for(extent: tuple[float, float], available: tuple[int, int]) -> tuple[bool, float]:
     """Return whether a flat section goes beside the 3D view (else below), and its part of the room.
 
     Parameters
     ----------
     extent : (float, float)
         Width and height of the section, in the mesh's length unit.
-    room : (int, int)
+    available : (int, int)
         Width and height of the 3D view and the flat view together, in pixels.
     """
-    (wide, high), (width, height) = np.maximum(extent, 1e-300), np.maximum(room, 1)
+    (wide, high), (width, height) = np.maximum(extent, 1e-300), np.maximum(available, 1)
     beside_scale = min(_SHARE * width / wide, height / high)
     below_scale = min(width / wide, _SHARE * height / high)
     if width >= BESIDE_PX and below_scale < _LONG * beside_scale:

@@ -126,8 +126,8 @@ class BoundaryMouse(QObject):
         name = self.scene.pick(*self.view.to_pixels(where))
         selected = self.store.session.view.selected
         if modifiers & Qt.KeyboardModifier.ControlModifier and name:
-            rest = tuple(other for other in selected if other != name)
-            self.store.change(changes.select, rest if name in selected else (*selected, name))
+            others = tuple(other for other in selected if other != name)
+            self.store.change(changes.select, others if name in selected else (*selected, name))
         else:
             self.store.change(changes.select, (name,) if name else ())
 

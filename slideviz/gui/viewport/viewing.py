@@ -131,8 +131,8 @@ class Viewing(QWidget):
         """Set the columns' widths so that both meshes get the same room beside the legend."""
         if self.second is None:
             return
-        rest = max(self.width() - self._grid.spacing() - STRIP, 2)
-        for column, width in enumerate((rest // 2, rest - rest // 2 + STRIP)):
+        width_left = max(self.width() - self._grid.spacing() - STRIP, 2)
+        for column, width in enumerate((width_left // 2, width_left - width_left // 2 + STRIP)):
             self._grid.setColumnStretch(column, width)
 
     def _place(self, swapped: bool) -> None:
@@ -160,10 +160,10 @@ class Viewing(QWidget):
         having = (scene for scene in reversed(self._scenes()) if scene.stage.has_legend)
         return next(having, self.scene)
 
-    def _rearranged(self, whole: bool) -> None:
+    def _rearranged(self, refit: bool) -> None:
         """Draw the views after their number changed; fit the mesh if it was seen whole before."""
         self._grid.activate()
-        if whole:
+        if refit:
             self.fit()
         self.render()
 
@@ -173,7 +173,7 @@ class Viewing(QWidget):
             return
         self.second_leaves.emit()
         second, self.second, self.second_scene = self.second, None, None
-        whole = self.scene.camera.sees_all()
+        sees_all = self.scene.camera.sees_all()
         self._link.end()
         self._link = None
         for view in (second, self.view):
@@ -186,7 +186,7 @@ class Viewing(QWidget):
         for title in self.titles:
             title.hide()
         self.scene.set_legend(True)
-        self._rearranged(whole)
+        self._rearranged(sees_all)
 
     # The session -----------------------------------------------------------------------
 
