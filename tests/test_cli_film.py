@@ -193,7 +193,7 @@ def test_a_picture_has_the_size_and_the_detail_asked_for(tmp_path):
 
 def test_a_detail_may_lie_where_coordinates_are_negative(case, tmp_path):
     from slideviz.cli.parser import parse
-    from slideviz.scene.moved import Detail
+    from slideviz.scene.overview import Detail
 
     words = ["film", str(case), "-o", "a.gif", "--zoom", "-0.5,.25,-1e-3,2"]
     assert parse(words).zoom == Detail((-0.5, 0.25, -1e-3), 2.0)

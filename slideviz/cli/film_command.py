@@ -90,7 +90,7 @@ def film(arguments: argparse.Namespace) -> int:
     from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.cli.progress import Bar
     from slideviz.export.encode import film_kind
-    from slideviz.export.film import FilmOptions, check_film, require_pair
+    from slideviz.export.film import FilmOptions, check_film, require_pair_width
     from slideviz.export.film import film as draw
     from slideviz.session.opening import of_runs
 
@@ -98,7 +98,7 @@ def film(arguments: argparse.Namespace) -> int:
     film_options = FilmOptions(arguments.size, arguments.fps, arguments.hold, arguments.between)
     check_film(file, film_options, overwrite=arguments.force)  # before the work, not after it
     if arguments.beside:
-        require_pair(film_options.pixels(file))
+        require_pair_width(film_options.pixels(file))
     case = read_case(arguments)
     if film_kind(file) != ".png":  # of pictures it is not known yet how many there will be
         require_output_paths(arguments, OutputPath(file, "-o"))
@@ -119,7 +119,7 @@ def _runs(arguments: argparse.Namespace, case: Case) -> tuple[StepFrame, list[Ru
     """Return the undeformed mesh, the run of the case, and one with the changes of ``--beside``."""
     from slideviz import quality, read
     from slideviz.errors import CaseError
-    from slideviz.scene.moved import require_detail
+    from slideviz.scene.overview import require_detail
     from slideviz.session.state import Run, StepFrame
 
     other = changed(case, arguments.beside, "--beside")  # mistakes before the work

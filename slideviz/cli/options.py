@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from slideviz.case.model import Case
-    from slideviz.scene.moved import Zoom
+    from slideviz.scene.overview import Zoom
     from slideviz.terms import Role
 
 NONE = "no reference: relative to itself"
@@ -204,7 +204,7 @@ def zoom(text: str) -> Zoom:
         return "auto"
     if text == "all":
         return "all"
-    from slideviz.scene.moved import Detail
+    from slideviz.scene.overview import Detail
 
     try:
         *centre, width = (float(word) for word in text.split(","))

@@ -142,7 +142,7 @@ def _deform(
     from slideviz import quality, read, write
     from slideviz.cli.output_paths import warn_of_losses
     from slideviz.cli.report import cell_data, folded_cells
-    from slideviz.scene.moved import require_detail
+    from slideviz.scene.overview import require_detail
     from slideviz.streaming.run import RunResult
 
     assert case.mesh_file is not None

@@ -9,7 +9,7 @@ import sys
 def window(arguments: argparse.Namespace) -> int:
     """Open the window, with a file if one is given; return the exit code."""
     from slideviz.errors import CaseError, nearest
-    from slideviz.export.offscreen import missing_screen
+    from slideviz.export.offscreen import display_fault
 
     if arguments.file is not None and not arguments.file.exists():
         raise CaseError(
@@ -17,7 +17,7 @@ def window(arguments: argparse.Namespace) -> int:
             f"(commands: {', '.join(arguments.commands)})"
             f"{nearest(str(arguments.file), arguments.commands)}"
         )
-    why = missing_screen() if sys.platform.startswith("linux") else ""
+    why = display_fault() if sys.platform.startswith("linux") else ""
     if why:
         raise CaseError(f"there is no screen ({why}); `slideviz run CASE` works without one")
     from slideviz.gui.app import launch

@@ -35,9 +35,9 @@ Add = Callable[[Pixels, float], None]
 SUFFIXES = (".mp4", ".gif", ".png")
 """The kinds of films (see `film_kind`)."""
 
-SLOWEST = 10
+MIN_FPS = 10
 """Least frame rate of an MP4, as players fail with lower ones; images shown longer are repeated."""
-FASTEST = {".mp4": 60.0, ".gif": 50.0, ".png": float("inf")}
+MAX_FPS = {".mp4": 60.0, ".gif": 50.0, ".png": float("inf")}
 """Largest frame rate by kind: what screens show, and what browsers play of a GIF."""
 _NUMBER = re.compile(r"(%(?:0\d)?d)")
 """The place of the number in the name of numbered pictures."""
@@ -103,7 +103,7 @@ def writer(file: Path, settings: EncoderSettings) -> AbstractContextManager[Add]
 def _mp4(file: Path, settings: EncoderSettings) -> Iterator[Add]:
     """Write an MP4 with H.264 as every browser plays it, encoded by ffmpeg."""
     fps = Fraction(settings.fps).limit_denominator(1000)
-    rate = fps * max(1, -(-SLOWEST // fps))
+    rate = fps * max(1, -(-MIN_FPS // fps))
     with atomic_write(file, SlidevizError) as out, tempfile.TemporaryFile() as log:
         process = _start_ffmpeg(out.name, settings.size, rate, log)
         pipe = process.stdin
@@ -119,7 +119,7 @@ def _mp4(file: Path, settings: EncoderSettings) -> Iterator[Add]:
             except OSError:
                 _raise_ffmpeg(file, process, log)
 
-        with closed(pipe), ended(process):
+        with closing_pipe(pipe), ended(process):
             yield add
             try:
                 pipe.close()
@@ -130,7 +130,7 @@ def _mp4(file: Path, settings: EncoderSettings) -> Iterator[Add]:
 
 
 @contextmanager
-def closed(pipe: IO[bytes]) -> Iterator[None]:
+def closing_pipe(pipe: IO[bytes]) -> Iterator[None]:
     """Close a pipe at the end of the context; ignore errors, as its reader may have ended."""
     try:
         yield

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from slideviz.errors import SlidevizError
-from slideviz.export.encode import FASTEST, EncoderSettings, Pixels, film_kind, targets, writer
+from slideviz.export.encode import MAX_FPS, EncoderSettings, Pixels, film_kind, targets, writer
 from slideviz.export.offscreen import LETTERS, check_size
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions, letters_across, panes
@@ -29,7 +29,7 @@ from slideviz.export.titles import (
     title_words,
 )
 from slideviz.mesh.quality import Quality, quality
-from slideviz.scene.moved import Zoom
+from slideviz.scene.overview import Zoom
 from slideviz.session.pieces import GoingOn, InThread, not_cancelled, run_inline
 from slideviz.session.state import Session, StepFrame
 
@@ -94,10 +94,10 @@ def check_film(
             f"an MP4 of {size[0]}x{size[1]} pixels cannot be made: width and height must be even; "
             f"take {size[0] + size[0] % 2}x{size[1] + size[1] % 2}"
         )
-    if film_options.fps is not None and not 0.1 <= film_options.fps <= FASTEST[kind]:
+    if film_options.fps is not None and not 0.1 <= film_options.fps <= MAX_FPS[kind]:
         raise SlidevizError(
             f"{film_options.fps:g} images per second cannot be shown; "
-            f"0.1 to {FASTEST[kind]:g} can ({kind})"
+            f"0.1 to {MAX_FPS[kind]:g} can ({kind})"
         )
     if not 0.0 <= film_options.hold <= 600.0:
         raise SlidevizError(
@@ -133,7 +133,7 @@ class FilmProgress:
     total: int
 
 
-def images_drawn(pieces: Generator[object, Any, None]) -> Generator[FilmProgress, None, None]:
+def draw_images(pieces: Generator[object, Any, None]) -> Generator[FilmProgress, None, None]:
     """Do all pieces of a film here, without threads, and yield its progress after each image."""
     run = run_inline(pieces)
     try:
@@ -244,12 +244,12 @@ def film(
     path = Path(file)
     options = image_options(film_options.pixels(path), both=session.view.beside is not None)
     if options.both:
-        require_pair(options.size)
+        require_pair_width(options.size)
     with OffscreenRenderer.of_runs(session, zoom) as renderer:
         runs = renderer.shown(session, options)
         titles = _titles_of_runs(runs, options, renderer.shows_detail, film_options.between > 0)
-        yield from images_drawn(
-            filming(renderer, options, path, film_options, titles=titles, overwrite=overwrite)
+        yield from draw_images(
+            film_steps(renderer, options, path, film_options, titles=titles, overwrite=overwrite)
         )
 
 
@@ -258,7 +258,7 @@ def image_options(size: tuple[int, int], both: bool = False) -> PictureOptions:
     return PictureOptions(size, title=True, both=both, letters=LETTERS, film=True, lines=1 + both)
 
 
-def filming(
+def film_steps(
     renderer: OffscreenRenderer,
     options: PictureOptions,
     file: Path,
@@ -308,7 +308,7 @@ def filming(
             _showing(one, film_frame.frame)
             for one, film_frame in zip(runs, film_frames, strict=True)
         ]
-        return (yield from renderer.drawing(shown, options, write(film_frames)))
+        return (yield from renderer.draw_panes(shown, options, write(film_frames)))
 
     yield from render_frames(count, file, film_options, draw)
 
@@ -320,11 +320,11 @@ def aim_at_largest(
     yield from renderer.prepare_steps()
     frames = renderer.session.frames
     widest = yield InThread(lambda _: max(range(len(frames)), key=lambda k: frames[k].mesh.extent))
-    renderer.pose(options, widest)
+    renderer.aim(options, widest)
     yield None
 
 
-def require_pair(size: tuple[int, int]) -> None:
+def require_pair_width(size: tuple[int, int]) -> None:
     """Raise SlidevizError if a film's size is too narrow for two runs side by side."""
     options = image_options(size, both=True)
     width = panes(options, options.gap)[0].size[0]

@@ -43,7 +43,7 @@ def offscreen(size: tuple[int, int]) -> Iterator[Any]:
     import pyvista as pv
 
     check_size(size)
-    if sys.platform.startswith("linux") and not x_answers():
+    if sys.platform.startswith("linux") and not has_x_server():
         # VTK would try X first, and log errors, before it uses EGL.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     plotter = pv.Plotter(off_screen=True, window_size=list(size))
@@ -128,7 +128,7 @@ def check_png(file: Path) -> None:
         raise SlidevizError(f"{file}: pictures are PNG; end the name with .png")
 
 
-def x_answers() -> bool:
+def has_x_server() -> bool:
     """Return whether the X server named by ``DISPLAY`` accepts connections."""
     if not os.environ.get("DISPLAY"):
         return False
@@ -145,7 +145,7 @@ def x_answers() -> bool:
     return bool(server)
 
 
-def wayland_answers() -> bool:
+def has_wayland() -> bool:
     """Return whether the compositor named by ``WAYLAND_DISPLAY`` accepts connections."""
     name = os.environ.get("WAYLAND_DISPLAY")
     if not name:
@@ -159,9 +159,9 @@ def wayland_answers() -> bool:
     return True
 
 
-def missing_screen() -> str:
+def display_fault() -> str:
     """Return why no window can be shown, in words; empty if a display is available."""
-    if x_answers() or wayland_answers():
+    if has_x_server() or has_wayland():
         return ""
     named = [
         f"{name}={os.environ[name]}"

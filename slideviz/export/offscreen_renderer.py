@@ -26,10 +26,10 @@ from slideviz.export.offscreen import (
     write_title,
 )
 from slideviz.export.picture_options import PictureOptions, headings, panes
-from slideviz.export.titles import DETAIL, caption, name_mark
+from slideviz.export.titles import DETAIL, caption, label_marked_cell
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.surfaces import Surface, find_surfaces
-from slideviz.scene.moved import Overview, Zoom, lengths
+from slideviz.scene.overview import Overview, Zoom, lengths
 from slideviz.session.changes import show_frame
 from slideviz.session.opening import of_runs
 from slideviz.session.panes import shown_views
@@ -105,7 +105,7 @@ class OffscreenRenderer:
         self._plotter.render_window.Render()  # initializes OpenGL
         yield
         self._scene = Scene(self._plotter, PAPER)
-        shown, overview = PictureOptions().showing(self.session), self.overview
+        shown, overview = PictureOptions().drawn_session(self.session), self.overview
         part = None if overview is None else overview.cells
         yield from self._scene.opening(shown, self.surfaces, part)
         if self.like is not None:
@@ -174,13 +174,13 @@ class OffscreenRenderer:
         sessions = self.shown(shown, options)
         if aim:
             self._aim(sessions[0], options)
-        return (yield from self.drawing(sessions, options, headings(sessions, options)))
+        return (yield from self.draw_panes(sessions, options, headings(sessions, options)))
 
     def shown(self, session: Session, options: PictureOptions) -> tuple[Session, ...]:
         """Return the sessions in a picture, from left to right: one, or two of a comparison."""
         return shown_views(session) if options.both else (session,)
 
-    def drawing(
+    def draw_panes(
         self,
         sessions: Sequence[Session],
         options: PictureOptions,
@@ -200,7 +200,7 @@ class OffscreenRenderer:
         between = np.repeat(left[:, -1:], options.gap, axis=1)
         return np.ascontiguousarray(np.concatenate([left, between, right], axis=1))
 
-    def pose(self, options: PictureOptions, frame: int | None = None) -> Scene:
+    def aim(self, options: PictureOptions, frame: int | None = None) -> Scene:
         """Aim the camera as for a picture of a step, by default the shown one; return the scene."""
         shown = self.session if frame is None else show_frame(self.session, frame)
         for _ in self.prepare_steps():
@@ -211,7 +211,7 @@ class OffscreenRenderer:
 
     def window(self, options: PictureOptions) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the ranges of x and of y that a picture of a 2D mesh shows."""
-        self.pose(options)
+        self.aim(options)
         camera, (width, height) = self._plotter.camera, options.size
         unit = 2.0 * camera.parallel_scale / height
         ranges = []
@@ -253,7 +253,7 @@ class OffscreenRenderer:
             # A film's title is longer, and has smaller letters than the rest.
             letters = TITLE * size * options.scale / (LETTERS if options.film else 1.0)
             write_title(plotter, words, self._scene.scheme, letters, title_height)
-        name_mark(plotter, self._scene, options.scale)
+        label_marked_cell(plotter, self._scene, options.scale)
         return image_of(plotter, options.background == "transparent")
 
     def _prepare(self, session: Session, options: PictureOptions) -> None:
@@ -263,7 +263,7 @@ class OffscreenRenderer:
         scene.stage.font_scale = options.scale
         scene.stage.has_legend = options.legend
         scene.stage.has_plate = options.background != "transparent"
-        scene.update(options.showing(session))
+        scene.update(options.drawn_session(session))
         if options.background == "transparent":
             plotter.set_background("white")  # VTK draws a gradient opaquely
         self._keep_room(options)
@@ -282,7 +282,7 @@ class OffscreenRenderer:
         scene.set_scheme(PAPER if like is None or options.background != "shown" else like.scheme)
         self._prepare(session, options)
         if like is not None:
-            scene.camera.take(like.camera)
+            scene.camera.copy_from(like.camera)
         if self.overview is not None:
             scene.look_along(self.overview, self._seen(options))
         elif options.fill:
@@ -360,11 +360,11 @@ def pictures_alike(frames: Sequence[StepFrame], base: Mesh, side: int) -> list[P
     session = of_runs(StepFrame(base, frames[0].quality), runs)
     with OffscreenRenderer.of_runs(session) as renderer:
         options = PictureOptions((side, side), legend=False, edges=False, both=False, film=True)
-        scene = renderer.pose(options)
+        scene = renderer.aim(options)
 
         def draw(run: Run, options: PictureOptions) -> Pixels:
             shown = replace(session, shown=run.number)
-            return run_to_end(renderer.drawing([shown], options, ([""], 1.0)))
+            return run_to_end(renderer.draw_panes([shown], options, ([""], 1.0)))
 
         inked = int((draw(runs[0], options) < WHITE).any(axis=2).sum())
         # The edges of small cells would hide their colors.

@@ -99,7 +99,7 @@ class PictureOptions:
         letters = part * self.scale / font_scale((size[0], size[1]))
         return replace(self, size=(size[0], size[1]), letters=letters)
 
-    def showing(self, session: Session) -> Session:
+    def drawn_session(self, session: Session) -> Session:
         """Return the session as the picture shows it: the view's toggles replaced by the options.
 
         Nothing is selected, and the motions' ghosts are left out if values are shown.
@@ -166,7 +166,7 @@ def letters_across(options: PictureOptions) -> float:
     return (1.0 - 2.0 * CAPTION_AT) * options.size[0] / letters
 
 
-def words_of_size(options: PictureOptions) -> str:
+def size_words(options: PictureOptions) -> str:
     """Return the size of a picture on paper, or in pixels, in words."""
     width, height = options.size
     if options.dpi is None:

@@ -176,7 +176,7 @@ def _cut(line: str, most: int) -> str:
     return line if len(line) <= most else line[: max(most - 1, 1)].rstrip(" ,") + "…"
 
 
-NAME = "mark:words"
+CELL_LABEL = "mark:words"
 """Name of the actor of the marked cell's label."""
 
 _AWAY = 9.0
@@ -198,7 +198,7 @@ def mark_words(session: Session) -> str:
     return f"{words}: {value:{number}}"
 
 
-def name_mark(plotter: Any, scene: Scene, scale: float) -> None:
+def label_marked_cell(plotter: Any, scene: Scene, scale: float) -> None:
     """Draw the label beside the marked cell of a scene; none if the cell is out of the picture.
 
     ``scale`` is the factor of lengths and letters.
@@ -206,7 +206,7 @@ def name_mark(plotter: Any, scene: Scene, scale: float) -> None:
     import pyvista as pv
     from vtkmodules.vtkRenderingCore import vtkCoordinate
 
-    plotter.remove_actor(NAME, reset_camera=False, render=False)
+    plotter.remove_actor(CELL_LABEL, reset_camera=False, render=False)
     words = mark_words(scene.session)
     if not words:
         return
@@ -236,10 +236,10 @@ def name_mark(plotter: Any, scene: Scene, scale: float) -> None:
     reach = max(side * (spot - middle)[0] for spot in around)
     reach = min(reach, 0.2 * plotter.window_size[0])
     at.SetValue(side * (reach + _AWAY * scale), 0.0)
-    plotter.add_actor(text, name=NAME, reset_camera=False, render=False, pickable=False)
+    plotter.add_actor(text, name=CELL_LABEL, reset_camera=False, render=False, pickable=False)
 
 
-def draw_mark(axes: Any, session: Session, pixel_pt: float) -> None:
+def draw_marked_cell(axes: Any, session: Session, pixel_pt: float) -> None:
     """Draw the marked cell of a 2D mesh and its label; a pixel is ``pixel_pt`` points wide."""
     from matplotlib.patches import Polygon
 

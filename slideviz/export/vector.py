@@ -13,7 +13,7 @@ from slideviz.errors import SlidevizError
 from slideviz.export.offscreen import CAPTION_AT, TITLE
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions, headings, panes
-from slideviz.export.titles import draw_mark
+from slideviz.export.titles import draw_marked_cell
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.plots.cells import color_bar, color_scale, draw_cells
 from slideviz.plots.figure_io import empty_figure, write_figure
@@ -174,7 +174,7 @@ def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: f
             style = {"colors": ROLES[session.role(name)].color, "linewidths": _LINE * pixel_pt}
             axes.add_collection(LineCollection(list(_lines(mesh, name)), **style))
     if options.marked:
-        draw_mark(axes, session, pixel_pt)
+        draw_marked_cell(axes, session, pixel_pt)
 
 
 def _lines(mesh: Mesh, name: str) -> FloatArray:

@@ -14,7 +14,15 @@ import numpy as np
 
 from slideviz.plots.histogram import histogram
 from slideviz.plots.series import GreedyRun, Outcome, QualityRun, StepRun
-from slideviz.plots.style import ON_DARK, ON_LIGHT, PRINT, Style, add_legend, place, style_axes
+from slideviz.plots.style import (
+    ON_DARK,
+    ON_LIGHT,
+    PRINT,
+    Style,
+    add_legend,
+    series_number,
+    style_axes,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,7 +51,7 @@ LABELS: dict[What, str] = {
     "control_nodes": "control nodes [-]",
     "max_error": "largest error [mesh units]",
 }
-_ROOM = 0.1
+_LABEL_GAP = 0.1
 """Least distance of two labels of numbers of steps, relative to the axis."""
 _CROWDED = 300
 """Number of cycles of a greedy selection above which its line is thin."""
@@ -53,7 +61,7 @@ def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -
     """Draw minimum (filled markers) and mean quality (hollow ones) against the step."""
     style_axes(axes, style, "step [-]", "quality [-]")
     for index, run in enumerate(runs):
-        look = _line(style, place(run.series, index))
+        look = _line(style, series_number(run.series, index))
         # Some markers are enough for many steps; those of each run are at other steps.
         every = max(1, len(run.steps) // 6)
         last = len(run.steps) - 1
@@ -87,7 +95,7 @@ def convergence(
     for index, run in enumerate(runs):
         shown = run.error > 0
         first = np.r_[True, run.level[1:] != run.level[:-1]] if len(run.level) else run.level > 0
-        line = _line(style, place(run.series, index))
+        line = _line(style, series_number(run.series, index))
         begins = np.flatnonzero(first[shown])
         line["markevery"] = begins[:: max(1, len(begins) // 10)].tolist()
         line["markersize"] = 3.5
@@ -139,7 +147,7 @@ def against_steps(
         steps = np.array([row.steps for row in mine])
         values = np.array([float(getattr(row, what)) for row in mine])
         bad = np.array([row.inverted > 0 for row in mine]) & (what in ("minimum", "mean"))
-        line = _line(style, place(mine[0].series, index))
+        line = _line(style, series_number(mine[0].series, index))
         axes.plot(steps, np.where(bad, np.nan, values), label=label, **line)
         if bad.any():  # an empty line that is not clipped would spoil the layout
             cross = {"color": line["color"], "linestyle": "", "marker": "x", "markersize": 6}
@@ -197,18 +205,18 @@ def _step_ticks(axes: Axes, steps: Sequence[int]) -> None:
         axes.set_xscale("log")
         axes.xaxis.set_minor_locator(NullLocator())
         places = np.log(places)
-    shown = [steps[k] for k in _apart(places)]
+    shown = [steps[k] for k in _spaced_indices(places)]
     axes.set_xticks(shown, [str(step) for step in shown])
     if len(steps) == 1:
         axes.set_xlim(steps[0] - 1, steps[0] + 1)
 
 
-def _apart(places: np.ndarray) -> list[int]:
+def _spaced_indices(places: np.ndarray) -> list[int]:
     """Return indices of ascending numbers (n,) to label: the ends, and those with enough room."""
     last = len(places) - 1
     if last < 1:
         return list(range(last + 1))
-    least = _ROOM * (places[last] - places[0])
+    least = _LABEL_GAP * (places[last] - places[0])
     chosen = [0]
     for k in range(1, last):
         if min(places[k] - places[chosen[-1]], places[last] - places[k]) >= least:

@@ -13,7 +13,7 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray
 from slideviz.plots.series import Bars, Distribution, Outline, QualityRun
-from slideviz.plots.style import PRINT, Style, add_legend, place, style_axes
+from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,7 +57,7 @@ def histogram(
         # A legend outside the axes is common to several, with other numbers of inverted cells.
         counted = counts.inverted > 0 and style.legend
         label = f"{run.label} ({counts.inverted} inverted)" if counted else run.label
-        outlines.append(Outline(label, counts, place(run.series, index)))
+        outlines.append(Outline(label, counts, series_number(run.series, index)))
     draw_distribution(axes, None, outlines, f"{metric} quality [-]", log, style)
 
 

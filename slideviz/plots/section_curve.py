@@ -10,7 +10,7 @@ import numpy as np
 
 from slideviz.color_scheme import COLOR_MAP
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.plots.style import PRINT, Style, add_legend, place, style_axes
+from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_axes
 from slideviz.plots.ticks import rounded_out
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
@@ -121,7 +121,7 @@ def draw_curves(
     if last.inverted.any():
         _folded(axes, last, style)
     for index, row in enumerate(rows):
-        look = style.series(place(row.series, index))
+        look = style.series(series_number(row.series, index))
         axes.plot(
             *steps(row.curve),
             color=look.color,

@@ -112,7 +112,7 @@ def laid_flat(
     return flat.by_depth(), shape.flat_labels(section)
 
 
-def arranged(size: FloatArray, inches: tuple[float, float], count: int) -> tuple[bool, float]:
+def arrangement(size: FloatArray, inches: tuple[float, float], count: int) -> tuple[bool, float]:
     """Return whether sections are side by side, and their scale in inches per mesh unit.
 
     If they are, the color bar is upright at their right; else they are one above the other, with
@@ -139,7 +139,7 @@ def arranged(size: FloatArray, inches: tuple[float, float], count: int) -> tuple
     return upright, scale[upright]
 
 
-def aired(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+def with_margin(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the corners (2,) of a box with a margin, and not thinner than length by `_THIN`."""
     size = high - low
     longest = float(size.max()) or 1.0
@@ -356,8 +356,8 @@ def _cells(
     for one in shown:
         if one.around is not None:
             box = window(box, one.around, (width - SIDES - BAR) / max(height - ENDS, 0.1))
-    low, high = aired(*box)
-    upright, scale = arranged(high - low, (width, height), len(shown))
+    low, high = with_margin(*box)
+    upright, scale = arrangement(high - low, (width, height), len(shown))
     if len(shown) > 1:
         figure.set_size_inches(width, HIGHER[upright] * height)
         lay_out(figure, "constrained" if upright else "compressed")

@@ -15,7 +15,7 @@ import numpy as np
 from slideviz.errors import SlidevizError
 from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
-from slideviz.plots.style import PRINT, Style, add_legend, place, style_axes
+from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -187,7 +187,7 @@ def spanwise(
     style_axes(axes, style, f"{what} quality [-]", label)
     ends = []
     for index, profile in enumerate(profiles):
-        look = style.series(place(profile.series, index))
+        look = style.series(series_number(profile.series, index))
         values: FloatArray = getattr(profile, what)
         height = profile.fraction if fraction else profile.position
         there = np.isfinite(values)

@@ -83,7 +83,7 @@ class Style:
         return "#ff5d6c" if self.dark else INVERTED_COLOR
 
 
-def place(series: int | None, index: int) -> int:
+def series_number(series: int | None, index: int) -> int:
     """Return the number of a series: ``series``, or if None its index in the plot."""
     return index if series is None else series
 

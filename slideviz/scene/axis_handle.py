@@ -18,7 +18,7 @@ from slideviz.session.section_cuts import Cuts
 PixelsOf = Callable[[FloatArray], FloatArray]
 """A function that returns the display coordinates (n, 2), in pixels, of points (n, 3)."""
 
-_ROOM = 0.015
+_MARGIN = 0.015
 """Margin between a patch and the frame around it, relative to the patch's diagonal."""
 
 _CHORD = np.radians(1.0)
@@ -51,7 +51,7 @@ def frame_of(section: Section, patch: Patch) -> list[FloatArray]:
     shape = axis_shape(section)
     girth = shape.girth(section, (patch.along[0] + patch.along[1]) / 2.0)
     size = (patch.angles[1] - patch.angles[0]) * girth, patch.along[1] - patch.along[0]
-    margin = _ROOM * float(np.hypot(*size))
+    margin = _MARGIN * float(np.hypot(*size))
     low, high = patch.along[0] - margin, patch.along[1] + margin
     first, last = patch.angles[0] - margin / girth, patch.angles[1] + margin / girth
     closed = patch.whole or last - first > TURN

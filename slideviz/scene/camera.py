@@ -82,7 +82,7 @@ class Camera:
         ``clouds`` are further arrays of points (n, 3) to be seen, such as those of other steps.
         """
         self.shift()
-        extent = self._whole(clouds)
+        extent = self._extent(clouds)
         if extent is None:
             return
         centre, half, depth = extent
@@ -92,13 +92,13 @@ class Camera:
     def fit_part(self, clouds: Sequence[FloatArray]) -> None:
         """Fit the given points, arrays (n, 3), to the view; the direction stays."""
         self.shift()
-        extent = self._whole()
+        extent = self._extent()
         if extent is None or not clouds:
             return
         centre, half, _ = self._around(clouds)
         self.aim(centre, max(half, 1e-9 * extent[1]), 2.0 * extent[2])
 
-    def _whole(self, clouds: Iterable[FloatArray] = ()) -> tuple[Any, float, float] | None:
+    def _extent(self, clouds: Iterable[FloatArray] = ()) -> tuple[Any, float, float] | None:
         """Return centre (3,), half view height and diagonal of all that is drawn; None if nothing.
 
         ``clouds`` are further arrays of points (n, 3).
@@ -134,7 +134,7 @@ class Camera:
 
     def sees_detail(self) -> bool:
         """Return whether the view is zoomed in: its height is below `DETAIL` of the fitted one."""
-        extent = self._whole()
+        extent = self._extent()
         return extent is not None and self._camera.parallel_scale < DETAIL * extent[1]
 
     @property
@@ -203,7 +203,7 @@ class Camera:
         camera.parallel_scale = camera.parallel_scale / factor
         renderer.ResetCameraClippingRange()
 
-    def take(self, other: Camera) -> None:
+    def copy_from(self, other: Camera) -> None:
         """Copy another camera's position and projection, but not its shift beside a legend."""
         camera, theirs = self._camera, other._camera
         camera.position, camera.focal_point = theirs.position, theirs.focal_point
@@ -284,7 +284,7 @@ class Camera:
         """Return the ten numbers of `place`, and the view's free width divided by its height."""
         return (*self.place, self._ratio(self.stage))
 
-    def go(self, place: tuple[float, ...]) -> None:
+    def move_to(self, place: tuple[float, ...]) -> None:
         """Restore a `place` or a `view`; of a `view` all the width is seen, if need be smaller."""
         camera = self._camera
         camera.position, camera.focal_point, camera.up = place[:3], place[3:6], place[6:9]

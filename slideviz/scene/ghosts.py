@@ -104,7 +104,7 @@ class GhostLayer(Layer):
                 actor.prop.line_width = 4.5 if hits else 2.5
                 actor.visibility = True
             if not surface.flat:
-                self._draw_wire(key, color, not rim_goes_along(points, surface, session.mesh))
+                self._draw_wire(key, color, not rim_moves(points, surface, session.mesh))
 
     def _draw_wire(self, key: str, color: str, wanted: bool) -> None:
         """Show the edges of a ghost's faces in front of everything, or hide them."""
@@ -193,7 +193,7 @@ def is_apart(points: FloatArray, surface: Surface, session: Session) -> bool:
     return left > max(still, ARRIVED * displacement)
 
 
-def rim_goes_along(points: FloatArray, surface: Surface, mesh: Mesh) -> bool:
+def rim_moves(points: FloatArray, surface: Surface, mesh: Mesh) -> bool:
     """Return whether the rim of a ghost at points (u, d) moves about as far as its faces.
 
     The rim of a wall that a free-form box dents stays in place; a closed surface has no rim.

@@ -23,7 +23,7 @@ from slideviz.scene.ghosts import GhostLayer, SupportLayer
 from slideviz.scene.legend import LegendLayer, TriadLayer
 from slideviz.scene.marked_cells import InvertedLayer, MarkLayer
 from slideviz.scene.mesh import BoundaryLayer, CellLayer, CoarseLayer, ThresholdLayer
-from slideviz.scene.moved import Overview
+from slideviz.scene.overview import Overview
 from slideviz.scene.passages import PassageLayer
 from slideviz.scene.points import PointLayer
 from slideviz.scene.sections import SectionLayer
@@ -147,7 +147,7 @@ class Scene:
         """Take another color scheme for background, letters and edges."""
         self.stage.scheme = scheme
         self.stage.set_background()
-        self._again()
+        self._redraw()
 
     def set_legend(self, drawn: bool) -> None:
         """Switch the legend and its strip on or off (off: a view beside this one has it)."""
@@ -157,9 +157,9 @@ class Scene:
     def resized(self) -> None:
         """Place the legend anew after the view's size has changed."""
         self.camera.shift()
-        self._again()
+        self._redraw()
 
-    def _again(self) -> None:
+    def _redraw(self) -> None:
         if self.session.mesh is not None:
             notify((layer.update for layer in self.layers), self.session, self.session)
 

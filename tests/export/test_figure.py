@@ -11,14 +11,14 @@ from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.errors import SlidevizError
 from slideviz.export import offscreen_renderer as renderer_module
 from slideviz.export import vector
-from slideviz.export.film import FilmOptions, filming, images_drawn
+from slideviz.export.film import FilmOptions, draw_images, film_steps
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import (
     TITLE_ROOM,
     PictureOptions,
     panes,
+    size_words,
     title_of,
-    words_of_size,
 )
 from slideviz.export.titles import fitting, mark_words, pair_titles
 from slideviz.export.vector import draw_vector, require_vector, write_vector
@@ -256,7 +256,7 @@ def test_a_film_has_the_titles_of_its_preview(session, renderer, tmp_path, monke
 
     monkeypatch.setattr(renderer_module, "write_title", keep)
     figure = PictureOptions((640, 400), title=True, both=False, film=True)
-    for _ in images_drawn(filming(renderer, figure, tmp_path / "a%d.png", FilmOptions())):
+    for _ in draw_images(film_steps(renderer, figure, tmp_path / "a%d.png", FilmOptions())):
         pass
     for frame in range(3):
         renderer.session = changes.show_frame(session, frame)
@@ -266,8 +266,8 @@ def test_a_film_has_the_titles_of_its_preview(session, renderer, tmp_path, monke
 
 
 def test_sizes_in_words():
-    assert words_of_size(PictureOptions((600, 300))) == "600 × 300 pixels"
-    assert words_of_size(PictureOptions((600, 300), dpi=300.0)).startswith("5.1 × 2.5 cm on paper")
+    assert size_words(PictureOptions((600, 300))) == "600 × 300 pixels"
+    assert size_words(PictureOptions((600, 300), dpi=300.0)).startswith("5.1 × 2.5 cm on paper")
 
 
 def test_what_cannot_be_drawn_or_written_is_told(renderer, tmp_path, cube, monkeypatch):
@@ -361,7 +361,7 @@ def test_the_legend_of_a_drawing_lies_on_a_plate(renderer):
 
 
 def test_whether_a_view_sees_all(renderer):
-    scene = renderer.pose(PLAIN)
+    scene = renderer.aim(PLAIN)
     view = OffscreenRenderer(scene.session, (), scene)
     assert view.fills
     scene.plotter.camera.parallel_scale *= 0.3

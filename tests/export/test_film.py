@@ -15,7 +15,14 @@ from slideviz.case.model import Case
 from slideviz.color_scheme import PAPER
 from slideviz.errors import SlidevizError
 from slideviz.export import offscreen_renderer as renderer_module
-from slideviz.export.film import FilmOptions, check_film, film, filming, image_options, images_drawn
+from slideviz.export.film import (
+    FilmOptions,
+    check_film,
+    draw_images,
+    film,
+    film_steps,
+    image_options,
+)
 from slideviz.export.offscreen import font_scale, offscreen
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.mesh.quality import quality
@@ -52,7 +59,7 @@ def film_of(session, file, film_options, like=None):
     """Film what a view shows."""
     figure = replace(image_options(film_options.size), fill=like is None)
     with OffscreenRenderer(session, find_surfaces(session.mesh), like) as renderer:
-        yield from images_drawn(filming(renderer, figure, file, film_options))
+        yield from draw_images(film_steps(renderer, figure, file, film_options))
 
 
 def mp4_images(file):

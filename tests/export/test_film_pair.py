@@ -8,7 +8,7 @@ from PIL import Image
 
 from slideviz.errors import SlidevizError
 from slideviz.export import offscreen_renderer as module
-from slideviz.export.film import FilmOptions, film, image_options, require_pair
+from slideviz.export.film import FilmOptions, film, image_options, require_pair_width
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import panes
 from slideviz.mesh.quality import quality
@@ -142,5 +142,5 @@ def test_what_cannot_be_is_told(runs, tmp_path, shoot):
         shoot((runs[0], replace(runs[1], frames=())), tmp_path / "a.gif")
     with pytest.raises(SlidevizError, match=r"300x300 pixels are too narrow.*take 408 or more"):
         shoot(runs, tmp_path / "a.gif", FilmOptions((300, 300)))
-    require_pair((408, 300))
+    require_pair_width((408, 300))
     assert not list(tmp_path.iterdir())

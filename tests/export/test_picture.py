@@ -9,7 +9,7 @@ from slideviz.errors import MeshError, SlidevizError
 from slideviz.export.offscreen_renderer import picture, pictures_alike
 from slideviz.mesh.quality import quality
 from slideviz.scene.actors import CELL, POINT, VALUES
-from slideviz.scene.moved import Detail, half_of, tiny_motion
+from slideviz.scene.overview import Detail, half_of, tiny_motion
 from slideviz.scene.scene import Scene
 from slideviz.session.changes import set_view
 from slideviz.session.opening import of_runs

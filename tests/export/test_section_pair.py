@@ -11,7 +11,7 @@ from slideviz.errors import CaseError
 from slideviz.export.section_job import PageFormat, save_section
 from slideviz.mesh.quality import quality
 from slideviz.plots import section_picture
-from slideviz.plots.section_picture import arranged
+from slideviz.plots.section_picture import arrangement
 from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
@@ -159,6 +159,6 @@ def test_nothing_in_the_picture_overlaps(save, stretch, paper):
 def test_long_shapes_are_above_each_other_and_high_ones_beside():
     page = (6.7, 4.2)
     for size, beside in (((4.0, 1.0), False), ((1.0, 3.0), True)):
-        assert arranged(np.array(size), page, 2)[0] is beside
-    narrow, _ = arranged(np.array((1.0, 3.0)), (3.3, 2.5), 2)
+        assert arrangement(np.array(size), page, 2)[0] is beside
+    narrow, _ = arrangement(np.array((1.0, 3.0)), (3.3, 2.5), 2)
     assert not narrow, "titles beside each other would be too small there"

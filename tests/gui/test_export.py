@@ -689,15 +689,15 @@ def test_a_marked_cell_is_in_pictures_unless_it_is_switched_off_and_in_films_if_
     ran.window.store.change(changes.mark_cell, 3)
     with ran.window.exports._renderer() as renderer:
         dialog = PictureDialog(ran.window, renderer)
-        assert dialog.picture_options.showing(renderer.session).view.marked_cell == 3
+        assert dialog.picture_options.drawn_session(renderer.session).view.marked_cell == 3
         dialog.options["marked"].setChecked(False)
-        assert dialog.picture_options.showing(renderer.session).view.marked_cell is None
+        assert dialog.picture_options.drawn_session(renderer.session).view.marked_cell is None
         assert dialog._form.isRowVisible(dialog.options["marked"])
         form = FilmForm(renderer)
         assert form.layout().isRowVisible(form.mark)
-        assert form.picture_options.showing(renderer.session).view.marked_cell is None
+        assert form.picture_options.drawn_session(renderer.session).view.marked_cell is None
         form.mark.setChecked(True)
-        assert form.picture_options.showing(renderer.session).view.marked_cell == 3
+        assert form.picture_options.drawn_session(renderer.session).view.marked_cell == 3
     # A new run has no marked cell. One that is marked in another run is of no interest there.
     ran.window.store.change(changes.start_run)
     with ran.window.exports._renderer() as renderer:

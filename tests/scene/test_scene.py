@@ -428,7 +428,7 @@ def test_a_camera_comes_back(scene, session):
     place = scene.camera.place
     scene.camera.fit()
     assert scene.camera.place != place
-    scene.camera.go(place)
+    scene.camera.move_to(place)
     assert np.allclose(scene.camera.place, place)
 
 
@@ -438,13 +438,13 @@ def test_a_view_that_was_kept_is_not_cut_in_a_narrower_one(scene, session, cube,
     opened(scene, changes.set_view(solid, perspective=True) if perspective else session)
     view, width = scene.camera.view, scene.plotter.window_size[0]
     scene.plotter.window_size = [260, scene.plotter.window_size[1]]
-    scene.camera.go(view[:10])
+    scene.camera.move_to(view[:10])
     assert scene.camera.loses_some()
-    scene.camera.go(view)
+    scene.camera.move_to(view)
     assert not scene.camera.loses_some()
     # In one that is as wide, or wider, it is what it was.
     scene.plotter.window_size = [width, scene.plotter.window_size[1]]
-    scene.camera.go(view)
+    scene.camera.move_to(view)
     assert scene.camera.place == pytest.approx(view[:10])
 
 

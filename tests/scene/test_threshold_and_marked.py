@@ -296,7 +296,7 @@ def test_flying_to_a_cell_puts_it_into_the_middle_at_a_good_size(scene, bent):
     assert np.allclose(scene.plotter.camera.focal_point, at.mean(axis=0))
     seen = to_display(scene.plotter, at)
     assert 300 / 16 < np.ptp(seen, axis=0).max() < 300 / 4
-    scene.camera.go(before)
+    scene.camera.move_to(before)
     assert np.allclose(scene.camera.place, before)
     scene.fly_to(10**9)
     assert np.allclose(scene.camera.place, before)

@@ -17,7 +17,7 @@ from slideviz.export.film import (
     FilmProgress,
     aim_at_largest,
     check_film,
-    filming,
+    film_steps,
 )
 from slideviz.export.offscreen import LARGEST, SMALLEST
 from slideviz.export.offscreen_renderer import OffscreenRenderer
@@ -312,7 +312,7 @@ class FilmDialog(QDialog):
         self._previewing.stop()
         self._file = file
         options, film_options = self.form.picture_options, self.form.film_options
-        self._runner.start(filming(self.renderer, options, file, film_options, overwrite=True))
+        self._runner.start(film_steps(self.renderer, options, file, film_options, overwrite=True))
         self._show_filming(True)
 
     def _came(self, drawn: FilmProgress) -> None:

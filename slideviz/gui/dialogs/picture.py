@@ -15,7 +15,7 @@ from qtpy.QtWidgets import QCheckBox, QDialog, QDialogButtonBox, QFormLayout, QL
 
 from slideviz.export.offscreen import LARGEST, LETTERS, SMALLEST, font_scale
 from slideviz.export.offscreen_renderer import OffscreenRenderer
-from slideviz.export.picture_options import BACKGROUNDS, PictureOptions, words_of_size
+from slideviz.export.picture_options import BACKGROUNDS, PictureOptions, size_words
 from slideviz.export.vector import MOST_CELLS
 from slideviz.gui.responsiveness.timers import PREVIEW_MS, later
 from slideviz.gui.responsiveness.worker import PieceRunner, raise_again
@@ -247,9 +247,9 @@ class PictureDialog(QDialog):
         options = self.picture_options
         too_large = max(options.size) > LARGEST or min(options.size) < SMALLEST
         self.words.setText(
-            f"{words_of_size(options)}: width and height can be {SMALLEST} to {LARGEST} pixels"
+            f"{size_words(options)}: width and height can be {SMALLEST} to {LARGEST} pixels"
             if too_large
-            else words_of_size(options)
+            else size_words(options)
         )
         set_style(self.words, "bad", too_large)
         for button in (self.save, self.copy):

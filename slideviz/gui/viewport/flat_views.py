@@ -319,7 +319,8 @@ class FlatView(QWidget):
         self._refit = later(self, self.fit)
         CellMouse(self.view, self.scene, store)
         # The rulers follow the camera, whether the mouse or the program moves it.
-        self._watching = self.view.camera.AddObserver("ModifiedEvent", lambda *_: self._looked())
+        moved = self._camera_moved
+        self._watching = self.view.camera.AddObserver("ModifiedEvent", lambda *_: moved())
 
     def link(self, other: FlatView | None) -> None:
         """Link the camera with that of another flat view; None ends the link."""
@@ -366,13 +367,13 @@ class FlatView(QWidget):
             if one is not None:
                 one._ranges = one.scene.ranges()
 
-    def _looked(self) -> None:
+    def _camera_moved(self) -> None:
         """Update the rulers and the linked view after the camera changed."""
         self._sync_rulers()
         partner = self._partner
         # Drawing sets the clipping planes, which modifies the camera but does not move it.
         if partner is not None and not partner.scene.camera.looks_like(self.scene.camera):
-            partner.scene.camera.take(self.scene.camera)
+            partner.scene.camera.copy_from(self.scene.camera)
             partner.view.render_soon()
 
     def set_scheme(self, scheme: ColorScheme) -> None:

@@ -122,7 +122,7 @@ class CameraLink:
                 return
             self._following = True
             try:
-                follower.camera.take(leader.camera)
+                follower.camera.copy_from(leader.camera)
             finally:
                 self._following = False
             view.render_soon()

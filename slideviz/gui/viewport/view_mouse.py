@@ -36,18 +36,18 @@ class CoarseWhileMoving(QObject):
     def __init__(self, view: View3D, scene: Scene) -> None:
         super().__init__(view)
         self.view, self.scene = view, scene
-        self._timer = later(self, self._rest, STILL_MS)
-        view.signals.moving.connect(self._moving)
-        view.signals.released.connect(self._rest)
+        self._timer = later(self, self._draw_fully, STILL_MS)
+        view.signals.moving.connect(self._draw_coarsely)
+        view.signals.released.connect(self._draw_fully)
 
-    def _moving(self) -> None:
+    def _draw_coarsely(self) -> None:
         """Draw coarse boundaries from now on, if the last frame in full detail was slow."""
         if self.view.veiled or not (self.scene.coarse or self.view.frame_s > SLOW_FRAME_S):
             return
         self.scene.draw_coarse(True)
         self._timer.start()
 
-    def _rest(self) -> None:
+    def _draw_fully(self) -> None:
         """Draw the boundaries in full detail again."""
         self._timer.stop()
         if self.scene.draw_coarse(False):
@@ -74,13 +74,13 @@ class CellMouse(QObject):
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
-            self._tell(event)
+            self._show_tooltip(event)
             return True
         if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:
             return event.key() == Qt.Key.Key_Escape and self._escape()
         return False
 
-    def _tell(self, event: QHelpEvent) -> None:
+    def _show_tooltip(self, event: QHelpEvent) -> None:
         cell = self.scene.pick_cell(*self.view.to_pixels(event.pos()))
         if cell is None:
             QToolTip.hideText()

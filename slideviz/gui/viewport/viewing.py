@@ -104,7 +104,7 @@ class Viewing(QWidget):
         self.second_scene.set_coarse_boundaries(self.coarse)
         self.second_scene.open(changes.second_view(session), self.surfaces)
         self.second_scene.set_motion_ghosts(self.scene.motion_ghosts)
-        self.second_scene.camera.take(self.scene.camera)
+        self.second_scene.camera.copy_from(self.scene.camera)
         self._share_legend(session.view.swapped)
         self._link = CameraLink((self.view, self.second), (self.scene, self.second_scene))
         self._rearranged(not detail)
@@ -152,7 +152,7 @@ class Viewing(QWidget):
         if fitted:
             camera.fit()
         elif restored:
-            camera.go(restored)
+            camera.move_to(restored)
 
     @property
     def _leader(self) -> Scene:
@@ -202,7 +202,7 @@ class Viewing(QWidget):
         self.scene.set_coarse_boundaries(opened.coarse)
         self.scene.open(session, opened.surfaces)
         if opened.camera is not None:
-            self.scene.camera.go(opened.camera)
+            self.scene.camera.move_to(opened.camera)
         self.scene.set_motion_ghosts(self._ghosts.moved(session.case))
         self.view.unveil()
 
@@ -307,7 +307,7 @@ class Viewing(QWidget):
         if before is None:
             self.fit()
         else:
-            self.scene.camera.go(before)
+            self.scene.camera.move_to(before)
             self.render()
 
     def look_from(self, side: str) -> None:
