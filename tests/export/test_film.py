@@ -179,7 +179,7 @@ def test_few_images_are_shown_longer_and_many_ten_a_second():
 
 def test_images_in_between_have_their_own_mesh_and_quality(tmp_path, frames, monkeypatch):
     seen, words = [], []
-    draw, write = OffscreenRenderer.drawing, renderer_module.write_title
+    draw, write = OffscreenRenderer.draw_panes, renderer_module.write_title
     monkeypatch.setattr(
         OffscreenRenderer,
         "drawing",
@@ -343,13 +343,13 @@ def test_the_view_is_filmed_with_its_camera_and_one_color_range(tmp_path, ran):
 def test_displacement_of_the_view_keeps_the_range_of_the_last_step(tmp_path, ran, monkeypatch):
     ran = replace(ran, view=replace(ran.view, color_by="displacement"))
     seen = []
-    draw = OffscreenRenderer.drawing
+    draw = OffscreenRenderer.draw_panes
 
     def watch(self, shown, *rest):
         seen.extend((one.color_range, one.frame) for one in shown)
         return draw(self, shown, *rest)
 
-    monkeypatch.setattr(OffscreenRenderer, "drawing", watch)
+    monkeypatch.setattr(OffscreenRenderer, "draw_panes", watch)
     for _ in film_of(ran, tmp_path / "v%d.png", FilmOptions(SMALL)):
         pass
     assert {span for span, _ in seen} == {ran.color_range}
@@ -367,7 +367,7 @@ def test_cancelling_the_film_of_a_view_leaves_nothing(tmp_path, ran):
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_film_draws_its_mesh_once_and_leaves_nothing(tmp_path, square, monkeypatch, count):
     added, scenes = [], []
-    add, draw = Stage.add, OffscreenRenderer.drawing
+    add, draw = Stage.add, OffscreenRenderer.draw_panes
     monkeypatch.setattr(
         Stage, "add", lambda self, *rest, **more: (added.append(1), add(self, *rest, **more))[1]
     )
@@ -378,7 +378,7 @@ def test_a_film_draws_its_mesh_once_and_leaves_nothing(tmp_path, square, monkeyp
         return draw(self, *rest)
 
     added_before = []
-    monkeypatch.setattr(OffscreenRenderer, "drawing", watch)
+    monkeypatch.setattr(OffscreenRenderer, "draw_panes", watch)
     frames = leaning(square)
     runs = [Run(k, Case(), frames[1:], "done", name=str(k)) for k in range(1, count + 1)]
     for _ in film(of_runs(frames[0], runs), tmp_path / "a%d.png", FilmOptions((640, 300))):

@@ -100,13 +100,13 @@ def test_both_halves_are_one_picture_when_the_runs_are_the_same(runs, tmp_path, 
 
 def test_the_range_of_displacements_holds_both_runs(made, runs, tmp_path, monkeypatch, shoot):
     ranges = []
-    draw = OffscreenRenderer.drawing
+    draw = OffscreenRenderer.draw_panes
 
     def spy(self, shown, *rest):
         ranges.extend(one.color_range for one in shown)
         return draw(self, shown, *rest)
 
-    monkeypatch.setattr(OffscreenRenderer, "drawing", spy)
+    monkeypatch.setattr(OffscreenRenderer, "draw_panes", spy)
     first = made.mesh
     far = first.with_points(first.points + np.array([3.0, 0.0]))
     frames = (StepFrame(far, quality(far, reference=first)),)
