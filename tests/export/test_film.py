@@ -182,7 +182,7 @@ def test_images_in_between_have_their_own_mesh_and_quality(tmp_path, frames, mon
     draw, write = OffscreenRenderer.draw_panes, renderer_module.write_title
     monkeypatch.setattr(
         OffscreenRenderer,
-        "drawing",
+        "draw_panes",
         lambda self, shown, *rest: (seen.append(shown[0].frame), draw(self, shown, *rest))[1],
     )
     monkeypatch.setattr(
