@@ -62,12 +62,7 @@ PALETTE = {
 # Files -------------------------------------------------------------------------------------
 
 FileFormat = Literal["su2", "su2b"]
-
-FILE_FORMATS: dict[FileFormat, Term] = {
-    "su2": Term("SU2", "SU2’s text"),
-    "su2b": Term("SU2B", "SU2’s binary mesh"),
-}
-"""The formats of SU2, by ending; their labels are the values of MESH_FORMAT."""
+"""The formats of SU2, by ending, which MESH_FORMAT has in capitals."""
 
 
 # Boundaries --------------------------------------------------------------------------------

@@ -7,9 +7,9 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
+from slideviz.formats.losses import left_out
 from slideviz.formats.su2b.layout import MAGIC
 from slideviz.samples.table import write_sample
-from slideviz.session.formats import left_out
 from tests.formats.test_su2b import THREE_D, TWO_D, packed
 
 FFD = "FFD_NBOX= 1\nFFD_NLEVEL= 1\n"

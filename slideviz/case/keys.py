@@ -17,13 +17,8 @@ from slideviz.case.motion_text import MOTIONS
 from slideviz.case.values import AXIS, NAMES, PAIRS, PATH, POINT, YES_NO, choice, one_of, whole
 from slideviz.case.view_keys import VIEW_ROWS
 from slideviz.errors import CaseError
-from slideviz.terms import (
-    FILE_FORMATS,
-    METRICS,
-    PERIODIC_DIRECTIONS,
-    PERIODIC_MODES,
-    PERIODIC_TYPES,
-)
+from slideviz.formats.table import FILE_FORMATS
+from slideviz.terms import METRICS, PERIODIC_DIRECTIONS, PERIODIC_MODES, PERIODIC_TYPES
 
 
 def no_pair(case: Case) -> str:

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from slideviz.argument_types import CheckedFields, check_types
 from slideviz.errors import CaseError, nearest, not_one_of
+from slideviz.formats.table import FILE_FORMATS
 from slideviz.mesh.model import DEFAULT_FEATURE_ANGLE_DEG, frozen_array
 from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.terms import (
     FFD_BLENDINGS,
     FFD_SYSTEMS,
-    FILE_FORMATS,
     KERNELS,
     METHODS,
     METRICS,

@@ -30,36 +30,16 @@ def convert(arguments: argparse.Namespace) -> int:
 
 
 def _convert(arguments: argparse.Namespace) -> int:
-    from dataclasses import replace
+    from functools import partial
 
-    from slideviz import quality, read
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.output_paths import OutputPath, require_output_paths, warn_of_losses
-    from slideviz.cli.report import cell_data
-    from slideviz.formats.convert import convert as write_converted
-    from slideviz.session.formats import holds_quality
+    from slideviz.cli.output_paths import OutputPath, require_output_paths
+    from slideviz.formats.convert import convert
 
     require_output_paths(arguments, OutputPath(arguments.output, "OUT", is_mesh=True))
     if _is_to_be_streamed(arguments):
         return _convert_streamed(arguments)
-    mesh = read(arguments.mesh, zone=arguments.zone)
-    binary = arguments.output.suffix.lower() == ".su2b"
-    alone = bool(arguments.zone) and mesh.zones > 1
-    if alone and arguments.output.suffix.lower() == mesh.origin.ending:
-        words = f"{arguments.output} will have zone {mesh.zone} alone, and of {mesh.name} nothing"
-        say("warning", f"{words} but that mesh: leave out --zone to keep FFD boxes and the rest")
-    # Without --zone no zone is lost.
-    warn_of_losses(arguments.output, mesh if alone else replace(mesh, zones=1), alone=alone)
-    if not arguments.zone and mesh.origin.ending == ".su2" and binary:
-        for zone in range(2, mesh.zones + 1):
-            other = read(arguments.mesh, zone=zone)
-            warn_of_losses(
-                arguments.output, replace(other, zones=1, name=f"{mesh.name}, zone {zone}")
-            )
-    values = None
-    if holds_quality(arguments.output) and (arguments.zone or mesh.zones == 1):
-        values = cell_data(arguments.output, quality(mesh))
-    write_converted(arguments.mesh, arguments.output, arguments.zone, mesh, values)
+    convert(arguments.mesh, arguments.output, arguments.zone, warn=partial(say, "warning"))
     print(arguments.output)
     return DONE
 

@@ -87,12 +87,12 @@ def _run_def(arguments: argparse.Namespace) -> int:
         OutputPath,
         qualities_path,
         require_output_paths,
-        warn_of_losses,
     )
     from slideviz.cli.report import folded_cells, run_report
     from slideviz.cli.run_command import run_steps
     from slideviz.cli.run_outcome import CELLS, advice_for, report_outcome, write_qualities
     from slideviz.design.su2.surface import at_rest, convex_part, make_surface
+    from slideviz.formats.losses import warning_of_losses
 
     begin = time.perf_counter()
     config, mesh = read_configuration(arguments)
@@ -123,7 +123,7 @@ def _run_def(arguments: argparse.Namespace) -> int:
             return surface, [at_rest(case, surface.moved() if moves else mesh)]
         return surface, run_steps(arguments, case, mesh)
 
-    warn_of_losses(output, first.displacer.boxed(mesh), kind)
+    say("warning", warning_of_losses(output, first.displacer.boxed(mesh), kind))
     with _relaxation_told(config):
         part, (surface, steps), said = convex_part(
             config, mesh, attempt, lambda each: each[1][-1].mesh
@@ -186,14 +186,14 @@ def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, beg
     """Write the undeformed mesh with the boxes that the configuration defines; return the code."""
     from slideviz import write
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.output_paths import warn_of_losses
     from slideviz.cli.report import print_remarks, save_json
     from slideviz.design.su2.boxes import set_boxes
+    from slideviz.formats.losses import warning_of_losses
 
     case: Case = config.case
     boxed, boxes = set_boxes(config, mesh)
     assert case.mesh_out is not None
-    warn_of_losses(case.mesh_out, boxed, case.mesh_out_format)
+    say("warning", warning_of_losses(case.mesh_out, boxed, case.mesh_out_format))
     write(case.mesh_out, boxed, overwrite=arguments.force, file_format=case.mesh_out_format)
     counts = {box.name: sum(len(nodes) for nodes, _ in box.embedded.values()) for box in boxes}
     report = {

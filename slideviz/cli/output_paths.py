@@ -18,8 +18,6 @@ from slideviz.cli.terminal import say
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.mesh.model import Mesh
-    from slideviz.terms import FileFormat
 
 _INPUTS = {
     "mesh": "the input mesh",
@@ -158,39 +156,12 @@ def _overlap(one: OutputPath, other: OutputPath) -> bool:
 
 
 def _require_mesh_ending(file: Path) -> None:
-    if file.suffix.lower() not in (".su2", ".su2b", ".vtu", ".vtkhdf"):
+    from slideviz.formats.table import MESHIO, format_for
+
+    if format_for(file).writer == MESHIO.writer:
         from slideviz.formats.meshio.calls import formats_of
 
         formats_of(file)
-
-
-def warn_of_losses(
-    output: Path, mesh: Mesh, file_format: FileFormat | None = None, *, alone: bool = False
-) -> None:
-    """Print a warning on what a file will lack of a mesh.
-
-    ``alone`` is whether one of several zones is converted.
-
-    Raises
-    ------
-    MeshError
-        The format cannot store the mesh, or it is CGNS and the mesh was not read from CGNS.
-    """
-    from slideviz.formats.files import usual_ending
-    from slideviz.formats.su2b.write import OTHER_ZONES, require_binary, sentence_of_lost
-    from slideviz.session.formats import lost_in
-
-    kind = file_format or output.suffix.lower().removeprefix(".")
-    if kind == "cgns":
-        from slideviz.formats.cgns.write import require_cgns
-
-        require_cgns(output, mesh)
-    elif kind == "su2b":
-        require_binary(mesh)
-    lost, ending = lost_in(f".{kind}", mesh), usual_ending(mesh)
-    if ending == ".su2b" and lost != [OTHER_ZONES]:
-        ending = ".su2"
-    say("warning", sentence_of_lost(output, mesh.name, lost, ending, alone=alone))
 
 
 def make_folder(folder: Path) -> None:

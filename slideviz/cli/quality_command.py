@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slideviz.cli.options import add_reference, add_shared, optional_case, reference_words
+from slideviz.formats.table import own_endings
 from slideviz.terms import METRICS
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def add_quality(calls: argparse._SubParsersAction) -> None:
         "--output",
         type=Path,
         metavar="FILE",
-        help="mesh with quality (.vtu, .vtkhdf), or .csv",
+        help=f"mesh with quality ({own_endings('quality')}), or .csv",
     )
     add_shared(call, "stream")
     call.set_defaults(command=quality)
@@ -47,8 +48,9 @@ def quality(arguments: argparse.Namespace) -> int:
     from slideviz import write
     from slideviz.cli.mesh_source import open_mesh
     from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.cli.report import WORST, cell_data
+    from slideviz.cli.report import WORST
     from slideviz.errors import CaseError
+    from slideviz.formats.files import quality_data
 
     output = arguments.output
     if arguments.stream and output is not None:
@@ -65,7 +67,7 @@ def quality(arguments: argparse.Namespace) -> int:
         if is_table:
             _write_csv(output, found)
         elif output:
-            write(output, mesh, cell_data=cell_data(output, found))
+            write(output, mesh, cell_data=quality_data(output, found))
         worst = found.worst(WORST)
         rows = list(zip(worst.tolist(), opened.source.types(worst).tolist(), strict=True))
         return _report(arguments, mesh.name, found, rows, opened.reference)

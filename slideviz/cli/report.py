@@ -15,7 +15,6 @@ from slideviz.errors import CaseError, Note
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
-from slideviz.session.formats import holds_quality
 from slideviz.solver.deform import Step, folded_at
 from slideviz.streaming.quality import CellCounts
 from slideviz.system.atomic import atomic_write
@@ -255,10 +254,3 @@ def quality_lines(quality: Quality, undeformed: Quality | None = None) -> str:
     if quality.unproven:
         rows.append(("unproven", quality.unproven))
     return table(rows)
-
-
-def cell_data(path: Path, found: Quality) -> dict | None:
-    """Return the qualities as cell data; None where the format of ``path`` has no cell data."""
-    if not holds_quality(path):
-        return None
-    return {"size-skew": found.values, "size": found.size, "skew": found.skew}

@@ -32,6 +32,7 @@ from slideviz.cli.run_outcome import (
     write_qualities,
 )
 from slideviz.cli.terminal import holding, say
+from slideviz.formats.table import FORMATS, endings, format_for, own_endings, usual_ending
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -59,7 +60,7 @@ def add_run(calls: argparse._SubParsersAction) -> None:
         "--steps-file",
         type=Path,
         metavar="FILE",
-        help="all steps with their quality in one file for ParaView (.vtkhdf)",
+        help=f"all steps with their quality in one file for ParaView ({own_endings('series')})",
     )
     call.add_argument(
         "--picture",
@@ -140,15 +141,16 @@ def _deform(
 ) -> RunResult:
     """Deform a mesh in memory, and write it."""
     from slideviz import quality, read, write
-    from slideviz.cli.output_paths import warn_of_losses
-    from slideviz.cli.report import cell_data, folded_cells
+    from slideviz.cli.report import folded_cells
+    from slideviz.formats.files import quality_data
+    from slideviz.formats.losses import warning_of_losses
     from slideviz.scene.overview import require_detail
     from slideviz.streaming.run import RunResult
 
     assert case.mesh_file is not None
     seconds = {"read": -time.perf_counter()}
     mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
-    warn_of_losses(output, mesh, kind)
+    say("warning", warning_of_losses(output, mesh, kind))
     if arguments.picture:
         require_detail(arguments.zoom, mesh)
     seconds["read"] += time.perf_counter()
@@ -159,7 +161,7 @@ def _deform(
     before = quality(mesh, metric=case.quality_metric)
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
-    data = cell_data(output, found)
+    data = quality_data(output, found)
     force = arguments.force
     write(output, last.mesh, overwrite=force, cell_data=data, base=mesh, file_format=kind)
     seconds["write"] += time.perf_counter()
@@ -254,7 +256,7 @@ def _needing_memory(arguments: argparse.Namespace) -> list[str]:
 
 
 def _is_su2(output: Path, kind: FileFormat | None) -> bool:
-    return (kind or output.suffix.lower().removeprefix(".")) in ("su2", "su2b")
+    return format_for(output, kind).value is not None
 
 
 def _require_output_paths(
@@ -265,6 +267,7 @@ def _require_output_paths(
     from slideviz.system.file_checks import same_file
 
     assert case.mesh_file is not None
+    ours = "|".join(map(re.escape, endings(lambda row: row.solver)))
     may_force = not arguments.force and same_file(output, case.mesh_file)
     mesh = OutputPath(
         output,
@@ -295,7 +298,7 @@ def _require_output_paths(
             arguments.steps_dir,
             "--steps-dir",
             named=False,
-            files=rf"{re.escape(case.mesh_file.stem)}_\d+\.(su2b?|cgns)",
+            files=rf"{re.escape(case.mesh_file.stem)}_\d+({ours})",
         ),
     )
 
@@ -303,12 +306,11 @@ def _require_output_paths(
 def _require_series(path: Path) -> None:
     """Raise CaseError where the file's ending is not that of a format for all steps."""
     from slideviz.errors import CaseError
-    from slideviz.formats.vtkhdf import VTKHDF
 
-    if path.suffix.lower() != VTKHDF:
+    if not format_for(path).series:
         raise CaseError(
-            f"{path}: only {VTKHDF} files hold all steps; end the name of --steps-file with it, or "
-            "use --steps-dir"
+            f"{path}: only {own_endings('series')} files hold all steps; end the name of "
+            "--steps-file with it, or use --steps-dir"
         )
 
 
@@ -325,10 +327,9 @@ def _default_output(case: Case) -> Path:
 def _format_of(output: Path, case: Case) -> FileFormat | None:
     """Return the format of MESH_OUT_FORMAT, or None; raise CaseError if ``-o`` contradicts it."""
     from slideviz.errors import CaseError
-    from slideviz.session.formats import MESH_FORMATS
 
     kind, ending = case.mesh_out_format, output.suffix.lower()
-    if kind and output != case.mesh_out and ending in MESH_FORMATS and ending != f".{kind}":
+    if kind and output != case.mesh_out and ending in FORMATS and ending != f".{kind}":
         raise CaseError(
             f"{output}: its ending is {ending}, but MESH_OUT_FORMAT says {kind.upper()}; change "
             "one of them"
@@ -344,7 +345,6 @@ def run_steps(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Ste
     """
     from slideviz import deform, write
     from slideviz.cli.progress import Bar
-    from slideviz.formats.files import usual_ending
 
     steps: list[Step] = []
     folder = arguments.steps_dir
@@ -379,13 +379,12 @@ def _series(path: Path | None, mesh: Mesh, metric: Metric) -> Iterator[Callable[
         yield lambda _: None
         return
     from slideviz import quality
-    from slideviz.cli.report import cell_data
-    from slideviz.formats.vtkhdf import vtkhdf_series
+    from slideviz.formats.files import quality_data
 
-    with vtkhdf_series(path, mesh) as series:
+    with format_for(path).function("series")(path, mesh) as series:
 
         def add(now: Mesh) -> None:
-            values = cell_data(path, quality(now, reference=mesh, metric=metric))
+            values = quality_data(path, quality(now, reference=mesh, metric=metric))
             series.add(now.points, values or {}, {"displacement": now.points - mesh.points})
 
         add(mesh)

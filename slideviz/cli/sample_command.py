@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from slideviz.cli.options import count
-from slideviz.terms import FILE_FORMATS
+from slideviz.formats.table import FILE_FORMATS
 
 
 def add_sample(calls: argparse._SubParsersAction) -> None:

@@ -24,7 +24,6 @@ from slideviz.formats.su2.numbers import (
     parse_cells,
     require_all_coordinates,
 )
-from slideviz.formats.su2.scan import Progress
 from slideviz.formats.su2.text import Text
 from slideviz.formats.su2b.layout import NAME_BYTES
 from slideviz.formats.su2b.write import LARGEST_4, SORTED, marker_table, padded, rows_of
@@ -33,7 +32,7 @@ from slideviz.mesh.elements import SIZES
 from slideviz.mesh.model import Cells, IntArray
 from slideviz.system.cleanup import open_temporary
 from slideviz.system.ranks import SERIAL, SerialPool
-from slideviz.system.threads import ordered_map
+from slideviz.system.threads import Tick, ordered_map
 
 HEAD = 8
 """Bytes before the first zone."""
@@ -166,7 +165,7 @@ def _counted(text: Text) -> IntArray:
 
 
 def write_layout(
-    layout: BinaryLayout, path: Path, progress: Progress, ranks: SerialPool = SERIAL
+    layout: BinaryLayout, path: Path, progress: Tick, ranks: SerialPool = SERIAL
 ) -> bytes:
     """Write the binary form of a text into an existing file of its size, but for the file's head.
 

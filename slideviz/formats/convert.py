@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,14 +10,12 @@ from numpy.typing import ArrayLike
 
 from slideviz.argument_types import check_types
 from slideviz.errors import path_error
-from slideviz.formats.files import read, write
-from slideviz.formats.su2.write import su2_blocks
-from slideviz.formats.su2b.write import su2b_blocks
+from slideviz.formats.files import quality_data, read, write
+from slideviz.formats.losses import warning_of_losses
+from slideviz.formats.table import FORMATS, format_for, usual_ending
 from slideviz.mesh.model import Mesh, Origin
+from slideviz.mesh.quality import quality
 from slideviz.system.atomic import atomic_write
-
-_ZONED = {".su2": "su2", ".su2b": "su2b"}
-"""Formats with several zones, by file name ending."""
 
 
 @check_types
@@ -25,8 +23,9 @@ def convert(
     source: str | Path,
     target: str | Path,
     zone: int | None = None,
-    first: Mesh | None = None,
     cell_data: Mapping[str, ArrayLike] | None = None,
+    *,
+    warn: Callable[[str], object] | None = None,
 ) -> Mesh:
     """Write a mesh in the format that the ending of ``target`` names; return its first zone.
 
@@ -36,10 +35,11 @@ def convert(
         The file to read, and the one to write; one that exists is replaced.
     zone : int, optional
         The zone to convert, from 1; all of them when left out.
-    first : Mesh, optional
-        The zone, or the first one, if it was read already.
     cell_data : mapping of str to (n_cells,) or (n_cells, k), optional
-        Values on its cells by name, as of `slideviz.write`.
+        Values on the cells by name, as of `slideviz.write`; when left out, their quality where
+        the format has a place for it: that of the shape alone.
+    warn : callable, optional
+        Called with a sentence on each loss: what the new file will not have of the mesh.
 
     Raises
     ------
@@ -56,34 +56,45 @@ def convert(
     Mesh('square.su2', 2D, 4 points, Cells(1 quadrilateral), markers: none)
     """
     source, target = Path(source), Path(target)
-    mesh = read(source, zone) if first is None else first
-    kind = _ZONED.get(target.suffix.lower())
-    if mesh.zones == 1 or (zone is None and mesh.origin.ending == f".{kind}"):
+    row, mesh = format_for(target), read(source, zone)
+    alone = zone is not None and mesh.zones > 1
+    same = mesh.origin.ending == row.ending
+    keeps_zones = bool(row.zones) and zone is None
+    if warn is not None:
+        for sentence in _warnings(source, target, mesh, alone):
+            warn(sentence)
+    if row.quality and cell_data is None and (alone or mesh.zones == 1):
+        cell_data = quality_data(target, quality(mesh))
+    if mesh.zones == 1 or (keeps_zones and same):
         write(target, mesh, cell_data=cell_data)  # which keeps what else the file has
-        return mesh
-    if zone is not None:
-        alone = replace(mesh, zone=1, zones=1, origin=Origin())
-        write(target, alone, cell_data=cell_data)
-        return mesh
-    if kind is None:
+    elif alone:
+        only = replace(mesh, zone=1, zones=1, origin=Origin())
+        write(target, only, cell_data=cell_data)
+    elif not keeps_zones:
         raise path_error(
             target,
             f"{source.name} has {mesh.zones} zones, for which this format has no place; "
             "choose one with --zone",
         )
-    rest = (read(source, number) for number in range(2, mesh.zones + 1))
-    with atomic_write(target) as file:
-        for block in _zones(kind, mesh, *rest):
-            file.write(block)
+    else:
+        others = (read(source, number) for number in range(2, mesh.zones + 1))
+        with atomic_write(target) as file:
+            for block in row.function("zones")(mesh, *others):
+                file.write(block)
     return mesh
 
 
-def _zones(kind: str, *meshes: Mesh) -> Iterator[bytes]:
-    """Yield the bytes, in blocks, of a file of ``kind`` su2 or su2b with a zone for each mesh."""
-    if kind == "su2b":
-        yield from su2b_blocks(*meshes)
-        return
-    yield f"NZONE= {len(meshes)}\n".encode()
-    for number, mesh in enumerate(meshes, 1):
-        yield f"IZONE= {number}\n".encode()
-        yield from su2_blocks(mesh)
+def _warnings(source: Path, target: Path, mesh: Mesh, alone: bool) -> Iterator[str]:
+    """Yield a sentence for each loss of a conversion; ``alone``: one of several zones."""
+    row = format_for(target)
+    if alone and mesh.origin.ending == row.ending:
+        yield (
+            f"{target} will have zone {mesh.zone} alone, and of {mesh.name} nothing but that mesh: "
+            "leave out --zone to keep FFD boxes and the rest"
+        )
+    # Without --zone no zone is lost.
+    yield warning_of_losses(target, mesh if alone else replace(mesh, zones=1), alone=alone)
+    if not alone and row.zones and not row.sections and FORMATS[usual_ending(mesh)].sections:
+        for zone in range(2, mesh.zones + 1):
+            other = replace(read(source, zone), zones=1, name=f"{mesh.name}, zone {zone}")
+            yield warning_of_losses(target, other)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -11,30 +10,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from slideviz.argument_types import check_types
 from slideviz.errors import MeshError, path_error, printable
-from slideviz.formats.source import open_source, unreadable
-from slideviz.formats.su2.read import read_su2
-from slideviz.formats.su2.scan import Progress
-from slideviz.formats.su2.write import su2_blocks
-from slideviz.formats.su2b.read import is_su2b, read_su2b
-from slideviz.formats.su2b.write import su2b_blocks
-from slideviz.mesh.check import check_mesh, check_size
+from slideviz.formats.table import FILE_FORMATS, WriteOptions, format_for, format_of, holds_quality
+from slideviz.mesh.check import check_size
 from slideviz.mesh.model import Mesh
-from slideviz.system.atomic import atomic_write
-from slideviz.system.file_checks import require_regular_file
-from slideviz.terms import FILE_FORMATS, FileFormat
-
-_SNIFFED_BYTES = 1 << 16
-"""Bytes of a file that are searched for ``NDIME=``."""
-_UNSURE = ("", ".txt", ".dat", ".mesh", ".grid")
-"""Endings of files that may be SU2's, depending on their content."""
-_NDIME = re.compile(rb"^\s*NDIME\s*=", re.IGNORECASE | re.MULTILINE)
+from slideviz.mesh.quality import Quality
+from slideviz.system.threads import Tick
+from slideviz.terms import FileFormat
 
 
 @check_types
 def read(
     path: str | Path,
     zone: int | None = None,
-    progress: Progress | None = None,
+    progress: Tick | None = None,
     file_format: FileFormat | None = None,
 ) -> Mesh:
     """Return the mesh of a file.
@@ -68,18 +56,20 @@ def read(
     return mesh
 
 
-def _read(path: Path, zone: int | None, tick: Progress, file_format: FileFormat | None) -> Mesh:
+def _read(path: Path, zone: int | None, tick: Tick, file_format: FileFormat | None) -> Mesh:
     """Return the mesh of a file, as `read` does, whatever the size of its coordinates."""
     try:
-        kind = format_of(path, file_format)
-        if kind == "su2b":
-            return read_su2b(path, zone, tick)
-        if kind == "su2":
-            return read_su2(open_source(path), zone, tick)
-        if zone not in (None, 1):
+        row = format_of(path, file_format)
+        if not row.zones and zone not in (None, 1):
             raise path_error(
                 path, f"there is no zone {zone}, for only SU2 files have zones; leave it out"
             )
+        if not row.reader:
+            raise path_error(
+                path, "is written for ParaView, but not read; use the mesh it is made of"
+            )
+        if not row.isolated:
+            return row.function("reader")(path, zone, tick)
         from slideviz.formats.subprocess_reader import read_in_subprocess
 
         return read_in_subprocess(path, tick)
@@ -87,37 +77,6 @@ def _read(path: Path, zone: int | None, tick: Progress, file_format: FileFormat 
         raise path_error(
             path, "there is not enough memory to read it; use a machine with more"
         ) from problem
-
-
-def format_of(path: Path, given: FileFormat | None) -> FileFormat | None:
-    """Return the SU2 format of a file as ``given``, or by ending and content; None if neither is.
-
-    Raises
-    ------
-    MeshError
-        The file cannot be read, or is no ordinary file.
-    """
-    ending = path.suffix.lower()
-    try:
-        require_regular_file(path, MeshError)
-        if given is None and ending not in (".su2", ".su2b", *_UNSURE):
-            return None
-        binary = is_su2b(path)
-        if given is not None:
-            return given
-        if binary or ending == ".su2b":
-            return "su2b"
-        if ending == ".su2":
-            return "su2"
-        with path.open("rb") as file:
-            return "su2" if _NDIME.search(file.read(_SNIFFED_BYTES)) else None
-    except (OSError, ValueError) as problem:
-        raise unreadable(path, problem) from problem
-
-
-def usual_ending(mesh: Mesh) -> str:
-    """Return the ending, as ``.su2``, that is proposed for saving a mesh."""
-    return mesh.origin.ending or ".su2"
 
 
 @check_types
@@ -173,51 +132,18 @@ def write(
             "this is the file that the mesh was read from; choose another name, or ask "
             "for overwriting",
         )
-    replaces = path if overwrite else None
     values = _cell_arrays(mesh, cell_data or {})
-    kind = file_format or path.suffix.lower().removeprefix(".")
-    if kind not in ("su2", "su2b"):
-        moved = {} if base is None else {"displacement": mesh.points - base.points}
-        _write_other(path, mesh, values, moved, replaces)
-        return
-    if values:
+    row = format_for(path, file_format)
+    if values and row.solver:
         raise path_error(
-            path, f"an SU2 file has no place for cell data ({', '.join(values)}); write a .vtu file"
+            path,
+            f"a {row.ending} file has no place for cell data ({', '.join(values)}); write a .vtu "
+            "file",
         )
-    with atomic_write(path, replaces=replaces) as file:
-        for block in su2b_blocks(mesh) if kind == "su2b" else su2_blocks(mesh):
-            file.write(block)
-            if going_on is not None:
-                going_on()
-
-
-def _write_other(
-    path: Path,
-    mesh: Mesh,
-    values: dict[str, NDArray],
-    point_data: dict[str, NDArray],
-    replaces: Path | None,
-) -> None:
-    """Write a mesh in the format of the path's ending, which is none of SU2's."""
-    ending = path.suffix.lower()
-    if ending == ".cgns":
-        from slideviz.formats.cgns.write import write_cgns
-
-        if values:
-            raise path_error(
-                path, f"a CGNS file gets no cell data ({', '.join(values)}); write a .vtu file"
-            )
-        check_mesh(mesh)
-        write_cgns(path, mesh, replaces)
-    elif ending == ".vtkhdf":
-        from slideviz.formats.vtkhdf import write_vtkhdf
-
-        check_mesh(mesh)
-        write_vtkhdf(path, mesh, values, point_data, replaces)
-    else:
-        from slideviz.formats.meshio.write import write_other_format
-
-        write_other_format(path, mesh, values, point_data, replaces)
+    moved = {} if base is None or row.solver else {"displacement": mesh.points - base.points}
+    replaces = path if overwrite else None
+    options = WriteOptions(values, moved, replaces, going_on or (lambda: None))
+    row.function("writer")(path, mesh, options)
 
 
 def _checked_path(path: str | Path, file_format: FileFormat | None) -> Path:
@@ -232,6 +158,13 @@ def _checked_path(path: str | Path, file_format: FileFormat | None) -> Path:
         known = " | ".join(FILE_FORMATS)
         raise path_error(Path(path), f"file_format {file_format!r} is not one of {known}")
     return Path(path)
+
+
+def quality_data(path: Path, found: Quality) -> dict[str, NDArray] | None:
+    """Return qualities as cell data; None where the format of ``path`` has no cell data."""
+    if not holds_quality(path):
+        return None
+    return {"size-skew": found.values, "size": found.size, "skew": found.skew}
 
 
 def is_source(path: Path, mesh: Mesh) -> bool:

@@ -16,16 +16,14 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from slideviz.errors import MeshError, path_error
-from slideviz.formats.cgns.read import CgnsForm, read_cgns
-from slideviz.formats.meshio.bridge import read_with_meshio
-from slideviz.formats.su2.scan import Progress
-from slideviz.mesh.model import Cells, Marker, Mesh, Origin, frozen_array
+from slideviz.formats.table import MESHIO, format_for
+from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.system.cleanup import ended
-
-CGNS = ".cgns"
+from slideviz.system.threads import Tick
 
 # Limits of the process: several times what the slowest of meshio's readers needs.
 _SECONDS = 20
@@ -42,13 +40,13 @@ _SET_DEATH_SIGNAL = 1
 """``PR_SET_PDEATHSIG`` of Linux's ``prctl``."""
 
 
-def read_in_subprocess(path: Path, progress: Progress) -> Mesh:
-    """Return the mesh of a file, read by `read_cgns` if it ends in .cgns, else `read_with_meshio`.
+def read_in_subprocess(path: Path, progress: Tick) -> Mesh:
+    """Return the mesh of a file, read by the isolated reader of its format.
 
     Raises
     ------
     MeshError
-        As these functions, and if the process takes too long, crashes or does not start.
+        As by the reader, and if the process takes too long, crashes or does not start.
     """
     begun = time.monotonic()
     expected = 1.0 + path.stat().st_size / _BYTES_PER_SECOND
@@ -122,22 +120,13 @@ def _unpacked(path: Path, answer: bytes, code: int) -> Mesh:
     content = pickle.loads(answer)
     if isinstance(content, str):
         raise MeshError(content)
-    points, cells, markers, name, remarks, form = content
-    points = frozen_array(points, float)
-    return Mesh(
-        points=points,
-        cells=Cells.from_types(*cells),
-        markers=tuple(Marker(label, Cells.from_types(*parts)) for label, parts in markers),
-        name=name,
-        source=path.resolve(),
-        remarks=remarks,
-        origin=Origin() if form is None else CgnsForm(form[0], form[1], points),
-    )
+    assert isinstance(content, Mesh)
+    return content
 
 
 def _library(path: Path) -> str:
     """Return the name of the library that reads a file, for messages."""
-    return "HDF5" if path.suffix.lower() == CGNS else "meshio"
+    return "meshio" if format_for(path).reader == MESHIO.reader else "HDF5"
 
 
 def main() -> None:
@@ -153,21 +142,19 @@ def main() -> None:
         seconds, memory, path = int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4])
         _limit(seconds, memory)
         try:
-            if path.suffix.lower() == CGNS:
-                mesh = read_cgns(path)
-            else:
-                mesh = read_with_meshio(path, lambda _: None)
+            mesh = format_for(path).function("reader")(path)
         except MeshError as problem:
             pickle.dump(str(problem), channel)
         except MemoryError:
             pickle.dump(str(_too_large(path)), channel)
         else:
-            markers = [(m.name, (m.cells.types, m.cells.connectivity)) for m in mesh.markers]
-            cells = (mesh.cells.types, mesh.cells.connectivity)
-            form = mesh.origin
-            kept = (form.datasets, form.numbers) if isinstance(form, CgnsForm) else None
-            content = (mesh.points, cells, markers, mesh.name, mesh.remarks, kept)
-            pickle.dump(content, channel)
+            # Without what they have cached; by protocol 5 read-only arrays stay read-only.
+            markers = tuple(Marker(one.name, _bare(one.cells)) for one in mesh.markers)
+            pickle.dump(replace(mesh, cells=_bare(mesh.cells), markers=markers), channel, 5)
+
+
+def _bare(cells: Cells) -> Cells:
+    return Cells(cells.types, cells.offsets, cells.connectivity)
 
 
 def _limit(seconds: int, memory: int) -> None:

@@ -24,12 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.formats.hdf5 import Hdf5Draft, hdf5_write
+from slideviz.formats.table import WriteOptions
+from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 
 if TYPE_CHECKING:
     import h5py
 
-VTKHDF = ".vtkhdf"
 _VERSION = (2, 1)
 """Version of the format."""
 _VOLUME = "volume"
@@ -145,9 +146,7 @@ def vtkhdf_series(path: Path, mesh: Mesh, replaces: Path | None = None) -> Itera
         yield series
 
 
-def write_vtkhdf(
-    path: Path, mesh: Mesh, cell_data: Values, point_data: Values, replaces: Path | None = None
-) -> None:
+def write_vtkhdf(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write one mesh to a VTKHDF file, with values on its cells and points.
 
     Raises
@@ -155,8 +154,9 @@ def write_vtkhdf(
     MeshError
         It cannot be written.
     """
-    with _collection(path, mesh, replaces, is_series=False) as series:
-        series.add(mesh.points, cell_data, point_data)
+    check_mesh(mesh)
+    with _collection(path, mesh, options.replaces, is_series=False) as series:
+        series.add(mesh.points, options.cell_data, options.point_data)
 
 
 @contextmanager

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING
 from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
 
 from slideviz.errors import SlidevizError
-from slideviz.formats.files import is_source, usual_ending
+from slideviz.formats.files import is_source
+from slideviz.formats.losses import left_out
+from slideviz.formats.table import FORMATS, format_for, usual_ending
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import questions
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.session import changes, jobs
-from slideviz.session.formats import left_out
 from slideviz.session.saving import Unsaved, files_beside, view_to_case
 from slideviz.system.atomic import atomic_write
 
@@ -236,7 +237,7 @@ class Files(QObject):
         assert session.mesh is not None
         default = session.case.mesh_out or self.folder() / f"{self.stem()}_deformed.su2b"
         path = questions.ask_save(
-            self.window, "Deformed mesh", default, "SU2 binary meshes (*.su2b)"
+            self.window, "Deformed mesh", default, questions.mesh_filter(FORMATS[".su2b"])
         )
         if path is None or not is_source(path, session.mesh):
             return path
@@ -276,7 +277,7 @@ class Files(QObject):
             return False
         session = self.window.store.session
         case = session.case
-        if self._saved_to is not None and self._saved_to.suffix in (".su2", ".su2b", ".cgns"):
+        if self._saved_to is not None and format_for(self._saved_to).solver:
             case = case.change(mesh_out=self._saved_to)
         try:
             view_to_case(replace(session, case=case), self.window.scene.camera.view).write(path)

@@ -18,7 +18,7 @@ from slideviz.case.model import Case, FromFile
 from slideviz.case.motion import check_case, displacements
 from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
 from slideviz.formats.source import unreadable
-from slideviz.formats.vtkhdf import VTKHDF, vtkhdf_series
+from slideviz.formats.table import format_for, holds_quality
 from slideviz.mesh.coarse import coarse_surfaces
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.enclosing import enclosing_of
@@ -26,7 +26,6 @@ from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import Surface, find_surfaces
-from slideviz.session.formats import holds_quality
 from slideviz.session.large import first_frame, frame_of, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.opening import open_mesh
@@ -90,9 +89,9 @@ def centroids(mesh: Mesh) -> FloatArray:
 def step_paths(path: Path, count: int) -> list[Path]:
     """Return the files of ``count`` steps: the name of ``path`` with a number before its ending.
 
-    Only ``path`` for VTKHDF, where all steps are in one file.
+    Only ``path`` for VTKHDF and the like, where all steps are in one file.
     """
-    if path.suffix.lower() == VTKHDF:
+    if format_for(path).series:
         return [path]
     width = len(str(count))
     return [path.with_name(f"{path.stem}_{k:0{width}d}{path.suffix}") for k in range(1, count + 1)]
@@ -122,7 +121,7 @@ def save_steps(
         A file cannot be written; those before it stay.
     """
     paths = step_paths(path, len(frames))
-    if path.suffix.lower() == VTKHDF:
+    if format_for(path).series:
         _save_series(path, [*([first] if first else []), *frames], report, stopped)
         return paths
     for k, (target, frame) in enumerate(zip(paths, frames, strict=True)):
@@ -135,7 +134,7 @@ def save_steps(
 def _save_series(path: Path, frames: Sequence[StepFrame], report: Report, stopped: Stopped) -> None:
     """Write all frames into one VTKHDF file, with quality, and displacement from the first one."""
     start = frames[0].mesh
-    with vtkhdf_series(path, start) as series:
+    with format_for(path).function("series")(path, start) as series:
         for k, frame in enumerate(frames):
             raise_if_cancelled(stopped)
             report(JobProgress(f"Writing {path.name}", k / len(frames)))

@@ -11,20 +11,14 @@ import numpy as np
 
 from slideviz.errors import printable
 from slideviz.formats.binary_copy import BinaryLayout, binary_layout, write_layout
-from slideviz.formats.files import format_of
+from slideviz.formats.losses import OTHER_ZONES, lost_of_text, sentence_of_lost
 from slideviz.formats.su2.text import Text, find_text
 from slideviz.formats.su2.write import require_text_names, text_of_parts
 from slideviz.formats.su2b.elements import element_blocks
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone, find_zones
 from slideviz.formats.su2b.read import read_markers
-from slideviz.formats.su2b.write import (
-    OTHER_ZONES,
-    file_head,
-    halo_error,
-    lost_of_text,
-    require_binary_names,
-    sentence_of_lost,
-)
+from slideviz.formats.su2b.write import file_head, halo_error, require_binary_names
+from slideviz.formats.table import format_of
 from slideviz.mesh.model import Cells, FloatArray, IntArray
 from slideviz.streaming.resources import require_disk_space, text_size
 from slideviz.streaming.skin import index_of, read_skin
@@ -112,7 +106,7 @@ def streamed_kind(source: Path, target: Path) -> FileFormat | None:
     MeshError
         The file cannot be read.
     """
-    kind = format_of(source, None)
+    kind = format_of(source).value
     other = target.suffix.lower().removeprefix(".")
     return kind if kind != other and {kind, other} == {"su2", "su2b"} else None
 
@@ -134,7 +128,7 @@ def convert_streamed(
     MeshError
         The file has a mistake, the format cannot hold the mesh, or the disk has no room.
     """
-    if format_of(source, None) == "su2":
+    if format_of(source).value == "su2":
         _to_binary(source, target, zone, warn, tick)
     else:
         _to_text(source, target, zone, warn, tick)

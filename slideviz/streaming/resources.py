@@ -9,10 +9,10 @@ from pathlib import Path
 from slideviz.case.model import Case
 from slideviz.errors import MeshError
 from slideviz.formats.binary_copy import BinaryLayout
-from slideviz.formats.files import format_of
 from slideviz.formats.su2.text import find_text
 from slideviz.formats.su2b.layout import ZonePlace, open_zone
 from slideviz.formats.su2b.partial import names_of
+from slideviz.formats.table import format_of
 from slideviz.solver.deform import free_memory
 from slideviz.system.atomic import reason_of
 from slideviz.terms import FileFormat
@@ -36,7 +36,7 @@ def missing_memory(case: Case) -> str:
     path = case.mesh_file
     if path is None or case.method == "elastic":
         return ""
-    kind = format_of(path, case.mesh_format)
+    kind = format_of(path, case.mesh_format).value
     if kind is None:
         return ""
     said = missing_memory_of(path, kind)

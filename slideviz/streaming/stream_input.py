@@ -15,19 +15,15 @@ import numpy as np
 
 from slideviz.errors import MeshError, printable
 from slideviz.formats.binary_copy import binary_layout, write_layout
-from slideviz.formats.files import format_of
+from slideviz.formats.losses import OTHER_ZONES, lost_of_text, sentence_of_lost
 from slideviz.formats.su2.lines import Piece
 from slideviz.formats.su2.text import Text, find_text
 from slideviz.formats.su2.write import box_edits, moved_rows, patched_blocks, require_text_names
 from slideviz.formats.su2b.copying import checksums
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zone
 from slideviz.formats.su2b.partial import BINARY, finish_head, partial_file
-from slideviz.formats.su2b.write import (
-    OTHER_ZONES,
-    lost_of_text,
-    require_binary_names,
-    sentence_of_lost,
-)
+from slideviz.formats.su2b.write import require_binary_names
+from slideviz.formats.table import format_of
 from slideviz.mesh.model import Mesh
 from slideviz.streaming.resources import (
     bytes_of_binary,
@@ -93,7 +89,7 @@ def require_su2(path: Path, file_format: FileFormat | None = None) -> FileFormat
     MeshError
         It is of another format.
     """
-    kind = format_of(path, file_format)
+    kind = format_of(path, file_format).value
     if kind is None:
         raise MeshError(
             f"{path}: only SU2 meshes, text or binary, can be streamed; make one with `slideviz "

@@ -22,6 +22,8 @@ from slideviz.export.picture_options import (
 )
 from slideviz.export.titles import fitting, mark_words, pair_titles
 from slideviz.export.vector import draw_vector, require_vector, write_vector
+from slideviz.formats.losses import left_out
+from slideviz.formats.table import FORMATS, formats_for, holds_quality
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
@@ -29,7 +31,6 @@ from slideviz.scene.mesh import FADED
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import changes, jobs
-from slideviz.session.formats import MESH_FORMATS, formats_for, holds_quality, left_out
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.terms import ROLES
@@ -372,7 +373,7 @@ def test_whether_a_view_sees_all(renderer):
 def test_formats_and_what_they_leave_out(square, cube):
     assert ".bdf" not in formats_for(square)
     # A CGNS file is written as a copy of the one that was read.
-    assert set(formats_for(cube)) == set(MESH_FORMATS) - {".cgns"}
+    assert set(formats_for(cube)) == set(FORMATS) - {".cgns"}
     assert holds_quality(Path("a.VTU"))
     assert not holds_quality(Path("a.su2"))
     assert left_out(Path("a.su2"), square) == ""

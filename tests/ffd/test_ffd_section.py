@@ -265,7 +265,8 @@ def test_double_control_points_and_boxes_are_told(tmp_path):
 
 
 def test_binary_mesh_loses_its_boxes_and_says_so():
-    from slideviz.formats.su2b.write import lost_in_binary
+    from slideviz.formats.losses import lost_in
+    from slideviz.formats.table import FORMATS
 
     box = regular_box("B", plane_corners(CORNERS[:4, :2] * 1.0), (1, 1, 1), None)
-    assert lost_in_binary(with_boxes(square(), [box])) == ("its FFD boxes",)
+    assert lost_in(FORMATS[".su2b"], with_boxes(square(), [box])) == ["its FFD boxes"]

@@ -16,7 +16,8 @@ from slideviz.cli import run
 from slideviz.errors import MeshError
 from slideviz.formats.cgns.read import read_cgns
 from slideviz.formats.files import read, write
-from slideviz.session.formats import formats_for, left_out
+from slideviz.formats.losses import left_out
+from slideviz.formats.table import formats_for
 
 CASE = """\
 MESH_FILENAME= {mesh}
@@ -128,7 +129,9 @@ def test_a_mesh_from_another_format_is_refused(tmp_path):
 
 def test_cell_data_are_refused(passage, tmp_path):
     mesh = read_cgns(passage)
-    with pytest.raises(MeshError, match=r"a CGNS file gets no cell data \(quality\); write a .vtu"):
+    with pytest.raises(
+        MeshError, match=r"a .cgns file has no place for cell data \(quality\); write a .vtu"
+    ):
         write(tmp_path / "out.cgns", mesh, cell_data={"quality": quality(mesh).values})
 
 

@@ -111,7 +111,10 @@ ABAQUS = """\
 @pytest.fixture(autouse=True)
 def _in_this_process(monkeypatch):
     """Read in this process, where it is quick and can be patched."""
-    monkeypatch.setattr("slideviz.formats.subprocess_reader.read_in_subprocess", read_with_meshio)
+    monkeypatch.setattr(
+        "slideviz.formats.subprocess_reader.read_in_subprocess",
+        lambda path, _: read_with_meshio(path),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -490,21 +493,6 @@ def test_what_a_reader_raises(tmp_path, monkeypatch, problem, message):
     monkeypatch.setattr(meshio, "read", fails)
     with pytest.raises(MeshError, match=f"a.vtk: .*{message}"):
         read(save(tmp_path, "x", "a.vtk"))
-
-
-def test_stopping_and_progress(tmp_path):
-    class StoppedError(Exception):
-        pass
-
-    def stop(_):
-        raise StoppedError
-
-    path, seen = save(tmp_path, GMSH_22, "a.msh"), []
-    read(path, progress=seen.append)
-    assert seen == sorted(seen)
-    assert seen[-1] == 1.0
-    with pytest.raises(StoppedError):
-        read(path, progress=stop)
 
 
 # Writing.

@@ -26,7 +26,7 @@ def folder(tmp_path):
 
 def here(path):
     """Return the mesh as the reader's own process does it."""
-    return read_with_meshio(path, lambda _: None)
+    return read_with_meshio(path)
 
 
 def test_numbers_beside_an_xdmf_file_are_read(folder):

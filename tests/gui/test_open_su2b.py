@@ -6,7 +6,7 @@ import numpy as np
 from qtpy.QtWidgets import QFileDialog
 
 import slideviz as sv
-from slideviz.formats.files import usual_ending
+from slideviz.formats.table import usual_ending
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.questions import ask_open  # the driver answers the others
 from slideviz.samples.table import write_sample

@@ -357,7 +357,7 @@ def test_no_memory(tmp_path, monkeypatch):
     def refuse(*_):
         raise MemoryError
 
-    monkeypatch.setattr("slideviz.formats.files.read_su2", refuse)
+    monkeypatch.setattr("slideviz.formats.su2.read.read_su2", refuse)
     with pytest.raises(MeshError, match="there is not enough memory to read it; use a machine"):
         read(save(tmp_path, SQUARE))
 

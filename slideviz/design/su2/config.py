@@ -20,9 +20,10 @@ from slideviz.case.values import YES_NO, real, whole
 from slideviz.case.words import list_of, number
 from slideviz.design.su2.variables import DesignVariable, misspelt, read_variables, supported
 from slideviz.errors import CaseError, Note, nearest, not_one_of, shown
+from slideviz.formats.table import FILE_FORMATS
 from slideviz.rbf.kernels import SHAPE
 from slideviz.rbf.reduction import Reduction
-from slideviz.terms import FILE_FORMATS, ROLES, Role
+from slideviz.terms import ROLES, Role
 
 KERNELS = {
     "WENDLAND_C2": ("wendland-c2", 1.0),

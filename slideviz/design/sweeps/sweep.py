@@ -16,7 +16,8 @@ from slideviz.design.sweeps.results import SweepResults, sources_of
 from slideviz.design.sweeps.table import Design, DesignRow, Table, read_designs
 from slideviz.design.sweeps.worker import Packed, Task, TaskResult, packed, run_task
 from slideviz.errors import CaseError, DeformError
-from slideviz.formats.files import read, usual_ending
+from slideviz.formats.files import read
+from slideviz.formats.table import usual_ending
 from slideviz.mesh.model import Mesh, Origin
 
 LOST = 3

@@ -14,10 +14,12 @@ from slideviz.errors import path_error, printable
 from slideviz.formats.cgns.join import JOINED
 from slideviz.formats.cgns.read import CgnsForm
 from slideviz.formats.hdf5 import hdf5_write
+from slideviz.formats.table import WriteOptions
+from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import FloatArray, Mesh
 
 
-def write_cgns(path: Path, mesh: Mesh, replaces: Path | None = None) -> None:
+def write_cgns(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write a mesh that was read from a CGNS file as a copy of that file with its points.
 
     Coordinates that did not change keep the bits of the file; others are rounded to the file's
@@ -29,9 +31,10 @@ def write_cgns(path: Path, mesh: Mesh, replaces: Path | None = None) -> None:
         The mesh was not read from a CGNS file, that file was changed, or the new one cannot be
         written.
     """
-    form, source = require_cgns(path, mesh)
+    check_mesh(mesh)
+    form, source = require_cgns(mesh, path)
     try:
-        with hdf5_write(path, replaces, source) as draft:
+        with hdf5_write(path, options.replaces, source) as draft:
             _replace(path, source, draft.tree, form, mesh.points)
     except OSError as problem:
         raise path_error(
@@ -41,7 +44,7 @@ def write_cgns(path: Path, mesh: Mesh, replaces: Path | None = None) -> None:
         ) from problem
 
 
-def require_cgns(path: Path, mesh: Mesh) -> tuple[CgnsForm, Path]:
+def require_cgns(mesh: Mesh, path: Path) -> tuple[CgnsForm, Path]:
     """Return where the coordinates of a mesh are in the CGNS file it was read from, and that file.
 
     ``path`` is the file to write, for messages.

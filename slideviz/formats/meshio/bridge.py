@@ -20,7 +20,6 @@ import numpy as np
 from slideviz.errors import path_error, printable
 from slideviz.formats.meshio.calls import formats_of, load, meshio_errors
 from slideviz.formats.meshio.markers import MeshioBlock, find_markers
-from slideviz.formats.su2.scan import Progress
 from slideviz.mesh.check import check_mesh, first_fault
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, Mesh
@@ -55,7 +54,7 @@ _MOST_FILES = 100
 """Most files that are searched for names of further files: two may name each other."""
 
 
-def read_with_meshio(path: Path, progress: Progress) -> Mesh:
+def read_with_meshio(path: Path) -> Mesh:
     """Return the mesh of a file that meshio reads.
 
     Its cells are those of the highest dimension; those of one dimension less are its boundaries,
@@ -67,15 +66,11 @@ def read_with_meshio(path: Path, progress: Progress) -> Mesh:
     MeshError
         meshio cannot read the file, it names files elsewhere, or slideviz cannot use the mesh.
     """
-    progress(0.0)
     with meshio_errors(path, "read"):
         require_own_folder(path)
     data = load(path, formats_of(path))
-    progress(0.5)
     with meshio_errors(path, "understood"):
-        mesh = _mesh(path, data)
-    progress(1.0)
-    return mesh
+        return _mesh(path, data)
 
 
 def _mesh(path: Path, data: meshio.Mesh) -> Mesh:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slideviz.errors import MeshError, path_error
+from slideviz.formats.table import endings
 
 if TYPE_CHECKING:
     import meshio
@@ -42,12 +43,11 @@ def formats_of(path: Path) -> list[str]:
             return sorted(table[ending], key=lambda name: name != "gmsh")
     if path.suffix.lower() == ".cfg":
         raise path_error(path, "is a case file, not a mesh; name the mesh itself")
-    if path.suffix.lower() == ".vtkhdf":
-        raise path_error(path, "is written for ParaView, but not read; use the mesh it is made of")
     raise path_error(
         path,
-        f"no mesh format has the ending {path.suffix or '(none)'}; known are .su2, .su2b, "
-        ".cgns, .vtu, .vtk, .msh, .med, .inp and others of meshio, and for writing .vtkhdf",
+        f"no mesh format has the ending {path.suffix or '(none)'}; known are "
+        f"{', '.join(endings(lambda row: row.reader))} and others of meshio, and for writing "
+        f"{', '.join(endings(lambda row: not row.reader))}",
     )
 
 

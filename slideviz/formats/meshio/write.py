@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError, path_error
 from slideviz.formats.meshio.bridge import MESHIO_TYPES
 from slideviz.formats.meshio.calls import formats_of, load, meshio_errors
+from slideviz.formats.table import WriteOptions, write_blocks
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.system.atomic import atomic_write
@@ -56,18 +57,24 @@ _BLOCK_BYTES = 3 << 18
 _PRISM = np.array([0, 2, 1, 3, 5, 4])
 
 
-def write_other_format(
-    path: Path,
-    mesh: Mesh,
-    cell_data: Mapping[str, NDArray],
-    point_data: Mapping[str, NDArray] | None = None,
-    replaces: Path | None = None,
-) -> None:
-    """Write a mesh as VTU, or in the format of meshio that the ending names.
+def write_vtu(path: Path, mesh: Mesh, options: WriteOptions) -> None:
+    """Write a mesh as VTU, with values on its cells and points and the names of its boundaries.
 
-    Only VTU files get the point data. VTU, Gmsh, MED and Abaqus files have the names of
-    boundaries; other formats have their numbers at most. What meshio wrote is read again and
-    compared, for meshio leaves out what a format cannot hold.
+    Raises
+    ------
+    MeshError
+        The file cannot be written.
+    """
+    check_mesh(mesh)
+    write_blocks(path, vtu_blocks(mesh, options.cell_data, options.point_data), options)
+
+
+def write_with_meshio(path: Path, mesh: Mesh, options: WriteOptions) -> None:
+    """Write a mesh in the format of meshio that the ending names, without values on its points.
+
+    Gmsh, MED and Abaqus files have the names of boundaries; other formats have their numbers at
+    most. What meshio wrote is read again and compared, for meshio leaves out what a format cannot
+    hold.
 
     Raises
     ------
@@ -75,14 +82,9 @@ def write_other_format(
         The file cannot be written, or the format cannot hold the mesh.
     """
     check_mesh(mesh)
-    if path.suffix.lower() == ".vtu":
-        with atomic_write(path, replaces=replaces) as file:
-            for block in vtu_blocks(mesh, cell_data, point_data):
-                file.write(block)
-        return
     name = formats_of(path)[0]
-    data = _to_meshio(mesh, cell_data, name)
-    with atomic_write(path, replaces=replaces) as file:
+    data = _to_meshio(mesh, options.cell_data, name)
+    with atomic_write(path, replaces=options.replaces) as file:
         # meshio wants a name, and some formats write several files.
         try:
             with draft(path.parent, is_folder=True) as folder:

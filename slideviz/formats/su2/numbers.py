@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.formats.su2.lines import Lines, Piece, Rows, number_of, show
-from slideviz.formats.su2.scan import Progress
 from slideviz.mesh.check import first_fault, no_node
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, IntArray
-from slideviz.system.threads import ordered_map
+from slideviz.system.threads import Tick, ordered_map
 
 _SUPPORTED = ", ".join(str(vtk) for vtk, row in ELEMENTS.items() if row.dim > 0)
 """The element types, for messages."""
@@ -30,7 +29,7 @@ _EXTRA_POINT_WORDS = 2
 """Most numbers after the coordinates: the index, and in partitioned files the global index."""
 
 
-def parse_cells(lines: Lines, rows: Rows, dim: int, n_points: int, progress: Progress) -> Cells:
+def parse_cells(lines: Lines, rows: Rows, dim: int, n_points: int, progress: Tick) -> Cells:
     """Return the elements on rows, each with type, nodes, and perhaps an index that is ignored.
 
     Parameters
@@ -91,7 +90,7 @@ def fill_cells(
         nodes[node : node + len(its)] = its
 
 
-def _each(work: Callable[[Piece], None], rows: Rows, progress: Progress) -> None:
+def _each(work: Callable[[Piece], None], rows: Rows, progress: Tick) -> None:
     """Call ``work`` with each piece, on all cores."""
     for piece, _ in zip(rows, ordered_map(work, rows), strict=True):
         progress((piece.row + piece.rows) / number_of(rows))
@@ -186,7 +185,7 @@ def _parse(text: bytes, kind: type) -> NDArray | None:
         return None
 
 
-def parse_points(lines: Lines, rows: Rows, dim: int, progress: Progress) -> FloatArray:
+def parse_points(lines: Lines, rows: Rows, dim: int, progress: Tick) -> FloatArray:
     """Return the coordinates (n, dim) of the points on rows, read-only.
 
     Raises

@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 
 from slideviz.errors import printable
-from slideviz.formats.source import Source
+from slideviz.formats.source import Source, open_source
 from slideviz.formats.su2.keyword_blocks import boxes_elsewhere, find_blocks, find_bounds
 from slideviz.formats.su2.lines import Rows, number_of
 from slideviz.formats.su2.numbers import parse_cells, parse_points
-from slideviz.formats.su2.scan import Progress, scan
+from slideviz.formats.su2.scan import scan
 from slideviz.formats.su2.send_receive import find_halo
 from slideviz.formats.su2.text import boundaries_elsewhere
 from slideviz.formats.su2.zone import find_zone
 from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh, Origin
+from slideviz.system.threads import Tick
 
 _SCANNED = 0.2
 """Part of the time of reading a file, as told to the progress, that finding its lines takes."""
+
+
+_SNIFFED_BYTES = 1 << 16
+"""Bytes of a file that are searched for ``NDIME=``."""
+_NDIME = re.compile(rb"^\s*NDIME\s*=", re.IGNORECASE | re.MULTILINE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +52,24 @@ class Document(Origin):
     section."""
 
 
-def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
+def is_su2(path: Path) -> bool:
+    """Return whether a file begins as an SU2 text does, by its ``NDIME=``.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    """
+    with path.open("rb") as file:
+        return _NDIME.search(file.read(_SNIFFED_BYTES)) is not None
+
+
+def read_su2_file(path: Path, zone: int | None, progress: Tick) -> Mesh:
+    """Return one zone of an SU2 file, as `read_su2` does."""
+    return read_su2(open_source(path), zone, progress)
+
+
+def read_su2(raw: Source, zone: int | None, progress: Tick) -> Mesh:
     """Return one zone of an SU2 file.
 
     Parameters
@@ -110,12 +135,12 @@ def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
     )
 
 
-def _shares(sizes: list[int], progress: Progress) -> list[Progress]:
+def _shares(sizes: list[int], progress: Tick) -> list[Tick]:
     """Return a function for each part that turns its progress (0 to 1) into that of all parts."""
     total = max(sum(sizes), 1)
     edges = [_SCANNED + (1.0 - _SCANNED) * sum(sizes[:k]) / total for k in range(len(sizes) + 1)]
 
-    def share(begin: float, end: float) -> Progress:
+    def share(begin: float, end: float) -> Tick:
         return lambda done: progress(begin + done * (end - begin))
 
     return [share(begin, end) for begin, end in pairwise(edges)]

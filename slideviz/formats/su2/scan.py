@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from slideviz.errors import MeshError, printable
 from slideviz.formats.source import Source
 from slideviz.formats.su2.lines import Lines, line_end, text_of
 from slideviz.mesh.model import IntArray
-from slideviz.system.threads import ordered_map
+from slideviz.system.threads import Tick, ordered_map
 
 BLOCK_BYTES = 1 << 20
 """About how many bytes a block has: whole lines that are scanned together."""
-Progress = Callable[[float], object]
-"""A callback, called with the fraction done; what it raises ends the work."""
 
 
-def scan(raw: Source, progress: Progress) -> Lines:
+def scan(raw: Source, progress: Tick) -> Lines:
     """Return the lines of an SU2 file.
 
     Parameters

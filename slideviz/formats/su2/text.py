@@ -13,9 +13,10 @@ from slideviz.formats.source import open_source
 from slideviz.formats.su2.keyword_blocks import KeywordBlock, find_blocks, find_bounds, is_ffd
 from slideviz.formats.su2.lines import Lines, number_of
 from slideviz.formats.su2.numbers import fill_points, parse_cells
-from slideviz.formats.su2.scan import Progress, scan
+from slideviz.formats.su2.scan import scan
 from slideviz.formats.su2.zone import TextZone, find_zone
 from slideviz.mesh.model import FloatArray
+from slideviz.system.threads import Tick
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +56,7 @@ class Text:
         return b"".join(part for part in parts if is_ffd(part)) or None
 
 
-def find_text(path: Path, zone: int | None, progress: Progress = lambda _: None) -> Text:
+def find_text(path: Path, zone: int | None, progress: Tick = lambda _: None) -> Text:
     """Return a zone of an SU2 text file; its parts are located and counted, but not read.
 
     ``zone`` is counted from 1; None: the first.
@@ -72,7 +73,7 @@ def find_text(path: Path, zone: int | None, progress: Progress = lambda _: None)
 
 
 def boundaries_elsewhere(
-    lines: Lines, sections: list[KeywordBlock], zone: TextZone, progress: Progress
+    lines: Lines, sections: list[KeywordBlock], zone: TextZone, progress: Tick
 ) -> Iterator[tuple[int, str, FloatArray]]:
     """Yield zone, name and nodes (k, d) of each boundary of the other zones, as far as readable.
 
@@ -90,7 +91,7 @@ def boundaries_elsewhere(
 
 
 def _boundaries_of(
-    lines: Lines, zone: TextZone, progress: Progress
+    lines: Lines, zone: TextZone, progress: Tick
 ) -> Iterator[tuple[int, str, FloatArray]]:
     """Yield number, name and nodes (k, d) of each boundary of a zone."""
     count = number_of(zone.points)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from slideviz.formats.su2.lines import Piece, Rows
 from slideviz.formats.su2.read import Document
 from slideviz.formats.su2.scan import BLOCK_BYTES
 from slideviz.formats.su2.zone import SEND_RECEIVE
+from slideviz.formats.table import WriteOptions, write_blocks
 from slideviz.mesh.check import check_mesh, check_points
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 from slideviz.system.threads import ordered_map
@@ -28,6 +30,31 @@ _NUMBER_BYTES = 20
 """Most bytes of an index, with the blank after it."""
 Edit = tuple[int, int, bytes]
 """A change of a file: first byte and end of the text to replace, and the new text."""
+
+
+def write_su2(path: Path, mesh: Mesh, options: WriteOptions) -> None:
+    """Write a mesh as SU2 text.
+
+    Raises
+    ------
+    MeshError
+        As by `su2_blocks`, or the file cannot be written.
+    """
+    write_blocks(path, su2_blocks(mesh), options)
+
+
+def su2_zones(*meshes: Mesh) -> Iterator[bytes]:
+    """Yield an SU2 file with a zone for each mesh, block by block.
+
+    Raises
+    ------
+    MeshError
+        As by `su2_blocks`.
+    """
+    yield f"NZONE= {len(meshes)}\n".encode()
+    for number, mesh in enumerate(meshes, 1):
+        yield f"IZONE= {number}\n".encode()
+        yield from su2_blocks(mesh)
 
 
 def su2_blocks(mesh: Mesh) -> Iterator[bytes]:

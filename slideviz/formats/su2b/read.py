@@ -13,7 +13,6 @@ from typing import Literal
 import numpy as np
 
 from slideviz.errors import MeshError, printable
-from slideviz.formats.su2.scan import Progress
 from slideviz.formats.su2b.elements import BLOCK, element_blocks
 from slideviz.formats.su2b.layout import (
     MAGIC,
@@ -26,6 +25,7 @@ from slideviz.formats.su2b.layout import (
 from slideviz.mesh.check import first_fault
 from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
+from slideviz.system.threads import Tick
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class BinaryForm(Origin):
     """The cells as read."""
 
 
-def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
+def read_su2b(path: Path, zone: int | None, progress: Tick) -> Mesh:
     """Return one zone of an SU2 binary mesh.
 
     Parameters

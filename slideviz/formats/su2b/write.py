@@ -8,8 +8,8 @@ that it had.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
-from slideviz.formats.su2.keyword_blocks import is_ffd
 from slideviz.formats.su2.read import Document
 from slideviz.formats.su2b.elements import BLOCK
 from slideviz.formats.su2b.layout import NAME_BYTES, SEND_RECEIVE
 from slideviz.formats.su2b.read import BinaryForm
+from slideviz.formats.table import WriteOptions, write_blocks
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.elements import SIZES
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
@@ -29,8 +29,6 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 SORTED = (3, 5, 9, 10, 12, 13, 14)
 """SU2's order of the types of elements."""
 LARGEST_4 = 2**32 - 1
-OTHER_ZONES = "its other zones"
-"""What a file of one zone loses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +52,17 @@ class ZoneContent:
     """Returns coordinates (k, d)."""
     markers: tuple[Marker, ...]
     """The boundaries."""
+
+
+def write_su2b(path: Path, mesh: Mesh, options: WriteOptions) -> None:
+    """Write a mesh as SU2 binary.
+
+    Raises
+    ------
+    MeshError
+        As by `su2b_blocks`, or the file cannot be written.
+    """
+    write_blocks(path, su2b_blocks(mesh), options)
 
 
 def su2b_blocks(*meshes: Mesh) -> Iterator[bytes]:
@@ -84,7 +93,7 @@ def su2b_blocks(*meshes: Mesh) -> Iterator[bytes]:
     yield form.after
 
 
-def require_binary(mesh: Mesh) -> None:
+def require_binary(mesh: Mesh, _path: Path | None = None) -> None:
     """Raise if an SU2 binary file cannot hold a mesh.
 
     Raises
@@ -121,67 +130,6 @@ def require_binary_names(mesh: str, names: Iterable[str]) -> None:
                 f"has room for {NAME_BYTES - 1} bytes ({size} given) and has no {SEND_RECEIVE}; "
                 "rename the marker"
             )
-
-
-def lost_in_binary(mesh: Mesh) -> tuple[str, ...]:
-    """Return what of a mesh's file is lost if it is written as SU2 binary, in words."""
-    is_binary = isinstance(mesh.origin, BinaryForm)
-    return lost_of_mesh(replace(mesh, zones=1) if is_binary else mesh)
-
-
-def lost_of_mesh(mesh: Mesh) -> tuple[str, ...]:
-    """Return what the file of a mesh has besides points, cells and boundaries, in words."""
-    document = mesh.origin
-    keys = ["FFD_NBOX"] if document.ffd else []
-    has_halo = mesh.halo is not None
-    if isinstance(document, Document):
-        keys += [document.raw[a:b].partition(b"=")[0].strip().decode() for a, b in document.unknown]
-        has_halo = has_halo or bool(document.sends)
-    halo = (f"its halo ({SEND_RECEIVE}; its cells are as any others now)",) if has_halo else ()
-    return (*halo, *lost_of_text(keys, mesh.zones))
-
-
-def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:
-    """Return what of an SU2 text is lost as binary, in words; empty if nothing is.
-
-    ``keys`` are those of sections that slideviz does not know, ``zones`` the number of zones.
-    """
-    unique = dict.fromkeys(key.upper() for key in keys)
-    others = ", ".join(key for key in unique if not is_ffd(key.encode()))
-    lost = {
-        "its FFD boxes": any(is_ffd(key.encode()) for key in unique),
-        f"its other sections ({others})": bool(others),
-        OTHER_ZONES: zones > 1,
-    }
-    return tuple(words for words, is_lost in lost.items() if is_lost)
-
-
-def listed(lost: Sequence[str]) -> str:
-    """Return words (at least one) as a list in a sentence: ``a, b and c``."""
-    *first, last = lost
-    return f"{', '.join(first)} and {last}" if first else last
-
-
-def sentence_of_lost(
-    output: Path, name: str, lost: Sequence[str], ending: str = ".su2", *, alone: bool = False
-) -> str:
-    """Return in words what a file will not have of a mesh; nothing where it has all.
-
-    Parameters
-    ----------
-    ending : str
-        Of a file that would have it.
-    alone : bool
-        Whether one of several zones is converted, as ``--zone`` asks for.
-    """
-    if not lost:
-        return ""
-    remedy = f"write a {ending} file"
-    if alone:
-        has_zones = output.suffix.lower() in (".su2", ".su2b")
-        is_enough = has_zones and list(lost) == [OTHER_ZONES]
-        remedy = "leave out --zone" if is_enough else f"leave out --zone and {remedy}"
-    return f"{output} will not have {listed(lost)} of {name}; {remedy} to keep them"
 
 
 def file_head(zones: int, form: BinaryForm | None = None) -> Iterator[bytes]:

@@ -13,8 +13,7 @@ from slideviz.export.offscreen import LETTERS
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.export.vector import MOST_CELLS, SUFFIXES, write_vector
-from slideviz.formats.files import usual_ending
-from slideviz.formats.vtkhdf import VTKHDF
+from slideviz.formats.table import format_for, own_endings, usual_ending
 from slideviz.gui.dialogs.film import FilmDialog
 from slideviz.gui.dialogs.picture import PictureDialog
 from slideviz.gui.widgets import questions
@@ -166,7 +165,8 @@ class Exports(QObject):
             return
         ending = usual_ending(mesh)
         default = files.folder() / f"{files.stem()}_step{ending}"
-        title = f"Save {len(run.frames)} steps: NAME_1{ending} and so on, or one .vtkhdf file"
+        one = own_endings("series")
+        title = f"Save {len(run.frames)} steps: NAME_1{ending} and so on, or one {one} file"
         filters = questions.mesh_filters(mesh)
         path = questions.ask_numbered(self.window, title, default, filters)
         if path is None:
@@ -184,7 +184,7 @@ class Exports(QObject):
 
     def _steps_written(self, paths: list[Path], number: int) -> None:
         run = self._session.run_shown
-        whole = paths[-1].suffix.lower() == VTKHDF
+        whole = bool(format_for(paths[-1]).series)
         if run is not None and run.number == number and (whole or len(run.frames) == len(paths)):
             self.window.store.change(changes.saved_mesh)
         self._written(paths[-1])

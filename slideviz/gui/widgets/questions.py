@@ -8,12 +8,12 @@ from pathlib import Path
 from qtpy.QtCore import Qt, QTimer
 from qtpy.QtWidgets import QDialog, QDialogButtonBox, QFileDialog, QFormLayout, QMessageBox, QWidget
 
+from slideviz.formats.table import FILE_FORMATS, MeshFormat, formats_for, readable_patterns
 from slideviz.gui.responsiveness.timers import ROWS_MS
 from slideviz.gui.widgets.build import decimal_box, dialog_buttons, hint_label
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberBox
 from slideviz.mesh.model import Mesh
-from slideviz.session.formats import formats_for
 
 PICTURE_FILTERS = "PNG picture (*.png)"
 CASE_FILTERS = "Case (*.cfg)"
@@ -21,16 +21,20 @@ CASE_FILTERS = "Case (*.cfg)"
 
 def mesh_filters(mesh: Mesh) -> str:
     """Return the formats a mesh can be saved in, as filters of a file dialog."""
-    return ";;".join(f"{row.name} (*{end})" for end, row in formats_for(mesh).items())
+    return ";;".join(map(mesh_filter, formats_for(mesh).values()))
+
+
+def mesh_filter(row: MeshFormat) -> str:
+    """Return a format as a filter of a file dialog."""
+    return f"{row.name} (*{row.ending})"
 
 
 def ask_open(parent: QWidget, folder: Path) -> Path | None:
     """Return the mesh or case that the user wants to open, or None."""
-    import meshio
-
-    every = " ".join("*" + suffix for suffix in sorted(meshio.extension_to_filetypes))
-    ours = "*.su2 *.su2b"
-    filters = f"SU2 meshes and cases ({ours} *.cfg);;All meshes ({ours} {every});;All files (*)"
+    ours = " ".join(f"*.{ending}" for ending in FILE_FORMATS)
+    filters = (
+        f"SU2 meshes and cases ({ours} *.cfg);;All meshes ({readable_patterns()});;All files (*)"
+    )
     name, _ = QFileDialog.getOpenFileName(parent, "Open a mesh or case", str(folder), filters)
     return Path(name) if name else None
 

@@ -1,0 +1,247 @@
+"""The one table of mesh formats: endings, names, readers, writers, and what each format keeps.
+
+Reading, writing, the dialogs of the window, ``convert``, help texts and warnings of losses all go
+by it. A new format is a folder with its reader and writer, and a row here. This module imports no
+reader or writer: a row names its functions, which are imported at the first use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from slideviz.errors import MeshError
+from slideviz.system.atomic import atomic_write
+from slideviz.system.file_checks import require_regular_file
+from slideviz.terms import FileFormat, Term
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from slideviz.mesh.model import Mesh
+
+_UNSURE = ("", ".txt", ".dat", ".mesh", ".grid")
+"""Endings of files whose format may be found by their content."""
+
+
+@dataclass(frozen=True)
+class WriteOptions:
+    """What a writer gets besides path and mesh."""
+
+    cell_data: Mapping[str, NDArray]
+    """(n_cells,) or (n_cells, k): values on the cells by name."""
+    point_data: Mapping[str, NDArray]
+    """(n,) or (n, d): values on the points by name."""
+    replaces: Path | None = None
+    """The input file that may be overwritten."""
+    going_on: Callable[[], object] = lambda: None
+    """Called between blocks of a file; what it raises stops the writing."""
+
+
+@dataclass(frozen=True)
+class MeshFormat:
+    """A mesh format. Its functions are named as ``module:function``, below this package."""
+
+    ending: str
+    """File name ending, with its dot."""
+    name: str
+    """Name and strengths, in file dialogs."""
+    reader: str = "meshio.bridge:read_with_meshio"
+    """Returns a mesh: ``read(path, zone, tick)``, or ``read(path)`` if isolated; "" for none."""
+    writer: str = "meshio.write:write_with_meshio"
+    """Writes a mesh: ``write(path, mesh, options)``, `WriteOptions`."""
+    isolated: bool = True
+    """Whether it is read in a process of its own, with limits of time and memory."""
+    quality: bool = False
+    """Whether cells can have values."""
+    boundaries: Literal["names", "numbers"] = "names"
+    """Whether boundaries keep their names, or get numbers."""
+    dims: tuple[int, ...] = (2, 3)
+    """Dimensions of the meshes that it can store."""
+    solver: bool = False
+    """Whether it is a solver's: cells have no values, and nobody expects any."""
+    sections: bool = False
+    """Whether it keeps other sections of SU2 texts, such as FFD boxes and halos."""
+    copies: bool = False
+    """Whether a file can be written only as a copy of the one that the mesh was read from."""
+    require: str = ""
+    """Raises MeshError where a file cannot hold a mesh: ``require(mesh, path)``."""
+    zones: str = ""
+    """Yields a file with several zones, block by block: ``blocks(*meshes)``; "" for one zone."""
+    series: str = ""
+    """Context with a file that holds all steps: ``series(path, mesh)``; "" where it holds one."""
+    detects: str = ""
+    """Returns whether a file is of this format, by its content: ``detects(path)``."""
+    term: Term | None = None
+    """Its words as a value of MESH_FORMAT; None where it is none."""
+
+    @property
+    def value(self) -> FileFormat | None:
+        """Return its value of MESH_FORMAT; only meshes of these formats can be streamed."""
+        return self.ending.removeprefix(".") if self.term else None  # type: ignore[return-value]
+
+    def function(self, field: str) -> Callable[..., Any]:
+        """Return the function that a field names, such as ``reader``."""
+        module, _, name = getattr(self, field).partition(":")
+        return getattr(import_module(f"slideviz.formats.{module}"), name)
+
+
+MESHIO = MeshFormat("", "a format of meshio", boundaries="numbers")
+"""Any other format: meshio knows it, or nobody."""
+
+_ROWS = (
+    MeshFormat(
+        ".su2",
+        "SU2 (keeps all markers and sections)",
+        "su2.read:read_su2_file",
+        "su2.write:write_su2",
+        isolated=False,
+        solver=True,
+        sections=True,
+        zones="su2.write:su2_zones",
+        detects="su2.read:is_su2",
+        term=Term("SU2", "SU2’s text"),
+    ),
+    MeshFormat(
+        ".su2b",
+        "SU2 binary (keeps all markers)",
+        "su2b.read:read_su2b",
+        "su2b.write:write_su2b",
+        isolated=False,
+        solver=True,
+        require="su2b.write:require_binary",
+        zones="su2b.write:su2b_blocks",
+        detects="su2b.read:is_su2b",
+        term=Term("SU2B", "SU2’s binary mesh"),
+    ),
+    MeshFormat(
+        ".vtu",
+        "VTU for ParaView, with quality and displacement",
+        writer="meshio.write:write_vtu",
+        quality=True,
+    ),
+    MeshFormat(
+        ".vtkhdf",
+        "VTKHDF for ParaView: boundaries as blocks, steps",
+        "",
+        "vtkhdf:write_vtkhdf",
+        quality=True,
+        series="vtkhdf:vtkhdf_series",
+    ),
+    MeshFormat(".vtk", "Legacy VTK, with quality", quality=True, boundaries="numbers"),
+    MeshFormat(".xdmf", "XDMF, with quality", quality=True, boundaries="numbers"),
+    MeshFormat(
+        ".cgns",
+        "CGNS (a copy of the file, with other coordinates)",
+        "cgns.read:read_cgns",
+        "cgns.write:write_cgns",
+        solver=True,
+        copies=True,
+        require="cgns.write:require_cgns",
+    ),
+    MeshFormat(".med", "MED for Salome, with quality", quality=True),
+    MeshFormat(".msh", "Gmsh"),
+    MeshFormat(".inp", "Abaqus"),
+    MeshFormat(".vol", "Netgen"),
+    MeshFormat(".mesh", "Medit", boundaries="numbers"),
+    MeshFormat(".bdf", "Nastran", boundaries="numbers", dims=(3,)),
+)
+FORMATS: dict[str, MeshFormat] = {row.ending: row for row in _ROWS}
+"""Formats by ending; meshio writes more, but hardly any that stores boundaries besides cells."""
+FILE_FORMATS: dict[FileFormat, Term] = {
+    row.value: row.term for row in _ROWS if row.value and row.term
+}
+"""The values of MESH_FORMAT, which are SU2's own formats, with their words."""
+
+
+def format_for(path: Path, file_format: FileFormat | None = None) -> MeshFormat:
+    """Return the format of a file to write: ``file_format``, or that of its ending."""
+    return FORMATS.get(f".{file_format}" if file_format else path.suffix.lower(), MESHIO)
+
+
+def format_of(path: Path, file_format: FileFormat | None = None) -> MeshFormat:
+    """Return the format of a file to read: ``file_format``, or by its ending and its content.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read, or is no ordinary file.
+    """
+    from slideviz.formats.source import unreadable
+
+    try:
+        require_regular_file(path, MeshError)
+        ending = path.suffix.lower()
+        row = FORMATS.get(ending, MESHIO)
+        if not (file_format or row.detects or ending in _UNSURE):
+            return row
+        path.open("rb").close()
+        if file_format:
+            return FORMATS[f".{file_format}"]
+        # The text last: its own ending is enough for it.
+        for known in reversed([one for one in _ROWS if one.detects]):
+            if known is row or known.function("detects")(path):
+                return known
+        return row
+    except (OSError, ValueError) as problem:
+        raise unreadable(path, problem) from problem
+
+
+def endings(select: Callable[[MeshFormat], object]) -> list[str]:
+    """Return the endings of formats, as ``.su2``, in the order of the table."""
+    return [row.ending for row in _ROWS if select(row)]
+
+
+def own_endings(*fields: str) -> str:
+    """Return the endings of the formats that slideviz writes itself, with commas.
+
+    Only those whose ``fields`` are true, such as ``quality`` and ``series``.
+    """
+    own = (row for row in _ROWS if row.writer != MESHIO.writer)
+    return ", ".join(row.ending for row in own if all(getattr(row, name) for name in fields))
+
+
+def formats_for(mesh: Mesh) -> dict[str, MeshFormat]:
+    """Return the formats that can store a mesh, by ending; CGNS only if it was read from CGNS."""
+    return {
+        row.ending: row
+        for row in _ROWS
+        if mesh.dim in row.dims and (not row.copies or mesh.origin.ending == row.ending)
+    }
+
+
+def holds_quality(path: Path) -> bool:
+    """Return whether a file of that name can have values of the cells."""
+    return format_for(path).quality
+
+
+def usual_ending(mesh: Mesh) -> str:
+    """Return the ending, as ``.su2``, that is proposed for saving a mesh."""
+    return mesh.origin.ending or ".su2"
+
+
+def readable_patterns() -> str:
+    """Return the patterns of all files that can be read, as ``*.su2 *.su2b``, for a dialog."""
+    import meshio
+
+    own = endings(lambda row: row.reader)
+    return " ".join(
+        f"*{end}" for end in dict.fromkeys([*own, *sorted(meshio.extension_to_filetypes)])
+    )
+
+
+def write_blocks(path: Path, blocks: Iterable[bytes], options: WriteOptions) -> None:
+    """Write a file block by block, whole or not at all.
+
+    Raises
+    ------
+    MeshError
+        It cannot be written; what was at ``path`` is as before.
+    """
+    with atomic_write(path, replaces=options.replaces) as file:
+        for block in blocks:
+            file.write(block)
+            options.going_on()
