@@ -236,8 +236,10 @@ def off_points(box: Box, mesh: Mesh, marker: str) -> list[str]:
     return [sentence] if off > OFF else []
 
 
-def ffd_displacements(case: Case, mesh: Mesh, names: Iterable[str]) -> dict[object, Displacements]:
-    """Return the displacements of the nodes of the moving markers ``names``, by motion of a box.
+def ffd_displacements(
+    case: Case, mesh: Mesh, on: Mapping[str, IntArray]
+) -> dict[object, Displacements]:
+    """Return the displacements of the nodes ``on`` moving markers, by motion of a box.
 
     Several equal motions share one, their mean.
 
@@ -248,7 +250,6 @@ def ffd_displacements(case: Case, mesh: Mesh, names: Iterable[str]) -> dict[obje
     """
     motions = box_motions(case)
     boxes = boxes_for(case, mesh) if motions else {}
-    on = {name: mesh.marker(name).nodes for name in names}
     found: dict[object, list[Displacements]] = {}
     problems = {}
     alone = len(motions) == len(case.motions) and not any(box.level for box in boxes.values())

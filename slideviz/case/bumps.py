@@ -7,7 +7,7 @@ geometry representation method* (class and shape transformation, CST); as SU2 8 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -73,8 +73,10 @@ def normals_at(mesh: Mesh, markers: Iterable[str], nodes: IntArray) -> FloatArra
     return out
 
 
-def bump_displacements(case: Case, mesh: Mesh, names: Iterable[str]) -> dict[object, Displacements]:
-    """Return the displacements of the nodes of the moving markers ``names``, by airfoil motion.
+def bump_displacements(
+    case: Case, mesh: Mesh, on: Mapping[str, IntArray]
+) -> dict[object, Displacements]:
+    """Return the displacements of the nodes ``on`` moving markers, by airfoil motion.
 
     Raises
     ------
@@ -84,11 +86,11 @@ def bump_displacements(case: Case, mesh: Mesh, names: Iterable[str]) -> dict[obj
     found: dict[object, Displacements] = {}
     problems = []
     for place, motion in enumerate(case.motions, start=1):
-        mine = [name for name in names if isinstance(motion, OnAirfoil) and moves(motion, name)]
-        if not mine or not isinstance(motion, OnAirfoil):
+        markers = [name for name in on if isinstance(motion, OnAirfoil) and moves(motion, name)]
+        if not markers or not isinstance(motion, OnAirfoil):
             continue
-        nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in mine]))
-        shape = _shape(motion, mesh, mine, nodes)
+        nodes = np.unique(np.concatenate([on[name] for name in markers]))
+        shape = _shape(motion, mesh, markers, nodes)
         vectors = np.zeros((len(nodes), mesh.dim))
         vectors[:, 1] = motion.height * shape
         found[motion] = Displacements(nodes, vectors)

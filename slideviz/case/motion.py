@@ -17,11 +17,9 @@ import numpy as np
 from slideviz.case.boxes import ffd_displacements
 from slideviz.case.bumps import bump_displacements
 from slideviz.case.check import (
-    check_case,
     marker_problems,
     motion_problems,
     raise_all,
-    require_valid,
 )
 from slideviz.case.displacement import Displacements, read_displacements
 from slideviz.case.model import (
@@ -44,27 +42,32 @@ from slideviz.mesh.axis_frame import ordered_sum
 from slideviz.mesh.check import LARGEST, within
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 
-Given = Mapping[object, Displacements]
+ReferenceDisplacements = Mapping[object, Displacements]
 """Displacements by the key (`key_of`) of their motion."""
 
 
 def key_of(motion: FromFile | BoxMotion | OnAirfoil) -> object:
-    """Return the key of a motion in `Given`; motions with the same displacements share it."""
+    """Return the key of a motion; those with the same displacements share it."""
     return (motion.path, motion.marker) if isinstance(motion, FromFile) else motion
 
 
 def placed_displacements(
-    case: Case, mesh: Mesh, names: Iterable[str]
+    case: Case, mesh: Mesh, on: Mapping[str, IntArray]
 ) -> dict[object, Displacements]:
     """Return the displacements by motions that depend on undeformed places, by their motion.
 
-    ``names`` are the moving markers. Raises CaseError where such a motion moves no node.
+    ``on`` has the nodes (k,) of each moving marker. Raises CaseError where such a motion moves no
+    node.
     """
-    return ffd_displacements(case, mesh, names) | bump_displacements(case, mesh, names)
+    return ffd_displacements(case, mesh, on) | bump_displacements(case, mesh, on)
 
 
-def given_displacements(case: Case, mesh: Mesh) -> dict[object, Displacements]:
+def reference_displacements(
+    case: Case, mesh: Mesh, on: Mapping[str, IntArray]
+) -> dict[object, Displacements]:
     """Return the displacements by files, FFD boxes and bumps of a case, by `key_of` their motion.
+
+    ``on`` has the nodes (k,) of each moving marker.
 
     Raises
     ------
@@ -72,11 +75,6 @@ def given_displacements(case: Case, mesh: Mesh) -> dict[object, Displacements]:
         A file cannot be read or has mistakes, or a box has none of the nodes that it should move;
         the message has all of these.
     """
-    on = {
-        name: mesh.marker(name).nodes
-        for name in case.markers_with("moving")
-        if name in mesh.marker_names
-    }
     files: dict[object, Displacements] = {}
     problems: list[str] = []
     try:
@@ -84,9 +82,9 @@ def given_displacements(case: Case, mesh: Mesh) -> dict[object, Displacements]:
     except CaseError as problem:
         problems.append(str(problem))
     for motion in case.motions:
-        mine = [nodes for name, nodes in on.items() if moves(motion, name)]
-        if isinstance(motion, FromFile) and (mine or not motion.marker):
-            nodes = np.unique(np.concatenate([*mine, np.empty(0, np.int64)]))
+        moved = [nodes for name, nodes in on.items() if moves(motion, name)]
+        if isinstance(motion, FromFile) and (moved or not motion.marker):
+            nodes = np.unique(np.concatenate([*moved, np.empty(0, np.int64)]))
             names = " or ".join(repr(name) for name in named(motion.marker))
             of = f"marker {names}" if names else "a moving marker"
             try:
@@ -110,17 +108,6 @@ def _read_file(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Displacement
     shape = mesh.part.n_points, mesh.dim
     return replace(read_displacements(path, mesh.part.points[nodes], shape, of), nodes=nodes)
 
-
-__all__ = [
-    "Displacements",
-    "check_case",
-    "displacement_of",
-    "displacements",
-    "given_displacements",
-    "moved_points",
-    "moved_together",
-    "require_valid",
-]
 
 AGREE = 1e-9
 """Largest allowed difference of two displacements of one node, over the mesh's extent."""
@@ -149,7 +136,7 @@ def displacements(case: Case, mesh: Mesh) -> Displacements:
     raise_all((*marker_problems(case, mesh), *motion_problems(case, mesh)))
     names = case.markers_with("moving")
     on = {name: mesh.marker(name).nodes for name in names}
-    files = given_displacements(case, mesh)
+    files = reference_displacements(case, mesh, on)
     vectors = list(moved_together(case.motions, mesh.points, on, files).values())
     nodes = np.concatenate(list(on.values()))
     order = np.argsort(nodes, kind="stable")
@@ -181,7 +168,10 @@ def _require_size(mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> None:
 
 
 def moved_together(
-    motions: Iterable[Motion], points: FloatArray, on: Mapping[str, IntArray], files: Given
+    motions: Iterable[Motion],
+    points: FloatArray,
+    on: Mapping[str, IntArray],
+    files: ReferenceDisplacements,
 ) -> dict[str, FloatArray]:
     """Return the displacement (k, d) of the nodes of each marker after all motions, in sequence.
 
@@ -230,7 +220,7 @@ def moved_points(
     motions: Iterable[Motion],
     points: FloatArray,
     nodes: IntArray | None = None,
-    files: Given | None = None,
+    files: ReferenceDisplacements | None = None,
 ) -> FloatArray:
     """Return the points (k, d) of one marker after its motions; parameters as `displacement_of`."""
     return points + displacement_of(motions, points, nodes, files)
@@ -240,7 +230,7 @@ def displacement_of(
     motions: Iterable[Motion],
     points: FloatArray,
     nodes: IntArray | None = None,
-    files: Given | None = None,
+    files: ReferenceDisplacements | None = None,
 ) -> FloatArray:
     """Return the displacement (k, d) of the nodes of one marker after all motions, in sequence.
 
@@ -263,7 +253,7 @@ def displacement_of(
 
 
 def _change(
-    motion: Motion, points: FloatArray, nodes: IntArray | None, files: Given | None
+    motion: Motion, points: FloatArray, nodes: IntArray | None, files: ReferenceDisplacements | None
 ) -> FloatArray:
     """Return the displacement (k, d) by one motion of the nodes of a marker, now at ``points``."""
     if isinstance(motion, Prescribed):

@@ -14,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from slideviz.case.check import check_case
 from slideviz.case.model import Case, FromFile
-from slideviz.case.motion import check_case, displacements
+from slideviz.case.motion import displacements
 from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
 from slideviz.formats.source import unreadable
 from slideviz.formats.table import format_for, holds_quality

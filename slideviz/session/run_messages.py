@@ -223,7 +223,7 @@ def loose_words(case: Case, extent: float, largest: float) -> str:
 
 def _problems(session: Session) -> list[str]:
     """Return the problems of the session's case with its mesh (`check_case`) as sentences."""
-    from slideviz.case.motion import check_case
+    from slideviz.case.check import check_case
 
     assert session.mesh is not None
     said = (in_window_words(text) for text in check_case(session.case, session.mesh))

@@ -74,9 +74,9 @@ def find_domain(case: Case, mesh: Mesh) -> Domain:
         Periodic markers do not match, a marker element is no side of a cell, or a coordinate is
         not finite, or too large to compute with.
     """
+    case, notes = roles_of_copies(case, mesh)
     _require_finite(mesh)
     check_size(mesh)
-    case, notes = roles_of_copies(case, mesh)
     boundary = boundary_of(mesh)
     fans = find_fans(boundary, mesh.points, case.feature_angle_deg)
     pairs, frame, coords, representative = find_period(case, mesh, boundary)

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.case.check import idle_settings
+from slideviz.case.check import idle_settings, require_valid
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
-from slideviz.case.motion import require_valid
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.rbf.classify import Classes, directions

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.check import contradictions
+from slideviz.case.check import check_case, contradictions, require_valid
 from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
-from slideviz.case.motion import check_case, require_valid
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
 

@@ -11,7 +11,12 @@ from hypothesis.extra.numpy import arrays
 
 from slideviz.case.check import contradictions
 from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
-from slideviz.case.motion import displacement_of, displacements, given_displacements, moved_points
+from slideviz.case.motion import (
+    displacement_of,
+    displacements,
+    moved_points,
+    reference_displacements,
+)
 from slideviz.errors import CaseError
 
 coordinate = st.floats(-1e3, 1e3)
@@ -232,8 +237,8 @@ class TestDisplacements:
         one = case(FromFile(tmp_path / "d.txt", "UPPER"), Scale("UPPER", (2.0,)))
         found = displacements(one, square)
         assert found.vectors[:, 0].tolist() == [-0.5, 0.5, 1.5, 2.5]
-        files = given_displacements(one, square)
         nodes = square.marker("UPPER").nodes
+        files = reference_displacements(one, square, {"UPPER": nodes})
         seen = moved_points(one.motions, square.points[nodes], nodes, files)
         assert (seen == square.points[nodes] + found.vectors).all()
         (tmp_path / "d.txt").write_text("3 1 0\n")
