@@ -13,7 +13,7 @@ RUNS := 5000
 SEED := 0
 
 .DEFAULT_GOAL := help
-.PHONY: help setup upgrade demo test test-all lint format docs golden bench laws shots study clean
+.PHONY: help setup upgrade demo test test-all lint format docs golden smoke bench laws shots study clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; \
@@ -50,6 +50,9 @@ docs: setup ## build the documentation into build/docs/html; its examples run
 
 golden: setup ## record what users get, which test-all compares (PARTS="films window")
 	$(BIN)/python -m tests.golden.record $(PARTS)
+
+smoke: setup ## build the wheel and try it outside of the clone, also without Qt and VTK
+	$(BIN)/python tools/smoke.py
 
 bench: setup ## measure the speed (needs a quiet machine)
 	$(PYTEST) tests/benchmarks -o python_files="bench_*.py test_*.py" --benchmark-only $(ARGS)

@@ -327,6 +327,17 @@ def test_an_unforeseen_error_is_one_message(square, monkeypatch, capsys):
     assert "Traceback" not in err
 
 
+@pytest.mark.parametrize("package", ["pyvista", "matplotlib"])
+def test_a_package_that_is_missing_is_named_before_anything_is_computed(
+    square, tmp_path, monkeypatch, capsys, package
+):
+    monkeypatch.setitem(sys.modules, package, None)
+    case = square / "square.cfg"
+    assert run(["compare", str(case), "-o", str(tmp_path / "compared")]) == 1
+    assert f"this needs {package}, which is not installed; `pip" in capsys.readouterr().err
+    assert not (tmp_path / "compared").exists()
+
+
 def test_out_of_memory_is_one_sentence(square, monkeypatch, capsys):
     def broken(*_, **__):
         raise MemoryError

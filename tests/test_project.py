@@ -11,6 +11,7 @@ from pathlib import Path
 import yaml
 
 import slideviz
+from tools import smoke
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = Path(slideviz.__file__).parent
@@ -40,6 +41,13 @@ def test_no_address_is_invented():
     texts = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("slideviz/**/*.py")]
     texts += [ROOT / "docs" / "conf.py", ROOT / "CITATION.cff"]
     assert [path for path in texts if "github.com/slideviz" in path.read_text("utf-8")] == []
+
+
+def test_all_dependencies_are_known_by_what_needs_them():
+    needed = {re.split(r"[^\w.-]", one)[0] for one in PROJECT["project"]["dependencies"]}
+    assert {*f"{smoke.COMPUTING} {smoke.PLOTS} {smoke.DRAWING}".split()} == needed
+    page = (ROOT / "docs" / "tutorials" / "cluster.md").read_text(encoding="utf-8")
+    assert f"pip install {smoke.COMPUTING} {smoke.PLOTS}\n" in page
 
 
 def test_the_desktop_file_starts_what_is_installed():

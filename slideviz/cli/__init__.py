@@ -77,6 +77,13 @@ def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
     except Exception as problem:
         if os.environ.get("SLIDEVIZ_DEBUG"):
             traceback.print_exc()
+        missing = (isinstance(problem, ModuleNotFoundError) and problem.name) or "slideviz"
+        if not missing.startswith("slideviz"):
+            return _fail(
+                f"this needs {missing.partition('.')[0]}, which is not installed; `pip install "
+                "slideviz` installs all that is missing",
+                WRONG_INPUT,
+            )
         return _fail(
             f"internal error ({type(problem).__name__}: {problem}); please report it with the "
             "output of the same command under SLIDEVIZ_DEBUG=1",

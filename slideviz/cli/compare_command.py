@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -71,6 +72,8 @@ def compare(arguments: argparse.Namespace) -> int:
     from slideviz.study.combinations import COMPARED_METHODS, MODES, announcement, refused, warm
     from slideviz.study.table import terminal_head
 
+    for name in ("matplotlib",) if arguments.no_pictures else ("matplotlib", "pyvista"):
+        import_module(name)  # else it would be missed only after all is computed
     case = read_case(arguments)
     mesh_file = require_mesh_file(arguments, case)
     wanted = _wanted(arguments, case)
@@ -212,7 +215,6 @@ def _drawn(
     folder: Path,
 ) -> list[Path]:
     """Write plots and pictures, and return their paths."""
-    from slideviz.study.montage import DPI, montage
     from slideviz.study.plots import figures, profiler, save_figure, steps_name
 
     span = None if arguments.span == "none" else profiler(case, mesh, arguments.span)
@@ -220,6 +222,8 @@ def _drawn(
     for name, figure in figures(rows, span):
         files += save_figure(figure, folder, name)
     if not arguments.no_pictures:
+        from slideviz.study.montage import DPI, montage
+
         for steps in dict.fromkeys(row.combination.steps for row in rows):
             pictures = montage([row for row in rows if row.combination.steps == steps], mesh)
             if pictures is not None:
