@@ -189,7 +189,7 @@ def test_mesh_and_case_may_be_files(tmp_path):
 
 def test_options_of_idwarp_that_do_nothing_are_named():
     mesh = grid((6, 6), hole=HOLE[:2])
-    with pytest.warns(UserWarning, match="options of IDWarp that do nothing here: aExp, LdefFact;"):
+    with pytest.warns(UserWarning, match="options of IDWarp without effect here: aExp, LdefFact;"):
         USMesh({"gridFile": mesh, "case": case_of(mesh), "aExp": 3.0, "LdefFact": 1.0})
 
 

@@ -294,7 +294,7 @@ def _read(options: Mapping[str, Any]) -> tuple[Mesh, Case, Any]:
     idle = [name for name in _THEIRS[1:] if options.get(name) not in (None, [])]
     if idle:
         warnings.warn(
-            f"options of IDWarp that do nothing here: {', '.join(idle)}; the case says how the "
+            f"options of IDWarp without effect here: {', '.join(idle)}; the case says how the "
             "mesh deforms",
             stacklevel=3,
         )

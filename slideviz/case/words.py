@@ -175,4 +175,4 @@ def wrong_by(part: float, *, bounded: bool) -> str:
     ``bounded``: whether it is a bound; else it is the part of the error that could be measured.
     """
     percent = f"{100.0 * part:.2g} % of the largest"
-    return f"up to {percent}" if bounded else f"{percent} or more, how much is not known"
+    return f"up to {percent}" if bounded else f"{percent} or more; how much more is unknown"

@@ -33,8 +33,8 @@ def note_of_refinement(steps: Sequence[FrozenStep]) -> tuple[str, ...]:
         Note(
             f"the system is nearly singular (condition number {largest_condition(steps):.0e}): "
             f"between the boundary nodes designs would be wrong by up to {100 * refined:.2g} % "
-            "of the largest displacement, so all are solved with twice the digits; those for "
-            "which that does not suffice are told by a ConditionWarning"
+            "of the largest displacement, so all are solved with twice the digits; a "
+            "ConditionWarning names those for which that does not suffice"
         ),
     )
 
@@ -97,7 +97,7 @@ def warn_of_errors(
     worst = np.unravel_index(int(np.argmax(errors - allowed)), errors.shape)
     chosen = "control nodes and facets" if reduced else "the facets that nodes slide on"
     of = "" if errors.ndim == 0 else f" of {counted(int(above.sum()), 'design')}"
-    why = f": {chosen} are those of another displacement; choose them anew with `deformer = "
+    why = f": {chosen} are those of another displacement; renew them with `deformer = "
     why += "deformer.refresh(displacement)`"
     if reference[worst]:
         why = f", with {chosen} chosen for this displacement; use more STEPS, a less smooth "

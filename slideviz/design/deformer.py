@@ -141,8 +141,8 @@ class Deformer:
         setup = make_setup(held, mesh, displaced(most, mesh))
         if setup.reduction is not None and not sizes.any():
             raise DeformError(
-                "no displacement is given by which control nodes could be chosen: all are zero; "
-                "give `displacements` as large as the designs to come, or use DATA_REDUCTION= NO"
+                "all displacements are zero, so control nodes cannot be chosen; give "
+                "`displacements` as large as the designs to come, or use DATA_REDUCTION= NO"
             )
         self._setup, self._input = setup, known_node_map(mesh, setup, asked)
         self._references = references
@@ -329,7 +329,7 @@ class Deformer:
         given = self._shaped(displacement, self.displacement.shape, "displacement")
         if given.ndim == 3:
             raise CaseError(
-                "derivatives are those at one displacement; of several, call it for each"
+                "derivatives are taken at one displacement; call it for each of several"
             )
         start = Tape().variable(given)
         states = self._run(self._input.target(start))

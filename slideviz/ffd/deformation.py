@@ -261,7 +261,7 @@ class BoxDeformation:
         if lost and not box.level:
             self.notes.append(
                 f"{lost} nodes in the FFD box {box.name!r} are in one before it, too: as in SU2, "
-                "they go where the last one takes them, and lose the motion of the other"
+                f"they move with the last one, and lose the motion of the other"
             )
 
     def _bound(self, box: Box) -> None:

@@ -64,7 +64,7 @@ def read_boxes(mesh: Mesh, lines: list[str], system: CoordinateSystem) -> tuple[
     for k, name in enumerate(names):
         if name in names[:k]:
             line = entries[k]["FFD_TAG"].line
-            raise _error(mesh, line, f"the FFD box {name!r} stands twice; rename one")
+            raise _error(mesh, line, f"the FFD box {name!r} is defined twice; rename one")
     _require_count(mesh, lines, names)
     levels = next((_value(line) for line in lines if key_of(line) == "FFD_NLEVEL"), "1")
     for reader in readers:

@@ -33,7 +33,7 @@ def first_fault(cells: Cells, n_points: int) -> tuple[int, str] | None:
     element, node = repeated
     name = ELEMENTS[int(cells.types[element])].name
     return element, (
-        f"node {node} stands twice in one {name}; replace the collapsed element by one with "
+        f"node {node} occurs twice in one {name}; replace the collapsed element by one with "
         "fewer nodes"
     )
 

@@ -87,7 +87,7 @@ def unsoundness(
     node = int(on[np.argmax(length[on])]) if len(on) else int(np.argmax(length * beyond))
     where = ", ".join(f"{value:.6g}" for value in mesh.points[node])
     return (
-        f"node {mesh.number(node)} at ({where}) would go {length[node]:.3g} far, more than "
+        f"node {mesh.number(node)} at ({where}) would move by {length[node]:.3g}, more than "
         f"{GROWTH:g} times the {reach[node]:.3g} that the motion reaches, whose largest "
         f"displacement so far is {asked:.3g}: {_cause(setup, mesh, moved)}"
     )
@@ -115,8 +115,8 @@ def overshoot_of_rest(
     if length <= GROWTH * _reach(setup, shift, largest, ("moving", "fixed", "sliding")):
         return None
     return (
-        f"would go {length:.3g} far, {length / largest:.3g} times the largest displacement that is "
-        f"asked for ({largest:.3g}): {_cause(setup, mesh, moved)}"
+        f"would move by {length:.3g}, {length / largest:.3g} times the largest displacement that "
+        f"is asked for ({largest:.3g}): {_cause(setup, mesh, moved)}"
     )
 
 
@@ -174,7 +174,7 @@ def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) 
     if setup.fitted_radius < radius:
         remedy = "INFLUENCE_FACTOR= AUTO, or RBF_KERNEL= wendland-c0"
     sentence = (
-        f"node {found.node} at ({where}) goes {found.length:.3g} far, {ratio:.3g} "
+        f"node {found.node} at ({where}) moves by {found.length:.3g}, {ratio:.3g} "
         f"times as far as the farthest boundary node ({most:.3g}): the interpolation, whose "
         f"support radius is {radius:.3g}, continues the turning or stretching of the boundary "
         f"beyond it; use {remedy}"

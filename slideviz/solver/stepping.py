@@ -314,7 +314,7 @@ def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
         f"step {index}: the data reduction ended with {solution.control_nodes} control nodes at "
         f"an error of {solution.max_error:.3g}, above its tolerance of "
         f"{setup.reduction.tolerance:.3g}: {solution.short}. Boundary nodes still get exactly "
-        "their displacement, but what is near them follows by the correction alone"
+        "their displacement, but the mesh near them follows by the correction only"
     )
 
 

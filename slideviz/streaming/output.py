@@ -113,14 +113,14 @@ class Output:
         """Return a sentence on how much a stopped run has left to go on with."""
         done, total = self._opened().done, len(parts(self.source.n_points))
         if done:
-            return f"{self._path.name}: goes on after {done} of {total} parts"
+            return f"{self._path.name}: continues after {done} of {total} parts"
         if self._input.is_reused:
             return (
-                f"{self._path.name}: goes on with the text as it was read; no part is written yet"
+                f"{self._path.name}: continues with the text that was read; no part is written yet"
             )
         return (
-            f"{self._path.name}: there is nothing to go on with, of this case, mesh and version; "
-            "it is made from the beginning"
+            f"{self._path.name}: there is nothing to resume of this case, mesh and version; the "
+            f"run starts from the beginning"
         )
 
     def displace(self, displacer: InteriorDisplacer, *, final: bool) -> None:

@@ -97,7 +97,9 @@ def quality_blocks(
         if isinstance(source, FileSource) and not may_fold:
             known, signs = len(signs), orientations_of(np.concatenate([signs, found.signs]))
             if known < 2 == len(signs):
-                also = "rate a deformed mesh with --reference UNDEFORMED, " * (source.base is None)
+                also = "compare a deformed mesh with --reference UNDEFORMED, " * (
+                    source.base is None
+                )
                 parts = [
                     (k, min(k + CELLS, source.n_cells)) for k in range(0, source.n_cells, CELLS)
                 ]

@@ -259,7 +259,7 @@ def _twice(source: BinaryFile, place: ZonePlace, element: int, index: int) -> Me
         place,
         element,
         f"its index {index % 2**64} is not below the number of elements, {place.cells.count}, or "
-        "stands twice; write the mesh again",
+        f"occurs twice; write the mesh again",
     )
 
 

@@ -93,10 +93,10 @@ def test_kernels_that_cannot_be_refined_are_measured_too(kernel):
     *_, last = sv.deform(case, mesh)
     told = [text for text in last.warnings if "may be wrong by" in text]
     assert bool(told) == (kernel == "gaussian")
-    assert all("or more, how much is not known; use" in text for text in told)
+    assert all("or more; how much more is unknown; use" in text for text in told)
 
 
-@pytest.mark.parametrize(("doubt", "little"), [(5e-4, True), (2e-3, False)])
+@pytest.mark.parametrize(("error_estimate", "little"), [(5e-4, True), (2e-3, False)])
 def test_a_small_error_is_a_note(error_estimate, little):
     step: Any = SimpleNamespace(condition=1e12, refined=0.0, error_estimate=error_estimate)
     with pytest.warns(ConditionWarning) as told:
@@ -162,7 +162,7 @@ def test_well_conditioned_systems_keep_every_bit(monkeypatch):
     mesh, case = builders.airfoil(40, 3), asked(Rotate("airfoil", 5.0))
     *_, last = sv.deform(case, mesh)
     assert last.warnings == ()
-    monkeypatch.setattr("slideviz.rbf.exact.System.wrong", lambda *_: np.zeros(1))
+    monkeypatch.setattr("slideviz.rbf.exact.System.field_error", lambda *_: np.zeros(1))
     *_, same = sv.deform(case, mesh)
     assert last.mesh.points.tobytes() == same.mesh.points.tobytes()
     assert last.mesh.points.tobytes() == sv.Deformer(mesh, case).deform().tobytes()
@@ -207,11 +207,11 @@ def test_a_deformer_at_its_own_reference_does_not_blame_another_displacement():
     roles = dict.fromkeys(mesh.marker_names, "sliding") | {"BLOCK": "moving"}
     motion = Translate("BLOCK", (0.04, -0.03, 0.015))
     case = Case(roles=roles, motions=(motion,), sliding="ds", kernel="gaussian")
-    with pytest.warns(ConditionWarning, match="of the largest or more, how much is not known"):
+    with pytest.warns(ConditionWarning, match="of the largest or more; how much more is unknown"):
         deformer = sv.Deformer(mesh, case.change(reduction=None, influence_factor=2.5))
     with pytest.warns(ToleranceWarning, match="nodes slide on chosen for this displacement; use"):
         deformer.deform()
-    with pytest.warns(ToleranceWarning, match="are those of another displacement; choose"):
+    with pytest.warns(ToleranceWarning, match="are those of another displacement; renew"):
         deformer.deform(1.01 * deformer.displacement)
     both = np.stack([0.5 * deformer.displacement, deformer.displacement])
     with pytest.warns(ToleranceWarning, match=r"of 2 designs .* nodes slide on chosen for this"):
@@ -220,7 +220,9 @@ def test_a_deformer_at_its_own_reference_does_not_blame_another_displacement():
 
 def test_what_is_measured_at_a_reference_is_no_bound_for_single_nodes():
     made = sample("airfoil")
-    with pytest.warns(ConditionWarning, match="single nodes, .* or more, how much is not") as told:
+    with pytest.warns(
+        ConditionWarning, match="single nodes, .* or more; how much more is unknown"
+    ) as told:
         deformer = sv.Deformer(made.mesh, made.case.change(kernel="wendland-c6"))
     alone = np.zeros_like(deformer.displacement)
     alone[0, 1] = 1.0

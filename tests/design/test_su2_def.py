@@ -109,8 +109,8 @@ def test_kinds_do_what_su2_says_and_add_up(here):
             "0.1, 0.2",
             "TRANSLATION\nDV_PARAM= (0, 1, 0)\nDV_VALUE= 0.1",
             (
-                "variable 2 (FFD_CONTROL_POINT_2D) of DV_KIND will do nothing, as in SU2: "
-                "TRANSLATION stands first, and decides what can move; make two runs"
+                "variable 2 (FFD_CONTROL_POINT_2D) of DV_KIND will have no effect, as in SU2: "
+                "TRANSLATION is first, and decides what can move; make two runs"
             ),
         ),
         (
@@ -118,21 +118,27 @@ def test_kinds_do_what_su2_says_and_add_up(here):
             "(0, 1, 0)",
             "0.1, 0.2",
             "TRANSLATION\nDV_PARAM= (0, 1, 0)\nDV_VALUE= 0.1",
-            "DV_PARAM has 1 group for 2 variables: as in SU2, the last ones of DV_KIND do nothing",
+            (
+                "DV_PARAM has 1 group for 2 variables: as in SU2, the last ones of DV_KIND have no "
+                "effect"
+            ),
         ),
         (
             "TRANSLATION",
             "(0, 1, 0, 7, 0)",
             "0.1",
             "TRANSLATION\nDV_PARAM= (0, 1, 0)\nDV_VALUE= 0.1",
-            "DV_PARAM: 7, 0 after the last variable is passed over",
+            "DV_PARAM: 7, 0 after the last variable is ignored",
         ),
         (
             "NO_DEFORMATION, SCALE",
             "(1.0); (1.0)",
             "0.0, 2.0",
             "SCALE\nDV_VALUE= 1.0",
-            "variable 2 (SCALE) of DV_KIND will do nothing, as in SU2: NO_DEFORMATION stands first",
+            (
+                "variable 2 (SCALE) of DV_KIND will have no effect, as in SU2: NO_DEFORMATION is "
+                "first"
+            ),
         ),
     ],
 )
@@ -295,7 +301,7 @@ def test_surface_file_gives_positions_in_any_order(here):
     assert new[3].tolist() == pytest.approx([0.5, 0.1])
     assert new[1].tolist() == pytest.approx([0.2, 0.05])
     assert not found.displacement[[0, 2, 4, 5, 6]].any()
-    said = "p.dat: 1 of 3 nodes are not on DV_MARKER= (low); they are passed over"
+    said = "p.dat: 1 of 3 nodes are not on DV_MARKER= (low); they are ignored"
     assert found.case().warnings == (said,)
 
 
@@ -342,7 +348,7 @@ def test_surface_file_of_another_boundary_is_refused_and_writes_nothing(here, ca
     assert not Path("out.su2").exists()
     Path("p.dat").write_text("\n".join([*rows, "2 0.3 0.02"]))
     assert run(["def", "a.cfg", "-q", "--json", "a.json"]) == 0
-    said = "p.dat: 7 of 8 nodes are not on DV_MARKER= (low); they are passed over"
+    said = "p.dat: 7 of 8 nodes are not on DV_MARKER= (low); they are ignored"
     assert capsys.readouterr().err.count(said) == 1
     assert said in json.loads(Path("a.json").read_text())["warnings"]
 
@@ -503,7 +509,7 @@ def test_roles_follow_from_the_lists_of_su2_and_of_ours(here):
                 f"{BOXED}DV_KIND= FFD_CONTROL_POINT_2D, SCALE\nDV_VALUE= 1, 1\n"
                 "DV_PARAM= (BOX, 1, 0, 0, 1); (1.0)"
             ),
-            "SCALE cannot stand in a list that begins with FFD_CONTROL_POINT_2D: it has no FFD box",
+            "SCALE cannot be in a list that begins with FFD_CONTROL_POINT_2D: it has no FFD box",
         ),
         ("DV_KIND= SCALE", "DV_VALUE is missing: a value for each variable"),
         ("DV_KIND= SCALE, SCALE\nDV_VALUE= 1", "DV_VALUE has 1 value for 2 variables"),
@@ -630,7 +636,7 @@ def test_boundaries_of_su2s_keys_that_the_mesh_lacks_are_passed_over(row, roles,
     key = row.partition("=")[0]
     (warning,) = found.case.warnings
     assert warning.startswith(f"a.cfg: {key}: mesh.su2 has no marker '")
-    assert warning.count("': passed over, as in SU2") == 1
+    assert warning.count("': ignored, as in SU2") == 1
 
 
 def test_command_passes_over_a_boundary_and_is_that_without_it(here, capsys):
@@ -642,7 +648,7 @@ def test_command_passes_over_a_boundary_and_is_that_without_it(here, capsys):
     config(text + "MARKER_SYM= (left, axis, right)\n")
     assert run(["def", "a.cfg", "-q", "--json", "a.json"]) == 0
     assert Path("out.su2").read_bytes() == expected
-    said = "a.cfg: MARKER_SYM: mesh.su2 has no marker 'axis': passed over, as in SU2"
+    said = "a.cfg: MARKER_SYM: mesh.su2 has no marker 'axis': ignored, as in SU2"
     assert capsys.readouterr().err.count(said) == 1
     assert said in json.loads(Path("a.json").read_text())["warnings"]
     config("DV_KIND= FFD_SETTING\nMARKER_SYM= (axis)\n" + BOXED)
@@ -657,7 +663,7 @@ def test_internal_boundaries_of_su2_are_passed_over_where_the_mesh_lacks_them(he
     found = on_mesh(config(text), sv.read("mesh.su2"))
     assert dict(found.case.roles) == {"low": "moving", "left": "internal"}
     (warning,) = found.case.warnings
-    assert warning.startswith("a.cfg: MARKER_INTERNAL: mesh.su2 has no marker 'core': passed over,")
+    assert warning.startswith("a.cfg: MARKER_INTERNAL: mesh.su2 has no marker 'core': ignored,")
     text = "DV_KIND= SCALE\nDV_VALUE= 1.1\nMARKER_DEFORM_MESH_INTERNAL= (left)\n"
     assert config(text).case.roles["left"] == "internal"
 
@@ -697,7 +703,7 @@ def test_without_dv_marker_some_of_the_deformed_boundaries_may_be_missing(here, 
     rest = "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nDV_KIND= SCALE\nDV_VALUE= 1.1\n"
     Path("a.cfg").write_text(f"{rest}MARKER_DEFORM_MESH= (low, flap)\n")
     assert run(["def", "a.cfg", "-q"]) == 0
-    assert "MARKER_DEFORM_MESH: mesh.su2 has no marker 'flap': pas" in capsys.readouterr().err
+    assert "MARKER_DEFORM_MESH: mesh.su2 has no marker 'flap': ignored" in capsys.readouterr().err
     Path("a.cfg").write_text(f"{rest}MARKER_DEFORM_MESH= (slat, flap)\n")
     assert run(["def", "a.cfg", "-q"]) == 1
     assert "MARKER_DEFORM_MESH: mesh.su2 has no marker 'slat'; it has" in capsys.readouterr().err
@@ -739,7 +745,7 @@ def test_input_mesh_is_not_written_over_unasked(here, capsys):
     Path("a.cfg").write_text(same)
     before = Path("mesh.su2").read_bytes()
     assert run(["def", "a.cfg"]) == 1
-    assert "say --force to write over it" in capsys.readouterr().err
+    assert "add --force to write over it" in capsys.readouterr().err
     assert Path("mesh.su2").read_bytes() == before
     assert run(["def", "a.cfg", "--force", "-q"]) == 0
     assert Path("mesh.su2").read_bytes() != before

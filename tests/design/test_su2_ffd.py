@@ -437,7 +437,7 @@ def test_convexity_that_cannot_be_had_is_told(here, capsys):
     Path("surface_positions.dat").write_text("\n".join(rows))
     Path("a.cfg").write_text(text + "DV_KIND= SURFACE_FILE\n")
     assert run(["def", "a.cfg", "-q"]) == 3
-    assert "values, which SURFACE_FILE has none of: all of it is done" in capsys.readouterr().err
+    assert "values, which SURFACE_FILE has none of: all of it is applied" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -479,7 +479,7 @@ def test_variables_without_effect_are_told(kind, parameters, message, here):
     found = surface(text)
     assert not found.displacement.any()
     (said,) = found.warnings
-    assert "as in SU2, variable 1 of DV_KIND will do nothing; " in said
+    assert "as in SU2, variable 1 of DV_KIND will have no effect; " in said
     assert message in said
     text = text.replace("(3, 4, 2)", "(1, 3, 1)").replace(kind, "FFD_CONTROL_SURFACE")
     (said,) = surface(text.replace(parameters, f"(BOX, {LINE})")).warnings

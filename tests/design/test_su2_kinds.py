@@ -148,7 +148,10 @@ def test_normals_of_triangles_are_those_of_the_median_dual_mesh():
             "(1, 0.5); (0, 1, 0)",
             (0.02, 0.1),
             (True, False),
-            "variable 2 (TRANSLATION) of DV_KIND will do nothing, as in SU2: its motion is lost,",
+            (
+                "variable 2 (TRANSLATION) of DV_KIND will have no effect, as in SU2: its motion is "
+                "lost,"
+            ),
         ),
         ("TRANSLATION, HICKS_HENNE", "(0, 1, 0); (1, 0.5)", (0.1, 0.02), (True, True), ""),
         (
@@ -156,14 +159,20 @@ def test_normals_of_triangles_are_those_of_the_median_dual_mesh():
             "(0, 1, 0.5); (1, 1, 3); (0, 0, 0, 0, 0, 1); (1, 0.3)",
             (0.02, 0.03, 4.0, 0.01),
             (True, False, False, False),
-            "variables 2 (CST), 3 (ROTATION), 4 (HICKS_HENNE) of DV_KIND will do nothing, as in",
+            (
+                "variables 2 (CST), 3 (ROTATION), 4 (HICKS_HENNE) of DV_KIND will have no effect, "
+                "as in"
+            ),
         ),
         (
             "HICKS_HENNE, SURFACE_BUMP, HICKS_HENNE_CAMBER",
             "(1, 0.3); (0, 1, 0.4); (0.5)",
             (0.02, 0.03, 0.1),
             (True, True, False),
-            "variable 3 (HICKS_HENNE_CAMBER) of DV_KIND will do nothing, as in SU2: HICKS_HENNE_",
+            (
+                "variable 3 (HICKS_HENNE_CAMBER) of DV_KIND will have no effect, as in SU2: "
+                "HICKS_HENNE_"
+            ),
         ),
         (
             "ANGLE_OF_ATTACK, SCALE",
@@ -177,7 +186,10 @@ def test_normals_of_triangles_are_those_of_the_median_dual_mesh():
             "(1.0); (1, 0, 0)",
             (1.1, 0.1),
             (True, False),
-            "variable 2 (TRANSLATE_GRID) of DV_KIND will do nothing, as in SU2: SCALE_GRID stands",
+            (
+                "variable 2 (TRANSLATE_GRID) of DV_KIND will have no effect, as in SU2: SCALE_GRID "
+                "is"
+            ),
         ),
     ],
 )
@@ -335,8 +347,11 @@ def test_a_chord_along_y_has_no_camber(here):
 @pytest.mark.parametrize(
     ("kinds", "message"),
     [
-        ("NACA_4DIGITS, NACA_4DIGITS", "NACA_4DIGITS must stand alone; make two runs"),
-        ("HICKS_HENNE_CAMBER, SCALE", "HICKS_HENNE_CAMBER stands with variables of its kind only"),
+        (
+            "NACA_4DIGITS, NACA_4DIGITS",
+            "NACA_4DIGITS cannot be combined with others; make two runs",
+        ),
+        ("HICKS_HENNE_CAMBER, SCALE", "HICKS_HENNE_CAMBER can be combined with its own kind only"),
     ],
 )
 def test_lists_that_su2_refuses_are_refused(kinds, message, here):
@@ -412,7 +427,7 @@ def test_deform_mesh_is_warned_about(here):
     text = f"{HEAD}DV_KIND= SCALE\nDV_VALUE= 1.1\nDEFORM_MESH= YES\n"
     Path("a.cfg").write_text(text)
     (said,) = read_config(Path("a.cfg")).case.warnings
-    assert said.startswith("DEFORM_MESH= YES: SU2 would pass over the design variables; here they")
+    assert said.startswith("DEFORM_MESH= YES: SU2 would ignore the design variables; here they")
 
 
 def test_no_deformation_writes_the_mesh_back(here):
@@ -517,7 +532,7 @@ def test_wrong_settings_of_radial_functions_are_told(text, message, here):
 def test_elasticity_that_su2_is_asked_for_is_noted(here):
     Path("a.cfg").write_text(f"{HEAD}DV_KIND= SCALE\nDV_VALUE= 1.1\nDEFORM_KIND= ELASTIC\n")
     (said,) = read_config(Path("a.cfg")).case.warnings
-    assert said.startswith("DEFORM_KIND= ELASTIC: radial functions move the mesh all the same; wr")
+    assert said.startswith("DEFORM_KIND= ELASTIC: radial functions move the mesh nevertheless; wr")
 
 
 def turned(points, numbers, degrees):

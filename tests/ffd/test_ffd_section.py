@@ -260,7 +260,7 @@ def test_double_control_points_and_boxes_are_told(tmp_path):
     with pytest.raises(MeshError, match=r"must have each \(i, j, k\) from \(0, 0, 0\) to \(2, 1"):
         boxes_of(mesh)
     mesh = sv.read(written(tmp_path, SECTION + SECTION))
-    with pytest.raises(MeshError, match="the FFD box 'MAIN' stands twice; rename one"):
+    with pytest.raises(MeshError, match="the FFD box 'MAIN' is defined twice; rename one"):
         boxes_of(mesh)
 
 

@@ -377,7 +377,7 @@ def test_side_with_a_node_twice(tmp_path):
     data = {"marker": [[0], [1, 1]]}
     path = foreign(tmp_path / "a.vtu", [QUAD, lines], cell_data=data)
     with pytest.raises(
-        MeshError, match=r"a.vtu: marker 'marker_1': element 1: node 2 stands twice"
+        MeshError, match=r"a.vtu: marker 'marker_1': element 1: node 2 occurs twice"
     ):
         read(path)
 

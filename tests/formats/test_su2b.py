@@ -261,8 +261,8 @@ MISTAKES = [
     (change(WHOLE, LIST + 5 * 8, "<Q", 10), "element 1 is a tetrahedron .type 10, dimension 3."),
     (change(WHOLE, LIST + 8, "<Q", 5), "byte 56: element 0 has the node 5, .* from 0 to 4"),
     (change(WHOLE, LIST + 7 * 8, "<Q", 2**64 - 2), "byte 104: element 1 has the node 184467440737"),
-    (change(WHOLE, LIST + 8, "<Q", 1), "byte 48: element 0: node 1 stands twice in one triangle"),
-    (change(WHOLE, LIST + 4 * 8, "<Q", 1), "element 1 has the index 1, .* stands twice"),
+    (change(WHOLE, LIST + 8, "<Q", 1), "byte 48: element 0: node 1 occurs twice in one triangle"),
+    (change(WHOLE, LIST + 4 * 8, "<Q", 1), "element 1 has the index 1, .* occurs twice"),
     (
         change(WHOLE, LIST + 4 * 8, "<Q", 2),
         "byte 80: element 0 has the index 2, which is not below",
@@ -281,7 +281,7 @@ MISTAKES = [
     (change(WHOLE, NAME, "33s", b"\0"), "the marker name '' is empty or no printable"),
     (change(WHOLE, NAME, "33s", b"\xff"), "is empty or no printable UTF-8"),
     (change(WHOLE, NAME, "33s", b"a" * 33), "is not ended by a zero"),
-    (change(WHOLE, NAME, "33s", b"rest"), "marker rest stands a second time"),
+    (change(WHOLE, NAME, "33s", b"rest"), "marker rest occurs a second time"),
     (change(WHOLE, NAME, "33s", b"send_receive"), "cannot have send_receive markers .halos."),
     (WHOLE + b"12", "2 bytes follow the last of the 1 zones"),
 ]

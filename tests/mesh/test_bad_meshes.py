@@ -107,8 +107,8 @@ FAULTS = {
     "node far below": ("5 1 2 5 1", f"5 1 2 -{'9' * 30} 1", 4, f"node -{'9' * 30} does not exist"),
     "type endless": ("5 1 2 5 1", f"{'9' * 30} 1 2 5 1", 4, f"element type {'9' * 30} is not"),
     "marker node": ("3 3 4\n", "3 3 6\n", 20, "node 6 does not exist"),
-    "node twice": ("5 1 2 5 1", "5 1 2 1 1", 4, "node 1 stands twice in one triangle; replace"),
-    "marker twice": ("3 3 4\n", "3 4 4\n", 20, "node 4 stands twice in one line"),
+    "node twice": ("5 1 2 5 1", "5 1 2 1 1", 4, "node 1 occurs twice in one triangle; replace"),
+    "marker twice": ("3 3 4\n", "3 4 4\n", 20, "node 4 occurs twice in one line"),
     "type 7": (
         "5 1 2 5 1",
         "7 1 2 5 1",
@@ -481,7 +481,7 @@ def test_check_mesh_finds_each_fault(tmp_path):
         },
         r"two markers are named 'a'; rename one": {"markers": (Marker("a", line),) * 2},
         r"cell 0: node 6 does not exist": {"cells": Cells.from_blocks([(5, [[0, 1, 6]])])},
-        r"marker 'a': element 1: node 2 stands twice in one line": {
+        r"marker 'a': element 1: node 2 occurs twice in one line": {
             "markers": (Marker("a", Cells.from_blocks([(3, [[0, 1], [2, 2]])])),)
         },
         r"point 5 is at \(2.1, nan\), which is not finite": {
@@ -511,7 +511,7 @@ def test_first_fault_finds_the_first(mesh, data):
     found = first_fault(Cells.from_types(mesh.cells.types, twice), len(mesh.points))
     assert found is not None
     assert found[0] == element
-    assert f"node {twice[begin]} stands twice" in found[1]
+    assert f"node {twice[begin]} occurs twice" in found[1]
 
 
 # Writing.

@@ -235,8 +235,8 @@ def test_a_killed_rank_ends_all_and_others_go_on_with_what_is_done(square, alone
     hook = kill.format(1, 300)
     code, out, err = done(started(square, 2, *WORDS, "--resume", hook=hook, pause=0.02))
     assert (code != 0, out) == (True, "")
-    assert err.count("slideviz: ended by SIGTERM; what is done is kept in ") == 1
-    assert err.count("/.out.su2b.partial; go on with --resume") == 1
+    assert err.count("slideviz: ended by SIGTERM; the partial result is in ") == 1
+    assert err.count("/.out.su2b.partial; continue with --resume") == 1
     assert err.count("slideviz:") == 1
     assert not (square / "out.su2b").exists()
     assert ours.read_bytes()[:4] not in MAGIC
@@ -398,7 +398,7 @@ def test_parts_that_changed_since_are_made_again(tmp_path, monkeypatch):
     monkeypatch.setattr(output, "move", lambda *a: (made.append(a[-1]), move(*a))[1])
     told = []
     stream(case, out, resume=True, note=told.append)
-    assert "goes on after 3 of 10 parts" in told[0]
+    assert "continues after 3 of 10 parts" in told[0]
     assert min(made) == (30, 40)
     assert out.read_bytes() == whole
 

@@ -164,7 +164,7 @@ def test_cells_numbered_both_ways_or_folded_are_refused(small, capsys):
     assert run(["quality", "mesh.su2b", "--stream"]) == 1
     said = capsys.readouterr().err
     assert "numbered the other way round" in said
-    assert "rate a deformed mesh with --reference UNDEFORMED, run it without --stream" in said
+    assert "compare a deformed mesh with --reference UNDEFORMED, run it without --stream" in said
 
 
 def test_another_order_of_the_reference_is_told(small):

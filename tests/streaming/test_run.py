@@ -209,7 +209,7 @@ def test_resume_does_again_what_is_not_as_it_was_left(tmp_path, monkeypatch, cap
         note.write_text({"note": "no note", "deep": deep, "keys": json.dumps(known)}[change])
     capsys.readouterr()
     assert run(call) == 0
-    assert "there is nothing to go on with" in capsys.readouterr().err
+    assert "there is nothing to resume" in capsys.readouterr().err
     assert (Path("out.su2b").read_bytes() == whole) is (change != "case")
     assert Path("out_qual.txt").exists()
 
@@ -250,7 +250,7 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
         monkeypatch.setattr(output, "move", lambda *a, seen=counted: (seen.append(1), move(*a))[1])
         told: list[str] = []
         stream(case, out, note=told.append, resume=True)
-        assert (f"goes on after {stop} of {parts} parts" in told[0]) == (stop > 0)
+        assert (f"continues after {stop} of {parts} parts" in told[0]) == (stop > 0)
         assert len(counted) == parts - stop
         assert out.read_bytes() == whole
         assert not list(tmp_path.glob(".*"))
@@ -272,7 +272,7 @@ def test_a_damaged_note_begins_anew(tmp_path, monkeypatch, text):
     note.write_text(text.replace("{}", about) if "e999" in text else text)
     told: list[str] = []
     stream(case, out, note=told.append, resume=True)
-    assert "there is nothing to go on with" in told[0]
+    assert "there is nothing to resume" in told[0]
     assert not list(tmp_path.glob(".*"))
 
 
@@ -292,7 +292,7 @@ def test_an_early_end_tells_of_what_an_earlier_run_has_done(tmp_path, monkeypatc
         )
         with pytest.raises(TypeError):
             stream(case, out)
-    assert told == [f"what an earlier run has done is kept in {ours}; go on with --resume"]
+    assert told == [f"the partial result of an earlier run is in {ours}; continue with --resume"]
     stream(case, out, resume=True)
     assert cleanup.leftover_message() == cleanup.NOTHING_LEFT
 
@@ -347,7 +347,7 @@ def test_what_is_copied_and_then_changed_by_another_is_copied_again(tmp_path, mo
     flip(names_of(out)[0], at % len(whole))
     told: list[str] = []
     stream(case, out, note=told.append, resume=True)
-    assert "goes on after 2 of" in told[0]
+    assert "continues after 2 of" in told[0]
     assert out.read_bytes() == whole
 
 
@@ -363,7 +363,7 @@ def test_another_case_or_a_changed_mesh_begins_anew(tmp_path, monkeypatch):
     other = case.change(steps=1)
     told: list[str] = []
     stream(other, out, note=told.append, resume=True)
-    assert "there is nothing to go on with" in told[0]
+    assert "there is nothing to resume" in told[0]
     again = out.read_bytes()
     stream(other, out)
     assert out.read_bytes() == again
@@ -602,7 +602,7 @@ def test_the_extent_is_that_of_the_mesh_even_without_boundaries(tmp_path):
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (change(WHOLE, 56, "<Q", 1), "byte 48: element 0: node 1 stands twice in one triangle"),
+        (change(WHOLE, 56, "<Q", 1), "byte 48: element 0: node 1 occurs twice in one triangle"),
         (change(WHOLE, 80, "<Q", 1), "byte 48: element 0: its index 1 is not below .* twice"),
         (change(WHOLE, 80, "<Q", 2), "byte 48: element 0: its index 2 is not below the number"),
         (change(WHOLE, 144, "<d", 1e60), "byte 144: point 0 is at .* larger than 1e.50"),

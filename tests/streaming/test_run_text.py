@@ -276,7 +276,7 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, smal
             patch.setattr(output, "move", lambda *a, seen=moved: seen.append(1) or move(*a))
             told: list[str] = []
             stream(case, out, note=told.append, resume=True)
-        assert (f"goes on after {stop} of {parts} parts" in told[0]) == (stop > 0)
+        assert (f"continues after {stop} of {parts} parts" in told[0]) == (stop > 0)
         assert ("goes on with the text as it was read" in told[0]) == (stop == 0)
         assert bool(made_again) == (stop == -1)
         assert len(moved) == parts - max(stop, 0)
@@ -296,7 +296,7 @@ def test_a_binary_copy_that_another_has_changed_is_made_anew(tmp_path, monkeypat
     flip(names_of(out, ".binary")[0], 500)
     told = []
     stream(case, out, resume=True, note=told.append)
-    assert "goes on after 2 of" in told[0]
+    assert "continues after 2 of" in told[0]
     assert out.read_bytes() == in_memory(case, tmp_path / f"memory.{ending}")
 
 
@@ -311,7 +311,7 @@ def test_a_text_that_changed_is_read_anew(tmp_path, monkeypatch, small):
     case.mesh_file.write_text(text + "% more\n")
     told = []
     stream(case, out, resume=True, note=told.append)
-    assert "there is nothing to go on with" in told[0]
+    assert "there is nothing to resume" in told[0]
     assert out.read_bytes() == in_memory(case, tmp_path / "memory.su2")
 
 

@@ -339,7 +339,9 @@ def _without_effect(found: MovedBoxes) -> list[str]:
         else:
             why = "three indices of -1 move nothing"
         reasons.setdefault(f"{variable.kind}: {why}", []).append(place + 1)
-    return [f"as in SU2, {places_words(at)} will do nothing; {why}" for why, at in reasons.items()]
+    return [
+        f"as in SU2, {places_words(at)} will have no effect; {why}" for why, at in reasons.items()
+    ]
 
 
 def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
@@ -409,7 +411,7 @@ def _embeddings(
         if len(stay):
             warnings.append(
                 f"{len(stay)} nodes of {marker} are inside the FFD box {box.name!r}, which lists "
-                "none of that boundary: as in SU2, they stay; set the box anew to move them"
+                "none of that boundary: as in SU2, they stay; define the box again to move them"
             )
         on[marker] = box.embed(stay[:0], np.empty((0, 3))), 0.0
     return on, warnings

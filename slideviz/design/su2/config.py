@@ -63,7 +63,7 @@ def radial_settings(
     if kind not in ("", "ELASTIC", "RBF"):
         note(rows["DEFORM_KIND"], not_one_of(kind, ("ELASTIC", "RBF")))
     if kind == "ELASTIC" and "METHOD" not in rows:
-        why = "DEFORM_KIND= ELASTIC: radial functions move the mesh all the same; write METHOD="
+        why = "DEFORM_KIND= ELASTIC: radial functions move the mesh nevertheless; write METHOD="
         warnings.append(Note(f"{why} elastic for elasticity"))
     given: dict[str, Any] = {}
     for name, form in {**READ_ALWAYS, **(READ_WITH_RBF if kind == "RBF" else {})}.items():
@@ -404,7 +404,7 @@ class _Reader:
                 sentence = f"{shown(words[key])} is not supported; supported: {listed}"
                 self.note(self.rows[key], sentence)
         if self.word("DEFORM_MESH", "NO").upper() == "YES":
-            sentence = "DEFORM_MESH= YES: SU2 would pass over the design variables; here they move"
+            sentence = "DEFORM_MESH= YES: SU2 would ignore the design variables; here they move"
             self.warnings.append(f"{sentence} DV_MARKER")
         for key in ELSEWHERE:
             if key in self.rows:

@@ -59,6 +59,6 @@ def _warnings(config: Su2Config, mesh: Mesh, passed: dict[str, str]) -> list[str
         close = nearest(names[0], mesh.marker_names) if len(names) == 1 else ""
         found.append(
             f"{config.source}: {key}: {mesh.name} has no marker {' or '.join(map(repr, names))}: "
-            f"passed over, as in SU2{close}"
+            f"ignored, as in SU2{close}"
         )
     return found

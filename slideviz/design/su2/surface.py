@@ -81,7 +81,7 @@ def convex_part(
     if full is not None and not first:
         return 1.0, full, ()
     if kind.group in WITHOUT_VALUE and full is not None:
-        note = f"CONVEXITY_CHECK scales values, which {kind.kind} has none of: all of it is done"
+        note = f"CONVEXITY_CHECK scales values, which {kind.kind} has none of: all of it is applied"
         return 1.0, full, (note,)
     best: tuple[float, Attempt] | None = None
     part, step, depth, valid = 1.0, 1.0, 0, False
@@ -193,7 +193,7 @@ def read_positions(
     positions = mesh.points[nodes]
     positions[np.searchsorted(nodes, listed[moving])] = table[moving, 1:]
     if others:
-        sentence = f"{path}: {others} of {len(listed)} nodes are not on {of}; they are passed over"
+        sentence = f"{path}: {others} of {len(listed)} nodes are not on {of}; they are ignored"
         warnings = (*warnings, sentence)
     return positions, warnings
 
@@ -394,7 +394,7 @@ def _left_behind(config: Su2Config, mesh: Mesh) -> list[str]:
         if kinds and boxes_of(mesh):
             sentence = (
                 f"the FFD boxes in {config.case.mesh_out} follow their control points only, and "
-                f"not {', '.join(kinds)}; set them anew to use them with that mesh"
+                f"not {', '.join(kinds)}; define them again to use them with that mesh"
             )
             return [Note(sentence)]
     return []

@@ -219,11 +219,13 @@ def _groups(
         problems.append((entry.line, f"DV_PARAM has {sentence}; give one each"))
         return []
     if len(groups) < len(kinds):
-        warnings.append(f"DV_PARAM has {sentence}: as in SU2, the last ones of DV_KIND do nothing")
+        warnings.append(
+            f"DV_PARAM has {sentence}: as in SU2, the last ones of DV_KIND have no effect"
+        )
     last, most = groups[-1], len(KINDS[kinds[len(groups) - 1]].parameters)
     if most and len(last) > most:
         extra = ", ".join(word.text for word in last[most:])
-        warnings.append(Note(f"DV_PARAM: {extra} after the last variable is passed over"))
+        warnings.append(Note(f"DV_PARAM: {extra} after the last variable is ignored"))
         groups[-1] = last[:most]
     return groups
 
@@ -291,14 +293,14 @@ def _contradictions(variables: list[DesignVariable]) -> list[str]:
     if first is None or len(variables) == 1:
         return []
     if first.group in ALONE:
-        return [f"{first.kind} must stand alone; make two runs"]
+        return [f"{first.kind} cannot be combined with others; make two runs"]
     others = {each.kind: None for each in variables if each.group != first.group}
     if first.group == "ffd" and others:
-        sentence = f"{', '.join(others)} cannot stand in a list that begins with {first.kind}"
+        sentence = f"{', '.join(others)} cannot be in a list that begins with {first.kind}"
         return [f"{sentence}: it has no FFD box; make two runs"]
     alike = all(each.kind == first.kind for each in variables)
     if first.kind == "HICKS_HENNE_CAMBER" and not alike:
-        return ["HICKS_HENNE_CAMBER stands with variables of its kind only; make two runs"]
+        return ["HICKS_HENNE_CAMBER can be combined with its own kind only; make two runs"]
     return []
 
 
@@ -314,21 +316,21 @@ def _dispatched(variables: list[DesignVariable], warnings: list[str]) -> tuple[D
     for reason, places in reasons.items():
         more = f" and {len(places) - 6} more" if len(places) > 6 else ""
         sentence = f"variable{'s' * (len(places) > 1)} {', '.join(places[:6])}{more} of DV_KIND"
-        warnings.append(f"{sentence} will do nothing, as in SU2: {reason}; make two runs")
+        warnings.append(f"{sentence} will have no effect, as in SU2: {reason}; make two runs")
     return tuple(found)
 
 
 def _why_ignored(variable: DesignVariable, first: DesignVariable) -> str:
     """Return why SU2 ignores a variable, or loses its motion; empty where it moves."""
     if first.group == "grid":
-        return f"{first.kind} stands first, and moves the mesh alone"
+        return f"{first.kind} is first, and alone moves the mesh"
     if variable.group != first.group:
-        return f"{first.kind} stands first, and decides what can move"
+        return f"{first.kind} is first, and decides what can move"
     order, leading = KINDS[variable.kind].order, KINDS[first.kind].order
     if variable.kind == "HICKS_HENNE_CAMBER" != first.kind:
         return f"HICKS_HENNE_CAMBER moves only where it stands first, and {first.kind} does"
     if order < leading and first.kind != "ANGLE_OF_ATTACK":
-        return f"its motion is lost, since {first.kind}, which stands first, begins anew after it"
+        return f"its motion is lost, since {first.kind}, which is first, starts again after it"
     return ""
 
 

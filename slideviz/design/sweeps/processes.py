@@ -79,15 +79,15 @@ class Processes(Executor):
             return ""
         if any(code < 0 for code in self.exit_codes):
             return (
-                "processes are killed before they begin, perhaps for want of memory; let fewer "
-                "work at a time (workers)"
+                "processes are killed before they begin, perhaps because memory is short; use "
+                "fewer at a time (workers)"
             )
         main = sys.modules["__main__"]
         if main.__package__ == "slideviz" or not str(getattr(main, "__file__", "")).endswith(".py"):
-            return "processes end before they begin; what they have printed says why"
+            return "processes end before they begin; their output says why"
         return (
-            "processes end before they begin; in a script, the sweep must stand under "
-            '`if __name__ == "__main__":`, for each process imports the script'
+            "processes end before they begin; in a script, the sweep must be under "
+            '`if __name__ == "__main__":`, because each process imports the script'
         )
 
     @property

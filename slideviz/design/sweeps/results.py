@@ -107,8 +107,8 @@ class SweepResults:
             return [row for row in found.values() if not row.problem and _has(row, meshes)]
         if self.path.exists() and not force:
             raise CaseError(
-                f"{self.path}: there are results already; go on with --resume (resume=True), "
-                "begin anew with --force (force=True), or choose another folder"
+                f"{self.path}: there are results already; continue with --resume (resume=True), "
+                f"start again with --force (force=True), or choose another folder"
             )
         self._begin()
         return []
@@ -178,7 +178,7 @@ class SweepResults:
             row = result_of(self._head, cells, self._folder)
         except ValueError:
             raise CaseError(
-                f"{self.path}:{line}: is no row of a sweep; take the line away, or {_REMEDY}"
+                f"{self.path}:{line}: is no row of a sweep; remove the line, or {_REMEDY}"
             ) from None
         rows = self._designs.rows
         values = dict(zip(self._designs.columns, cells[1:], strict=False))
@@ -206,7 +206,7 @@ class SweepResults:
                 raise ValueError
         except (OSError, ValueError):
             raise CaseError(
-                f"{path}: is missing or not readable, so that nothing tells what {self.path} was "
+                f"{path}: is missing or not readable, so that it is unknown what {self.path} was "
                 f"made of; {_REMEDY}"
             ) from None
         before.pop("slideviz", None)
@@ -220,10 +220,10 @@ class SweepResults:
             else f"the {key} changed"
             for key in changed
         )
-        raise CaseError(f"{self.path}: was made of something else: {said}; {_REMEDY}")
+        raise CaseError(f"{self.path}: was made from other input: {said}; {_REMEDY}")
 
 
-_REMEDY = "choose another folder, or begin anew with --force (force=True)"
+_REMEDY = "choose another folder, or start again with --force (force=True)"
 
 
 def locked(folder: Path) -> BaseFileLock:

@@ -247,8 +247,8 @@ class _Loop:
             except (BrokenExecutor, RuntimeError) as problem:
                 raise DeformError(
                     f"the executor takes no more work: {problem}; without an executor, processes "
-                    "that are lost are replaced, and with resume=True what is done need not be "
-                    "done again"
+                    "that are lost are replaced, and with resume=True finished designs are not "
+                    "run again"
                 ) from problem
             self._flying[future] = design, with_mesh
 

@@ -258,7 +258,7 @@ def _zone(source: BinaryFile, begin: int, number: int) -> ZonePlace:
     for _ in range(count):
         marker = _marker(source, at, dim)
         if marker.name in markers:
-            raise source.error(at, f"marker {marker.name} stands a second time; rename one of them")
+            raise source.error(at, f"marker {marker.name} occurs a second time; rename one of them")
         markers[marker.name] = marker
         at = marker.elements.entries + marker.elements.length * source.width
     return ZonePlace(number, begin, at, dim, cells, n_points, points, tuple(markers.values()))

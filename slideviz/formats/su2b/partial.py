@@ -83,7 +83,7 @@ def keep_earlier(path: Path) -> None:
     for ours, note in (names_of(path), names_of(path, BINARY)):
         if ours.exists() and note.exists():
             keep_partial(
-                ours, f"what an earlier run has done is kept in {ours}; go on with --resume"
+                ours, f"the partial result of an earlier run is in {ours}; continue with --resume"
             )
 
 
@@ -198,7 +198,7 @@ def finish_head(file: BinaryIO, head: bytes) -> None:
 
 def _kept_words(ours: Path) -> str:
     """Return the words for the user on a partial file that stays."""
-    return f"what is done is kept in {ours}; go on with --resume"
+    return f"the partial result is in {ours}; continue with --resume"
 
 
 def _noted(note: Path, about: str) -> list[int]:

@@ -232,7 +232,7 @@ def _check_order(source: BinaryFile, table: ElementTable, cells: Cells, order: I
         raise source.error(
             table.entries + (int(cells.offsets[k + 1]) + 2 * k + 1) * source.width,
             f"element {k} has the index {int(order[k]) % 2**64}, which is not below the number of "
-            f"elements, {len(order)}, or stands twice; write the mesh again",
+            f"elements, {len(order)}, or occurs twice; write the mesh again",
         )
 
 
