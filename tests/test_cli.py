@@ -449,7 +449,7 @@ def test_roles_that_the_method_does_not_use_are_told(square, capsys):
     argv = ["run", str(square / "square.cfg"), "--set", "STEPS=3", "--set", "SLIDING_MODE=none"]
     run([*argv, "--set", "PERIODIC_MODE=none", "--json", "-"])
     out = capsys.readouterr()
-    assert "LOWER and UPPER will not repeat" in out.err
+    assert "LOWER and UPPER will not stay periodic" in out.err
     assert "LEFT, RIGHT will not slide" in out.err
     assert len(json.loads(out.out)["warnings"]) == 2
 

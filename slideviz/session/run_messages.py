@@ -242,7 +242,7 @@ def idle_words(case: Case) -> tuple[str, ...]:
     """Return a sentence for each role without effect in the case's modes, seldom on purpose."""
     found: list[str] = []
     for names, mode, title, verb in (
-        (case.markers_with("periodic"), case.periodic, "Periodicity", "repeat"),
+        (case.markers_with("periodic"), case.periodic, "Periodicity", "stay periodic"),
         (case.markers_with("sliding"), case.sliding, "Sliding", "slide"),
     ):
         who = " and ".join(names) if len(names) <= MOST_NAMES else f"{len(names)} boundaries"

@@ -118,8 +118,11 @@ def test_workers_end_with_their_parent_however_it_ends(tmp_path):
 @pytest.mark.parametrize(
     ("end", "said"),
     [
-        (partial(signal.raise_signal, 9), "killed before they begin, perhaps for want of memory"),
-        (partial(os._exit, 1), 'must stand under `if __name__ == "__main__":`'),
+        (
+            partial(signal.raise_signal, 9),
+            "killed before they begin, perhaps because memory is short",
+        ),
+        (partial(os._exit, 1), 'must be under `if __name__ == "__main__":`'),
     ],
 )
 def test_why_no_process_starts_is_told(passage, monkeypatch, end, said):
@@ -146,7 +149,7 @@ def test_a_script_without_a_guard_is_told(tmp_path):
     )
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    assert 'must stand under `if __name__ == "__main__":`' in done.stderr
+    assert 'must be under `if __name__ == "__main__":`' in done.stderr
 
 
 def test_a_sweep_that_is_given_up_ends_at_once(passage):

@@ -309,7 +309,7 @@ def test_the_menu_of_the_motions_offers_what_can_be_done_as_to_paste_from_a_case
     assert opened.session.case.motions == (Translate("airfoil", (0.1, 0.0)), Rotate("", 5.0))
     QApplication.clipboard().setText("half a sentence")
     press(opened, "Ctrl+V")
-    assert "What was copied is no motion" in opened.window.banner.text.text()
+    assert "The clipboard has no motion" in opened.window.banner.text.text()
     assert len(opened.session.case.motions) == 2
 
 

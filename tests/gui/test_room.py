@@ -267,5 +267,5 @@ def test_a_case_whose_mesh_is_gone_says_so(driver, passage_file, answers, tmp_pa
     Path(passage_file).unlink()
     answers("ask_save", tmp_path / "a.cfg")
     assert driver.window.files.save_case()
-    assert "is not there any more" in driver.window.banner.text.text()
+    assert "no longer exists" in driver.window.banner.text.text()
     assert "passage.su2" in driver.window.banner.text.text()

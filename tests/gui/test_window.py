@@ -494,7 +494,7 @@ def test_what_is_missing_leads_to_its_panel_and_what_does_nothing_is_said(opened
     assert not said.isVisible()
     opened.window.store.change(changes.set_case, sliding="none", periodic="none")
     assert said.text().splitlines() == [
-        "Periodicity is “none”: periodic_1 and periodic_2 will not repeat.",
+        "Periodicity is “none”: periodic_1 and periodic_2 will not stay periodic.",
         "Sliding is “none”: inflow and outflow will not slide.",
     ]
     opened.window.store.change(changes.set_view, color_by="displacement")
