@@ -208,3 +208,14 @@ def see_through(actor: Any, opacity: float) -> None:
         shader.AddFragmentShaderReplacement(_DEPTH, True, _BEHIND, False)
     else:
         shader.ClearFragmentShaderReplacement(_DEPTH, True)
+
+
+def draw_in_front(mapper: Any) -> None:
+    """Give the lines and points of a mapper a depth offset that draws them before everything."""
+    mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, _IN_FRONT)
+    mapper.SetRelativeCoincidentTopologyPointOffsetParameter(_IN_FRONT)
+
+
+_IN_FRONT = -66_000.0
+"""Depth offset in 1/65536 of the depth range."""

@@ -13,8 +13,8 @@ from slideviz.errors import SlidevizError
 from slideviz.ffd.box import Box
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.surfaces import facet_connectivity, lifted
+from slideviz.scene.actors import draw_in_front
 from slideviz.scene.color_legend import set_letters
-from slideviz.scene.marked_cells import IN_FRONT
 from slideviz.scene.stage import KeyedLayer
 from slideviz.session.state import Session
 from slideviz.terms import ROLES
@@ -68,9 +68,7 @@ class BoxLayer(KeyedLayer):
             if mesh.dim == 3:
                 behind = self._add(shape, BEHIND if name == BASE else f"{MOVED}:behind", color)
                 behind.prop.opacity = FAINT if name == BASE else CLEAR
-                behind.mapper.SetResolveCoincidentTopologyToPolygonOffset()
-                behind.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, IN_FRONT)
-                behind.mapper.SetRelativeCoincidentTopologyPointOffsetParameter(IN_FRONT)
+                draw_in_front(behind.mapper)
         if boxes:
             self._label(boxes, mesh.dim, lift)
 

@@ -12,8 +12,8 @@ from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED
 from slideviz.plots.section_paint import Paint
 from slideviz.scene import pick
+from slideviz.scene.actors import draw_in_front
 from slideviz.scene.camera import Camera
-from slideviz.scene.marked_cells import IN_FRONT
 from slideviz.scene.passages import Period, matrices
 from slideviz.scene.sections import Instances, PolygonActor, plain_color
 from slideviz.scene.stage import Stage
@@ -152,8 +152,7 @@ class FlatScene:
     def _style_mark(self) -> None:
         prop, mapper = self._mark.actor.prop, self._mark.mapper
         prop.style, prop.color, prop.line_width = "wireframe", SELECTED_COLOR, 4.0
-        mapper.SetResolveCoincidentTopologyToPolygonOffset()
-        mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, IN_FRONT)
+        draw_in_front(mapper)
 
     def _draw_mark(self) -> None:
         """Draw the edges of the marked cell, if the section shows it."""

@@ -13,7 +13,7 @@ from slideviz.color_scheme import INTERSECTION_COLOR
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.surfaces import Surface, lifted
 from slideviz.scene import actors
-from slideviz.scene.stage import KeyedLayer, Layer, Stage
+from slideviz.scene.stage import KeyedLayer, Layer
 from slideviz.session.motions import support_case, support_key, support_of
 from slideviz.session.state import Session
 from slideviz.terms import ROLES
@@ -42,11 +42,10 @@ ARRIVED = 0.01
 class GhostLayer(Layer):
     """The ghosts: boundaries as they were undeformed, and as the motions will move them."""
 
-    def __init__(self, stage: Stage) -> None:
-        self.stage = stage
+    def clear(self) -> None:
+        """Forget the mesh; the scene removes its actors."""
         self.moved: dict[str, FloatArray] = {}
-        """dict of str to (u, d) float64: the points of the nodes of each boundary that will
-        move."""
+        """The points (u, d) of the nodes of each boundary that will move."""
         self._surfaces: dict[str, Surface] = {}
         self._actors: dict[str, Any] = {}
         # Kept here: a data set that only VTK holds may come back from a mapper without points.
@@ -57,11 +56,6 @@ class GhostLayer(Layer):
         """Draw another mesh."""
         self._session = session
         self._surfaces = {surface.name: surface for surface in surfaces}
-
-    def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
-        self.moved, self._surfaces, self._actors, self._shapes = {}, {}, {}, {}
-        self._session = Session()
 
     def set_moved(self, moved: Mapping[str, FloatArray]) -> None:
         """Set and draw the moved boundaries: for each name, points (u, d) of its nodes."""

@@ -32,15 +32,15 @@ class LegendLayer(KeyedLayer):
         # A mapper of its own: that of an actor may be removed before the bar.
         self._mapper = pv.DataSetMapper()
         self._mapper.lookup_table = stage.table
-        self._bar: tuple[str, float] | None = None
-        self._plate: Plate | None = None
         self._end = 0.0
         self._placed: tuple[float, ...] = ()
 
     def clear(self) -> None:
         """Remove the legend."""
         clear_legend(self.stage.plotter)
-        self._key, self._bar, self._plate = (), None, None
+        self._key = ()
+        self._bar: tuple[str, float] | None = None
+        self._plate: Plate | None = None
 
     def update(self, old: Session | None, new: Session) -> None:
         """Draw another state of the session; make the legend anew if its content has changed."""
@@ -114,9 +114,7 @@ COLORS = ("#c8452f", "#4c9a2a", "#3b7dd8")
 class TriadLayer(KeyedLayer):
     """The three axes in the lower left corner, which turn with the camera; two of a 2D mesh."""
 
-    def __init__(self, stage: Stage) -> None:
-        super().__init__(stage)
-        self._axes: Any = None
+    _axes: Any = None
 
     def clear(self) -> None:
         """Hide the arrows, which are no actors of the scene."""

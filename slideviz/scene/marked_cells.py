@@ -13,7 +13,7 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.surfaces import lifted
 from slideviz.scene import actors
-from slideviz.scene.actors import VALUES, part_shape
+from slideviz.scene.actors import VALUES, draw_in_front, part_shape
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
 from slideviz.session.inspect import middles, nodes_of
@@ -22,29 +22,18 @@ from slideviz.session.state import Session, StepFrame
 OUTLINE, FACES, DOT = "mark:outline", "mark:faces", "mark:dot"
 """Names of the actors."""
 
-IN_FRONT = -66_000.0
-"""Depth offset, in 1/65536 of the depth range, that draws lines and points before everything."""
-
 
 class MarkLayer(Layer):
     """The marked cell: its edges, its faces in the color of its value (3D), and a dot.
 
     The dot shows a cell that is smaller than a pixel. If the cell is inside a 3D mesh, the
     boundaries are made transparent (`slideviz.scene.mesh.BoundaryLayer`).
-
-    Attributes
-    ----------
-    cell : int or None
-        The index of the cell that is drawn.
     """
-
-    def __init__(self, stage: Stage) -> None:
-        self.stage = stage
-        self.clear()
 
     def clear(self) -> None:
         """Forget the mesh; the scene removes its actors."""
         self.cell: int | None = None
+        """The index of the cell that is drawn."""
         self._drawn: dict[str, Any] = {}
         # Kept here: a data set that only VTK holds may come back from a mapper without points.
         self._shapes: dict[str, Any] = {}
@@ -90,9 +79,7 @@ class MarkLayer(Layer):
             actor.prop.color = SELECTED_COLOR
             actor.prop.line_width, actor.prop.point_size = 4.0, 9.0
             actor.prop.render_points_as_spheres = name == DOT
-            actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
-            actor.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, IN_FRONT)
-            actor.mapper.SetRelativeCoincidentTopologyPointOffsetParameter(IN_FRONT)
+            draw_in_front(actor.mapper)
 
     def _place(self, mesh: Mesh, cell: int) -> None:
         """Move the actors to the cell's place in a deformed mesh."""
@@ -129,9 +116,8 @@ class InvertedLayer(Layer):
     """
 
     def __init__(self, stage: Stage, sections: SectionLayer) -> None:
-        self.stage = stage
+        super().__init__(stage)
         self.sections = sections
-        self.clear()
 
     def clear(self) -> None:
         """Forget the mesh; the scene removes its actors."""
@@ -181,8 +167,7 @@ class InvertedLayer(Layer):
         actor.prop.point_size = size * self.stage.pixel_scale
         actor.prop.render_points_as_spheres = True
         actor.GetShaderProperty().AddFragmentShaderReplacement(_DISC, False, _RING, False)
-        actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
-        actor.mapper.SetRelativeCoincidentTopologyPointOffsetParameter(IN_FRONT)
+        draw_in_front(actor.mapper)
 
 
 def _wanted(session: Session) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,13 +47,13 @@ def recolored(old: Session | None, new: Session) -> bool:
 class CellLayer(Layer):
     """The cells of a 2D mesh; of a 3D mesh without boundaries, the outside of its cells."""
 
-    def __init__(self, stage: Stage) -> None:
-        self.stage = stage
-        self.part: IntArray | None = None
-        """(k,): indices of the cells of a 3D mesh whose outside is drawn; None for all."""
+    part: IntArray | None = None
+    """(k,): indices of the cells of a 3D mesh whose outside is drawn; None for all."""
+
+    def clear(self) -> None:
+        """Forget the mesh; the scene removes its actors."""
         self.order: IntArray | None = None
-        """(m,): indices of the cells of a 2D mesh in the order of drawing; None for the mesh's
-        order."""
+        """(m,): indices of the cells of a 2D mesh in the order of drawing; None: the mesh's."""
         self.shape: Any = None
         self.actor: Any = None
         self._veil: tuple[Any, Any] | None = None
@@ -79,10 +80,6 @@ class CellLayer(Layer):
             veil = actors.part_shape(mesh, np.flatnonzero(mesh.halo.cells))
             self._veil = veil, self.stage.add(veil, "halo", lighting=False, pickable=False)
             self._veil[1].prop.opacity = VEIL
-
-    def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
-        self.shape = self.actor = self.order = self._veil = None
 
     def _stack(self, frame: StepFrame) -> None:
         """Draw the inverted cells of a 2D mesh last, so that overlapping cells do not hide them."""
@@ -137,8 +134,8 @@ class CellLayer(Layer):
 class BoundaryLayer(Layer):
     """The boundaries, an actor each, with a band around the selected ones."""
 
-    def __init__(self, stage: Stage) -> None:
-        self.stage = stage
+    def clear(self) -> None:
+        """Forget the mesh; the scene removes its actors."""
         self.drawn: dict[str, DrawnBoundary] = {}
         """The boundaries by name."""
         self.bands: dict[str, Band] = {}
@@ -157,10 +154,6 @@ class BoundaryLayer(Layer):
             self.drawn[surface.name] = self._add(surface, session.mesh.points)
         enclosing = enclosing_of(session.mesh, surfaces)
         self._closed, self._enclosed = enclosing.closed, enclosing.inner
-
-    def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
-        self.drawn, self.bands, self.glass = {}, {}, frozenset()
 
     def shapes(self) -> list[Any]:
         """Return the data sets of all boundaries."""
@@ -286,23 +279,18 @@ class ThresholdLayer(Layer):
     others : CellLayer
         Draws all cells; made faint while there is a threshold.
 
-    Attributes
-    ----------
-    cells : (k,) int64 or None
-        Indices of the cells within the threshold, in 2D the inverted ones last; None without one.
-    shape : pyvista.PolyData or None
-        The data set of these cells.
     """
 
     def __init__(self, stage: Stage, others: CellLayer) -> None:
-        self.stage = stage
+        super().__init__(stage)
         self.others = others
-        self.clear()
 
     def clear(self) -> None:
         """Forget the mesh; the scene removes its actors."""
         self.cells: IntArray | None = None
+        """(k,): the cells within the threshold, in 2D the inverted ones last; None without one."""
         self.shape: Any = None
+        """The data set of these cells."""
         self.actor: Any = None
         self._faded = False
 
@@ -380,23 +368,19 @@ class CoarseLayer(Layer):
     sections : SectionLayer
         Draws sections, whose edges are switched off meanwhile.
 
-    Attributes
-    ----------
-    on : bool
-        Whether they are drawn.
     """
 
+    surfaces: Mapping[str, Surface] = MappingProxyType({})
+    """The coarse boundaries by name, set before a mesh is opened; empty for small meshes."""
+
     def __init__(self, stage: Stage, boundaries: BoundaryLayer, sections: SectionLayer) -> None:
-        self.stage = stage
-        self._sections = sections
-        self.surfaces: Mapping[str, Surface] = {}
-        """The coarse boundaries by name, set before a mesh is opened; empty for small meshes."""
-        self._boundaries = boundaries
-        self.clear()
+        super().__init__(stage)
+        self._sections, self._boundaries = sections, boundaries
 
     def clear(self) -> None:
         """Forget the mesh; the scene removes its actors."""
         self.on = False
+        """Whether they are drawn."""
         self.drawn: dict[str, DrawnBoundary] = {}
         self._made_of: tuple[object, ...] = ()
         self._session = Session()

@@ -97,23 +97,22 @@ class PassageLayer(KeyedLayer):
     def __init__(
         self, stage: Stage, cells: CellLayer, boundaries: BoundaryLayer, threshold: ThresholdLayer
     ) -> None:
-        super().__init__(stage)
         self._cells, self._boundaries, self._threshold = cells, boundaries, threshold
-        self._period = Period()
         self._table = pv.LookupTable()
         self._table_key: tuple[object, ...] = ()
-        self._matrices: dict[int, FloatArray] = {}
-        self._mappers: dict[str, Any] = {}
-        self._props: dict[str, Any] = {}
         self._actors: dict[str, list[Any]] = {}
+        super().__init__(stage)
 
     def clear(self) -> None:
         """Forget the mesh, and remove the actors of all passages."""
         self._period = Period()
-        self._key, self._matrices = (), {}
+        self._key = ()
+        self._matrices: dict[int, FloatArray] = {}
         for copy in chain.from_iterable(self._actors.values()):
             self.stage.plotter.renderer.RemoveActor(copy)
-        self._mappers, self._props, self._actors = {}, {}, {}
+        self._mappers: dict[str, Any] = {}
+        self._props: dict[str, Any] = {}
+        self._actors = {}
 
     def shapes(self) -> list[Any]:
         """Return the outermost points of each passage, as a data set each."""

@@ -10,7 +10,7 @@ import pyvista as pv
 
 from slideviz.mesh.model import IntArray
 from slideviz.mesh.surfaces import Surface, lifted
-from slideviz.scene.stage import Layer, Stage
+from slideviz.scene.stage import Layer
 from slideviz.session.node_types import NOTHING, NodeTypes, TypedNodes
 from slideviz.session.state import Session
 from slideviz.terms import NODE_TYPES
@@ -28,25 +28,19 @@ _RGB = np.array([pv.Color(term.color).int_rgb for term in NODE_TYPES.values()], 
 class PointLayer(Layer):
     """The nodes that the view asks for, drawn as small balls."""
 
-    def __init__(self, stage: Stage) -> None:
-        self.stage = stage
+    def clear(self) -> None:
+        """Forget the mesh; the scene removes its actors."""
         self._types = NodeTypes()
         self._surfaces: tuple[Surface, ...] = ()
         self._drawn: TypedNodes = NOTHING
         self._key: tuple[object, ...] = ()
         self._shape: Any = None
         self._actor: Any = None
+        self.stage.point_words = ()
 
     def open(self, _session: Session, surfaces: Sequence[Surface]) -> None:
         """Draw another mesh."""
         self._surfaces = tuple(surfaces)
-
-    def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
-        self._types.clear()
-        self._surfaces, self._actor, self._shape = (), None, None
-        self._drawn, self._key = NOTHING, ()
-        self.stage.point_words = ()
 
     def update(self, old: Session | None, new: Session) -> None:
         """Draw another state of the session."""

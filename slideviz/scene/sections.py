@@ -58,25 +58,19 @@ class SectionDrawn:
 
 
 class SectionLayer(Layer):
-    """The cuts of the view's sections through the mesh and its neighbouring passages.
-
-    Attributes
-    ----------
-    drawn : dict of str to SectionDrawn
-        The sections by name of their actor: ``section:0`` is the first section through the mesh
-        itself, ``section:0:1`` that through its next passage.
-    """
+    """The cuts of the view's sections through the mesh and its neighbouring passages."""
 
     def __init__(self, stage: Stage) -> None:
-        self.stage = stage
         self.cuts = Cuts()
         """The cached cuts, shared with flat views."""
         self._lines = CutLines(stage)
-        self.clear()
+        super().__init__(stage)
 
     def clear(self) -> None:
         """Forget the mesh; the scene removes its actors."""
         self.drawn: dict[str, SectionDrawn] = {}
+        """The sections by name of their actor: ``section:0`` is the first section through the mesh
+        itself, ``section:0:1`` that through its next passage."""
         self._period = Period()
         self._instances: dict[str, Instances] = {}
         self._lines.clear()

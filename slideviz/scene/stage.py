@@ -26,6 +26,10 @@ class Layer:
     default.
     """
 
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self.clear()
+
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
         """Draw another mesh; the plotter is empty."""
 
@@ -33,7 +37,7 @@ class Layer:
         """Draw another state of the same mesh: change what differs from ``old`` (None: all)."""
 
     def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors afterwards."""
+        """Set the state without a mesh; the scene removes the actors of the last one afterwards."""
 
     def shapes(self) -> list[Any]:
         """Return the data sets that `Camera.fit` shows, unless they are inside other layers'."""
@@ -46,13 +50,9 @@ class KeyedLayer(Layer):
     names: tuple[str, ...] = ()
     """The names of its actors, removed before each drawing."""
 
-    def __init__(self, stage: Stage) -> None:
-        self.stage = stage
-        self._key: tuple[object, ...] = ()
-
     def clear(self) -> None:
         """Forget the mesh; the scene removes its actors."""
-        self._key = ()
+        self._key: tuple[object, ...] = ()
 
     def update(self, _old: Session | None, new: Session) -> None:
         """Draw another state of the session, if its key differs."""

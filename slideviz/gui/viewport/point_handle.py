@@ -23,8 +23,8 @@ from slideviz.color_scheme import SELECTED_COLOR, ColorScheme
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.scene.actors import draw_in_front
 from slideviz.scene.axis_handle import dragged_size, frame_of, patch_in, pixel_and_slope
-from slideviz.scene.marked_cells import IN_FRONT
 from slideviz.scene.pick import on_plane, to_display
 from slideviz.scene.scene import Scene
 from slideviz.sections.around_axis import Patch, PlaceOnSection, axis_shape
@@ -376,9 +376,7 @@ class AxisHandle(PointHandle[tuple[Section, PlaceOnSection]]):
                 render=False,
                 pickable=False,
             )
-            mapper = actor.mapper
-            mapper.SetResolveCoincidentTopologyToPolygonOffset()
-            mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, IN_FRONT)
+            draw_in_front(actor.mapper)
         actor.mapper.dataset = shape
         actor.prop.color = color
 
