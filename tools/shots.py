@@ -142,7 +142,7 @@ def roles(window: MainWindow, place: Path) -> None:
     store.change(changes.set_role, ["HUB", "SHROUD"], "internal")
     for motion in TURNED:
         store.change(changes.add_motion, motion)
-    store.change(changes.show, ["SHROUD", "PER1"], False)
+    store.change(changes.show_boundaries, ["SHROUD", "PER1"], False)
     store.change(changes.select, ("INFLOW",))
     _look(window, 30.0, -8.0)
     view = window.view
@@ -155,7 +155,7 @@ def quality(window: MainWindow, place: Path) -> None:
     """Show the stator after a run, with neighbouring passages."""
     _open(window, _stator(place))
     _run(window, **SLIDING)
-    window.store.change(changes.show, OUTER, False)
+    window.store.change(changes.show_boundaries, OUTER, False)
     window.store.change(changes.set_view, passages=1)
     _look(window, 30.0, 0.0)
 
@@ -168,7 +168,7 @@ def section(window: MainWindow, place: Path) -> None:
     window.dock_manager.panel(SectionsPanel).add["cylinder"].click()
     window.store.change(changes.set_view, passages=1)
     window.section_views.want_flat(True)
-    window.store.change(changes.show, OUTER, False)
+    window.store.change(changes.show_boundaries, OUTER, False)
     settle(window)
     window.section_views.setSizes([45, 55])
     _look(window, 25.0, -10.0)
@@ -180,7 +180,7 @@ def beside(window: MainWindow, place: Path) -> None:
     _run(window, sliding="none", periodic="none")
     _run(window, **SLIDING)
     window.store.change(changes.add_section, Section("cylinder", radius=NEAR_HUB))
-    window.store.change(changes.show, ("BLADE", "HUB", *OUTER), False)
+    window.store.change(changes.show_boundaries, ("BLADE", "HUB", *OUTER), False)
     window.store.change(changes.show_beside, 1)
     settle(window)
     window.viewing.look_from("+x")
@@ -214,7 +214,7 @@ def film_of_passage(path: Path) -> Path:
     """Write a film of the 2D passage, as in the dark picture, and return its path."""
     from slideviz.export.film import FilmOptions, film
     from slideviz.mesh.quality import quality as quality_of
-    from slideviz.session.opening import of_runs
+    from slideviz.session.opening import session_of_runs
     from slideviz.session.state import Run, StepFrame
     from slideviz.solver.deform import deform
 
@@ -222,7 +222,9 @@ def film_of_passage(path: Path) -> Path:
     case = made.case.change(motions=FAR)
     steps = deform(case, made.mesh)
     frames = tuple(StepFrame(step.mesh, quality_of(step.mesh, made.mesh), step) for step in steps)
-    session = of_runs(StepFrame(made.mesh, quality_of(made.mesh)), [Run(1, case, frames, "done")])
+    session = session_of_runs(
+        StepFrame(made.mesh, quality_of(made.mesh)), [Run(1, case, frames, "done")]
+    )
     for _ in film(session, path, FilmOptions((480, 300), 5.0, 1.5, 1), overwrite=True):
         pass
     return path

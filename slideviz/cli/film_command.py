@@ -92,7 +92,7 @@ def film(arguments: argparse.Namespace) -> int:
     from slideviz.export.encode import film_kind
     from slideviz.export.film import FilmOptions, check_film, require_pair_width
     from slideviz.export.film import film as draw
-    from slideviz.session.opening import of_runs
+    from slideviz.session.opening import session_of_runs
 
     file = arguments.output
     film_options = FilmOptions(arguments.size, arguments.fps, arguments.hold, arguments.between)
@@ -103,7 +103,7 @@ def film(arguments: argparse.Namespace) -> int:
     if film_kind(file) != ".png":  # of pictures it is not known yet how many there will be
         require_output_paths(arguments, OutputPath(file, "-o"))
     first, runs = _runs(arguments, case)
-    session = of_runs(first, runs, arguments.color)
+    session = session_of_runs(first, runs, arguments.color)
     drawing = draw(session, file, film_options, zoom=arguments.zoom, overwrite=arguments.force)
     with Bar(not arguments.quiet) as bar, closing(drawing):
         for drawn in drawing:

@@ -226,7 +226,7 @@ def film(
     Parameters
     ----------
     session : Session
-        Made of the runs (`slideviz.session.opening.of_runs`).
+        Made of the runs (`slideviz.session.opening.session_of_runs`).
     file : str or Path
         A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
     film_options : Reel

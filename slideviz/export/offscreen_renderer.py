@@ -31,7 +31,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.scene.overview import Overview, Zoom, lengths
 from slideviz.session.changes import show_frame
-from slideviz.session.opening import of_runs
+from slideviz.session.opening import session_of_runs
 from slideviz.session.panes import shown_views
 from slideviz.session.pieces import appearing, run_to_end
 from slideviz.session.state import Run, Session, StepFrame
@@ -323,7 +323,7 @@ def picture(
     Parameters
     ----------
     session : Session
-        Shows a run, or a mesh alone (`slideviz.session.opening.of_runs`).
+        Shows a run, or a mesh alone (`slideviz.session.opening.session_of_runs`).
     file : str or Path
         The PNG file.
     size : (int, int)
@@ -357,7 +357,7 @@ def pictures_alike(frames: Sequence[StepFrame], base: Mesh, side: int) -> list[P
         Width and height of each picture in pixels.
     """
     runs = [Run(k, Case(), (frame,), "done") for k, frame in enumerate(frames, start=1)]
-    session = of_runs(StepFrame(base, frames[0].quality), runs)
+    session = session_of_runs(StepFrame(base, frames[0].quality), runs)
     with OffscreenRenderer.of_runs(session) as renderer:
         options = PictureOptions((side, side), legend=False, edges=False, both=False, film=True)
         scene = renderer.aim(options)

@@ -63,7 +63,7 @@ class Actions:
 
     def _explain_colors(self, old: Session, new: Session) -> None:
         if lacks_displacement(new) and not lacks_displacement(old):
-            self.window.say(NO_DISPLACEMENT)
+            self.window.show_status(NO_DISPLACEMENT)
 
     def _explain_support(self, old: Session, new: Session) -> None:
         """Say the support radius when it is switched on, and when it changes while it is drawn."""
@@ -72,7 +72,7 @@ class Actions:
         before, now = support_case(old), support_case(new)
         changed = before is not now and support_key(before, new.mesh) != support_key(now, new.mesh)
         if changed or "support" not in old.view.drawn:
-            self.window.say(support_words(new))
+            self.window.show_status(support_words(new))
 
     def sync(self, now: CommandState) -> None:
         """Update the actions, menus and tool bar: titles, checked, enabled."""

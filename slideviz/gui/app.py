@@ -12,7 +12,7 @@ from qtpy.QtCore import QCoreApplication, QSettings, QStandardPaths, Qt, QTimer
 from qtpy.QtGui import QSurfaceFormat
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.responsiveness.threads import be_quick, prepare_drawing, ready_numerics
+from slideviz.gui.responsiveness.threads import import_numerics, prepare_drawing, tune_interpreter
 from slideviz.gui.responsiveness.timers import READ_MS, WARM_UP_MS
 from slideviz.gui.widgets.error_reporter import caught, crash_log
 from slideviz.gui.widgets.icons import logo
@@ -32,7 +32,7 @@ def launch(path: Path | None = None, run: bool = False) -> int:
     run : bool
         Whether to deform it at once.
     """
-    ready_numerics()
+    import_numerics()
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     QSurfaceFormat.setDefaultFormat(_graphics())
     app = QApplication.instance()
@@ -48,9 +48,9 @@ def launch(path: Path | None = None, run: bool = False) -> int:
     with crash_log(crashes):
         window = MainWindow(kept=kept / "sessions")
         with caught(window.error_reporter):
-            be_quick()
+            tune_interpreter()
             window.show()
-            window.recovery.look(crashes)
+            window.recovery.start(crashes)
             QTimer.singleShot(0, lambda: prepare_drawing(window.view, window.scene.stage))
             window.warmup.watch()
             QTimer.singleShot(WARM_UP_MS, window.warmup.start)

@@ -26,13 +26,13 @@ from slideviz.case.cfg import write_case
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.gui.panels.designs import DesignsPanel
-from slideviz.gui.responsiveness.timers import AUTOSAVE_MS, later
+from slideviz.gui.responsiveness.timers import AUTOSAVE_MS, single_shot
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.widgets.banner import Banner
 from slideviz.gui.widgets.error_reporter import old_crashes
 from slideviz.session import jobs
 from slideviz.session.design_table import DesignTable, read_results, write_results
-from slideviz.session.saving import Camera, restored, view_to_case
+from slideviz.session.saving import Camera, as_recovered, view_to_case
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.system.cleanup import private_file, private_folder
@@ -59,12 +59,12 @@ class SessionRecovery(QObject):
         self.window = window
         self.banner = banner
         self.autosave = autosave
-        self.waiting: list[LeftSession] = []
+        self.waiting: list[OrphanedSession] = []
         # Their locks are held while this window is open: they are offered at the next start.
-        self._later: list[LeftSession] = []
+        self._later: list[OrphanedSession] = []
         self._trace = ""
 
-    def look(self, crashes: Path | None = None) -> None:
+    def start(self, crashes: Path | None = None) -> None:
         """Find the sessions to restore, and traces of crashes in a folder; offer the first one."""
         self.waiting, problems = find_sessions(self.autosave.path.parent)
         for path in old_crashes(crashes) if crashes is not None else ():
@@ -88,7 +88,7 @@ class SessionRecovery(QObject):
             f"with {path.name} in {path.parent}?" + (f" ({more} more)" if more else "")
         )
         answers = {"Restore": partial(self.answer, True), "Discard": partial(self.answer, False)}
-        self.banner.ask(text, answers, self._trace, later=self._put_off)
+        self.banner.ask(text, answers, self._trace, later=self._postpone)
 
     def answer(self, restore: bool) -> None:
         """Start restoring the offered session, or remove its file; then offer the next."""
@@ -104,18 +104,18 @@ class SessionRecovery(QObject):
             )
         self._offer()
 
-    def _put_off(self) -> None:
+    def _postpone(self) -> None:
         self._later += self.waiting
         self.waiting = []
 
-    def _opened(self, found: LeftSession, opened: jobs.Opened) -> None:
-        session = restored(opened.session, found.source)
+    def _opened(self, found: OrphanedSession, opened: jobs.Opened) -> None:
+        session = as_recovered(opened.session, found.source)
         self.window.show_opened(replace(opened, session=session))
         self._restore_designs(found)
         self.autosave.replace(found)
-        self.window.say("Session restored. Runs are not saved; Run computes them again")
+        self.window.show_status("Session restored. Runs are not saved; Run computes them again")
 
-    def _restore_designs(self, found: LeftSession) -> None:
+    def _restore_designs(self, found: OrphanedSession) -> None:
         """Show the restored table of designs, or the error of its file.
 
         Its results count as those of the session's case only if the file says so.
@@ -177,13 +177,13 @@ class Autosave(QObject):
         self.path = folder / f"session-{os.getpid()}-{next(_numbers)}.cfg"
         self._camera, self._designs = camera, designs
         self._lock: QLockFile | None = None
-        self._written: tuple[object, ...] = ()
-        self._asked: tuple[object, ...] = ()
-        self._replaces: list[LeftSession] = []
+        self._written_key: tuple[object, ...] = ()
+        self._pending_key: tuple[object, ...] = ()
+        self._replaces: list[OrphanedSession] = []
         self._runner = JobRunner(self)
         self._runner.finished.connect(self._done)
         self._runner.failed.connect(self._failed)
-        self._timer = later(self, self.save, AUTOSAVE_MS)
+        self._timer = single_shot(self, self.save, AUTOSAVE_MS)
         store.listen(self._changed)
 
     def save(self) -> None:
@@ -191,17 +191,17 @@ class Autosave(QObject):
         session = self.store.session
         if self._runner.busy:
             self._timer.start()
-        elif session.mesh is not None and self._key(session) != self._written:
-            self._asked = self._key(session)
+        elif session.mesh is not None and self._key(session) != self._written_key:
+            self._pending_key = self._key(session)
             case = view_to_case(session, self._camera())
             table, of = self._designs()
             up_to_date = bool(table.left(of, session.case).results)
             self._runner.start(self._write, case, table, up_to_date)
 
-    def replace(self, found: LeftSession) -> None:
+    def replace(self, found: OrphanedSession) -> None:
         """Save this session, restored from an earlier one, then remove the earlier one's file."""
         self._replaces.append(found)
-        self._written = ()
+        self._written_key = ()
         self.save()
 
     def close(self) -> None:
@@ -213,13 +213,17 @@ class Autosave(QObject):
         if self._lock is not None:
             self._lock.unlock()
 
-    def look(self) -> None:
+    def schedule(self) -> None:
         """Schedule `save` after `AUTOSAVE_MS`, if the session differs from what was written."""
         self._changed(self.store.session, self.store.session)
 
     def _changed(self, _old: Session, new: Session) -> None:
         # The timer is not restarted by each change: also saved during constant changes.
-        if new.mesh is not None and self._key(new) != self._written and not self._timer.isActive():
+        if (
+            new.mesh is not None
+            and self._key(new) != self._written_key
+            and not self._timer.isActive()
+        ):
             self._timer.start()
 
     def _key(self, session: Session) -> tuple[object, ...]:
@@ -233,7 +237,7 @@ class Autosave(QObject):
             self._lock = _lock(self.path)
             if self._lock.tryLock(0):
                 private_file(Path(self._lock.fileName()))
-        remarks = [] if case.source is None else [f"{SOURCE}{_written(case.source)}"]
+        remarks = [] if case.source is None else [f"{SOURCE}{_path_text(case.source)}"]
         if table.rows:
             write_results(_designs_file(self.path), table)
             private_file(_designs_file(self.path))
@@ -244,11 +248,11 @@ class Autosave(QObject):
         private_file(self.path)
 
     def _done(self, _: object) -> None:
-        self._written = self._asked
+        self._written_key = self._pending_key
         for found in self._replaces:
             found.remove()
         self._replaces.clear()
-        self.look()
+        self.schedule()
 
     def _failed(self, error: Exception) -> None:
         # Tried again at the next change.
@@ -256,7 +260,7 @@ class Autosave(QObject):
 
 
 @dataclass(frozen=True, eq=False)
-class LeftSession:
+class OrphanedSession:
     """A session found in the file of a program that did not end properly."""
 
     path: Path
@@ -293,7 +297,7 @@ class LeftSession:
         self.lock.unlock()
 
 
-def find_sessions(folder: Path) -> tuple[list[LeftSession], list[str]]:
+def find_sessions(folder: Path) -> tuple[list[OrphanedSession], list[str]]:
     """Return the sessions whose lock is free, newest first, and a sentence per unreadable file.
 
     The lock of each session returned is held. Unreadable and half-written files are renamed to
@@ -308,16 +312,18 @@ def find_sessions(folder: Path) -> tuple[list[LeftSession], list[str]]:
             case = Case.read(path)
             if case.mesh_file is None:
                 raise SlidevizError(f"{path.name}: it names no mesh")
-            found.append(LeftSession(path, case, _source(path), lock))
+            found.append(OrphanedSession(path, case, _source(path), lock))
         except (SlidevizError, OSError, ValueError) as problem:
-            problems.append(_put_aside(path, str(problem).splitlines()[0]))
+            problems.append(_rename_broken(path, str(problem).splitlines()[0]))
             lock.unlock()
-    left = [path for path in folder.glob(".slideviz-*.tmp") if _is_left(path)]
-    problems += [_put_aside(path, "it was being written when the program ended") for path in left]
+    left = [path for path in folder.glob(".slideviz-*.tmp") if _is_stale(path)]
+    problems += [
+        _rename_broken(path, "it was being written when the program ended") for path in left
+    ]
     return found, problems
 
 
-def _is_left(path: Path) -> bool:
+def _is_stale(path: Path) -> bool:
     return time.time() - _modified(path) > HALF_WRITTEN_S
 
 
@@ -356,12 +362,12 @@ def _source(path: Path) -> Path | None:
     return None
 
 
-def _written(path: Path) -> str:
+def _path_text(path: Path) -> str:
     """Return a path as text in UTF-8: as it is, or else as a URI."""
     return str(path) if str(path).isprintable() else path.absolute().as_uri()
 
 
-def _put_aside(path: Path, why: str) -> str:
+def _rename_broken(path: Path, why: str) -> str:
     """Rename an unusable file to ``….broken``; return a sentence about it for the user."""
     kept = path.with_name(f"{path.name.lstrip('.')}.broken")
     number = count(2)

@@ -10,7 +10,7 @@ from functools import partial
 
 from qtpy.QtCore import QObject, Signal
 
-from slideviz.gui.responsiveness.timers import INTERSECTION_MS, later
+from slideviz.gui.responsiveness.timers import INTERSECTION_MS, single_shot
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.mesh.model import Mesh
 from slideviz.sections.model import Section
@@ -34,7 +34,7 @@ class BackgroundJob(QObject):
         super().__init__(parent)
         self.store = store
         self._runner = JobRunner(self)
-        self._timer = later(self, self._start, wait_ms)
+        self._timer = single_shot(self, self._start, wait_ms)
 
     @property
     def busy(self) -> bool:
@@ -110,7 +110,7 @@ class SectionReader(BackgroundJob):
         self._runner.finished.connect(self._read)
         self._runner.cancelled.connect(self._timer.start)
         self._runner.failed.connect(self._failed)
-        self._runner.doing.connect(lambda doing: self.progressed.emit(doing.text))
+        self._runner.progressed.connect(lambda doing: self.progressed.emit(doing.text))
         self._running: tuple[Mesh, Section] | None = None
         self._unreadable: set[tuple[Mesh, Section]] = set()
         store.listen(lambda _old, new: self._timer.start() if new.in_file else None)

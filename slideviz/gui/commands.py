@@ -46,13 +46,13 @@ KEY = QKeySequence.StandardKey
 # What they do ------------------------------------------------------------------------------
 
 
-def _again(window: MainWindow, step: Callable[[], bool], words: str, done: str) -> None:
+def _undo_or_redo(window: MainWindow, step: Callable[[], bool], words: str, done: str) -> None:
     """Call ``step`` (undo or redo), and show in the status bar which change that was."""
     if step():
-        window.say(f"{done}: {words}")
+        window.show_status(f"{done}: {words}")
 
 
-def _switch(name: Shown, window: MainWindow) -> None:
+def _toggle_shown(name: Shown, window: MainWindow) -> None:
     drawn = window.store.session.view.drawn
     window.store.change(changes.set_view, **{name: name not in drawn})
 
@@ -138,12 +138,12 @@ _FILE = Menu("file", "&File", entries=(
 
 _EDIT = Menu("edit", "&Edit", entries=(
     Command("undo", "Undo", "Undo the last change.",
-            lambda w: _again(w, w.store.undo, w.store.can_undo, "Undone"),
+            lambda w: _undo_or_redo(w, w.store.undo, w.store.can_undo, "Undone"),
             (KEY.Undo,), "undo", lambda now: bool(now.undo),
             title_now=lambda now: f"Undo {now.undo}".rstrip(),
             tip_now=lambda now: now.undo and f"Undo {now.undo}"),
     Command("redo", "Redo", "Redo the change that was undone.",
-            lambda w: _again(w, w.store.redo, w.store.can_redo, "Done again"),
+            lambda w: _undo_or_redo(w, w.store.redo, w.store.can_redo, "Done again"),
             (KEY.Redo, "Ctrl+Y"), "redo", lambda now: bool(now.redo),
             title_now=lambda now: f"Redo {now.redo}".rstrip(),
             tip_now=lambda now: now.redo and f"Redo {now.redo}"),
@@ -186,7 +186,7 @@ _COLORS = Menu("colors", "&Colors", "The range of values that the colors show.",
 ))
 
 
-def _side(side: str, keys: str, short: str = "") -> Command:
+def _side_command(side: str, keys: str, short: str = "") -> Command:
     place = "a corner" if side == "iso" else side
     return Command(f"side{side}", "isometric" if side == "iso" else side,
                    f"Look at the mesh from {place}.", lambda window: window.viewing.look_from(side),
@@ -194,10 +194,10 @@ def _side(side: str, keys: str, short: str = "") -> Command:
 
 
 _SIDES = Menu("look_from", "Look &from", "Look at the mesh from a side.", (
-    _side("+x", "1", "X"), _side("-x", "Shift+1"),
-    _side("+y", "2", "Y"), _side("-y", "Shift+2"),
-    _side("+z", "3", "Z"), _side("-z", "Shift+3"),
-    _side("iso", "0", "Iso"),
+    _side_command("+x", "1", "X"), _side_command("-x", "Shift+1"),
+    _side_command("+y", "2", "Y"), _side_command("-y", "Shift+2"),
+    _side_command("+z", "3", "Z"), _side_command("-z", "Shift+3"),
+    _side_command("iso", "0", "Iso"),
 ))
 
 # Without steps the commands are disabled, and Space presses the focused button.
@@ -220,27 +220,27 @@ STEPS = Menu("steps", "&Steps", "Show another step of the deformation.", (
 ))
 
 
-def _theme(theme: str, tip: str) -> Command:
+def _theme_command(theme: str, tip: str) -> Command:
     return Command(f"theme_{theme}", f"&{theme.capitalize()}", tip,
                    lambda window: window.set_theme(theme), checked=lambda now: now.theme == theme)
 
 
 _THEMES = Menu("theme", "&Theme", "Light or dark colors.", (
-    _theme("system", "Use light or dark colors as the desktop does."),
-    _theme("light", "Use light colors."),
-    _theme("dark", "Use dark colors."),
+    _theme_command("system", "Use light or dark colors as the desktop does."),
+    _theme_command("light", "Use light colors."),
+    _theme_command("dark", "Use dark colors."),
 ), one_of=True)
 
 
-def _toggle(name: Shown, term: ShownTerm) -> Command:
+def _shown_command(name: Shown, term: ShownTerm) -> Command:
     able = {"": has_mesh, "boxes": has_boxes, "3d": is_3d}[term.needs]
     image = name if name in STROKES else ""
-    return Command(name, term.name, term.tip, partial(_switch, name), (term.shortcut,),
+    return Command(name, term.name, term.tip, partial(_toggle_shown, name), (term.shortcut,),
                    image, able, checked=lambda now: name in now.session.view.drawn,
                    tip_now=lambda now: term.why_not if has_mesh(now) and not able(now) else "")
 
 
-def _section(kind: str, row: ShapeTerms) -> Command:
+def _section_command(kind: str, row: ShapeTerms) -> Command:
     def title(now: CommandState) -> str:
         words = row.words.get(2 if is_2d(now) else 3)
         return "" if words is None else words.action
@@ -255,7 +255,7 @@ COMPARE = Menu("compare", "Co&mpare with",
                fill=lambda window, menu: fill_compare(menu, window.store))
 
 _VIEW = Menu("view", "&View", entries=(
-    *(_toggle(name, term) for name, term in SHOWN.items()),
+    *(_shown_command(name, term) for name, term in SHOWN.items()),
     None,
     _COLORS,
     Command("fit", "&Fit all", "Make the whole mesh fill the view.",
@@ -268,9 +268,9 @@ _VIEW = Menu("view", "&View", entries=(
     _SIDES,
     COMPARE,
     Command("show_all", "Show &all boundaries", "Show the boundaries that were hidden.",
-            lambda w: w.store.change(changes.show, w.store.session.mesh.marker_names),
+            lambda w: w.store.change(changes.show_boundaries, w.store.session.mesh.marker_names),
             ("Shift+A",), enabled=has_mesh),
-    *(_section(kind, row) for kind, row in SECTION_SHAPES.items()),
+    *(_section_command(kind, row) for kind, row in SECTION_SHAPES.items()),
     None,
     STEPS,
     None,

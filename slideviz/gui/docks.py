@@ -32,7 +32,7 @@ from slideviz.gui.panels.run import RunPanel
 from slideviz.gui.panels.runs import RunsPanel
 from slideviz.gui.panels.sections import sections_panel
 from slideviz.gui.panels.worst import WorstPanel
-from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.widgets.build import PanelScroll
 from slideviz.gui.widgets.services import Services
 
@@ -66,7 +66,7 @@ class DockTabs(QObject):
         for dock in self._docks.values():
             for change in (dock.dockLocationChanged, dock.topLevelChanged, dock.visibilityChanged):
                 change.connect(self._soon)
-        self._timer = later(self, self.watch)
+        self._timer = single_shot(self, self.watch)
         self.watch()
 
     def _soon(self, _: object = None) -> None:
@@ -137,18 +137,18 @@ Side = Qt.DockWidgetArea
 LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
 BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
 LEFT_WIDTH, RIGHT_WIDTH = 356, 316
-"""Least initial width in pixels of the docks on each side, in a window at least `ROOMY` wide."""
+"""Least initial width in pixels of the docks on each side of a window of `FULL_WIDTH`."""
 
 NARROWEST = {LEFT: 236, RIGHT: 224}
 """Least width in pixels of the docks on each side."""
 
-ROOMY = 1280
+FULL_WIDTH = 1280
 """Width of a window in pixels below which the initial widths shrink in proportion."""
 
-LOW = 600
+LOW_HEIGHT = 600
 """Height of the window in pixels below which the boundaries are a tab beside motion and method."""
 
-FRAME = 40
+TITLE_BAR_HEIGHT = 40
 """Height in pixels of a screen that is left for the window's title bar."""
 
 HEIGHTS = {
@@ -160,40 +160,47 @@ HEIGHTS = {
 FIRST = {LEFT: "boundaries", RIGHT: "histogram"}
 """The dock whose width is set for each side before the window is shown."""
 
-SIDE = 0.22
+SIDE_FRACTION = 0.22
 """Initial width of each side's docks, relative to the window's."""
 
 
-def room_for(window: QWidget) -> QRect:
+def available_area(window: QWidget) -> QRect:
     """Return the part of the screen that a window may fill so that its title bar is visible too."""
     room = window.screen().availableGeometry()
     # A maximized window has its title bar within this.
-    return room if window.isMaximized() or window.isFullScreen() else room.adjusted(0, 0, 0, -FRAME)
+    return (
+        room
+        if window.isMaximized() or window.isFullScreen()
+        else room.adjusted(0, 0, 0, -TITLE_BAR_HEIGHT)
+    )
 
 
 @dataclass(frozen=True)
 class DockRow:
     """A row of the table of docks: name, title, area, and the function that makes its panel.
 
-    ``after`` names the dock that it is tabbed with, ``after_low`` that in a low window. ``named``:
-    it has no title bar, as its content says what it is. ``shown``: it is visible at first.
+    ``tabbed_with`` names the dock that it is tabbed with, ``tabbed_with_if_low`` that in a low
+    window. ``untitled``: it has no title bar, as its content says what it is. ``shown``: it is
+    visible at first.
     """
 
     name: str
     title: str
     area: Qt.DockWidgetArea
     make: Callable[[Services], QWidget]
-    after: str = ""
-    after_low: str = ""
-    named: bool = False
+    tabbed_with: str = ""
+    tabbed_with_if_low: str = ""
+    untitled: bool = False
     shown: bool = True
 
 
 DOCKS: tuple[DockRow, ...] = (
     DockRow("boundaries", "Boundaries", LEFT, lambda w: BoundariesPanel(w.store)),
-    DockRow("motion", "Motion", LEFT, lambda w: MotionPanel(w.store), after_low="boundaries"),
+    DockRow(
+        "motion", "Motion", LEFT, lambda w: MotionPanel(w.store), tabbed_with_if_low="boundaries"
+    ),
     DockRow("method", "Method", LEFT, lambda w: MethodPanel(w.store), "motion"),
-    DockRow("run", "Run", LEFT, lambda w: RunPanel(w.store), named=True),
+    DockRow("run", "Run", LEFT, lambda w: RunPanel(w.store), untitled=True),
     DockRow("histogram", "Histogram", RIGHT, lambda w: HistogramPanel(w.store)),
     DockRow(
         "worst",
@@ -234,20 +241,20 @@ class Docks(QObject):
         self.panels: dict[str, QWidget] = {}
         for row in DOCKS:
             self._make(row)
-        bare = {self.by_name[row.name] for row in DOCKS if row.named}
+        bare = {self.by_name[row.name] for row in DOCKS if row.untitled}
         self.tabs = DockTabs(window, self.by_name.values(), bare)
 
     def _make(self, row: DockRow) -> None:
         dock = QDockWidget(row.title, self.window)
         dock.setObjectName(row.title.lower())
         panel = row.make(self.window)
-        fixed = row.named or panel.findChild(PanelScroll) is not None
+        fixed = row.untitled or panel.findChild(PanelScroll) is not None
         dock.setWidget(panel if fixed else PanelScroll(panel))
         # A window made small and large again must not leave names and fields cut off.
         if row.area != BOTTOM:
             dock.setMinimumWidth(NARROWEST[row.area])
         # Keys must not go to a field in a dock that is hidden behind another tab.
-        dock.visibilityChanged.connect(lambda shown: None if shown else _leave(dock))
+        dock.visibilityChanged.connect(lambda shown: None if shown else _clear_focus(dock))
         self.by_name[row.name] = dock
         self.panels[row.name] = panel
 
@@ -285,7 +292,7 @@ class Docks(QObject):
 
     def _fit_screen(self) -> None:
         """Shrink and move the window so that all of it is on the screen."""
-        window, room = self.window, room_for(self.window)
+        window, room = self.window, available_area(self.window)
         window.resize(window.size().boundedTo(room.size()))
         corner = window.pos()
         x = min(max(corner.x(), room.left()), room.right() + 1 - window.width())
@@ -296,11 +303,11 @@ class Docks(QObject):
     def restore_layout(self) -> None:
         """Put every dock back to its initial place and size."""
         self._arrange()
-        self._share_room()
+        self._distribute_space()
 
-    def _after(self, row: DockRow) -> str:
+    def _tab_neighbour(self, row: DockRow) -> str:
         """Return the name of the dock that a dock is tabbed with at the window's height."""
-        return (self._low and row.after_low) or row.after
+        return (self._low and row.tabbed_with_if_low) or row.tabbed_with
 
     def _arrange(self, side: Side | None = None) -> None:
         """Put the docks of a side to their places, as they are shown; or all, as at first."""
@@ -308,27 +315,29 @@ class Docks(QObject):
         docks = {row: self.by_name[row.name] for row in rows}
         shown = {row: row.shown if side is None else not docks[row].isHidden() for row in rows}
         front = [dock for dock in docks.values() if side is not None and _is_in_front(dock)]
-        self._low = window.height() < LOW
+        self._low = window.height() < LOW_HEIGHT
         for dock in docks.values():
             dock.setFloating(False)
             # Without this, Qt leaves orphaned tab bars over the panels.
             window.removeDockWidget(dock)
         for row in rows:
-            if self._after(row):
-                window.tabifyDockWidget(self.by_name[self._after(row)], docks[row])
+            if self._tab_neighbour(row):
+                window.tabifyDockWidget(self.by_name[self._tab_neighbour(row)], docks[row])
             else:
                 window.addDockWidget(row.area, docks[row])
             docks[row].setVisible(shown[row])
         for row in rows:
-            if not self._after(row) and any(self._after(other) == row.name for other in rows):
+            if not self._tab_neighbour(row) and any(
+                self._tab_neighbour(other) == row.name for other in rows
+            ):
                 docks[row].raise_()
         for dock in front:
             dock.raise_()
 
-    def _share_room(self, side: Side | None = None) -> None:
-        self._share_width()
+    def _distribute_space(self, side: Side | None = None) -> None:
+        self._distribute_width()
         for area, heights in HEIGHTS.items():
-            rows = [row for row in DOCKS if row.name in heights and not self._after(row)]
+            rows = [row for row in DOCKS if row.name in heights and not self._tab_neighbour(row)]
             docks = [self.by_name[row.name] for row in rows if side in (None, area)]
             # The room of the boundaries is that of the motions, too, where these are tabs.
             wanted = [heights[row.name] for row in rows]
@@ -337,35 +346,35 @@ class Docks(QObject):
 
     def _follow_height(self) -> None:
         """Make the boundaries a tab in a low window, unless the user has moved these panels."""
-        low, rows = self.window.height() < LOW, [row for row in DOCKS if row.area == LEFT]
-        if low != self._low and all(self._is_usual(row, rows) for row in rows):
+        low, rows = self.window.height() < LOW_HEIGHT, [row for row in DOCKS if row.area == LEFT]
+        if low != self._low and all(self._has_initial_place(row, rows) for row in rows):
             self._arrange(LEFT)
-            self._share_room(LEFT)
+            self._distribute_space(LEFT)
 
-    def _is_usual(self, row: DockRow, rows: Sequence[DockRow]) -> bool:
+    def _has_initial_place(self, row: DockRow, rows: Sequence[DockRow]) -> bool:
         """Return whether a dock has its initial place, among those of its side."""
         window, dock = self.window, self.by_name[row.name]
-        first = {one.name: self._after(one) or one.name for one in rows}
+        first = {one.name: self._tab_neighbour(one) or one.name for one in rows}
         tab = {name: first[after] for name, after in first.items()}
         beside = {self.by_name[name] for name in tab if tab[name] == tab[row.name]}
         here = window.dockWidgetArea(dock) == row.area and not dock.isFloating()
         return here and {dock, *window.tabifiedDockWidgets(dock)} == beside
 
-    def _shares(self) -> dict[Side, int]:
+    def _usual_widths(self) -> dict[Side, int]:
         """Return the width in pixels that each side has unless the user has changed it."""
         width = self.window.width()
-        part, wide = round(SIDE * width), min(1.0, width / ROOMY)
+        part, wide = round(SIDE_FRACTION * width), min(1.0, width / FULL_WIDTH)
         usual = {LEFT: round(wide * LEFT_WIDTH), RIGHT: round(wide * RIGHT_WIDTH)}
         return {side: max(part, usual[side], least) for side, least in NARROWEST.items()}
 
-    def _share_width(self) -> None:
+    def _distribute_width(self) -> None:
         """Set the width of both sides to their part of the window's width."""
-        self._widths = self._shares()
+        self._widths = self._usual_widths()
         # Before the window is shown, no dock is in front.
-        docks = [self._seen(side) or self.by_name[FIRST[side]] for side in self._widths]
+        docks = [self._front_dock(side) or self.by_name[FIRST[side]] for side in self._widths]
         self.window.resizeDocks(docks, list(self._widths.values()), Qt.Orientation.Horizontal)
 
-    def _seen(self, side: Side) -> QDockWidget | None:
+    def _front_dock(self, side: Side) -> QDockWidget | None:
         """Return a dock of a side that is in front, or None; one behind a tab has an old width."""
         for dock in self.by_name.values():
             here = self.window.dockWidgetArea(dock) == side and not dock.isFloating()
@@ -375,20 +384,20 @@ class Docks(QObject):
 
     def follow(self) -> None:
         """Let the sides follow the window's width from now on, if they have their usual width."""
-        shares = self._shares()
-        self._widths = shares if self._as_wide_as(shares) else {}
+        shares = self._usual_widths()
+        self._widths = shares if self._has_widths(shares) else {}
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         """Set the sides' widths when the window is resized, unless the user has changed them."""
         resized = event.type() == QEvent.Type.Resize
-        if resized and self._widths and self._as_wide_as(self._widths):
-            QTimer.singleShot(0, self, self._share_width)
+        if resized and self._widths and self._has_widths(self._widths):
+            QTimer.singleShot(0, self, self._distribute_width)
         if resized:
             QTimer.singleShot(0, self, self._follow_height)
         return False
 
-    def _as_wide_as(self, widths: Mapping[Side, int]) -> bool:
-        seen = {side: self._seen(side) for side in widths}
+    def _has_widths(self, widths: Mapping[Side, int]) -> bool:
+        seen = {side: self._front_dock(side) for side in widths}
         return all(dock is None or abs(dock.width() - widths[s]) < 4 for s, dock in seen.items())
 
     def is_behind(self, widget: QWidget | None) -> bool:
@@ -444,7 +453,7 @@ def _is_in_front(dock: QDockWidget) -> bool:
     return dock.isVisible() and not dock.visibleRegion().isEmpty()
 
 
-def _leave(dock: QDockWidget) -> None:
+def _clear_focus(dock: QDockWidget) -> None:
     """Take the keyboard focus away from a field in a dock."""
     field = QApplication.focusWidget()
     if field is not None and dock.isAncestorOf(field):

@@ -174,7 +174,7 @@ class Files(QObject):
         if not all(save() for name, save in savers.items() if name in wanted):
             return False
         if "mesh" in wanted:
-            self.save_mesh(last=True, then=lambda: self._go_on(again))
+            self.save_mesh(last=True, then=lambda: self._confirmed(again))
             return False
         return answer != "cancel"
 
@@ -183,7 +183,7 @@ class Files(QObject):
         designs = window.dock_manager.panel(DesignsPanel).unsaved
         return Unsaved.of(window.store.session, window.runner.busy, designs)
 
-    def _go_on(self, again: Callable[[], object]) -> None:
+    def _confirmed(self, again: Callable[[], object]) -> None:
         """Call ``again`` with `ask_about_unsaved` returning True."""
         self._answered = True
         try:
@@ -252,7 +252,7 @@ class Files(QObject):
         if last:
             self._saved_to = path
             self.window.store.change(changes.saved_mesh)
-        self.window.say(f"Saved {path}")
+        self.window.show_status(f"Saved {path}")
         mesh = self.window.store.session.mesh
         said = [left_out(path, mesh)] if mesh is not None else []
         said += [f"{each[0].upper()}{each[1:]}." for each in torn]
@@ -273,7 +273,7 @@ class Files(QObject):
         path = questions.ask_save(self.window, "Save case", default, questions.CASE_FILTERS)
         if path is None:
             return False
-        if not self._take_along(path):
+        if not self._copy_sample_files(path):
             return False
         session = self.window.store.session
         case = session.case
@@ -286,7 +286,7 @@ class Files(QObject):
             return False
         self.window.store.change(changes.saved_case, replace(case, source=path))
         self.remember(path)
-        self.window.say(f"Saved {path}")
+        self.window.show_status(f"Saved {path}")
         if case.mesh_file is not None and not case.mesh_file.is_file():
             self.window.banner.show_message(
                 f"Saved. But its mesh {case.mesh_file} no longer exists: the case cannot be "
@@ -294,7 +294,7 @@ class Files(QObject):
             )
         return True
 
-    def _take_along(self, path: Path) -> bool:
+    def _copy_sample_files(self, path: Path) -> bool:
         """Copy the files of a sample, which are in a cache, beside the case that is being saved.
 
         Return False if the user declines to replace a file, or a copy fails.

@@ -17,12 +17,12 @@ from slideviz.gui.widgets.banner import NO_ANSWERS, Banner
 from slideviz.session import changes, jobs
 from slideviz.session.jobs import JobProgress, compute_in_file
 from slideviz.session.run_messages import (
-    help_for,
-    in_window_words,
     inverted_words,
     notes_of,
+    remedy_for,
     run_requirements,
     warnings_of,
+    with_field_labels,
 )
 from slideviz.session.runs_words import method_words
 from slideviz.session.state import Run, Session, StepFrame
@@ -41,17 +41,17 @@ class Running(QObject):
         A job has started, with its name; reports progress; has ended, in whatever way.
     cancelling()
         The running job was asked to stop.
-    said(str)
+    status_changed(str)
         A message for the status bar.
     worst_wanted()
         The user wants to see the worst cell.
     """
 
     began = Signal(str)
-    doing = Signal(object)
+    progressed = Signal(object)
     ended = Signal()
     cancelling = Signal()
-    said = Signal(str)
+    status_changed = Signal(str)
     worst_wanted = Signal()
 
     def __init__(self, store: Store, banner: Banner, parent: QObject | None = None) -> None:
@@ -66,15 +66,15 @@ class Running(QObject):
         self._about: int | None = None
         banner.shown.connect(self._forget_run)
         store.listen(self._hide_other)
-        self.runner.doing.connect(self.doing)
-        self.runner.doing.connect(self._tell)
+        self.runner.progressed.connect(self.progressed)
+        self.runner.progressed.connect(self._tell)
         self.runner.kept.connect(lambda frames: store.change(changes.add_frames, frames))
         self.runner.finished.connect(self._finished)
         self.runner.cancelled.connect(self._cancelled)
         self.runner.failed.connect(self._failed)
 
     def _tell(self, doing: JobProgress) -> None:
-        self.said.emit(doing.text)
+        self.status_changed.emit(doing.text)
 
     def start_job(
         self,
@@ -94,7 +94,7 @@ class Running(QObject):
         self._finish = finish
         self.runner.start(function, *values)
         self.began.emit(text)
-        self.said.emit(text)
+        self.status_changed.emit(text)
 
     def start_run(self, output: Path | None = None) -> None:
         """Start a run of the session's case, if nothing is missing for it.
@@ -169,7 +169,7 @@ class Running(QObject):
     def _cancelled(self) -> None:
         steps = len(self.store.session.frames) - 1
         kept = f"; {steps} step{'s' if steps != 1 else ''} kept" if steps > 0 else ""
-        self.said.emit(f"Cancelled{kept}")
+        self.status_changed.emit(f"Cancelled{kept}")
         log.info("cancelled%s", kept)
         if self._deforms:
             self._log_remarks(self.store.session.runs[-1])
@@ -188,10 +188,10 @@ class Running(QObject):
     def _failed(self, error: Exception) -> None:
         if self._deforms and isinstance(error, SlidevizError):
             # The message names keys of a case file: say it in the words of the window.
-            error = type(error)(in_window_words(str(error)))
+            error = type(error)(with_field_labels(str(error)))
         self.banner.show_error(error)
         log.error("%s", error)
-        self.said.emit("")
+        self.status_changed.emit("")
         self._end("failed")
 
     def _run_done(self, _: Any) -> None:
@@ -213,7 +213,7 @@ class Running(QObject):
         bad = inverted_words(run)
         if bad:
             folding = "" if session.outdated else session.folding
-            warnings.insert(0, f"{bad}. {help_for(run, session.mesh, folding)}")
+            warnings.insert(0, f"{bad}. {remedy_for(run, session.mesh, folding)}")
         if file is not None:
             warnings.insert(0, f"The deformed mesh is in {file}.")
             log.info("the deformed mesh is in %s", file)
@@ -221,7 +221,7 @@ class Running(QObject):
             show = {"Show the worst": self.worst_wanted.emit} if bad else NO_ANSWERS
             self.banner.show_message("\n".join(warnings), calm=not bad, answers=show)
             self._about = run.number
-        self.said.emit(f"Done: {text}")
+        self.status_changed.emit(f"Done: {text}")
 
     def _forget_run(self, _: str) -> None:
         self._about = None

@@ -23,7 +23,14 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.commands import COMMANDS
-from slideviz.gui.widgets.build import FoldingRow, boxed, hint_label, in_column, in_row, push_button
+from slideviz.gui.widgets.build import (
+    WrappingRow,
+    as_widget,
+    hint_label,
+    in_column,
+    in_row,
+    push_button,
+)
 from slideviz.gui.widgets.cards import SIZE, card
 from slideviz.gui.widgets.icons import icon, logo
 from slideviz.gui.widgets.labels import ElidedLabel, rich_label, wrapped
@@ -72,7 +79,7 @@ class StartPage(QScrollArea):
         self.page.setMaximumWidth(WIDEST)
         self._outer = in_row(None, self.page, None)
         self._outer.setStretchFactor(self.page, 100)
-        self.setWidget(boxed(self._outer))
+        self.setWidget(as_widget(self._outer))
         self.hint = hint_label("Files can also be dropped anywhere on this window.")
         self._recent = in_column(spacing=0)
         self.recent_buttons: list[QPushButton] = []
@@ -96,7 +103,7 @@ class StartPage(QScrollArea):
         title.setWordWrap(True)
         return in_row(picture, 10, title, wide=[title])
 
-    def _make_buttons(self, can_try: bool) -> FoldingRow:
+    def _make_buttons(self, can_try: bool) -> WrappingRow:
         self.attempt = push_button(
             TRY,
             "Open the sample “passage” and deform it at once.",
@@ -114,7 +121,7 @@ class StartPage(QScrollArea):
         for button in (self.attempt, self.open):
             button.setAutoDefault(True)  # the Enter key, too
             button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        return FoldingRow([self.attempt], [self.open], spacing=10, apart=False)
+        return WrappingRow([self.attempt], [self.open], spacing=10, apart=False)
 
     def _make_cards(self, samples: dict[str, str]) -> QGridLayout:
         self._cards = QGridLayout()

@@ -20,7 +20,7 @@ from slideviz.gui.autosave import Autosave, SessionRecovery
 from slideviz.gui.background import READING, IntersectionCheck, SectionReader
 from slideviz.gui.dialogs.exports import Exports
 from slideviz.gui.dialogs.help import Help
-from slideviz.gui.docks import Docks, room_for
+from slideviz.gui.docks import Docks, available_area
 from slideviz.gui.files import Files
 from slideviz.gui.panels.boundaries import BoundariesPanel
 from slideviz.gui.panels.designs import DesignsPanel
@@ -79,7 +79,7 @@ class MainWindow(Services):
         super().__init__()
         self.settings = settings or QSettings("slideviz", "slideviz")
         self.setObjectName("slideviz")
-        room = room_for(self).size()
+        room = available_area(self).size()
         self.setMinimumSize(QSize(900, 620).boundedTo(room))
         self.resize(QSize(1280, 800).boundedTo(room))
         self.setAcceptDrops(True)
@@ -87,7 +87,7 @@ class MainWindow(Services):
         scheme = self._choose_theme(str(self.settings.value("theme", "system")))
         self.store = Store()
         self.banner = Banner()
-        self.offer = Banner()
+        self.recovery_banner = Banner()
         self.error_reporter = ErrorReporter(self.banner, self)
         self.store.failed = self.error_reporter.show
         self.running = Running(self.store, self.banner, self)
@@ -135,7 +135,7 @@ class MainWindow(Services):
         self.start.raise_()
         self.start.show_recent(self.files.recent())
         self.player = Player(self.store)
-        parts = (self.banner, self.offer, stack, self.player)
+        parts = (self.banner, self.recovery_banner, stack, self.player)
         in_column(*parts, wide=[stack], spacing=0, on=centre)
         self.setCentralWidget(centre)
 
@@ -195,16 +195,16 @@ class MainWindow(Services):
     def _connect(self) -> None:
         running, panel = self.running, self.run_panel
         running.began.connect(panel.set_busy)
-        running.doing.connect(panel.show_doing)
+        running.progressed.connect(panel.show_progress)
         running.cancelling.connect(panel.show_cancelling)
         running.ended.connect(lambda: panel.set_busy(""))
         # The deformed mesh may be out of view.
         running.ended.connect(self.viewing.refit)
         for change in (running.began, running.ended):
             change.connect(lambda *_: self.sync_actions())
-        running.said.connect(self.say)
+        running.status_changed.connect(self.show_status)
         running.worst_wanted.connect(self._show_worst)
-        panel.place_wanted.connect(self.lead_to)
+        panel.requirement_clicked.connect(self.focus_requirement)
         self.dock_manager.panel(DesignsPanel).changed.connect(self.sync_actions)
         self.start.file_wanted.connect(self.files.open_path)
         self.start.sample_wanted.connect(self.files.open_sample)
@@ -226,8 +226,8 @@ class MainWindow(Services):
                 lambda: (designs.table, designs.case),
                 self,
             )
-            designs.changed.connect(self.autosave.look)
-            self.recovery = SessionRecovery(self, self.offer, self.autosave)
+            designs.changed.connect(self.autosave.schedule)
+            self.recovery = SessionRecovery(self, self.recovery_banner, self.autosave)
 
     # The session -----------------------------------------------------------------------
 
@@ -255,7 +255,7 @@ class MainWindow(Services):
         """Show a mesh or case that was just opened, in place of the present one."""
         session = opened.session
         if not opened.kept:
-            session = changes.fresh_view(session, self.store.session.view)
+            session = changes.inherit_view(session, self.store.session.view)
         self.banner.hide()
         self.start.hide()
         self.exports.end()
@@ -270,7 +270,7 @@ class MainWindow(Services):
         notes = [] if session.in_file else [*remarks]
         notes.append(boxes_hint(session))
         name = (session.case.source or session.path).name
-        self.say(f"Opened {name}{''.join(f'. {text}' for text in notes if text)}")
+        self.show_status(f"Opened {name}{''.join(f'. {text}' for text in notes if text)}")
 
     # Jobs ------------------------------------------------------------------------------
 
@@ -287,18 +287,18 @@ class MainWindow(Services):
         if output is not None:
             self.running.start_run(output)
 
-    def say(self, text: str) -> None:
+    def show_status(self, text: str) -> None:
         """Show a short message in the status bar for 8 s; an empty text clears it."""
         self.statusBar().showMessage(text, 8000)
 
     def _say_reading(self, text: str) -> None:
         """Show the progress of reading a section; an empty text clears only such a message."""
         if text or self.statusBar().currentMessage().startswith(READING):
-            self.say(text)
+            self.show_status(text)
 
     # The view --------------------------------------------------------------------------
 
-    def lead_to(self, missing: Requirement) -> None:
+    def focus_requirement(self, missing: Requirement) -> None:
         """Bring the panel to the front where a missing requirement is met, and focus the field."""
         if missing.place == "open":
             self.files.ask_and_open()
@@ -306,7 +306,7 @@ class MainWindow(Services):
         self.dock_manager.bring_to_front(missing.place)
         panel = self.dock_manager.panels[missing.place]
         if isinstance(panel, Panel):
-            panel.lead_to(missing)
+            panel.focus_requirement(missing)
 
     def _show_worst(self) -> None:
         self.dock_manager.bring_to_front("worst")
@@ -357,7 +357,7 @@ class MainWindow(Services):
         # What counts as unsaved, and the question: `Files.ask_about_unsaved`.
         if not self._closed:
             if self.files.saving:
-                self.say("The window closes when the mesh is saved")
+                self.show_status("The window closes when the mesh is saved")
                 self.files.after_save = self.close
                 event.ignore()
                 return

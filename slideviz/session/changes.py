@@ -120,7 +120,7 @@ def select(session: Session, names: Iterable[str]) -> Session:
 
 
 @undoable("hidden boundaries")
-def show(session: Session, names: Iterable[str], shown: bool = True) -> Session:
+def show_boundaries(session: Session, names: Iterable[str], shown: bool = True) -> Session:
     """Return the session with the boundaries ``names`` shown, or hidden."""
     hidden = session.view.hidden
     change = frozenset(names)
@@ -202,7 +202,7 @@ def mark_cell(session: Session, cell: int | None) -> Session:
     return set_view(session, marked_cell=cell, marked_in=session.shown)
 
 
-def fresh_view(session: Session, old: ViewState) -> Session:
+def inherit_view(session: Session, old: ViewState) -> Session:
     """Return a session just opened, with the things drawn and the color map of the view ``old``.
 
     FFD boxes are drawn as ``session`` has them: if it has FFD motions.
@@ -225,11 +225,11 @@ def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
     changed = tuple(names)
     roles = dict(session.case.roles) | dict.fromkeys(changed, role)
     guesses = {name: guess for name, guess in session.guesses.items() if name not in changed}
-    for name in _left_alone(session, changed, role):
+    for name in _unhinted_partners(session, changed, role):
         if name in guesses:
             del guesses[name]
             roles[name] = "fixed"
-    still = (_of_moving(motion, roles) for motion in session.case.motions)
+    still = (_restricted_to_moving(motion, roles) for motion in session.case.motions)
     motions = tuple(motion for motion in still if motion is not None)
     case = session.case.change(roles=roles, motions=motions)
     first_sliding = "sliding" in roles.values() and "sliding" not in session.case.roles.values()
@@ -243,7 +243,7 @@ def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
     return replace(session, case=case, guesses=guesses)
 
 
-def _left_alone(session: Session, changed: Sequence[str], role: Role) -> Iterator[str]:
+def _unhinted_partners(session: Session, changed: Sequence[str], role: Role) -> Iterator[str]:
     """Yield the boundaries that match one of ``changed``, and whose names hint at no role.
 
     None where ``role`` is periodic.
@@ -254,7 +254,7 @@ def _left_alone(session: Session, changed: Sequence[str], role: Role) -> Iterato
                 yield name
 
 
-def _of_moving(motion: Motion, roles: Mapping[str, Role]) -> Motion | None:
+def _restricted_to_moving(motion: Motion, roles: Mapping[str, Role]) -> Motion | None:
     """Return the motion for those of its boundaries that move; None where none does."""
     names = named(motion.marker)
     moving = tuple(name for name in names if roles.get(name) == "moving")
@@ -264,7 +264,7 @@ def _of_moving(motion: Motion, roles: Mapping[str, Role]) -> Motion | None:
 
 
 @undoable("confirming guesses")
-def confirm(session: Session, names: Iterable[str] | None = None) -> Session:
+def confirm_guesses(session: Session, names: Iterable[str] | None = None) -> Session:
     """Return the session with the guesses for some boundaries (default: all) confirmed."""
     gone = set(session.guesses if names is None else names)
     kept = {name: guess for name, guess in session.guesses.items() if name not in gone}
@@ -436,7 +436,7 @@ def remove_run(session: Session, number: int) -> Session:
     return show_run(session, rest[-1].number)
 
 
-def bring_back(session: Session, number: int) -> Session:
+def restore_run(session: Session, number: int) -> Session:
     """Return the session with a removed run back at its place, if it is still in ``removed``."""
     back = [run for run in session.removed if run.number == number]
     if not back:
@@ -458,7 +458,7 @@ def rename_run(session: Session, number: int, name: str) -> Session:
 
 
 @undoable("settings of a run")
-def take_settings(session: Session, number: int) -> Session:
+def adopt_settings(session: Session, number: int) -> Session:
     """Return the session with the case of a run as its own, and no guesses."""
     run = session.run(number)
     if run is None:

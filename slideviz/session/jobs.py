@@ -31,7 +31,7 @@ from slideviz.session.large import first_frame, frame_of, is_large, read_boundar
 from slideviz.session.motions import Ghosts
 from slideviz.session.opening import open_mesh
 from slideviz.session.passages import find_period
-from slideviz.session.run_messages import in_window_words
+from slideviz.session.run_messages import with_field_labels
 from slideviz.session.saving import Camera, camera_from_case
 from slideviz.session.state import Session, StepFrame
 from slideviz.solver.intersection import folding_message, intersection_message, jump_message
@@ -169,7 +169,7 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
         folded = None if found else folding_message(*asked)
     except SlidevizError as error:
         return _first_line(error, files), ""
-    said = in_window_words(found[0].upper() + found[1:] + ".") if found else ""
+    said = with_field_labels(found[0].upper() + found[1:] + ".") if found else ""
     return said, (f"{folded}." if folded else "")
 
 

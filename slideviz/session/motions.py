@@ -23,9 +23,9 @@ from slideviz.session.state import Session
 from slideviz.solver.prescribed import displaced, moving_bodies, support_radius
 from slideviz.system.atomic import atomic_write
 
-NAMED = Path("table")
+PLACEHOLDER = Path("table")
 """Stands for the file in messages of `parse_displacements`; `TableRows.check` replaces it."""
-LARGEST = 5_000_000
+MOST_BYTES = 5_000_000
 """Most bytes of a file that can be edited by hand."""
 
 
@@ -63,9 +63,9 @@ class TableRows:
         if not text.strip():
             raise CaseError(f"Type or paste rows: {self.heading}")
         try:
-            read = parse_displacements(text, NAMED, self.nodes, self.shape, self.of)
+            read = parse_displacements(text, PLACEHOLDER, self.nodes, self.shape, self.of)
         except CaseError as error:
-            first, *others = str(error).replace(f"{NAMED}:", "Line ").splitlines()
+            first, *others = str(error).replace(f"{PLACEHOLDER}:", "Line ").splitlines()
             raise CaseError(f"{first} ({len(others)} more)" if others else first) from error
         moved = np.linalg.norm(read.vectors, axis=1)
         return (
@@ -111,7 +111,7 @@ def table_text(path: Path) -> str:
     if not path.is_file():
         return ""
     size = path.stat().st_size
-    if size > LARGEST:
+    if size > MOST_BYTES:
         raise CaseError(
             f"{path}: the table has {size / 1e6:.0f} MB, too much to be edited here; write it with "
             "another program"
@@ -326,7 +326,7 @@ def _axis(direction: Sequence[float]) -> str:
     return direction_words(direction).removeprefix("-")
 
 
-def found_text(session: Session) -> str:
+def pair_text(session: Session) -> str:
     """Return lines on the periodic boundaries: matching pairs with their period, and the others."""
     names = session.case.markers_with("periodic")
     lines = [

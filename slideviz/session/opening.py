@@ -70,7 +70,9 @@ def suggested_reduction(mesh: Mesh) -> Reduction:
     return Reduction(tolerance=float(f"{RELATIVE_TOLERANCE * mesh.extent:.2g}") or 1e-300)
 
 
-def of_runs(first: StepFrame, runs: Sequence[Run] = (), color_by: ColorBy = "size-skew") -> Session:
+def session_of_runs(
+    first: StepFrame, runs: Sequence[Run] = (), color_by: ColorBy = "size-skew"
+) -> Session:
     """Return a session for a picture: the last step of a run, with that of a second run beside it.
 
     Parameters

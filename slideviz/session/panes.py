@@ -12,14 +12,14 @@ from slideviz.session.changes import (
     show_frame,
     show_run,
 )
-from slideviz.session.runs_words import brief
+from slideviz.session.runs_words import summary
 from slideviz.session.state import Run, Session
 
 
 def run_title(run: Run, among: Sequence[Run] = ()) -> str:
     """Return number and name of a run, and words that distinguish it from the runs ``among``."""
     name = f"{run.name} · " if run.name else ""
-    return f"Run {run.number}: {name}{brief(run, among, method=True)}"
+    return f"Run {run.number}: {name}{summary(run, among, method=True)}"
 
 
 def choices(session: Session) -> dict[int, str]:

@@ -62,7 +62,7 @@ def exact_cost(case: Case, mesh: Mesh) -> str:
     )
 
 
-def ended(run: Run) -> str:
+def end_message(run: Run) -> str:
     """Return the end of a run in a few words."""
     step = run.last.step if run.last is not None else None
     if run.last is None or step is None:
@@ -79,7 +79,7 @@ def inverted_words(run: Run) -> str:
     return f"{count:,} inverted cell{'' if count == 1 else 's'}" if count else ""
 
 
-def help_for(run: Run, mesh: Mesh | None, folding: str = "") -> str:
+def remedy_for(run: Run, mesh: Mesh | None, folding: str = "") -> str:
     """Return sentences on a run's inverted cells: their first step, and remedies.
 
     Parameters
@@ -116,14 +116,14 @@ def warnings_of(run: Run) -> tuple[str, ...]:
     """Return the warnings of a run, without its notes."""
     step = run.last.step if run.last is not None else None
     found = () if step is None else step.warnings
-    return tuple(in_window_words(text) for text in found if not isinstance(text, Note))
+    return tuple(with_field_labels(text) for text in found if not isinstance(text, Note))
 
 
 def notes_of(run: Run) -> tuple[str, ...]:
     """Return the notes of a run: remarks that are harmless."""
     step = run.last.step if run.last is not None else None
     found = () if step is None else step.warnings
-    return tuple(in_window_words(text) for text in found if isinstance(text, Note))
+    return tuple(with_field_labels(text) for text in found if isinstance(text, Note))
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ def moves_nothing(motion: Motion) -> bool:
     return isinstance(motion, Radial) and motion.factor == 1 and motion.distance == 0
 
 
-def loose_words(case: Case, extent: float, largest: float) -> str:
+def tolerance_warning(case: Case, extent: float, largest: float) -> str:
     """Return a sentence where the typed tolerance is not far below the largest displacement.
 
     Parameters
@@ -226,7 +226,7 @@ def _problems(session: Session) -> list[str]:
     from slideviz.case.check import check_case
 
     assert session.mesh is not None
-    said = (in_window_words(text) for text in check_case(session.case, session.mesh))
+    said = (with_field_labels(text) for text in check_case(session.case, session.mesh))
     return [text[:1].upper() + text[1:] for text in said]
 
 
@@ -238,7 +238,7 @@ _KEY = re.compile(rf"\b({'|'.join(_LABELLED)})\b(?:=(?:{_VALUE})?)?")
 _KERNEL = re.compile(rf"\b({'|'.join(KERNELS)})\b(?= is too)|\b\w+-c\d[ab]?\b")
 
 
-def idle_words(case: Case) -> tuple[str, ...]:
+def idle_text(case: Case) -> tuple[str, ...]:
     """Return a sentence for each role without effect in the case's modes, seldom on purpose."""
     found: list[str] = []
     for names, mode, title, verb in (
@@ -251,7 +251,7 @@ def idle_words(case: Case) -> tuple[str, ...]:
     return tuple(found)
 
 
-def in_window_words(text: str) -> str:
+def with_field_labels(text: str) -> str:
     """Return a message with keys of the case file replaced by their labels in the window."""
     kernel = KEYS["RBF_KERNEL"].kind
     return _KERNEL.sub(lambda found: kernel.called(found[0]), _KEY.sub(_words, text))

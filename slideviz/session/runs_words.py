@@ -149,7 +149,7 @@ def differences_from(run: Run, among: Sequence[Run]) -> str:
     return ", ".join(filter(None, words))
 
 
-def brief(run: Run, among: Sequence[Run] = (), method: bool = False) -> str:
+def summary(run: Run, among: Sequence[Run] = (), method: bool = False) -> str:
     """Return a line on a run's settings, to be put beside its name.
 
     Settings that differ in the runs ``among`` come first, since the end of the line may be cut off.

@@ -178,7 +178,7 @@ def view_from_case(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewS
     return replace(view, **values)
 
 
-def restored(session: Session, source: Path | None) -> Session:
+def as_recovered(session: Session, source: Path | None) -> Session:
     """Return a session just opened from its recovery file as unsaved, of case file ``source``."""
     return replace(session, case=session.case.change(source=source), saved=Case())
 

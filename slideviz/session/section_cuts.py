@@ -183,7 +183,7 @@ def _middle_of_moving(session: Session) -> FloatArray:
     return np.asarray((points.min(axis=0) + points.max(axis=0)) / 2.0)
 
 
-def span(section: Section, points: FloatArray) -> tuple[float, float]:
+def position_range(section: Section, points: FloatArray) -> tuple[float, float]:
     """Return the lowest and highest position at which a section goes through points (n, 3)."""
     ends: list[float] = []
 
@@ -195,7 +195,7 @@ def span(section: Section, points: FloatArray) -> tuple[float, float]:
     return min(ends), max(ends)
 
 
-def turned(section: Section, direction: Triple, points: FloatArray) -> Section:
+def with_direction(section: Section, direction: Triple, points: FloatArray) -> Section:
     """Return the section with another normal or axis, ``direction``.
 
     It keeps its position (place or size) if it goes through points (n, 3) there; else it gets one
@@ -208,9 +208,9 @@ def turned(section: Section, direction: Triple, points: FloatArray) -> Section:
     return new.shape.at_position(new, round_middle(found))
 
 
-NOTHING = Polygons(np.empty((0, 3)), *(np.zeros(n, np.int64) for n in (1, 0, 0)))
+NO_POLYGONS = Polygons(np.empty((0, 3)), *(np.zeros(n, np.int64) for n in (1, 0, 0)))
 """No polygons."""
-KEPT = 24
+CACHE_SIZE = 24
 """Most cuts that are cached: dragging a section makes many that are not needed again."""
 
 
@@ -255,7 +255,7 @@ class Cuts:
         one = replace(section, name="", shown=True, flat=False)
         key = one, b"" if matrix is None else matrix.tobytes(), only
         if key not in self._found:
-            while len(self._found) >= KEPT:
+            while len(self._found) >= CACHE_SIZE:
                 self._found.pop(next(iter(self._found)))
             points = mesh.points if matrix is None else transformed(mesh.points, matrix)
             self._found[key] = cutter.show(points, section, only)
@@ -265,10 +265,10 @@ class Cuts:
         """Return the cut through a mesh in its file; empty until its cells were read."""
         slab = slab_of(mesh, section)
         if slab is None or matrix is not None or not len(slab.mesh.cells):
-            return NOTHING
+            return NO_POLYGONS
         key = slab, section.whole
         if key not in self._slabs:
-            while len(self._slabs) >= KEPT:
+            while len(self._slabs) >= CACHE_SIZE:
                 self._slabs.pop(next(iter(self._slabs)))
             self._slabs[key] = Cutter.of(slab.mesh).show(slab.mesh.points, section)
         return self._slabs[key]

@@ -108,8 +108,8 @@ __all__ = [
     "StepFrame",
     "ViewState",
     "cell_displacement",
-    "essence",
-    "round_above",
+    "result_settings",
+    "round_up",
 ]
 
 
@@ -236,7 +236,11 @@ class Session:
     def outdated(self) -> bool:
         """Return whether the case would give another result than the run that is shown."""
         run = self.run_shown
-        return run is not None and bool(run.frames) and essence(run.case) != essence(self.case)
+        return (
+            run is not None
+            and bool(run.frames)
+            and result_settings(run.case) != result_settings(self.case)
+        )
 
     @property
     def color_range(self) -> tuple[float, float]:
@@ -245,7 +249,7 @@ class Session:
             return self.view.color_range
         if self.view.color_by != "displacement":
             return 0.0, 1.0
-        return 0.0, round_above(self.largest_displacement) or 1.0
+        return 0.0, round_up(self.largest_displacement) or 1.0
 
     @cached_property
     def largest_displacement(self) -> float:
@@ -260,7 +264,7 @@ class Session:
         return self.case.roles.get(marker, "fixed")
 
 
-def round_above(value: float) -> float:
+def round_up(value: float) -> float:
     """Return a round number that is at least ``value``, for a color bar; 0 for no positive value.
 
     Its fifths, at which the bar has labels, have few digits, too.
@@ -272,7 +276,7 @@ def round_above(value: float) -> float:
     return float(f"{next(fit, 10.0) * power:.3g}")
 
 
-def essence(case: Case) -> Case:
+def result_settings(case: Case) -> Case:
     """Return the case with defaults for all that does not change the result, and sorted roles."""
     roles = {name: role for name, role in sorted(case.roles.items()) if role != "fixed"}
     return replace(effective(case), roles=roles, mesh_out=None, source=None, warnings=(), view={})

@@ -9,15 +9,15 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from slideviz.case.model import Case
-from slideviz.session.changes import bring_back, remove_run, set_view, show_run, undo_words
+from slideviz.session.changes import remove_run, restore_run, set_view, show_run, undo_words
 from slideviz.session.state import Guess, Session, ViewState
 
 Listener = Callable[[Session, Session], None]
 Failed = Callable[[Exception], None]
 
-TOGETHER_S = 1.0
+MERGE_S = 1.0
 """Changes of one kind with less than so many seconds between them are undone as one."""
-DEEPEST = 200
+UNDO_LIMIT = 200
 """Most changes that can be undone."""
 
 
@@ -83,7 +83,7 @@ class UndoState:
     def _put_runs(self, session: Session) -> Session:
         """Return the session with the memento's removed runs removed, and all others back."""
         for number in sorted({run.number for run in session.removed} - self.removed):
-            session = bring_back(session, number)
+            session = restore_run(session, number)
             if number == self.shown:
                 session = show_run(session, number)
         for run in session.runs:
@@ -142,7 +142,7 @@ class Store:
         self.session = session or Session()
         self._clock = clock
         self._listeners: list[Listener] = []
-        self._waiting: list[tuple[Session, Session]] = []
+        self._queue: list[tuple[Session, Session]] = []
         self.failed: Failed | None = None
         self._undo: list[UndoEntry] = []
         self._redo: list[UndoEntry] = []
@@ -183,7 +183,7 @@ class Store:
                 self._undo[-1] = replace(last, at_s=float("-inf"))
 
     @contextmanager
-    def taking_back(self) -> Iterator[None]:
+    def reverting(self) -> Iterator[None]:
         """Within, a change to what was there before the last ones of its kind undoes these."""
         self._taking_back = True
         try:
@@ -201,20 +201,20 @@ class Store:
         if session.mesh is not self.session.mesh:
             self._undo.clear()
             self._redo.clear()
-        self._waiting.append((self.session, session))
+        self._queue.append((self.session, session))
         self.session = session
-        if len(self._waiting) > 1:
+        if len(self._queue) > 1:
             return
         first: Exception | None = None
         try:
-            while self._waiting:
+            while self._queue:
                 try:
-                    notify(self._listeners, *self._waiting[0], failed=self.failed)
+                    notify(self._listeners, *self._queue[0], failed=self.failed)
                 except Exception as error:
                     first = first or error
-                self._waiting.pop(0)
+                self._queue.pop(0)
         finally:
-            self._waiting.clear()
+            self._queue.clear()
         if first is not None:
             raise first
 
@@ -266,7 +266,7 @@ class Store:
         self._undo.append(
             UndoEntry(_OutsideChange(put, before, after), words, (put,), float("-inf"))
         )
-        del self._undo[:-DEEPEST]
+        del self._undo[:-UNDO_LIMIT]
 
     def _remember(self, old: Session, new: Session, words: str, kind: tuple[object, ...]) -> None:
         if new is old or new.mesh is not old.mesh or new.mesh is None:
@@ -275,13 +275,13 @@ class Store:
         if before == UndoState.of(new):
             return
         self._redo.clear()
-        if self._taking_back and self._drop_alike(UndoState.of(new), kind):
+        if self._taking_back and self._drop_same_kind(UndoState.of(new), kind):
             return
         now = self._clock()
         last = self._undo[-1] if self._undo else None
         # Infinity: a change during a drag is undone with the others of the drag.
         at_s = float("inf") if self._dragging else now
-        if last is not None and last.kind == kind and now - last.at_s < TOGETHER_S:
+        if last is not None and last.kind == kind and now - last.at_s < MERGE_S:
             self._undo.pop()
             if last.before != UndoState.of(new):
                 self._undo.append(replace(last, at_s=at_s))
@@ -290,9 +290,9 @@ class Store:
         # The removal of a run that is no longer in `removed` cannot be undone.
         there = {run.number for run in new.removed}
         self._undo = [d for d in self._undo if d.kind[0] is not remove_run or d.kind[1] in there]
-        del self._undo[:-DEEPEST]
+        del self._undo[:-UNDO_LIMIT]
 
-    def _drop_alike(self, before: UndoState, kind: tuple[object, ...]) -> bool:
+    def _drop_same_kind(self, before: UndoState, kind: tuple[object, ...]) -> bool:
         """Forget the last changes since a state; return whether all are of one kind."""
         for at in reversed(range(len(self._undo))):
             if self._undo[at].kind != kind:

@@ -58,15 +58,19 @@ class Bench:
     """A window, the beat of its event loop, and what waits for it."""
 
     def __init__(self, app, folder: Path) -> None:
-        from slideviz.gui.responsiveness.threads import be_quick, prepare_drawing, ready_numerics
+        from slideviz.gui.responsiveness.threads import (
+            import_numerics,
+            prepare_drawing,
+            tune_interpreter,
+        )
         from slideviz.gui.window import MainWindow
 
-        ready_numerics()
+        import_numerics()
         self.app = app
         settings = QSettings(str(folder / "settings.ini"), QSettings.Format.IniFormat)
         self.window = MainWindow(settings, kept=folder / "sessions")
         self.case = folder / "stator.cfg"
-        be_quick()
+        tune_interpreter()
         self.window.show()
         prepare_drawing(self.window.view, self.window.scene.stage)
         self.window.warmup.start()

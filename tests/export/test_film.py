@@ -29,7 +29,7 @@ from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.scene.scene import Scene
 from slideviz.scene.stage import Stage
-from slideviz.session.opening import of_runs
+from slideviz.session.opening import session_of_runs
 from slideviz.session.state import Run, StepFrame
 
 SMALL = (320, 200)
@@ -52,7 +52,7 @@ def shoot(frames, file, film_options, **options):
 
 def shown(frames):
     """A session of a run with these steps."""
-    return of_runs(frames[0], [Run(1, Case(), tuple(frames[1:]), "done")])
+    return session_of_runs(frames[0], [Run(1, Case(), tuple(frames[1:]), "done")])
 
 
 def film_of(session, file, film_options, like=None):
@@ -381,7 +381,7 @@ def test_a_film_draws_its_mesh_once_and_leaves_nothing(tmp_path, square, monkeyp
     monkeypatch.setattr(OffscreenRenderer, "draw_panes", watch)
     frames = leaning(square)
     runs = [Run(k, Case(), frames[1:], "done", name=str(k)) for k in range(1, count + 1)]
-    for _ in film(of_runs(frames[0], runs), tmp_path / "a%d.png", FilmOptions((640, 300))):
+    for _ in film(session_of_runs(frames[0], runs), tmp_path / "a%d.png", FilmOptions((640, 300))):
         pass
     assert len(scenes) == 4
     assert {len(added), *added_before} == {len(added)}, "no actor is made again"

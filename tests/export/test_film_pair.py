@@ -14,8 +14,8 @@ from slideviz.export.picture_options import panes
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
 from slideviz.scene.color_legend import STRIP
-from slideviz.session.opening import of_runs
-from slideviz.session.state import Run, StepFrame, round_above
+from slideviz.session.opening import session_of_runs
+from slideviz.session.state import Run, StepFrame, round_up
 from slideviz.solver.deform import deform
 
 SIZE = (800, 400)
@@ -44,7 +44,7 @@ def runs(made):
 @pytest.fixture(scope="module")
 def shoot(made):
     def film_of(runs, file, film_options=USUAL, color_by="size-skew", **options):
-        session = of_runs(StepFrame(made.mesh, quality(made.mesh)), runs, color_by)
+        session = session_of_runs(StepFrame(made.mesh, quality(made.mesh)), runs, color_by)
         return list(film(session, file, film_options, **options))[-1].done
 
     return film_of
@@ -117,7 +117,7 @@ def test_the_range_of_displacements_holds_both_runs(made, runs, tmp_path, monkey
         assert len(set(ranges)) == 1
         assert ranges[0] == (
             0.0,
-            round_above(np.linalg.norm(far.points - first.points, axis=1).max()),
+            round_up(np.linalg.norm(far.points - first.points, axis=1).max()),
         )
 
 

@@ -29,7 +29,7 @@ from slideviz.sections.model import Section
 from slideviz.session import changes, section_cuts
 from slideviz.session.opening import open_mesh
 from slideviz.session.passages import find_period
-from slideviz.session.section_cuts import KEPT, Cuts
+from slideviz.session.section_cuts import CACHE_SIZE, Cuts
 from slideviz.session.state import Session, StepFrame
 
 MIDDLE = Section("plane", (0.0, 0.0, 0.46), (0.0, 0.0, 1.0))
@@ -390,7 +390,7 @@ def test_cuts_are_remembered_for_the_frame_only(cube):
     cuts = Cuts()
     first = cuts.of(cube, MIDDLE)
     assert cuts.of(cube, Section("plane", MIDDLE.origin, MIDDLE.direction, name="mine")) is first
-    for z in np.linspace(0.1, 0.2, KEPT):
+    for z in np.linspace(0.1, 0.2, CACHE_SIZE):
         cuts.of(cube, MIDDLE.shape.at_position(MIDDLE, z))
     assert cuts.of(cube, MIDDLE) is not first
     shifted = cube.with_points(cube.points + 0.1)
@@ -432,7 +432,7 @@ def test_positions_move_a_plane_along_its_normal():
     assert plane.shape.position(plane) == pytest.approx(3.6)
     there = plane.shape.at_position(plane, 4.6)
     assert there.origin == pytest.approx((1.0, 2.6, 3.8))
-    low, high = section_cuts.span(plane, np.array([[0.0, 0.0, 0.0], [0.0, 5.0, 0.0]]))
+    low, high = section_cuts.position_range(plane, np.array([[0.0, 0.0, 0.0], [0.0, 5.0, 0.0]]))
     assert (low, high) == pytest.approx((0.0, 3.0))
     with pytest.raises(CaseError, match="radius -1 is not positive"):
         Section("cylinder", radius=1.0).sized(-1.0)
@@ -441,9 +441,9 @@ def test_positions_move_a_plane_along_its_normal():
 def test_a_turned_plane_still_cuts(cube):
     points = section_cuts.cell_points(cube)
     outside = Section("plane", (0.0, 5.0, 0.3), (0.0, 0.0, 1.0))
-    within = section_cuts.turned(outside, (0.0, 1.0, 0.0), points).origin[1]
+    within = section_cuts.with_direction(outside, (0.0, 1.0, 0.0), points).origin[1]
     assert within == pytest.approx(0.5, abs=0.1)
-    kept = section_cuts.turned(MIDDLE, (0.0, 1.0, 1.0), points)
+    kept = section_cuts.with_direction(MIDDLE, (0.0, 1.0, 1.0), points)
     assert kept.origin == MIDDLE.origin
 
 

@@ -12,7 +12,7 @@ from slideviz.scene.actors import CELL, POINT, VALUES
 from slideviz.scene.overview import Detail, half_of, tiny_motion
 from slideviz.scene.scene import Scene
 from slideviz.session.changes import set_view
-from slideviz.session.opening import of_runs
+from slideviz.session.opening import session_of_runs
 from slideviz.session.state import Run, StepFrame
 
 
@@ -24,9 +24,9 @@ def pixels(path):
 def shown(mesh, base=None):
     """A session that shows a mesh, deformed or not."""
     if base is None:
-        return of_runs(StepFrame(mesh, quality(mesh)))
+        return session_of_runs(StepFrame(mesh, quality(mesh)))
     frame = StepFrame(mesh, quality(mesh, base))
-    return of_runs(StepFrame(base, quality(base)), [Run(1, Case(), (frame,), "done")])
+    return session_of_runs(StepFrame(base, quality(base)), [Run(1, Case(), (frame,), "done")])
 
 
 def has(image, rgb, within=10):

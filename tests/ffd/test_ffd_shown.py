@@ -107,7 +107,7 @@ def test_boxes_are_drawn_at_first_where_a_motion_is_of_one(boxed):
     assert "ffd" not in plain.view.drawn
     opened = session_of(boxed, PUSH)
     assert "ffd" in opened.view.drawn
-    assert "ffd" in changes.fresh_view(opened, ViewState()).view.drawn
+    assert "ffd" in changes.inherit_view(opened, ViewState()).view.drawn
     added = changes.add_motion(plain, PUSH)
     assert "ffd" in added.view.drawn
     # Who takes them away is not asked again by the next number that is typed.

@@ -131,28 +131,28 @@ def test_the_session_of_a_window_that_is_open_is_not_offered(make, qtbot, case_f
     kept(first, qtbot)
     assert find_sessions(folder) == ([], [])
     other = make()
-    other.recovery.look()
-    assert not other.offer.isVisible()
+    other.recovery.start()
+    assert not other.recovery_banner.isVisible()
     assert other.autosave.path != first.autosave.path
 
 
 def test_after_a_crash_it_is_offered_and_restored(make, qtbot, crashed, case_file, folder):
     window = make()
-    window.recovery.look()
-    assert window.offer.isVisible()
-    text = window.offer.text.text()
+    window.recovery.start()
+    assert window.recovery_banner.isVisible()
+    text = window.recovery_banner.text.text()
     assert "did not end properly" in text
     assert f"with {case_file.name} in {case_file.parent}?" in text, (
         "it is known by the case that was open"
     )
-    window.offer.answers["Restore"].click()
+    window.recovery_banner.answers["Restore"].click()
     qtbot.waitUntil(lambda: window.store.session.mesh is not None and not window.runner.busy)
     session = window.store.session
     assert session.case.steps == 7
     assert session.view.color_by == "skew"
     assert session.case.source == case_file
     assert session.unsaved_case
-    assert not window.offer.isVisible()
+    assert not window.recovery_banner.isVisible()
     qtbot.waitUntil(lambda: not crashed.exists())
     assert Case.read(window.autosave.path).steps == 7, "it is safe under its new name"
     assert find_sessions(folder) == ([], [])
@@ -181,8 +181,8 @@ def test_the_designs_and_their_results_come_back(make, qtbot, folder, case_file,
     for suffix in (".cfg", ".csv"):
         folder.joinpath("session-4194399-1").with_suffix(suffix).write_text(texts[suffix])
     window = make()
-    window.recovery.look()
-    window.offer.answers["Restore"].click()
+    window.recovery.start()
+    window.recovery_banner.answers["Restore"].click()
     panel = window.dock_manager.panel(DesignsPanel)
     qtbot.waitUntil(lambda: bool(panel.table.rows))
     assert panel.table.designs() == [{"STEPS": "1"}, {"STEPS": "2"}, {"STEPS": "3"}]
@@ -201,8 +201,8 @@ def test_the_designs_and_their_results_come_back(make, qtbot, folder, case_file,
 def test_designs_that_cannot_be_read_are_told_and_the_session_is_restored(make, qtbot, crashed):
     crashed.with_suffix(".csv").write_text("design,STEPS\n1\n")
     window = make()
-    window.recovery.look()
-    window.offer.answers["Restore"].click()
+    window.recovery.start()
+    window.recovery_banner.answers["Restore"].click()
     qtbot.waitUntil(lambda: window.store.session.mesh is not None and not window.runner.busy)
     qtbot.waitUntil(window.banner.isVisible)
     assert "is no table of results" in window.banner.text.text()
@@ -211,25 +211,25 @@ def test_designs_that_cannot_be_read_are_told_and_the_session_is_restored(make, 
 
 def test_discard_throws_it_away(make, crashed, folder):
     window = make()
-    window.recovery.look()
-    window.offer.answers["Discard"].click()
-    assert not window.offer.isVisible()
+    window.recovery.start()
+    window.recovery_banner.answers["Discard"].click()
+    assert not window.recovery_banner.isVisible()
     assert list(folder.iterdir()) == []
 
 
 def test_a_closed_offer_comes_again_at_the_next_start_only(make, crashed, qtbot):
     window = make()
-    window.recovery.look()
-    window.offer._closed()
-    assert not window.offer.isVisible()
+    window.recovery.start()
+    window.recovery_banner._closed()
+    assert not window.recovery_banner.isVisible()
     assert crashed.exists()
     second = make()
-    second.recovery.look()
-    assert not second.offer.isVisible(), "the first window holds it"
+    second.recovery.start()
+    assert not second.recovery_banner.isVisible(), "the first window holds it"
     window.close()
     window.recovery._later.clear()
-    second.recovery.look()
-    assert second.offer.isVisible()
+    second.recovery.start()
+    assert second.recovery_banner.isVisible()
 
 
 def test_several_are_offered_one_after_the_other_newest_first(make, crashed):
@@ -237,13 +237,13 @@ def test_several_are_offered_one_after_the_other_newest_first(make, crashed):
     older.write_text(crashed.read_text().replace("STEPS= 7", "STEPS= 3"))
     os.utime(older, (1e9, 1e9))
     window = make()
-    window.recovery.look()
+    window.recovery.start()
     assert [found.case.steps for found in window.recovery.waiting] == [7, 3]
-    assert "1 more" in window.offer.text.text()
-    window.offer.answers["Discard"].click()
+    assert "1 more" in window.recovery_banner.text.text()
+    window.recovery_banner.answers["Discard"].click()
     assert older.exists()
-    assert "2001" in window.offer.text.text()
-    window.offer.answers["Discard"].click()
+    assert "2001" in window.recovery_banner.text.text()
+    window.recovery_banner.answers["Discard"].click()
     assert not older.exists()
 
 
@@ -252,8 +252,8 @@ def test_a_session_whose_mesh_is_gone_is_told_and_kept(make, crashed, qtbot, cas
     away = mesh.rename(mesh.with_suffix(".away"))
     try:
         window = make()
-        window.recovery.look()
-        window.offer.answers["Restore"].click()
+        window.recovery.start()
+        window.recovery_banner.answers["Restore"].click()
         qtbot.waitUntil(lambda: window.banner.isVisible())
         assert "no such file" in window.banner.text.text()
         assert crashed.exists()
@@ -310,11 +310,11 @@ def test_sessions_that_cannot_be_read_are_told_once(make, folder):
     window = make()
     for text in BROKEN:
         (folder / "session-4194399-1.cfg").write_text(text)
-        window.recovery.look()
+        window.recovery.start()
         assert "cannot be read" in window.banner.text.text()
-        assert not window.offer.isVisible()
+        assert not window.recovery_banner.isVisible()
         window.banner.hide()
-        window.recovery.look()
+        window.recovery.start()
         assert not window.banner.isVisible()
 
 

@@ -154,14 +154,14 @@ def test_the_plot_is_saved(full, tmp_path, answers):
 
 
 def test_another_plot_does_not_show_the_one_before_meanwhile(full, qtbot):
-    canvas, gone_to = full.canvas, []
+    canvas, row_activated = full.canvas, []
     before = full.grab().toImage()
     with qtbot.waitSignal(canvas.drawn):
         choose(full, "span")
         assert canvas.wiped
-        canvas.picked = gone_to.append
+        canvas.picked = row_activated.append
         QTest.mouseClick(canvas, Qt.MouseButton.LeftButton, pos=QPoint(150, 100))
-        assert not gone_to, "its axes are no longer there"
+        assert not row_activated, "its axes are no longer there"
         shown, ground = canvas.grab().toImage(), canvas.scheme.background
         corners = {shown.pixelColor(x, y).name() for x in (3, 290) for y in range(20, 90, 7)}
         assert corners <= {ground, canvas.scheme.background_top}, "nothing of the old plot"

@@ -59,7 +59,7 @@ def test_designs_are_run_drawn_and_shown(window, passage, qtbot, in_a_thread, dr
     assert panel.rows.model.rowCount() == 3
     assert panel.run.text() == "Run 3 designs"
     run(panel, qtbot)
-    assert panel.said.label.text().startswith("3 designs done")
+    assert panel.status.label.text().startswith("3 designs done")
     assert set(panel.table.results) == {1, 2, 3}
     columns = [panel.rows.model.headerData(k, Qt.Orientation.Horizontal) for k in range(4)]
     assert columns == ["airfoil.rotate\nangle_deg", "STEPS", "min", "mean"]
@@ -116,7 +116,7 @@ def test_the_last_of_several_clicks_counts(window, passage, qtbot, in_a_thread, 
     window.start_run()
     assert window.runner.busy
     panel.show_design(1)
-    assert panel.said.label.text().startswith("Another job runs")
+    assert panel.status.label.text().startswith("Another job runs")
     assert panel.shown == 3
     driver.settle()
 
@@ -128,12 +128,12 @@ def test_designs_that_fail_say_why_and_what_is_done_is_not_run_again(
     fill(panel, "SLIDING_MODE", "ps, none")
     assert panel.rows.model.headerData(0, Qt.Orientation.Horizontal) == "SLIDING_\nMODE"
     run(panel, qtbot)
-    assert panel.said.label.text().startswith(
+    assert panel.status.label.text().startswith(
         "1 design done; 1 failed\nDesign 2: PERIODIC_MODE= moving needs"
     )
     assert [panel.rows.model.index(k, 1).data() for k in (0, 1)][1] == "failed"
     panel.show_design(2)
-    assert panel.said.label.text().startswith("Design 2: PERIODIC_MODE= moving needs")
+    assert panel.status.label.text().startswith("Design 2: PERIODIC_MODE= moving needs")
     assert panel.shown is None
     assert panel.table.results[2].problem
     assert panel.run.text() == "Run 1 design"
@@ -145,7 +145,7 @@ def test_designs_that_fail_say_why_and_what_is_done_is_not_run_again(
     case = window.store.session.case.change(source=tmp_path / "other.cfg")
     window.store.change(changes.saved_case, case)
     assert not panel.run.isEnabled()
-    assert not panel.said.label.text().startswith("The settings")
+    assert not panel.status.label.text().startswith("The settings")
     window.store.change(changes.set_case, steps=3)
     assert panel.run.text() == "Run 1 design"
 
@@ -159,25 +159,27 @@ def test_what_is_said_can_be_read_to_its_end(window, passage, qtbot):
     panel.mesh = window.store.session.mesh
     panel.table = panel.table.with_results([DesignRow(1, problem=f"{name}: {why}")])
     panel.show_design(1)
-    assert panel.said.label.text() == f"Design 1: {why}"
-    bar, high = panel.said.verticalScrollBar(), panel.fontMetrics().height()
-    qtbot.waitUntil(lambda: panel.said.height() > 1.9 * high)
-    assert panel.said.width() > 0.9 * panel.width()
+    assert panel.status.label.text() == f"Design 1: {why}"
+    bar, high = panel.status.verticalScrollBar(), panel.fontMetrics().height()
+    qtbot.waitUntil(lambda: panel.status.height() > 1.9 * high)
+    assert panel.status.width() > 0.9 * panel.width()
     assert not bar.maximum()
-    assert panel.said.height() >= panel.said.label.heightForWidth(panel.said.viewport().width())
+    assert panel.status.height() >= panel.status.label.heightForWidth(
+        panel.status.viewport().width()
+    )
     # Of many lines, three are seen, and the others scrolled to.
     more = [DesignRow(2, inverted=3), DesignRow(3, problem=f"{name}: another reason")]
     panel.table = panel.table.with_results(more)
     panel._ended("", wrong=False)
-    assert panel.said.label.text().splitlines() == [
+    assert panel.status.label.text().splitlines() == [
         "1 design done; 2 failed; 1 with inverted cells",
         f"Design 1: {why}",
         "Design 3: another reason",
     ]
     qtbot.waitUntil(lambda: bar.maximum() > 0)
-    assert panel.said.height() < 4 * high
+    assert panel.status.height() < 4 * high
     panel._say("")
-    assert not panel.said.isVisible()
+    assert not panel.status.isVisible()
 
 
 def test_where_all_failed_there_is_no_plot(passage):
@@ -203,7 +205,7 @@ def test_mistakes_are_told_and_change_nothing_and_the_design_shown_is_none_of_an
 ):
     panel = passage
     fill(panel, "STEPS", "1, many")
-    assert "whole number" in panel.said.label.text()
+    assert "whole number" in panel.status.label.text()
     fill(panel, "airfoil.translate.y", "0 to 1 in")
     assert panel.rows.model.rowCount() == 0
     fill(panel, "STEPS", "1, 2")
@@ -245,12 +247,12 @@ def test_tables_are_loaded_and_saved_and_all_mistakes_are_told_with_their_rows(
     file.write_text("nothing\n1\n")
     answers("ask_table", file)
     QTest.mouseClick(panel.load, LEFT)
-    assert "no such number of a motion" in panel.said.label.text()
+    assert "no such number of a motion" in panel.status.label.text()
     file = tmp_path / "designs.csv"
     file.write_text("STEPS\n1\nmany\n0.5\nx\ny\nz\n")
     answers("ask_table", file)
     QTest.mouseClick(passage.load, LEFT)
-    assert "(and 4 more)" in passage.said.label.text()
+    assert "(and 4 more)" in passage.status.label.text()
     assert window.banner.isVisible()
     window.banner.details.click()
     told = window.banner.dialog.text.toPlainText()
@@ -303,7 +305,7 @@ def test_changes_of_the_table_are_undone_with_its_results(
     QTest.mouseClick(panel.run, LEFT)
     undo.trigger()
     assert panel.table.rows == done.rows
-    assert "stop that first" in panel.said.label.text()
+    assert "stop that first" in panel.status.label.text()
     assert undo.text() == "Undo designs"
     panel.runner.cancel()
     qtbot.waitUntil(lambda: not panel.runner.busy)
@@ -317,7 +319,7 @@ def test_other_settings_make_results_old(window, passage, qtbot, in_a_thread, an
     run(panel, qtbot)
     before = dict(panel.table.results)
     window.store.change(changes.set_case, sliding="ds")
-    assert "settings have changed" in panel.said.label.text()
+    assert "settings have changed" in panel.status.label.text()
     answers("ask_unsaved", "discard")
     run(panel, qtbot)
     assert panel.table.results[1].seconds != before[1].seconds
@@ -354,7 +356,7 @@ def test_a_stop_keeps_what_is_there(passage, qtbot, in_a_thread):
     qtbot.waitUntil(lambda: len(panel.table.results) > 1, timeout=60_000)
     QTest.mouseClick(panel.stop, LEFT)
     qtbot.waitUntil(lambda: not panel.runner.busy, timeout=60_000)
-    assert panel.said.label.text() == "Stopped; the results are kept."
+    assert panel.status.label.text() == "Stopped; the results are kept."
     assert 1 < len(panel.table.results) < 500
 
 

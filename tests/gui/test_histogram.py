@@ -247,7 +247,7 @@ def test_what_goes_wrong_in_a_drawing_is_told_in_the_window(full, qtbot, monkeyp
     assert [str(error) for _, error, _ in caught] == ["no such font"]
     monkeypatch.undo()
     with qtbot.waitSignal(full.canvas.drawn):
-        full.canvas.ask()
+        full.canvas.request_draw()
 
 
 def test_it_is_dark_in_the_dark(full, qtbot):

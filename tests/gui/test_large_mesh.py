@@ -79,7 +79,7 @@ def test_only_the_boundary_is_in_memory_and_what_needs_all_cells_says_so(stator,
     assert (folder / "mesh.su2b").read_bytes() == before
     stator.window.actions_table.by_name["designs"].trigger()
     panel = stator.window.docks["designs"].findChild(DesignsPanel)
-    assert "sweep it with `slideviz sweep`" in panel.said.label.text()
+    assert "sweep it with `slideviz sweep`" in panel.status.label.text()
     assert not any(widget.isEnabled() for widget in (panel.rows.add, panel.load, panel.run))
     panel.start()
     assert not panel.runner.busy

@@ -22,7 +22,7 @@ from slideviz.case.model import (
 from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import with_boxes
 from slideviz.gui.dialogs.motion_table import TableDialog
-from slideviz.gui.panels.motion_form import control_point
+from slideviz.gui.panels.motion_form import control_point_problem
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.session import changes
 from slideviz.session.motions import Ghosts, TableRows
@@ -311,7 +311,7 @@ def test_motion_of_a_box_is_shown_edited_and_kept_and_takes_whole_numbers(boxed,
     for text in ("0.5", "-2"):
         boxed.type(form.index.fields[0], text)
         assert boxed.session.case.motions[0].index == (0, 0, -1)
-    assert "whole numbers from 0, or -1 for all" in control_point((0.5, 0.0))
+    assert "whole numbers from 0, or -1 for all" in control_point_problem((0.5, 0.0))
     boxed.type(form.index.fields[0], "9")
     assert boxed.session.case.motions[0].index == (9, 0, -1)
     (missing,) = run_requirements(boxed.session)[:1]

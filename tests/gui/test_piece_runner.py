@@ -20,7 +20,7 @@ def runner(qtbot):
 class Emitted:
     def __init__(self, runner):
         self.all = []
-        runner.came.connect(lambda value: self.all.append(("came", value)))
+        runner.yielded.connect(lambda value: self.all.append(("came", value)))
         runner.done.connect(lambda value: self.all.append(("done", value)))
         runner.failed.connect(lambda error: self.all.append(("failed", str(error))))
 

@@ -150,7 +150,7 @@ def test_garbage_is_looked_for_in_the_windows_thread_only(tidy, qtbot):
     assert not gc.isenabled()
     gc.collect()
     gone = weakref.ref(Ring())
-    tidy.look()
+    tidy.collect_if_due()
     assert gone() is not None, "for little, nobody looks"
     much = [[] for _ in range(2 * GARBAGE_OBJECTS)]
     assert gone() is not None
@@ -165,7 +165,7 @@ def test_old_garbage_is_found_too(tidy):
         gc.collect()
     del ring
     much = [[] for _ in range(2 * GARBAGE_OBJECTS)]
-    tidy.look()
+    tidy.collect_if_due()
     assert gone() is None
     assert much
 
@@ -225,7 +225,7 @@ def test_numpy_multiplies_in_the_thread_that_asks():
 
 def test_every_thread_stands_back_before_it_works(window, qtbot, monkeypatch):
     order = []
-    monkeypatch.setattr(threads, "stand_back", lambda: order.append("back"))
+    monkeypatch.setattr(threads, "lower_priority", lambda: order.append("back"))
     monkeypatch.setattr(threads.jit_warmup, "warm_up", lambda *_: order.append("warm"))
     window.warmup.start()
     qtbot.waitUntil(lambda: len(order) == 2)
@@ -246,7 +246,7 @@ def test_every_thread_stands_back_before_it_works(window, qtbot, monkeypatch):
 def test_python_is_set_up_for_a_window(qapp):
     before = sys.getswitchinterval()
     try:
-        collector = threads.be_quick()
+        collector = threads.tune_interpreter()
         assert sys.getswitchinterval() == pytest.approx(timers.SWITCH_S)
         assert not gc.isenabled()
         assert gc.get_freeze_count() > 1000

@@ -179,7 +179,7 @@ def test_a_large_mesh_appears_part_by_part_but_a_picture_is_whole_and_what_is_hi
     driver.open(case_file)
     assert view._veiled
     name = driver.session.mesh.marker_names[-1]
-    driver.window.store.change(changes.show, (name,), False)
+    driver.window.store.change(changes.show_boundaries, (name,), False)
     driver.qtbot.waitUntil(lambda: not view._veiled, timeout=20_000)
     assert not driver.window.scene.drawn[name].actor.visibility
     assert driver.window.scene.drawn[driver.session.mesh.marker_names[0]].actor.visibility

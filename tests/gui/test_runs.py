@@ -521,11 +521,11 @@ def test_steps_hiding_selection_and_clicks_act_on_both(ran):
         nodes = viewing.scene.drawn["airfoil"].surface.nodes
         seen = np.asarray(viewing.second_scene.drawn["airfoil"].shape.points)[:, :2]
         assert np.allclose(seen, frame.mesh.points[nodes]), step
-    store.change(changes.show, ("airfoil",), False)
+    store.change(changes.show_boundaries, ("airfoil",), False)
     store.change(changes.select, ("inlet",) if "inlet" in ran.session.case.roles else ("airfoil",))
     for scene in viewing._scenes():
         assert not scene.drawn["airfoil"].actor.visibility
-    store.change(changes.show, ("airfoil",))
+    store.change(changes.show_boundaries, ("airfoil",))
     for scene in viewing._scenes():
         assert scene.drawn["airfoil"].actor.visibility
     store.change(changes.select, ())

@@ -116,7 +116,7 @@ def test_a_section_that_is_dragged_goes_with_fewer_facets_and_what_changes_meanw
     press_and_move(window.view)
     name = stator.session.mesh.marker_names[0]
     window.store.change(changes.set_view, color_by="size-skew")
-    window.store.change(changes.show, (name,), shown=False)
+    window.store.change(changes.show_boundaries, (name,), shown=False)
     every, some = shown(scene)
     assert not every
     assert name not in some

@@ -67,7 +67,7 @@ def test_a_job_that_waits_for_compilation_says_so(window, qtbot, work):
     assert text.text() == "Reading a.su2"
     work.compile.set()
     qtbot.waitUntil(lambda: text.text() == "Reading a.su2 (compiling, once)")
-    window.run_panel.show_doing(JobProgress("Measuring the cells", 0.5))
+    window.run_panel.show_progress(JobProgress("Measuring the cells", 0.5))
     assert text.text() == "Measuring the cells (compiling, once)"
     work.end.set()
     qtbot.waitUntil(lambda: text.text() == "Measuring the cells")

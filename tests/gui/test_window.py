@@ -22,7 +22,7 @@ from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.session import changes, jobs
 from slideviz.session.inspect import worst_cells
-from slideviz.session.run_messages import ended
+from slideviz.session.run_messages import end_message
 from slideviz.session.runs_table import described
 
 
@@ -411,7 +411,7 @@ def test_settings_reach_the_case_and_impossible_numbers_do_not(opened):
     assert (case.sliding, case.periodic, case.periodic_type) == ("ds", "moving", "translational")
     assert (case.steps, case.influence_factor, case.feature_angle_deg) == (12, 3.5, 35.0)
     assert (case.quality_metric, case.kernel) == ("rbf-slide", "wendland-c4")
-    assert "λ =" in method.found.text()
+    assert "λ =" in method.period_hint.text()
     field = more.influence_factor
     opened.window.store.change(changes.set_case, influence_factor=2.5)
     field.selectAll()
@@ -435,7 +435,7 @@ def test_what_is_not_available_says_why(opened):
     assert not method.periodic.isEnabled()
     assert "no boundary has the role" in method.periodic.toolTip()
     assert not method.sliding.isEnabled()
-    assert "Periodicity: no boundary" in method.reason.text()
+    assert "Periodicity: no boundary" in method.idle_reasons.text()
     opened.role("periodic_1", "periodic")
     assert method.periodic.isEnabled()
     assert "Whether" not in method.periodic.toolTip()
@@ -754,7 +754,7 @@ def test_inverted_cells_are_told_in_red_with_what_would_help(ready):
     assert "more steps" in panel.text.toolTip()
     assert banner.property("calm") is False
     assert "38 inverted cells. What may help: " in banner.text.text()
-    assert "inverted" in ended(run_)
+    assert "inverted" in end_message(run_)
     # From step 0, and from an order of one's own, too.
     session, table = ready.session, ready.window.dock_manager.panels["worst"].table
     table.sortByColumn(CELL, Qt.SortOrder.DescendingOrder)

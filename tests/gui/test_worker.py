@@ -20,7 +20,7 @@ class Ears:
         runner.finished.connect(lambda value: self.end("finished", value))
         runner.cancelled.connect(lambda: self.end("cancelled", None))
         runner.failed.connect(lambda error: self.end("failed", error))
-        runner.doing.connect(self.doing.append)
+        runner.progressed.connect(self.doing.append)
         runner.kept.connect(self.kept.extend)
 
     def end(self, *what):

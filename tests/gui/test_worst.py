@@ -19,7 +19,7 @@ from slideviz.gui.panels.worst_table import (
     QUALITY,
     SINCE,
     WorstModel,
-    digits_apart,
+    distinguishing_digits,
     place_digits,
 )
 from slideviz.gui.widgets import plot_canvas
@@ -411,10 +411,10 @@ def test_the_sign_of_the_order_does_not_touch_the_word(full):
 
 
 def test_qualities_have_as_many_digits_as_tell_them_apart():
-    assert digits_apart(np.array([0.1, 0.2, 0.3])) == 4
-    assert digits_apart(np.array([0.94915, 0.94916, 0.94917, 0.94918])) == 5
-    assert digits_apart(np.full(9, 0.5)) == 4
-    assert digits_apart(np.empty(0)) == 4
+    assert distinguishing_digits(np.array([0.1, 0.2, 0.3])) == 4
+    assert distinguishing_digits(np.array([0.94915, 0.94916, 0.94917, 0.94918])) == 5
+    assert distinguishing_digits(np.full(9, 0.5)) == 4
+    assert distinguishing_digits(np.empty(0)) == 4
 
 
 def worst_at(positions, numbers):

@@ -14,9 +14,9 @@ from slideviz.mesh.periodic import find_pairs, pair_up
 from slideviz.mesh.quality import quality
 from slideviz.plots.figure_io import figure_bytes
 from slideviz.session import changes
-from slideviz.session.motions import found_text
+from slideviz.session.motions import pair_text
 from slideviz.session.opening import guess_by_name, open_mesh
-from slideviz.session.run_messages import in_window_words, run_requirements
+from slideviz.session.run_messages import run_requirements, with_field_labels
 from slideviz.session.runs_table import best
 from slideviz.session.state import Run, StepFrame
 
@@ -73,10 +73,10 @@ def test_the_axis_of_what_matches_comes_with_it(plain):
 
 def test_those_without_a_partner_are_named_beside_those_that_have_one(plain):
     session = changes.set_role(plain, ("left", "right", "bottom"), "periodic")
-    text = found_text(session)
+    text = pair_text(session)
     assert "Found: " in text
     assert "No match found yet for bottom; the run will try." in text
-    whole = found_text(changes.set_role(session, ("top",), "periodic"))
+    whole = pair_text(changes.set_role(session, ("top",), "periodic"))
     assert "No match" not in whole
 
 
@@ -178,7 +178,7 @@ def test_a_vtu_file_has_the_displacement(square, tmp_path, vector):
     ],
 )
 def test_messages_have_the_words_of_the_window(text, said):
-    assert in_window_words(text) == said
+    assert with_field_labels(text) == said
 
 
 def test_what_is_missing_has_the_words_of_the_window(plain):

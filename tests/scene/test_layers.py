@@ -105,10 +105,10 @@ def test_points_follow_the_step_and_their_boundary(scene, row):
     scene.update(moved)
     assert has(near(scene, at + LEFT), NODE_TYPES["moving"].color)
     assert not has(near(scene, at), NODE_TYPES["moving"].color, 25)
-    hidden = changes.show(moved, ("BLADE",), False)
+    hidden = changes.show_boundaries(moved, ("BLADE",), False)
     scene.update(hidden)
     assert not has(near(scene, at + LEFT), NODE_TYPES["moving"].color)
-    scene.update(changes.show_frame(changes.show(hidden, ("BLADE",)), 0))
+    scene.update(changes.show_frame(changes.show_boundaries(hidden, ("BLADE",)), 0))
     assert has(near(scene, at), NODE_TYPES["moving"].color)
 
 

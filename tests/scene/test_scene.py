@@ -156,7 +156,7 @@ def test_hidden_boundaries_are_not_drawn_and_not_picked(scene, session):
     session = opened(scene, changes.set_role(session, ("left",), "moving"))
     x, y = to_display(scene.plotter, np.array([[0.0, 1.5, 0.0]]))[0]
     assert scene.pick(x, y) == "left"
-    scene.update(changes.show(session, ("left",), False))
+    scene.update(changes.show_boundaries(session, ("left",), False))
     # The legend still names the role, so that some of its color remains.
     assert count(image(scene), ROLES["moving"].color) < 250
     assert scene.pick(x, y) is None
@@ -179,7 +179,7 @@ def test_a_click_finds_the_front_boundary_of_a_3d_mesh(scene, cube):
         scene.plotter.render()
         x, y = to_display(scene.plotter, np.array([cube.points.mean(axis=0)]))[0]
         assert scene.pick(x, y) == name, side
-    scene.update(changes.show(session, ("FRONT",), False))
+    scene.update(changes.show_boundaries(session, ("FRONT",), False))
     assert scene.pick(x, y) in ("BLOCK", "BACK")
     assert scene.pick(2, 2) is None
 

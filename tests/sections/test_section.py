@@ -14,7 +14,7 @@ from slideviz.mesh.model import Cells, Mesh
 from slideviz.sections.cut import Cutter, cut_cases
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import joined
-from slideviz.session.section_cuts import span
+from slideviz.session.section_cuts import position_range
 from tests.builders import cube, passage, permuted, square
 from tests.oracles.sections import cut_cells, height
 
@@ -276,9 +276,9 @@ def test_cells_of_no_kind_that_a_mesh_has_are_no_trouble():
 def test_the_reach_tells_where_a_section_meets_the_mesh():
     mesh = passage()
     radii = np.hypot(mesh.points[:, 0], mesh.points[:, 1])
-    low, high = span(Section("cylinder", radius=1.0), mesh.points)
+    low, high = position_range(Section("cylinder", radius=1.0), mesh.points)
     assert (low, high) == pytest.approx((radii.min(), radii.max()))
-    low, high = span(Section("plane", (0, 0, 0.25), (0, 0, 2)), mesh.points)
+    low, high = position_range(Section("plane", (0, 0, 0.25), (0, 0, 2)), mesh.points)
     assert (low, high) == pytest.approx((mesh.points[:, 2].min(), mesh.points[:, 2].max()))
 
 

@@ -21,7 +21,7 @@ from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session.opening import open_mesh
 from slideviz.session.passages import keeps, passages
-from slideviz.session.section_cuts import first_section, span, turned
+from slideviz.session.section_cuts import first_section, position_range, with_direction
 from slideviz.session.state import StepFrame
 from tests.builders import cube, grid, ring, square
 from tests.sections.test_section import KINDS, areas, shaken
@@ -258,17 +258,17 @@ def test_it_starts_from_end_to_end_of_the_passage_at_round_numbers(extent):
     assert max(len(f"{v:.10g}") for v in (*section.origin, section.half_angle_deg)) <= 7
     found = Cutter.of(mesh).cut(mesh.points, section)
     assert np.ptp(found.points[:, 2]) > 0.5 * np.ptp(mesh.points[:, 2])
-    low, high = span(section, mesh.points)
+    low, high = position_range(section, mesh.points)
     assert low < section.half_angle_deg < high
 
 
 def test_another_axis_or_apex_leaves_it_where_it_cuts():
     points = sector(degrees=360.0).points
-    assert turned(CUT, (0.0, 0.0, 2.0), points).half_angle_deg == ANGLE
-    across = turned(
+    assert with_direction(CUT, (0.0, 0.0, 2.0), points).half_angle_deg == ANGLE
+    across = with_direction(
         Section("cone", (-3.0, 0.0, 0.5), (0, 0, 1), half_angle_deg=1.0), (1, 0, 0), points
     )
-    low, high = span(across, points)
+    low, high = position_range(across, points)
     assert low < across.half_angle_deg < high
 
 

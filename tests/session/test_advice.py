@@ -11,7 +11,13 @@ from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.reduction import Reduction
 from slideviz.session.motions import largest_prescribed
-from slideviz.session.run_messages import ended, exact_cost, help_for, inverted_words, loose_words
+from slideviz.session.run_messages import (
+    end_message,
+    exact_cost,
+    inverted_words,
+    remedy_for,
+    tolerance_warning,
+)
 from slideviz.session.state import Run, StepFrame
 from slideviz.solver import deform as solver
 from slideviz.solver.deform import deform
@@ -37,13 +43,13 @@ def with_inverted(run, count):
 
 
 def test_it_tells_the_end_and_the_inverted_cells(run):
-    assert ended(replace(run, frames=())) == "Ready."
-    assert ended(run) == "Done."
-    assert ended(with_inverted(run, 1)) == "Done: 1 inverted cell"
+    assert end_message(replace(run, frames=())) == "Ready."
+    assert end_message(run) == "Done."
+    assert end_message(with_inverted(run, 1)) == "Done: 1 inverted cell"
     assert inverted_words(with_inverted(run, 12)) == "12 inverted cells"
     stopped = replace(run, frames=run.frames[:1])
-    assert ended(stopped) == "Stopped after step 1 of 2."
-    assert ended(with_inverted(stopped, 3)) == "Stopped after step 1 of 2: 3 inverted cells."
+    assert end_message(stopped) == "Stopped after step 1 of 2."
+    assert end_message(with_inverted(stopped, 3)) == "Stopped after step 1 of 2: 3 inverted cells."
 
 
 @pytest.mark.parametrize(
@@ -63,7 +69,7 @@ def test_it_tells_the_end_and_the_inverted_cells(run):
 def test_it_offers_what_the_case_has_not_used(case, words, not_words):
     """The window and the command line offer the same, in the same order."""
     mesh = Mesh(np.zeros((3, 2)), Cells.from_blocks([(5, [[0, 1, 2]])]))
-    text = help_for(Run(1, case), mesh)
+    text = remedy_for(Run(1, case), mesh)
     assert all(word in text for word in words)
     assert not any(word in text for word in not_words)
     assert advice_for(case, 0.0).count(";") == text.count(";")
@@ -71,7 +77,7 @@ def test_it_offers_what_the_case_has_not_used(case, words, not_words):
 
 def test_where_the_motion_goes_through_itself_no_steps_are_offered(run, passage):
     folding = "airfoil goes through itself near (0, 0); cells will overlap there."
-    assert help_for(run, passage.mesh, folding) == (
+    assert remedy_for(run, passage.mesh, folding) == (
         "airfoil goes through itself near (0, 0), so more steps cannot help; another motion, or a "
         "smaller one, may."
     )
@@ -88,14 +94,14 @@ def test_fixed_boundaries_beside_inverted_cells_and_the_last_valid_step_are_name
     frames = (run.frames[0], replace(run.last, quality=bad))
     fixed = dict(case.roles) | {"outflow": "fixed", "inflow": "fixed"}
     of_fixed = replace(run, case=case.change(roles=fixed), frames=frames)
-    text = help_for(of_fixed, mesh)
+    text = remedy_for(of_fixed, mesh)
     assert text.startswith("Step 1 of 2 is the last without any. What may help: the role “slid")
     assert "“sliding” for outflow beside these cells, and a sliding method; more steps" in text
     assert "MARKER_SLIDING for outflow beside these cells, and SLIDING_MODE= ps or ds; more" in (
         advice_for(of_fixed.case, 0.0, mesh, bad)
     )
     without = replace(of_fixed, frames=frames[1:])
-    assert help_for(without, mesh).startswith("What may help: ")
+    assert remedy_for(without, mesh).startswith("What may help: ")
 
 
 @pytest.mark.parametrize(
@@ -111,10 +117,10 @@ def test_fixed_boundaries_beside_inverted_cells_and_the_last_valid_step_are_name
 )
 def test_a_motion_beyond_the_pitch_is_named(run, passage, motion, words):
     case = passage.case.change(motions=(motion,), periodic="moving", sliding="ps")
-    text = help_for(replace(run, case=case, frames=()), passage.mesh)
+    text = remedy_for(replace(run, case=case, frames=()), passage.mesh)
     assert text.startswith(words or "What may help")
     assert ("a motion below the pitch" in text) == bool(words)
-    assert "pitch" not in help_for(replace(run, case=case.change(periodic="none")), passage.mesh)
+    assert "pitch" not in remedy_for(replace(run, case=case.change(periodic="none")), passage.mesh)
 
 
 def test_a_rotation_beyond_the_pitch_is_named_in_degrees(run, passage):
@@ -142,11 +148,11 @@ def test_a_tolerance_above_the_motion_is_told_before_a_run(passage, reduction, w
     case, motion = passage.case, Translate("airfoil", (0.0, 0.2))
     largest = largest_prescribed(case.change(motions=(motion,)), passage.mesh)
     assert largest == pytest.approx(0.2)
-    text = loose_words(case.change(reduction=reduction), 2.0, largest)
+    text = tolerance_warning(case.change(reduction=reduction), 2.0, largest)
     assert text.startswith(words)
     assert bool(text) == bool(words)
     assert text.endswith("A hundredth of it is 0.002." if words else "")
-    assert loose_words(case.change(reduction=reduction), 2.0, 0.0) == ""
+    assert tolerance_warning(case.change(reduction=reduction), 2.0, 0.0) == ""
     assert largest_prescribed(case.change(motions=()), passage.mesh) == 0.0
 
 

@@ -71,6 +71,6 @@ def test_it_is_written_as_a_displacement_file(rows, tmp_path):
 def test_a_large_file_is_not_edited_by_hand(tmp_path, monkeypatch):
     path = tmp_path / "table.txt"
     path.write_text("1 0 0\n" * 10)
-    monkeypatch.setattr(motions, "LARGEST", 59)
+    monkeypatch.setattr(motions, "MOST_BYTES", 59)
     with pytest.raises(CaseError, match="too much to be edited here"):
         table_text(path)

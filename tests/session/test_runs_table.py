@@ -15,11 +15,11 @@ from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.runs_table import COLUMNS, best, described, table_text, write_table
 from slideviz.session.runs_words import (
-    brief,
     method_words,
     reduction_words,
     seconds_words,
     steps_words,
+    summary,
 )
 from slideviz.session.state import Run, StepFrame
 from slideviz.solver.deform import deform
@@ -79,10 +79,10 @@ def test_the_table_is_written_whole_or_not_at_all(runs, tmp_path):
 def test_a_run_is_described_in_a_line_and_in_full(runs):
     first, second = runs
     nodes = [run.last.step.control_nodes for run in runs]
-    assert brief(first).startswith(f"moving vertices · 2 steps · {nodes[0]} nodes · ")
-    assert brief(second).startswith(f"fixed vertices · 1 step · {nodes[1]} nodes · ")
+    assert summary(first).startswith(f"moving vertices · 2 steps · {nodes[0]} nodes · ")
+    assert summary(second).startswith(f"fixed vertices · 1 step · {nodes[1]} nodes · ")
     other = replace(second, case=second.case.change(kernel="gaussian", periodic="none"))
-    assert brief(other).startswith("1 step · Gaussian · ")
+    assert summary(other).startswith("1 step · Gaussian · ")
     assert "kernel: Gaussian (global)" in described(other)
     text = described(second)
     assert all(f"{column.title}: " in text for column in COLUMNS if column.title != "name")
@@ -94,8 +94,8 @@ def test_a_run_is_described_in_a_line_and_in_full(runs):
 
 def test_a_run_that_is_not_done_says_how_far_it_came(runs):
     going = replace(runs[0], frames=runs[0].frames[:1], end="")
-    assert brief(going).startswith("running · moving vertices · 1 of 2 steps")
-    assert brief(replace(going, end="cancelled")).startswith("cancelled · ")
+    assert summary(going).startswith("running · moving vertices · 1 of 2 steps")
+    assert summary(replace(going, end="cancelled")).startswith("cancelled · ")
     bare = Run(3, runs[0].case.change(steps=0))
     assert steps_words(bare) == "0 steps, automatic"
     found = rows(table_text([bare]))[0]

@@ -14,7 +14,7 @@ from slideviz.rbf.reduction import Reduction
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.panes import choices
-from slideviz.session.runs_words import brief, run_words
+from slideviz.session.runs_words import run_words, summary
 from slideviz.session.state import Run, Session, StepFrame
 
 BASE = Case(roles={"blade": "moving", "in": "sliding"}, motions=(Rotate("blade", 5.0),), steps=3)
@@ -39,7 +39,7 @@ def moved(*motions):
 
 def words(*cases):
     runs = runs_of(*cases)
-    return [brief(run, runs) for run in runs]
+    return [summary(run, runs) for run in runs]
 
 
 def test_motions_are_told_where_they_differ():
@@ -139,7 +139,7 @@ def test_a_run_can_have_a_name_of_its_own():
     plain, named = session.runs
     assert (named.name, plain.name) == ("stiff blade", "")
     assert (run_words(named), run_words(plain)) == ("stiff blade", "no sliding")
-    assert brief(named, session.runs).startswith("no sliding · "), "what it is, is told still"
+    assert summary(named, session.runs).startswith("no sliding · "), "what it is, is told still"
     assert (named.label, plain.label) == ("run 2: stiff blade", "run 1")
     assert (
         replace(named, name="a name of many letters in all").label == "run 2: a name of many lett…"
@@ -190,5 +190,5 @@ def test_every_setting_that_changes_a_result_tells_runs_apart(key):
         reduction=Reduction(0.25, multilevel=True),
     )
     runs = runs_of(base, key.put(base, other_value(key, base)))
-    first, second = (f"{run_words(run)}: {brief(run, runs)}" for run in runs)
+    first, second = (f"{run_words(run)}: {summary(run, runs)}" for run in runs)
     assert first != second

@@ -13,7 +13,7 @@ from slideviz.session import changes
 from slideviz.session.colors import fit_colors
 from slideviz.session.opening import open_mesh
 from slideviz.session.run_messages import run_requirements
-from slideviz.session.state import Session, StepFrame, essence
+from slideviz.session.state import Session, StepFrame, result_settings
 from slideviz.session.store import Store
 
 
@@ -50,7 +50,7 @@ def test_a_role_for_several_confirms_their_guesses_and_leaves_the_others(session
 
 
 def test_confirming_keeps_the_roles(session):
-    new = changes.confirm(session)
+    new = changes.confirm_guesses(session)
     assert not new.guesses
     assert new.case == session.case
 
@@ -95,10 +95,10 @@ def test_motions_are_added_replaced_moved_and_removed_in_order(session):
 
 
 def test_hide_show_isolate(session):
-    assert changes.show(session, ("left",), False).view.hidden == {"left"}
+    assert changes.show_boundaries(session, ("left",), False).view.hidden == {"left"}
     only = changes.isolate(session, ("left",))
     assert only.view.hidden == {"bottom", "right", "top"}
-    assert changes.show(only, session.mesh.marker_names).view.hidden == frozenset()
+    assert changes.show_boundaries(only, session.mesh.marker_names).view.hidden == frozenset()
 
 
 def test_frames_are_kept_shown_and_limited(session):
@@ -128,7 +128,7 @@ def test_settings_without_effect_make_no_step_outdated(session):
 
 
 def test_essence_takes_unnamed_boundaries_as_fixed():
-    assert essence(Case(roles={"a": "fixed", "b": "moving"})) == essence(
+    assert result_settings(Case(roles={"a": "fixed", "b": "moving"})) == result_settings(
         Case(roles={"b": "moving"})
     )
 
@@ -226,7 +226,7 @@ def test_store_works_again_after_a_listener_failed():
 def test_fresh_view_keeps_the_taste_but_not_the_boundaries(session):
     gone = {"hidden": frozenset({"gone"}), "selected": ("gone",)}
     old = replace(session.view, drawn=frozenset({"triad"}), **gone)
-    new = changes.fresh_view(session, old)
+    new = changes.inherit_view(session, old)
     assert new.view.drawn == {"triad"}
     assert new.view.hidden == frozenset()
     assert new.view.selected == ()
@@ -263,10 +263,10 @@ def test_the_undeformed_mesh_can_be_shown_beside_a_run(session):
 
 
 def test_the_range_of_the_displacement_ends_at_a_round_number():
-    from slideviz.session.state import round_above
+    from slideviz.session.state import round_up
 
     for value, wanted in ((0.0202, 0.025), (1.0, 1.0), (9.1, 10.0), (3e-7, 3e-7), (0.0, 0.0)):
-        assert round_above(value) == pytest.approx(wanted, rel=1e-12)
+        assert round_up(value) == pytest.approx(wanted, rel=1e-12)
 
 
 def test_each_quantity_has_a_color_range_of_its_own(session):

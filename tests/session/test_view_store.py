@@ -15,7 +15,7 @@ from slideviz.session.changes import UNDO_WORDS, undo_words
 from slideviz.session.colors import fit_colors
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import Session, StepFrame, ViewState
-from slideviz.session.store import TOGETHER_S, Store, UndoState
+from slideviz.session.store import MERGE_S, Store, UndoState
 from slideviz.terms import COLOR_BY, ROLES, SHOWN
 
 
@@ -70,7 +70,7 @@ def test_a_new_change_after_undo_ends_redo(store, clock):
 def test_typing_into_one_field_is_undone_at_once_but_another_field_is_not(store, clock):
     for steps in (1, 12, 123):
         store.change(changes.set_case, steps=steps)
-        clock.now += TOGETHER_S / 2
+        clock.now += MERGE_S / 2
     store.change(changes.set_case, sliding="ps")
     store.undo()
     assert store.session.case.steps == 123
@@ -120,7 +120,7 @@ def test_each_change_that_can_be_undone_has_words():
         "add_motion": "new motion",
         "add_section": "new section",
         "choose_section": "choice of a section",
-        "confirm": "confirming guesses",
+        "confirm_guesses": "confirming guesses",
         "fit_colors": "color range",
         "isolate": "hidden boundaries",
         "lay_flat": "flat view",
@@ -133,9 +133,9 @@ def test_each_change_that_can_be_undone_has_words():
         "set_case": "settings",
         "set_role": "role",
         "set_view": "view",
-        "show": "hidden boundaries",
+        "show_boundaries": "hidden boundaries",
         "show_handle": "handle",
-        "take_settings": "settings of a run",
+        "adopt_settings": "settings of a run",
     }
 
 
@@ -184,7 +184,7 @@ def test_what_the_mouse_holds_is_undone_as_one_however_long_it_takes(store, cloc
         store.set_dragging(True)
         for step in range(4):
             store.change(changes.set_view, threshold=(low + 0.01 * step, 0.9))
-            clock.now += 3 * TOGETHER_S
+            clock.now += 3 * MERGE_S
         store.set_dragging(False)
     assert store.session.view.threshold == (0.53, 0.9)
     store.undo()
@@ -327,7 +327,7 @@ def test_any_intents_keep_the_session_valid_and_undoing_all_gives_the_first_back
     for intent in some:
         perform(store, intent)
         require_valid(store.session)
-        clock.now += 2 * TOGETHER_S if slowly else 0.1
+        clock.now += 2 * MERGE_S if slowly else 0.1
     while store.can_undo:
         store.undo()
         require_valid(store.session)

@@ -8,7 +8,7 @@ from slideviz.cli.run_outcome import advice_for
 from slideviz.mesh.quality import quality
 from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.samples.table import sample
-from slideviz.session.run_messages import help_for
+from slideviz.session.run_messages import remedy_for
 from slideviz.session.state import Run, StepFrame
 from slideviz.solver import setup
 from slideviz.solver.deform import Step
@@ -106,7 +106,7 @@ def test_it_stays_below_half_of_the_first_layer_beside_sliding_walls(monkeypatch
     relative = loose.change(reduction=Reduction(relative=1e-4))
     keys = "DATA_RED_TOLERANCE= 5e-07 instead of DATA_RED_RELATIVE, half of"
     assert keys in advice_for(relative, 5e-7)
-    shown = help_for(Run(1, loose, (StepFrame(bad.mesh, state, bad),), "done"), mesh)
+    shown = remedy_for(Run(1, loose, (StepFrame(bad.mesh, state, bad),), "done"), mesh)
     assert "What may help: a data reduction with the tolerance 5e-07, half of" in shown
 
 

@@ -98,7 +98,7 @@ class Exports(QObject):
                 marked=renderer.session.marked_here,
             )
             copy_image(to_image(renderer.image(options)))
-        self.window.say(f"Copied a picture of {size[0]} × {size[1]} pixels")
+        self.window.show_status(f"Copied a picture of {size[0]} × {size[1]} pixels")
 
     # Films -----------------------------------------------------------------------------
 
@@ -117,7 +117,9 @@ class Exports(QObject):
         self.film = dialog
         dialog.made.connect(self._written)
         dialog.failed.connect(self.window.banner.show_error)
-        dialog.stopped.connect(lambda: self.window.say("The film was stopped; no file is left"))
+        dialog.stopped.connect(
+            lambda: self.window.show_status("The film was stopped; no file is left")
+        )
         dialog.finished.connect(self._film_closed)
         dialog.show()
 
@@ -189,12 +191,14 @@ class Exports(QObject):
             self.window.store.change(changes.saved_mesh)
         self._written(paths[-1])
         if not whole:
-            self.window.say(f"Saved {len(paths)} meshes, {paths[0].name} to {paths[-1].name}")
+            self.window.show_status(
+                f"Saved {len(paths)} meshes, {paths[0].name} to {paths[-1].name}"
+            )
 
     def _written(self, path: Path) -> None:
         self.window.settings.setValue("folder", str(path.parent))
         log.info("wrote %s", path)
-        self.window.say(f"Saved {path}")
+        self.window.show_status(f"Saved {path}")
 
 
 def picture_filters(session: Session) -> str:

@@ -22,11 +22,11 @@ from slideviz.export.film import (
 from slideviz.export.offscreen import LARGEST, SMALLEST
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
-from slideviz.gui.responsiveness.timers import PREVIEW_MS, later
-from slideviz.gui.responsiveness.worker import PieceRunner, raise_again
+from slideviz.gui.responsiveness.timers import PREVIEW_MS, single_shot
+from slideviz.gui.responsiveness.worker import PieceRunner, reraise
 from slideviz.gui.widgets.build import (
     QuietBar,
-    boxed,
+    as_widget,
     check_box,
     decimal_box,
     hint_label,
@@ -244,19 +244,19 @@ class FilmDialog(QDialog):
         self._ask = ask
         self._file: Path | None = None
         self._runner, self._previewing = PieceRunner(self), PieceRunner(self)
-        self._runner.came.connect(self._came)
+        self._runner.yielded.connect(self._progressed)
         self._runner.done.connect(self._done)
         self._runner.failed.connect(self._failed)
-        self._previewing.failed.connect(raise_again)
+        self._previewing.failed.connect(reraise)
         self.form = FilmForm(renderer)
         self.form.changed.connect(self._changed)
         self.words = QLabel()
         self.words.setTextFormat(Qt.TextFormat.PlainText)  # it has the name of a file
         self.words.setWordWrap(True)
         self.bar = QuietBar()
-        parts = boxed(in_column(self._make_previews(), self.form, self.words, self.bar))
+        parts = as_widget(in_column(self._make_previews(), self.form, self.words, self.bar))
         self.setLayout(in_column(on_screen(parts, self), self._make_buttons()))
-        self._soon = later(self, self._draw, PREVIEW_MS)
+        self._soon = single_shot(self, self._draw, PREVIEW_MS)
         self._changed()
         self._show_filming(False)
 
@@ -315,7 +315,7 @@ class FilmDialog(QDialog):
         self._runner.start(film_steps(self.renderer, options, file, film_options, overwrite=True))
         self._show_filming(True)
 
-    def _came(self, drawn: FilmProgress) -> None:
+    def _progressed(self, drawn: FilmProgress) -> None:
         self.bar.setRange(0, drawn.total)
         self.bar.setValue(drawn.done)
         self.words.setText(f"Image {drawn.done} of {drawn.total} of {self._file.name}")

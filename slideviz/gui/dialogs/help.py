@@ -102,7 +102,7 @@ class Help(QObject):
     def copy_details(self) -> None:
         """Copy the details for a bug report to the clipboard (see `details`)."""
         QApplication.clipboard().setText(details(self.window))
-        self.window.say("Copied; paste it into the report and say what you did")
+        self.window.show_status("Copied; paste it into the report and say what you did")
 
     def _show(self, name: str, make: Callable[[], QDialog]) -> None:
         dialog = self._shown.get(name)

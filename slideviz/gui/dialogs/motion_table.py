@@ -8,7 +8,7 @@ from qtpy.QtCore import QSize
 from qtpy.QtWidgets import QDialog, QDialogButtonBox, QLabel, QPlainTextEdit, QWidget
 
 from slideviz.errors import SlidevizError
-from slideviz.gui.responsiveness.timers import TABLE_MS, later
+from slideviz.gui.responsiveness.timers import TABLE_MS, single_shot
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import dialog_buttons, in_column, set_style
 from slideviz.gui.widgets.labels import fixed_font
@@ -58,7 +58,7 @@ class TableDialog(QDialog):
         self.buttons.addButton(QDialogButtonBox.StandardButton.Cancel)
         self.setLayout(in_column(about, self.edit, self.answer, self.buttons, wide=[self.edit]))
         self.fill.clicked.connect(self._fill)
-        self._soon = later(self, self.check, TABLE_MS)
+        self._soon = single_shot(self, self.check, TABLE_MS)
         self.edit.textChanged.connect(self._soon.start)
         self.edit.setFocus()
         self.check()

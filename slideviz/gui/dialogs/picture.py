@@ -17,10 +17,10 @@ from slideviz.export.offscreen import LARGEST, LETTERS, SMALLEST, font_scale
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import BACKGROUNDS, PictureOptions, size_words
 from slideviz.export.vector import MOST_CELLS
-from slideviz.gui.responsiveness.timers import PREVIEW_MS, later
-from slideviz.gui.responsiveness.worker import PieceRunner, raise_again
+from slideviz.gui.responsiveness.timers import PREVIEW_MS, single_shot
+from slideviz.gui.responsiveness.worker import PieceRunner, reraise
 from slideviz.gui.widgets.build import (
-    boxed,
+    as_widget,
     check_box,
     decimal_box,
     dialog_buttons,
@@ -110,11 +110,11 @@ class PictureDialog(QDialog):
         self._make_options()
         left = in_column(self.preview, self.words, self.kinds, None)
         parts = in_row(left, in_column(self._form, None), spacing=16)
-        self.setLayout(in_column(on_screen(boxed(parts), self), self._make_buttons()))
-        self._timer = later(self, self._draw, PREVIEW_MS)
+        self.setLayout(in_column(on_screen(as_widget(parts), self), self._make_buttons()))
+        self._timer = single_shot(self, self._draw, PREVIEW_MS)
         self._runner = PieceRunner(self)
-        self._runner.failed.connect(raise_again)
-        self._take(kept)
+        self._runner.failed.connect(reraise)
+        self._restore_choices(kept)
         self._changed()
 
     # Parts -----------------------------------------------------------------------------
@@ -140,9 +140,9 @@ class PictureDialog(QDialog):
         self.dpi = number_box(50, 1200, round(PAPER[2]), self._changed, unit=" dpi", tip=tip)
         self._form = QFormLayout()
         self._form.addRow("Size", self.size_choice)
-        self._pixels = boxed(in_row(self.width_px, QLabel("×"), self.height_px, None))
+        self._pixels = as_widget(in_row(self.width_px, QLabel("×"), self.height_px, None))
         paper = (self.width_cm, QLabel("×"), self.height_cm, self.dpi)
-        self._paper = boxed(in_row(*paper, None))
+        self._paper = as_widget(in_row(*paper, None))
         self._form.addRow("", self._pixels)
         self._form.addRow("", self._paper)
         self.text = Choice(TEXT, "How large letters are; on paper, normal is 8.5 points.")
@@ -202,7 +202,7 @@ class PictureDialog(QDialog):
             del kept["marked"]
         return json.dumps(kept)
 
-    def _take(self, kept: str) -> None:
+    def _restore_choices(self, kept: str) -> None:
         """Fill the fields from the `choices` of the last time; from defaults if there are none."""
         usual = replace(PictureOptions(), fill=self.renderer.fills)
         known = asdict(usual)

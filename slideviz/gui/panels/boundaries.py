@@ -24,7 +24,7 @@ from slideviz.gui.widgets.icons import role_icon
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.session import changes
-from slideviz.session.run_messages import idle_words
+from slideviz.session.run_messages import idle_text
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.terms import ROLES, labels
@@ -96,7 +96,7 @@ class BoundariesPanel(Panel):
         self.keep = push_button(
             "Keep all",
             "Confirm every guessed role.",
-            lambda: self.store.change(changes.confirm),
+            lambda: self.store.change(changes.confirm_guesses),
             "keep",
         )
         guesses = in_row(self.guess_text, self.keep, wide=[self.guess_text])
@@ -145,7 +145,7 @@ class BoundariesPanel(Panel):
             for row, name in enumerate(names):
                 self._sync_row(session, row, name)
             self._sync_selection(session)
-        self.idle_text.setText("\n".join(idle_words(session.case)))
+        self.idle_text.setText("\n".join(idle_text(session.case)))
         self.idle_text.setVisible(bool(self.idle_text.text()))
         count = len(session.guesses)
         self.keep.setVisible(count > 0)
@@ -175,7 +175,7 @@ class BoundariesPanel(Panel):
             choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             for index, role in enumerate(ROLES):
                 choice.setItemIcon(index, role_icon(role))
-            choice.explain({role: f"{role}: {ROLES[role].tip}" for role in ROLES})
+            choice.set_tips({role: f"{role}: {ROLES[role].tip}" for role in ROLES})
             choice.chosen.connect(partial(self._role_chosen, name))
             self.table.setCellWidget(row, ROLE, choice)
             self._choices.append(choice)
@@ -239,7 +239,7 @@ class BoundariesPanel(Panel):
         shown = item.checkState() == Qt.CheckState.Checked
         name = self._names[item.row()]
         chosen = self.selected()
-        self.store.change(changes.show, chosen if name in chosen else (name,), shown)
+        self.store.change(changes.show_boundaries, chosen if name in chosen else (name,), shown)
 
     def _role_chosen(self, name: str, role: object) -> None:
         chosen = self.selected()
@@ -265,21 +265,21 @@ def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMen
         act.setCheckable(True)
         act.setChecked(roles == {role})
         act.setIconVisibleInMenu(roles != {role})  # in its place there is the check mark
-        act.triggered.connect(_later(store, changes.set_role, names, role))
+        act.triggered.connect(_slot(store, changes.set_role, names, role))
         menu.addAction(act)
     menu.addSeparator()
     if any(name in store.session.guesses for name in names):
         keep = menu.addAction("Keep the guess")
-        keep.triggered.connect(_later(store, changes.confirm, names))
+        keep.triggered.connect(_slot(store, changes.confirm_guesses, names))
     for text, function, values in (
-        ("Hide", changes.show, (names, False)),
+        ("Hide", changes.show_boundaries, (names, False)),
         ("Show only this" if len(names) == 1 else "Show only these", changes.isolate, (names,)),
-        ("Show all", changes.show, (store.session.mesh.marker_names,)),
+        ("Show all", changes.show_boundaries, (store.session.mesh.marker_names,)),
     ):
-        menu.addAction(text).triggered.connect(_later(store, function, *values))
+        menu.addAction(text).triggered.connect(_slot(store, function, *values))
     return menu
 
 
-def _later(store: Store, function: Callable[..., Session], *values: object) -> Callable[..., None]:
+def _slot(store: Store, function: Callable[..., Session], *values: object) -> Callable[..., None]:
     """Return a slot that makes a change of the session and ignores the signal's arguments."""
     return lambda *_: store.change(function, *values)

@@ -16,7 +16,7 @@ from qtpy.QtWidgets import QHBoxLayout, QWidget
 
 from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.errors import SlidevizError
-from slideviz.gui.widgets.build import boxed, check_box, in_column, in_row, push_button
+from slideviz.gui.widgets.build import as_widget, check_box, in_column, in_row, push_button
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write_plot
@@ -77,13 +77,13 @@ class CurvesPanel(Panel):
     def _make_head(self) -> QHBoxLayout:
         self.kind = Choice(KINDS, name="curve_kind")
         self.kind.setMinimumContentsLength(4)
-        self.kind.explain(TIPS)
+        self.kind.set_tips(TIPS)
         self.kind.chosen.connect(lambda _: self._other_plot())
         self.save = push_button("Save…", "Save the plot as PNG, SVG or PDF.", self._save)
         self.whole = check_box(
             "0–1",
             "Show all possible qualities instead of those of the curves.",
-            lambda _: self.canvas.ask(),
+            lambda _: self.canvas.request_draw(),
             "whole_quality",
         )
         return in_row(self.kind, self.whole, self.save, wide=[self.kind])
@@ -98,7 +98,7 @@ class CurvesPanel(Panel):
         both = (self.what, self.coordinate)
         for choice in both:
             choice.chosen.connect(lambda _: self._other_plot())
-        self.span_row = boxed(in_row(*both, wide=both))
+        self.span_row = as_widget(in_row(*both, wide=both))
         return self.span_row
 
     # State to widgets ------------------------------------------------------------------
@@ -115,7 +115,7 @@ class CurvesPanel(Panel):
         self.canvas.setCursor(shape)
         self.canvas.setToolTip(TIPS["steps"] if kind == "steps" else "")
         if missing:
-            self.area.say(missing)
+            self.area.show_text(missing)
         else:
             self.area.plot()
 

@@ -16,7 +16,7 @@ from slideviz.design.sweeps.table import DesignRow, read_designs
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.gui.panels.designs_plot import DesignPlot
 from slideviz.gui.panels.designs_rows import DesignRows
-from slideviz.gui.responsiveness.timers import ROWS_MS, later
+from slideviz.gui.responsiveness.timers import ROWS_MS, single_shot
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import QuietBar, in_column, in_row, push_button, set_style
@@ -45,24 +45,24 @@ class DesignsJob(QObject):
 
     Signals
     -------
-    came(list of Row)
+    results_arrived(list of Row)
         Results since the last emission: not one by one, as each repaints the whole window.
-    said(str, float)
+    progressed(str, float)
         The progress, in words and from 0 to 1.
     """
 
-    came = Signal(list)
-    said = Signal(str, float)
+    results_arrived = Signal(list)
+    progressed = Signal(str, float)
 
     def __init__(self, ended: Callable[[str, bool], None], parent: QObject) -> None:
         super().__init__(parent)
-        self._news, self._fraction = "", 0.0
-        self._arrived: list[DesignRow] = []
+        self._text, self._fraction = "", 0.0
+        self._rows: list[DesignRow] = []
         self._ended = ended
         self.runner = JobRunner(self)
-        self._soon = later(self, self._take, ROWS_MS)
-        self.runner.doing.connect(self._doing)
-        self.runner.kept.connect(self._kept)
+        self._timer = single_shot(self, self._flush, ROWS_MS)
+        self.runner.progressed.connect(self._progressed)
+        self.runner.kept.connect(self._rows_done)
         self.runner.finished.connect(lambda _: self._end(""))
         self.runner.cancelled.connect(lambda: self._end("Stopped; the results are kept."))
         self.runner.failed.connect(lambda error: self._end(str(error), wrong=True))
@@ -71,27 +71,27 @@ class DesignsJob(QObject):
         """Run the designs of a table that have no result."""
         self.runner.start(run_designs, case, mesh, table)
 
-    def _doing(self, doing: JobProgress) -> None:
-        self._news, self._fraction = doing.text, doing.fraction or 0.0
-        if not self._soon.isActive():
-            self._soon.start()
+    def _progressed(self, doing: JobProgress) -> None:
+        self._text, self._fraction = doing.text, doing.fraction or 0.0
+        if not self._timer.isActive():
+            self._timer.start()
 
-    def _kept(self, rows: list[DesignRow]) -> None:
-        self._arrived += rows
-        if not self._soon.isActive():
-            self._soon.start()
+    def _rows_done(self, rows: list[DesignRow]) -> None:
+        self._rows += rows
+        if not self._timer.isActive():
+            self._timer.start()
 
-    def _take(self) -> None:
+    def _flush(self) -> None:
         """Emit the results since the last emission, and the progress."""
-        self._soon.stop()
-        rows, self._arrived = self._arrived, []
+        self._timer.stop()
+        rows, self._rows = self._rows, []
         if rows:
-            self.came.emit(rows)
+            self.results_arrived.emit(rows)
         if self.runner.busy:
-            self.said.emit(self._news, self._fraction)
+            self.progressed.emit(self._text, self._fraction)
 
     def _end(self, text: str, wrong: bool = False) -> None:
-        self._take()
+        self._flush()
         self._ended(text, wrong)
 
 
@@ -135,7 +135,7 @@ class DesignsPanel(Panel):
         in_column(
             split,
             self._make_foot(),
-            self.said,
+            self.status,
             wide=[split],
             spacing=4,
             on=self,
@@ -164,7 +164,7 @@ class DesignsPanel(Panel):
         self.bar.setRange(0, 1000)
         self.bar.setTextVisible(False)
         self.bar.setFixedWidth(110)
-        self.said = WideLabel(lines=3)
+        self.status = WideLabel(lines=3)
         files = (self.load, self.remove, self.save, self.plot.save)
         return in_row(self.run, self.stop, self.bar, None, *files, spacing=4)
 
@@ -172,9 +172,9 @@ class DesignsPanel(Panel):
         self.rows.model.edited = self._edited
         self.rows.view.clicked.connect(lambda index: self.show_design(index.row() + 1))
         self.rows.view.activated.connect(lambda index: self.show_design(index.row() + 1))
-        self.plot.picked = self._picked
-        self.job.came.connect(self._came)
-        self.job.said.connect(self._going)
+        self.plot.picked = self._design_clicked
+        self.job.results_arrived.connect(self._results_arrived)
+        self.job.progressed.connect(self._progressed)
 
     # State to widgets ------------------------------------------------------------------
 
@@ -183,16 +183,16 @@ class DesignsPanel(Panel):
         self.runner.cancel()
         self.case = self.mesh = self.shown = None
         self.put(DesignTable())
-        self._say("")
+        self._show_status("")
 
     def sync(self, session: Session) -> None:
         """Offer the columns of the session's case."""
         self.rows.show_columns(session.case, session.mesh)
-        if self.table.results and not self.runner.busy and not self._left().results:
-            self._say("The settings have changed since: Run computes all designs again.")
+        if self.table.results and not self.runner.busy and not self._with_valid_results().results:
+            self._show_status("The settings have changed since: Run computes all designs again.")
         self._sync()
 
-    def _left(self) -> DesignTable:
+    def _with_valid_results(self) -> DesignTable:
         """Return the table with only those results that are valid for the present case."""
         return self.table.left(self.case, self.store.session.case)
 
@@ -209,7 +209,7 @@ class DesignsPanel(Panel):
         busy, rows = self.runner.busy, bool(self.table.rows)
         in_file = self.store.session.in_file
         opened = self.store.session.mesh is not None and not in_file
-        count = 0 if busy else len(self.table.rows) - len(self._left().results)
+        count = 0 if busy else len(self.table.rows) - len(self._with_valid_results().results)
         self.rows.show_table(self.table, editable=not busy)
         self.plot.show_table(self.table.filled(self.case), self.shown)
         for widget, able in (
@@ -221,16 +221,16 @@ class DesignsPanel(Panel):
         ):
             widget.setEnabled(able)
         if in_file:
-            self._say("This mesh stays in its file: sweep it with `slideviz sweep`.")
+            self._show_status("This mesh stays in its file: sweep it with `slideviz sweep`.")
         self.run.setText(f"Run {count:,} design{'' if count == 1 else 's'}" if count else "Run")
         done = rows and not count
         self.run.setToolTip("All designs are done with these settings." if done else RUN)
         for part, seen in ((self.bar, busy), (self.stop, busy), (self.run, not busy)):
             part.setVisible(seen)
 
-    def _say(self, text: str, wrong: bool = False) -> None:
-        self.said.say(text)
-        set_style(self.said.label, "bad", wrong)
+    def _show_status(self, text: str, wrong: bool = False) -> None:
+        self.status.show_text(text)
+        set_style(self.status.label, "bad", wrong)
 
     # What the user does ----------------------------------------------------------------
 
@@ -239,7 +239,7 @@ class DesignsPanel(Panel):
         """Return a sentence about results that closing would lose; empty if there are none."""
         return self.table.unsaved(self.runner.busy, self.written)
 
-    def _try(self, change: Callable[[], DesignTable]) -> None:
+    def _apply(self, change: Callable[[], DesignTable]) -> None:
         """Show the table that ``change`` returns, or the error that it raises."""
         self.services.banner.withdraw(self._mistakes)
         self._mistakes = ""
@@ -247,30 +247,30 @@ class DesignsPanel(Panel):
             table = change()
         except SlidevizError as error:
             first, *more = str(error).splitlines()
-            self._say(f"{first} (and {len(more)} more)" if more else first, wrong=True)
+            self._show_status(f"{first} (and {len(more)} more)" if more else first, wrong=True)
             if more:
                 self._mistakes = str(error)
                 self.services.banner.show_error(error)
             return
-        self._say(counted(len(table.rows), "design") if table.rows else "")
+        self._show_status(counted(len(table.rows), "design") if table.rows else "")
         if (table.columns, table.rows) != (self.table.columns, self.table.rows):
-            self.store.remember("designs", partial(self._bring, self.case), self.table, table)
+            self.store.remember("designs", partial(self._restore, self.case), self.table, table)
         self.put(table)
 
-    def _bring(self, case: Case | None, table: DesignTable) -> bool:
+    def _restore(self, case: Case | None, table: DesignTable) -> bool:
         """Show a table again, whose results are for ``case``, with those that came since.
 
         Returns whether it is shown: not while designs are being run.
         """
         if self.runner.busy:
-            self._say("The designs are being run: stop that first, then undo.", wrong=True)
+            self._show_status("The designs are being run: stop that first, then undo.", wrong=True)
             return False
         known = table if case is self.case else table.without_results()
         self.put(known.keeping(self.table))
-        self._say(counted(len(table.rows), "design") if table.rows else "")
+        self._show_status(counted(len(table.rows), "design") if table.rows else "")
         return True
 
-    def _picked(self, number: int) -> None:
+    def _design_clicked(self, number: int) -> None:
         self.rows.view.selectRow(number - 1)
         self.show_design(number)
 
@@ -283,26 +283,26 @@ class DesignsPanel(Panel):
             return self._replacing(self.table.crossed(name, values))
 
         if name is not None and not self.runner.busy:
-            self._try(crossed)
+            self._apply(crossed)
 
     def _edited(self, row: int, column: int, text: str) -> None:
         def changed() -> DesignTable:
             read_designs(self.store.session.case, {self.table.columns[column]: [text]})
             return self.table.with_cell(row, column, text)
 
-        self._try(changed)
+        self._apply(changed)
 
     def _load(self) -> None:
         path = questions.ask_table(self, self.services.files.folder())
         if path is not None:
-            self._try(lambda: self._replacing(read_table(self.store.session.case, path)))
+            self._apply(lambda: self._replacing(read_table(self.store.session.case, path)))
 
     def _replacing(self, table: DesignTable) -> DesignTable:
         """Return another table, with the results it shares; this one if the user cancels."""
         table = table.keeping(self.table)
-        return table if self._may_become(table, " Ctrl+Z brings that back.") else self.table
+        return table if self._confirm_replacing(table, " Ctrl+Z brings that back.") else self.table
 
-    def _may_become(self, table: DesignTable, more: str = "") -> bool:
+    def _confirm_replacing(self, table: DesignTable, more: str = "") -> bool:
         """Return whether a table may replace this one; asks to save results that would be lost.
 
         ``more`` is the end of the question.
@@ -316,7 +316,7 @@ class DesignsPanel(Panel):
         return self.save_table() if answer == "table" else answer == "discard"
 
     def _remove(self) -> None:
-        self._try(lambda: self.table.without(self.rows.selected))
+        self._apply(lambda: self.table.without(self.rows.selected))
 
     def save_table(self) -> bool:
         """Ask for a file and save the table there; return whether it was written."""
@@ -328,10 +328,10 @@ class DesignsPanel(Panel):
         try:
             write_results(path, table)
         except SlidevizError as error:
-            self._say(str(error), wrong=True)
+            self._show_status(str(error), wrong=True)
             return False
         self.written = table
-        self._say(f"Saved {path}")
+        self._show_status(f"Saved {path}")
         return True
 
     def show_design(self, number: int) -> None:
@@ -342,46 +342,50 @@ class DesignsPanel(Panel):
             return
         case = session.case if row is None or self.case is None else self.case
         if row is not None and row.problem:
-            self._say(f"Design {number}: {self.table.reason(number, self.mesh)}", wrong=True)
+            self._show_status(
+                f"Design {number}: {self.table.reason(number, self.mesh)}", wrong=True
+            )
             return
         try:
             values = self.table.designs()[number - 1]
             (design,) = read_designs(case, [values]).rows
         except CaseError as error:
-            self._say(str(error), wrong=True)
+            self._show_status(str(error), wrong=True)
             return
         if not self.services.running.show_design(design.case, f"design {number}"):
-            self._say("Another job runs in the window; wait for it, or cancel it.", wrong=True)
+            self._show_status(
+                "Another job runs in the window; wait for it, or cancel it.", wrong=True
+            )
             return
         self.services.viewing.refit()  # no job ends if the design was shown before
         self.shown = number
-        self._say(f"Design {number} is shown.")
+        self._show_status(f"Design {number} is shown.")
         self._sync()
 
     # The job ---------------------------------------------------------------------------
 
     def start(self) -> None:
         """Run the designs that have no result with the present settings."""
-        session, table = self.store.session, self._left()
+        session, table = self.store.session, self._with_valid_results()
         if self.runner.busy or session.mesh is None or session.in_file:
             return
-        if len(table.results) == len(table.rows) or not self._may_become(table):
+        if len(table.results) == len(table.rows) or not self._confirm_replacing(table):
             return
         self.case, self.mesh = session.case, session.mesh
         self.put(table)
-        self._say("")
+        self._show_status("")
         self.job.start(self.case, self.mesh, table)
         self._sync()
 
-    def _came(self, rows: list[DesignRow]) -> None:
+    def _results_arrived(self, rows: list[DesignRow]) -> None:
         if self.mesh is self.store.session.mesh:
             self.put(self.table.with_results(rows))
 
-    def _going(self, words: str, fraction: float) -> None:
+    def _progressed(self, words: str, fraction: float) -> None:
         self.bar.setValue(round(1000 * fraction))
-        self._say(words)
+        self._show_status(words)
 
     def _ended(self, text: str, wrong: bool) -> None:
         failed = self.table.count_done() < len(self.table.results)
-        self._say(text or self.table.summary(self.mesh), wrong or failed)
+        self._show_status(text or self.table.summary(self.mesh), wrong or failed)
         self._sync()

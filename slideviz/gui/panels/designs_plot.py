@@ -84,7 +84,7 @@ class DesignPlot(QWidget):
         if plotted:
             self.area.plot()
         else:
-            self.area.say(FAILED if table.results else EMPTY)
+            self.area.show_text(FAILED if table.results else EMPTY)
 
     def drawing(self) -> Draw:
         """Return a function that draws the plot into a figure; one that draws nothing if empty."""

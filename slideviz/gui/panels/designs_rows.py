@@ -13,7 +13,7 @@ from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QStackedWidget, QTabl
 
 from slideviz.case.model import Case
 from slideviz.design.sweeps.table import NUMBERS, DesignRow
-from slideviz.gui.widgets.build import Do, hint_label, in_column, in_row, push_button
+from slideviz.gui.widgets.build import Slot, hint_label, in_column, in_row, push_button
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import TextField
 from slideviz.gui.widgets.labels import wrapped
@@ -138,7 +138,7 @@ class DesignRows(QWidget):
         Called when the user clicks “Add” or presses Return.
     """
 
-    def __init__(self, add: Do) -> None:
+    def __init__(self, add: Slot) -> None:
         super().__init__()
         self._mesh: Mesh | None = None
         self.column = Choice({}, "What varies: a number of a motion, or a setting.", "column")

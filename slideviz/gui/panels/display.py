@@ -90,7 +90,7 @@ class PassagesBox(NumberBox):
         return QValidator.State.Acceptable if good else QValidator.State.Intermediate, text, at
 
 
-class Span(QWidget):
+class RangeFields(QWidget):
     """Two number fields for a range; the low number must stay below the high one."""
 
     def __init__(self, name: str, changed: Callable[[tuple[float, float]], object]) -> None:
@@ -101,12 +101,12 @@ class Span(QWidget):
         for end, field in (("low", self.low), ("high", self.high)):
             field.setObjectName(f"{name}_{end}")
             field.setAccessibleName(f"{name} {end}")
-            field.changed.connect(lambda _: self._tell())
+            field.changed.connect(lambda _: self._emit_changed())
         parts = in_row(self.low, QLabel("to"), self.high, wide=[self.low, self.high], spacing=4)
         parts.setContentsMargins(0, 0, 0, 0)
         self.setLayout(parts)
 
-    def _tell(self) -> None:
+    def _emit_changed(self) -> None:
         # The other number may have been typed before it was valid.
         for field in (self.low, self.high):
             field.recheck()
@@ -167,7 +167,7 @@ class DisplayPanel(Panel):
         for index, name in enumerate(COLOR_MAPS):
             self.map.setItemIcon(index, map_icon(name))
         self.form.addRow("Colors", self.map)
-        self.range = Span("range", lambda values: self._set(color_range=values))
+        self.range = RangeFields("range", lambda values: self._set(color_range=values))
         self.fit_range = self._button("fit_range", "Fit", "fit_colors")
         self.reset_range = self._button("reset_range", "Reset", "usual_colors")
         parts = (self.range, self.fit_range, self.reset_range)
@@ -175,7 +175,7 @@ class DisplayPanel(Panel):
 
     def _make_threshold(self) -> None:
         self.only = check_box("Only cells", ONLY, self._only, "only")
-        self.threshold = Span("threshold", lambda values: self._set(threshold=values))
+        self.threshold = RangeFields("threshold", lambda values: self._set(threshold=values))
         self.form.addRow(self.only, self.threshold)
 
     def _make_rest(self) -> None:

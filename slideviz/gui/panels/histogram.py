@@ -13,8 +13,8 @@ from qtpy.QtGui import QColor, QKeySequence, QMouseEvent, QPainter, QPaintEvent,
 from qtpy.QtWidgets import QLabel
 
 from slideviz.color_scheme import SELECTED_COLOR
-from slideviz.gui.responsiveness.timers import SELECTING_MS, later
-from slideviz.gui.widgets.build import FoldingRow, check_box, in_column, push_button
+from slideviz.gui.responsiveness.timers import SELECTING_MS, single_shot
+from slideviz.gui.widgets.build import WrappingRow, check_box, in_column, push_button
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write_plot, is_seen
 from slideviz.gui.widgets.plot_image import Draw
@@ -131,11 +131,11 @@ class HistogramPanel(Panel):
     def __init__(self, store: Store) -> None:
         super().__init__(store)
         self._counts = FrameCounts()
-        self._wanted: Range | None = None
-        self._described: StepFrame | None = None
+        self._pending_range: Range | None = None
+        self._described_frame: StepFrame | None = None
         self.canvas = BrushCanvas(self.drawing)
         self.area = PlotArea(self.canvas)
-        self.canvas.brushed.connect(self._brushed)
+        self.canvas.brushed.connect(self._range_dragged)
         self.canvas.dragging.connect(self._dragged)
         self.numbers = QLabel()
         self.numbers.setTextFormat(Qt.TextFormat.RichText)
@@ -144,13 +144,13 @@ class HistogramPanel(Panel):
         self.range_text.setWordWrap(True)
         parts = (self.area, self.numbers, self.range_text, self._make_buttons())
         in_column(*parts, wide=[self.area], spacing=3, on=self, margins=(4, 4, 4, 4))
-        self._soon = later(self, self._choose, SELECTING_MS)
+        self._timer = single_shot(self, self._apply_range, SELECTING_MS)
         escape = QShortcut(QKeySequence(Qt.Key.Key_Escape), self)
         escape.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
         escape.activated.connect(self.clear_range)
         self.follow(_shown)
 
-    def _make_buttons(self) -> FoldingRow:
+    def _make_buttons(self) -> WrappingRow:
         self.log = check_box("log", "Counts on a logarithmic axis, which shows a few bad cells.")
         self.log.setChecked(True)
         self.whole = check_box(
@@ -159,7 +159,7 @@ class HistogramPanel(Panel):
             name="whole_range",
         )
         for box in (self.log, self.whole):
-            box.toggled.connect(lambda _: self.canvas.ask())
+            box.toggled.connect(lambda _: self.canvas.request_draw())
         self.show_all = push_button(
             "Show all cells",
             "Show cells of any value again (Esc).",
@@ -167,7 +167,7 @@ class HistogramPanel(Panel):
             "show_all_cells",
         )
         self.save = push_button("Save…", "Save the histogram as PNG, SVG or PDF.", self._save)
-        return FoldingRow((self.log, self.whole), (self.show_all, self.save))
+        return WrappingRow((self.log, self.whole), (self.show_all, self.save))
 
     # State to widgets ------------------------------------------------------------------
 
@@ -178,12 +178,12 @@ class HistogramPanel(Panel):
             widget.setVisible(session.frame is not None)
         self.show_all.setVisible(session.frame is not None)
         self.show_all.setEnabled(session.view.threshold is not None)
-        if not self._soon.isActive():
+        if not self._timer.isActive():
             self.canvas.show_band(session.view.threshold)
         if session.frame is None:
             self._counts = FrameCounts()
             self.range_text.hide()
-            self.area.say(
+            self.area.show_text(
                 "Open a mesh first. Then this panel shows how many cells have which quality."
             )
             return
@@ -193,12 +193,12 @@ class HistogramPanel(Panel):
         if is_seen(self):
             self._sync_words(session)
         else:
-            self._described = None
+            self._described_frame = None
 
     def _sync_words(self, session: Session) -> None:
         if session.frame is None or session.mesh is None:
             return
-        self._described = session.frame
+        self._described_frame = session.frame
         what = shown_measure(session)
         counted = session.frame.quality.counted
         found = session.frame.quality
@@ -228,7 +228,7 @@ class HistogramPanel(Panel):
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         # While the panel was behind another tab, the text was not updated.
-        if self._described is None and self.store.session.frame is not None:
+        if self._described_frame is None and self.store.session.frame is not None:
             QTimer.singleShot(0, self, lambda: self._sync_words(self.store.session))
 
     # Drawing ---------------------------------------------------------------------------
@@ -240,7 +240,7 @@ class HistogramPanel(Panel):
 
     # What the user does ----------------------------------------------------------------
 
-    def _brushed(self, band: Range | None) -> None:
+    def _range_dragged(self, band: Range | None) -> None:
         """Schedule the threshold for a selected range; None ends the threshold."""
         if band is None:
             self.clear_range()
@@ -248,24 +248,24 @@ class HistogramPanel(Panel):
         # The bar of the inverted cells is left of the first value: a range that lies there
         # selects them only, and one that begins there begins at 0.
         (low, high), left = band, first_value(self.canvas.figure.axes[0])
-        self._wanted = ONLY_INVERTED if high < left else (0.0 if low < left else low, high)
-        if not self._soon.isActive():
-            self._soon.start()
+        self._pending_range = ONLY_INVERTED if high < left else (0.0 if low < left else low, high)
+        if not self._timer.isActive():
+            self._timer.start()
 
     def _dragged(self, dragging: bool) -> None:
-        if not dragging and self._soon.isActive():
-            self._soon.stop()
-            self._choose()
+        if not dragging and self._timer.isActive():
+            self._timer.stop()
+            self._apply_range()
         self.store.set_dragging(dragging)
 
-    def _choose(self) -> None:
-        if self._wanted is not None:
-            self.store.change(changes.set_view, threshold=self._wanted)
+    def _apply_range(self) -> None:
+        if self._pending_range is not None:
+            self.store.change(changes.set_view, threshold=self._pending_range)
 
     def clear_range(self) -> None:
         """Show cells of any value again."""
-        self._soon.stop()
-        self._wanted = None
+        self._timer.stop()
+        self._pending_range = None
         if self.store.session.view.threshold is not None:
             self.store.change(changes.set_view, threshold=None)
         self.canvas.show_band(None)

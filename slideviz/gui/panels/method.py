@@ -16,7 +16,7 @@ from slideviz.case.model import Case
 from slideviz.case.values import Entry, Kind
 from slideviz.gui.widgets.build import (
     PanelScroll,
-    boxed,
+    as_widget,
     grow_fields,
     hint_label,
     in_column,
@@ -31,9 +31,9 @@ from slideviz.gui.widgets.panel import FieldWatch, Panel
 from slideviz.gui.widgets.vector_field import VectorField, a_direction
 from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.session import changes
-from slideviz.session.motions import found_text, largest_prescribed, support_key, support_of
+from slideviz.session.motions import largest_prescribed, pair_text, support_key, support_of
 from slideviz.session.opening import suggested_reduction
-from slideviz.session.run_messages import Requirement, loose_words
+from slideviz.session.run_messages import Requirement, tolerance_warning
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.terms import LEVEL_CRITERIA, DataReduction, labels
@@ -50,7 +50,7 @@ def number_field(kind: Kind) -> NumberField:
 
 def _choice(kind: Kind) -> Choice:
     field = Choice(kind.words)
-    field.explain(kind.tips)
+    field.set_tips(kind.tips)
     return field
 
 
@@ -179,7 +179,7 @@ class MoreSettings(QWidget):
         self.button.setCheckable(True)
         self.button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self.button.toggled.connect(self._show_form)
-        self.body = boxed(self.form)
+        self.body = as_widget(self.form)
         in_column(self.button, self.body, spacing=4, on=self)
         self._show_form(False)
 
@@ -224,32 +224,33 @@ class MethodPanel(Panel):
         for part in (self, self.more):
             for name, field in part.form.fields.items():
                 setattr(part, name, field)
-        self.found, self.tolerance_hint, self.reason = hint_label(), hint_label(), hint_label()
-        self.loose = hint_label()
-        set_style(self.loose, "bad", True)
+        self.period_hint, self.tolerance_hint = hint_label(), hint_label()
+        self.idle_reasons = hint_label()
+        self.tolerance_warning = hint_label()
+        set_style(self.tolerance_warning, "bad", True)
         self.tolerance_hint.setWordWrap(False)
         # The largest prescribed displacement, and the mesh, roles and motions that it is of.
         self._largest: tuple[tuple[object, ...], float] = ((), 0.0)
         self._support: tuple[tuple[object, ...], float] = ((), 0.0)
-        self._complete_form()
-        parts = (self.form, self.reason, self.more, None)
+        self._add_hints()
+        parts = (self.form, self.idle_reasons, self.more, None)
         in_column(*parts, on=self.area.widget(), margins=(6, 6, 6, 4))
         self._connect()
         self.watch = FieldWatch(self, store, "method")
-        self.follow(lambda session: session.mesh, self._take_mesh)
+        self.follow(lambda session: session.mesh, self._set_mesh)
         self.follow()
 
-    def _complete_form(self) -> None:
+    def _add_hints(self) -> None:
         """Add hints: the period that was found, and what part of the extent the tolerance is."""
         form, fields = self.form, self.form.fields
         row, _ = _position(form, fields["origin"])
-        form.insertRow(row + 1, "", self.found)
+        form.insertRow(row + 1, "", self.period_hint)
         row, role = _position(form, fields["tolerance"])
         form.removeWidget(fields["tolerance"])
         wide = fields["tolerance"]
-        self._tolerance_row = boxed(in_row(wide, self.tolerance_hint, wide=[wide]))
+        self._tolerance_row = as_widget(in_row(wide, self.tolerance_hint, wide=[wide]))
         form.setWidget(row, role, self._tolerance_row)
-        form.insertRow(row + 1, "", self.loose)
+        form.insertRow(row + 1, "", self.tolerance_warning)
 
     def _connect(self) -> None:
         self.form.changed.connect(self._set)
@@ -265,7 +266,7 @@ class MethodPanel(Panel):
         bar = self.area.verticalScrollBar()
         bar.setValue(min(self.more.y(), bar.maximum()))
 
-    def lead_to(self, _missing: Requirement) -> None:
+    def focus_requirement(self, _missing: Requirement) -> None:
         """Put the cursor into the first invalid field, or into that for sliding."""
         if not self.watch.focus():
             self.form.fields["sliding"].setFocus()
@@ -276,7 +277,7 @@ class MethodPanel(Panel):
         """Change the case by the new value of a key; data reduction is handled by this panel."""
         own: dict[str, Callable[[Case, Any], Case]] = {
             "DATA_REDUCTION": self._reduce,
-            "DATA_RED_TOLERANCE": self._tolerate,
+            "DATA_RED_TOLERANCE": self._put_tolerance,
         }
         case = self.store.session.case
         new = own.get(key.name, key.put)(case, value)
@@ -293,7 +294,7 @@ class MethodPanel(Panel):
             first = suggested_reduction(mesh)
         return put_reduction(case.change(reduction=first), wanted)
 
-    def _tolerate(self, case: Case, value: float) -> Case:
+    def _put_tolerance(self, case: Case, value: float) -> Case:
         given = case.reduction or Reduction()
         return case.change(reduction=replace(given, tolerance=value, relative=None))
 
@@ -302,13 +303,13 @@ class MethodPanel(Panel):
     def sync(self, session: Session) -> None:
         """Fill the panel from the session's case."""
         self._reduction = session.case.reduction or self._reduction
-        given = replace(self._in_length(self._reduction or Reduction()), auto=False)
+        given = replace(self._with_absolute_tolerance(self._reduction or Reduction()), auto=False)
         case, spare = session.case, Case(reduction=given)
         if case.reduction is not None:
             case = case.change(reduction=replace(given, auto=case.reduction.auto))
         fields = self.form.fields
         fields["origin"].set_scale(self._extent)
-        rotational = case.periodic_type != "translational" and "rotational" in _kinds(session)
+        rotational = case.periodic_type != "translational" and "rotational" in _pair_kinds(session)
         rotational = rotational or case.periodic_type == "rotational"
         no_axis = "" if rotational else "only rotational periodicity has an axis"
         self.form.sync(case, spare, {"axis": no_axis, "origin": no_axis})
@@ -317,13 +318,13 @@ class MethodPanel(Panel):
             self.form.setRowVisible(fields[name], not (no_pair(case) or no_axis))
         self._sync_hints(session)
 
-    def _take_mesh(self, session: Session) -> None:
+    def _set_mesh(self, session: Session) -> None:
         self._reduction, self._largest = None, ((), 0.0)
         self.watch.restore()
         # Once for each mesh: it takes 10 ms where there are 250,000 cells.
         self._extent = session.mesh.extent if session.mesh is not None else 0.0
 
-    def _in_length(self, given: Reduction) -> Reduction:
+    def _with_absolute_tolerance(self, given: Reduction) -> Reduction:
         """Return data reduction with its tolerance as a length, to six significant digits."""
         absolute = given.relative * self._extent if given.relative else given.tolerance
         return replace(given, tolerance=float(f"{absolute:.6g}"))
@@ -338,16 +339,16 @@ class MethodPanel(Panel):
         typed = get_reduction(case) == "YES"
         self.form.setRowVisible(self._tolerance_row, typed)
         largest = self._largest_of(session) if typed else 0.0
-        self.loose.setText(loose_words(case, extent, largest))
-        self.form.setRowVisible(self.loose, bool(self.loose.text()))
+        self.tolerance_warning.setText(tolerance_warning(case, extent, largest))
+        self.form.setRowVisible(self.tolerance_warning, bool(self.tolerance_warning.text()))
         self.more.radius.setText(self._radius_words(session))
         self.more.form.setRowVisible(self.more.radius, bool(self.more.radius.text()))
         reasons = (("Sliding", nothing_slides(case)), ("Periodicity", no_pair(case)))
         why = "\n".join(f"{title}: {why}." for title, why in reasons if why)
-        self.reason.setText(why if session.mesh is not None else "Open a mesh first.")
-        self.reason.setVisible(bool(self.reason.text()))
-        self.found.setText(found_text(session))
-        self.form.setRowVisible(self.found, bool(self.found.text()))
+        self.idle_reasons.setText(why if session.mesh is not None else "Open a mesh first.")
+        self.idle_reasons.setVisible(bool(self.idle_reasons.text()))
+        self.period_hint.setText(pair_text(session))
+        self.form.setRowVisible(self.period_hint, bool(self.period_hint.text()))
 
     def _radius_words(self, session: Session) -> str:
         """Return the support radius in words; "" where there is none."""
@@ -375,6 +376,6 @@ def _position(form: QFormLayout, field: QWidget) -> tuple[int, QFormLayout.ItemR
     return cast("tuple[int, QFormLayout.ItemRole]", form.getWidgetPosition(field))
 
 
-def _kinds(session: Session) -> set[str]:
+def _pair_kinds(session: Session) -> set[str]:
     names = set(session.case.markers_with("periodic"))
     return {pair.kind for pair in session.pairs if {pair.first, pair.second} <= names}

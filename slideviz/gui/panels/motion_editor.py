@@ -72,15 +72,15 @@ class MotionEditor(MotionForm):
         self.show_motion(None, (), 3)
 
     def _connect(self) -> None:
-        self.marker.chosen.connect(lambda _: self._tell())
+        self.marker.chosen.connect(lambda _: self._emit_changed())
         self.kind.chosen.connect(self._kind_chosen)
         self.about.chosen.connect(self._about_chosen)
-        self.box.chosen.connect(lambda _: self._tell())
-        self.side.chosen.connect(lambda _: self._tell())
+        self.box.chosen.connect(lambda _: self._emit_changed())
+        self.side.chosen.connect(lambda _: self._emit_changed())
         for field in self._rows.values():
             if isinstance(field, NumberField | VectorField):
-                field.changed.connect(lambda _: self._tell())
-        self.path.textEdited.connect(lambda _: self._tell())
+                field.changed.connect(lambda _: self._emit_changed())
+        self.path.textEdited.connect(lambda _: self._emit_changed())
         self.browse.clicked.connect(self._browse)
         self.table.clicked.connect(lambda _: self.table_wanted.emit())
 
@@ -91,7 +91,7 @@ class MotionEditor(MotionForm):
         if motion is None:
             return
         self._sync_targets(motion, targets)
-        self.kind.offer(FfdTwist, dim == 3)  # a section has no span to twist along
+        self.kind.set_item_enabled(FfdTwist, dim == 3)  # a section has no span to twist along
         self.kind.show_value(type(motion))
         shown = self._show_numbers(motion, dim)
         if isinstance(motion, Rotate | Scale | Radial):
@@ -266,7 +266,7 @@ class MotionEditor(MotionForm):
             self.axis.show_value(across)
         elif what == "centroid" and radially and self._machine is not None:
             self.axis.show_value(self._machine[0])
-        self._tell()
+        self._emit_changed()
         # The motion may be the same, but other fields belong to this choice.
         self.show_motion(self._motion, self._targets, self._dim)
 
@@ -317,7 +317,7 @@ class MotionEditor(MotionForm):
         """Set the names of the boxes for free-form deformation that can be chosen."""
         self._boxes = names
 
-    def _tell(self) -> None:
+    def _emit_changed(self) -> None:
         """Emit the motion that the fields describe, if it differs from the shown one."""
         marker, kind = self._targets[self.marker.currentData()], type(self._motion)
         x, y, z = self.axis.value if self._dim == 3 else Z
@@ -365,4 +365,4 @@ class MotionEditor(MotionForm):
         name, _ = QFileDialog.getOpenFileName(self, "Displacement file", self.path.text())
         if name:
             self.path.setText(name)
-            self._tell()
+            self._emit_changed()

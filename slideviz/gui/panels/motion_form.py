@@ -23,7 +23,7 @@ from slideviz.case.model import (
     Target,
     Translate,
 )
-from slideviz.gui.widgets.build import boxed, grow_fields, in_row
+from slideviz.gui.widgets.build import as_widget, grow_fields, in_row
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField, TextField, not_zero
 from slideviz.gui.widgets.vector_field import VectorField, a_direction
@@ -70,7 +70,7 @@ class MotionForm(QWidget):
         for field in self.factors.fields:
             field._allowed = not_zero
         self.percent = NumberField(
-            allowed=_above_minus_100,
+            allowed=_scale_problem,
             tip="How much larger the radius becomes, in percent: 3 is 3 % outwards.",
         )
         self.distance = NumberField(
@@ -84,32 +84,34 @@ class MotionForm(QWidget):
         )
         self.box = Choice({}, "The box whose control points move: of the mesh, or of the case.")
         self.index = VectorField(
-            allowed=control_point,
+            allowed=control_point_problem,
             names="ijk",
             tip="The control point, counted from 0 along each direction of the box; -1 is all.",
         )
         self.plane = NumberField(
-            0.0, a_plane, tip="The plane of control points, counted from 0 along j; -1 is all."
+            0.0,
+            plane_index_problem,
+            tip="The plane of control points, counted from 0 along j; -1 is all.",
         )
         self.amount = NumberField(
             tip="How far control points move, in the mesh's length unit. With the thickness, the "
             "last ones move forwards, and the first ones as far backwards."
         )
         self.side = Choice({side: term.label for side, term in SIDES.items()}, "Which side moves.")
-        self.side.explain({side: term.tip for side, term in SIDES.items()})
+        self.side.set_tips({side: term.tip for side, term in SIDES.items()})
         self.term = VectorField(
             (1.0, 1.0),
-            a_term,
+            term_problem,
             names=("term", "of"),
             tip="The term of the shape function, counted from 1 at the leading edge, and how many.",
         )
         self.peak = NumberField(
-            50.0, a_peak, tip="Where the bump is highest, in percent of the chord."
+            50.0, peak_problem, tip="Where the bump is highest, in percent of the chord."
         )
         self.raised = NumberField(tip="How far it is raised, in the mesh's length unit.")
         self.chord = VectorField(
             (0.0, 1.0),
-            a_chord,
+            chord_problem,
             names=("x from", "to"),
             tip="x of the leading and of the trailing edge: the airfoil lies along x.",
         )
@@ -127,8 +129,8 @@ class MotionForm(QWidget):
         line = in_row(*both, wide=both, spacing=6)
         line.setStretch(0, 4)  # room for the longest kind, where the window is 1280 pixels wide
         line.setStretch(1, 3)
-        self.form.addRow("Motion", boxed(line))
-        file = boxed(in_row(self.path, self.browse, self.table, wide=[self.path], spacing=4))
+        self.form.addRow("Motion", as_widget(line))
+        file = as_widget(in_row(self.path, self.browse, self.table, wide=[self.path], spacing=4))
         self._rows: dict[str, QWidget] = {}
         for name, title, widget in (
             ("box", "Box", self.box),
@@ -166,7 +168,7 @@ class MotionForm(QWidget):
             self.form.setRowVisible(widget, name in names)
 
 
-def _above_minus_100(value: float) -> str:
+def _scale_problem(value: float) -> str:
     """Return why a radius cannot change by this many percent; empty if it can."""
     return "" if value > -100.0 else "-100 % or less would fold the boundary"
 
@@ -188,30 +190,30 @@ KINDS: dict[type, str] = {
 """Labels of the kinds of motion, by class."""
 
 
-def control_point(values: Sequence[float]) -> str:
+def control_point_problem(values: Sequence[float]) -> str:
     """Return why numbers are no index of a control point; empty if they are."""
     whole = all(value == int(value) and value >= -1 for value in values)
     return "" if whole else "expected whole numbers from 0, or -1 for all"
 
 
-def a_plane(value: float) -> str:
+def plane_index_problem(value: float) -> str:
     """Return why a number is none of a plane of control points; empty if it is."""
-    return control_point((value,))
+    return control_point_problem((value,))
 
 
-def a_term(values: Sequence[float]) -> str:
+def term_problem(values: Sequence[float]) -> str:
     """Return why numbers are no term of a shape function; empty if they are."""
     k, n = values
     whole = k == int(k) and n == int(n) and 1 <= k <= n
     return "" if whole else "expected whole numbers, and a term from 1 to how many there are"
 
 
-def a_peak(value: float) -> str:
+def peak_problem(value: float) -> str:
     """Return why a bump cannot have its peak at this percentage of the chord; empty if it can."""
     return "" if 0.0 < value < 100.0 else "the peak lies between 0 and 100 % of the chord"
 
 
-def a_chord(values: Sequence[float]) -> str:
+def chord_problem(values: Sequence[float]) -> str:
     """Return why a chord cannot go from one x to another; empty if it can."""
     return "" if values[0] < values[1] else "the trailing edge has the larger x"
 

@@ -68,7 +68,7 @@ class MotionPanel(Panel):
         parts = (buttons, self.list, self.editor, self.hint, None)
         layout = in_column(*parts, spacing=4, on=self, margins=(6, 6, 6, 4))
         layout.setStretchFactor(self.list, 4)
-        self.follow(lambda session: session.mesh, self._take_mesh)
+        self.follow(lambda session: session.mesh, self._set_mesh)
         self.follow()
         self.watch = FieldWatch(self, store, "motion")
 
@@ -128,7 +128,7 @@ class MotionPanel(Panel):
         self._sync_editor(session)
         self._sync_buttons(session, moving)
 
-    def _take_mesh(self, session: Session) -> None:
+    def _set_mesh(self, session: Session) -> None:
         """Store another mesh and its extent (slow for a large mesh) and pass both to the editor."""
         mesh = session.mesh
         self._mesh, self._extent = mesh, mesh.extent if mesh is not None else 0.0
@@ -198,7 +198,7 @@ class MotionPanel(Panel):
         self.store.change(changes.add_motion, motion)
         self.editor.focus()
 
-    def lead_to(self, missing: Requirement) -> None:
+    def focus_requirement(self, missing: Requirement) -> None:
         """Put the cursor where a missing requirement is met; add a motion if one is missing."""
         motions = self.store.session.case.motions
         if self.watch.focus():

@@ -19,18 +19,18 @@ from slideviz.session import changes
 from slideviz.session.jobs import JobProgress
 from slideviz.session.run_messages import (
     Requirement,
-    ended,
+    end_message,
     exact_cost,
-    help_for,
     inverted_words,
     notes_of,
+    remedy_for,
     run_requirements,
 )
 from slideviz.session.state import Run, Session
 from slideviz.session.store import Store
 
-LONG = 100
-"""Number of letters from which a text is shortened (see `_short`)."""
+LONGEST_TEXT = 100
+"""Number of letters from which a text is shortened (see `_shortened`)."""
 
 SETTINGS, NOTES = "settings", "notes"
 """Targets of links in the text: take the settings of the shown run, show its notes."""
@@ -41,15 +41,15 @@ class RunPanel(Panel):
 
     Signals
     -------
-    place_wanted(Requirement)
+    requirement_clicked(Requirement)
         The user clicked on a missing requirement, and wants to be led to where it is met.
     """
 
-    place_wanted = Signal(object)
+    requirement_clicked = Signal(object)
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
-        self._busy = self._doing = ""
+        self._busy = self._progress_text = ""
         self._compiling = False
         self._missing: tuple[Requirement, ...] = ()
         self._cost = ""
@@ -101,7 +101,7 @@ class RunPanel(Panel):
         if self._missing:
             first = self._missing[0]
             more = len(self._missing) - 1
-            text = html.escape(_short(first.text))
+            text = html.escape(_shortened(first.text))
             self.text.setText(
                 f"<a href='{first.place}'>{text}</a>" + (f" (+{more} more)" if more else "")
             )
@@ -111,27 +111,27 @@ class RunPanel(Panel):
             return
         self.run.setToolTip(COMMANDS["run"].button_tip)
         self.text.setToolTip("")
-        self._tell_run(session)
+        self._show_run(session)
 
-    def _tell_run(self, session: Session) -> None:
+    def _show_run(self, session: Session) -> None:
         """Show how the shown run ended, or that the panels have other settings than it."""
         run, bad = session.run_shown, ""
         if run is None:
-            self._tell_ready("Ready.", session)
+            self._show_ready("Ready.", session)
         elif not session.outdated:
             bad = inverted_words(run)
-            text, notes = html.escape(ended(run)), notes_of(run)
+            text, notes = html.escape(end_message(run)), notes_of(run)
             count = f"{len(notes)} note{'' if len(notes) == 1 else 's'}"
             link = f" <a href='{NOTES}'>{count}</a>" if notes else ""
             self.text.setText((f"<b>{text}</b>" if bad else text) + link)
             if bad and self._remedy[:2] != (run, session.folding):
                 # The boundaries beside its cells are searched once.
-                remedy = help_for(run, session.mesh, session.folding)
+                remedy = remedy_for(run, session.mesh, session.folding)
                 self._remedy = (run, session.folding, remedy)
             lines = [self._remedy[2], *notes] if bad else notes
             self.text.setToolTip(wrapped("\n".join(lines)))
         elif run is session.runs[-1] and run.panels != session.case:
-            self._tell_ready("Settings changed since the last run.", session)
+            self._show_ready("Settings changed since the last run.", session)
         else:
             link = f"<a href='{SETTINGS}'>Use its settings</a>"
             design = run.panels is not None and html.escape(run.name)
@@ -139,9 +139,9 @@ class RunPanel(Panel):
             self.text.setText(f"The panels differ from {name}. {link}")
         set_style(self.text, "bad", bool(bad))
 
-    def _tell_ready(self, text: str, session: Session) -> None:
+    def _show_ready(self, text: str, session: Session) -> None:
         """Show ``text`` (or a warning that cells will fold), and the cost of the run."""
-        folding = _short(session.folding)
+        folding = _shortened(session.folding)
         text = html.escape(" ".join(filter(None, (folding or text, self._cost))))
         self.text.setText(f"<a href='motion'>{text}</a>" if folding else text)
         self.text.setToolTip(wrapped(session.folding))
@@ -153,10 +153,10 @@ class RunPanel(Panel):
                 text = "\n".join(f"Note: {note}" for note in notes_of(run))
                 main_window(self).banner.show_message(text)
         elif target == SETTINGS:
-            self.store.change(changes.take_settings, self.store.session.shown)
+            self.store.change(changes.adopt_settings, self.store.session.shown)
         else:
             asked = Requirement(self.store.session.folding, "motion")
-            self.place_wanted.emit((*self._missing, asked)[0])
+            self.requirement_clicked.emit((*self._missing, asked)[0])
 
     def take_theme(self, _scheme: ColorScheme) -> None:
         """Set the text again: a label's links keep the colors of the old theme otherwise."""
@@ -171,29 +171,29 @@ class RunPanel(Panel):
         self.bar.setRange(0, 1000)
         self.bar.setValue(0)
         if what:
-            self._tell_doing(what)
+            self._show_progress_text(what)
             self.text.setToolTip("")
         self.sync(self.store.session)
 
-    def show_doing(self, doing: JobProgress) -> None:
+    def show_progress(self, progress: JobProgress) -> None:
         """Show the progress of the job."""
         if not self._busy:
             return
-        self._tell_doing(doing.text)
-        if doing.fraction is None:
+        self._show_progress_text(progress.text)
+        if progress.fraction is None:
             self.bar.setRange(0, 0)
         else:
             self.bar.setRange(0, 1000)
-            self.bar.setValue(round(1000 * doing.fraction))
+            self.bar.setValue(round(1000 * progress.fraction))
 
     def set_compiling(self, compiling: bool) -> None:
         """Show with the progress of a job whether it may wait for compilation."""
         self._compiling = compiling
         if self._busy and self.cancel.isEnabled():
-            self._tell_doing(self._doing)
+            self._show_progress_text(self._progress_text)
 
-    def _tell_doing(self, text: str) -> None:
-        self._doing = text
+    def _show_progress_text(self, text: str) -> None:
+        self._progress_text = text
         self.text.setText(html.escape(f"{text} (compiling, once)" if self._compiling else text))
 
     def show_cancelling(self) -> None:
@@ -207,6 +207,6 @@ def _checked(session: Session) -> object:
     return session.mesh, session.case, session.intersection, session.invalid
 
 
-def _short(text: str) -> str:
+def _shortened(text: str) -> str:
     """Return a text short enough to stand beside the button: a long one only up to its ``;``."""
-    return text if len(text) <= LONG else text.partition("; ")[0].removesuffix(".") + "."
+    return text if len(text) <= LONGEST_TEXT else text.partition("; ")[0].removesuffix(".") + "."

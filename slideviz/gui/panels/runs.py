@@ -12,7 +12,7 @@ from qtpy.QtWidgets import QApplication, QMenu, QToolButton, QTreeWidgetItem, QW
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.commands import COMPARE
 from slideviz.gui.panels.runs_tree import MIN, NAME, NUMBER, RUN, WORDS, RunTree
-from slideviz.gui.widgets.build import FoldingRow, hint_label, in_column, tool_button
+from slideviz.gui.widgets.build import WrappingRow, hint_label, in_column, tool_button
 from slideviz.gui.widgets.command import Command, fill_compare
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.labels import wrapped
@@ -21,7 +21,7 @@ from slideviz.gui.widgets.plot_canvas import ask_and_write
 from slideviz.gui.widgets.services import Services, main_window
 from slideviz.session import changes
 from slideviz.session.runs_table import QUALITY, best, described, table_text, write_table
-from slideviz.session.runs_words import brief, run_words
+from slideviz.session.runs_words import run_words, summary
 from slideviz.session.state import Run, Session
 from slideviz.session.store import Store
 
@@ -44,7 +44,7 @@ class RunActions:
             button.setObjectName(f"runs_{name}")
             button.setIconSize(QSize(18, 18))
         every, left = list(self.buttons.values()), 1 + RUN_COMMANDS.index(None)
-        self.row = FoldingRow(every[:left], every[left:], spacing=2)
+        self.row = WrappingRow(every[:left], every[left:], spacing=2)
         """The buttons."""
 
     @property
@@ -114,7 +114,7 @@ class RunActions:
 
     def take_settings(self, number: int | None = None) -> None:
         """Put the settings of a run back into the panels."""
-        self.store.change(changes.take_settings, number or self.tree.number)
+        self.store.change(changes.adopt_settings, number or self.tree.number)
 
     def save_mesh(self, number: int | None = None) -> None:
         """Show a run and save the mesh of its last step."""
@@ -127,12 +127,12 @@ class RunActions:
         if number is None:
             return
         self.store.change(changes.remove_run, number)
-        self._window.say(f"Run {number} removed (Ctrl+Z brings it back)")
+        self._window.show_status(f"Run {number} removed (Ctrl+Z brings it back)")
 
     def copy_table(self, _number: int | None = None) -> None:
         """Copy the table of all runs to the clipboard, with tabs, for a spreadsheet."""
         QApplication.clipboard().setText(table_text(self.store.session.runs, "\t"))
-        self._window.say("Copied the table of runs")
+        self._window.show_status("Copied the table of runs")
 
     def export_table(self, _number: int | None = None) -> None:
         """Ask for a file name and write the table of all runs as CSV."""
@@ -253,7 +253,7 @@ class RunsPanel(Panel):
             )
         beside = number == session.view.beside
         tip = "The mesh before it is deformed." if run is None else described(run)
-        words = "step 0 of each run" if run is None else brief(run, session.runs)
+        words = "step 0 of each run" if run is None else summary(run, session.runs)
         if champion:
             tip += "\n\nIts minimum quality is the highest of the runs with the same motion."
         for column, text in enumerate(texts):

@@ -111,7 +111,7 @@ def text_color(option: QStyleOptionViewItem, plain: QPalette.ColorRole) -> QColo
     return option.palette.color(group, QPalette.ColorRole.HighlightedText if chosen else plain)
 
 
-class Seen(NamedTuple):
+class ShownRun(NamedTuple):
     """The run, its step and the run beside it that were shown when the mouse was pressed."""
 
     run: int | None = None
@@ -160,7 +160,7 @@ class RunTree(QTreeWidget):
         for column in (MIN, MEAN, INVERTED):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
             self.headerItem().setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
-        self.seen_before = Seen()
+        self.seen_before = ShownRun()
         self.session: Callable[[], Session] = Session
 
     @property
@@ -196,7 +196,7 @@ class RunTree(QTreeWidget):
         # A double click begins with a click, which shows the run: keep what was shown before,
         # as a double click compares the run with that.
         now = self.session()
-        self.seen_before = Seen(now.shown, now.view.frame, now.view.beside)
+        self.seen_before = ShownRun(now.shown, now.view.frame, now.view.beside)
         super().mousePressEvent(event)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:

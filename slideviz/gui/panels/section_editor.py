@@ -10,7 +10,7 @@ from qtpy.QtGui import QStandardItemModel
 from qtpy.QtWidgets import QFormLayout, QLabel, QSlider, QWidget
 
 from slideviz.errors import CaseError
-from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.widgets.build import check_box, grow_fields, in_row
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField
@@ -57,7 +57,7 @@ class SectionEditor(QWidget):
         self._place: int | None = None
         self._make_fields()
         self._place_fields()
-        self._soon = later(self, self._slid)
+        self._soon = single_shot(self, self._slider_moved)
 
     def _make_fields(self) -> None:
         self.axis = Choice({**{word: word for word in AXES}, FREE: "free"})
@@ -72,12 +72,12 @@ class SectionEditor(QWidget):
         self.slider.setMinimumWidth(80)
         self.slider.valueChanged.connect(lambda _: self._soon.start())
         self.slider.sliderPressed.connect(lambda: self.dragging.emit(True))
-        self.slider.sliderReleased.connect(self._let_go)
+        self.slider.sliderReleased.connect(self._slider_released)
         self.number = NumberField(0.0, self._allowed)
         self.number.setFixedWidth(84)
         self.number.changed.connect(self._position_typed)
         tip = "Show the cells it cuts whole, instead of cut."
-        self.whole = check_box("Whole cells", tip, lambda on: self._tell(whole=on))
+        self.whole = check_box("Whole cells", tip, lambda on: self._emit_changed(whole=on))
 
     def _place_fields(self) -> None:
         form = QFormLayout(self)
@@ -151,7 +151,7 @@ class SectionEditor(QWidget):
         key = (self._mesh, section.kind, section.direction, centre)
         if key != self._span_of:
             assert self._points is not None
-            self._span_of, self._span = key, section_cuts.span(section, self._points)
+            self._span_of, self._span = key, section_cuts.position_range(section, self._points)
         value, (low, high) = section.shape.position(section), self._span
         self.number.show_value(float(f"{value:.6g}"))
         if self.slider.isSliderDown() or self._soon.isActive():
@@ -162,11 +162,11 @@ class SectionEditor(QWidget):
 
     # Widgets to state ------------------------------------------------------------------
 
-    def _tell(self, **values: object) -> None:
+    def _emit_changed(self, **values: object) -> None:
         if self._section is not None:
-            self._offer(replace(self._section, **values))  # type: ignore[arg-type]
+            self._emit(replace(self._section, **values))  # type: ignore[arg-type]
 
-    def _offer(self, section: Section) -> None:
+    def _emit(self, section: Section) -> None:
         if section != self._section:
             self.changed.emit(section)
 
@@ -177,7 +177,7 @@ class SectionEditor(QWidget):
         if word == FREE:
             self.show_section(self._section, self._mesh, self._place)
         else:
-            self._offer(section_cuts.turned(self._section, AXES[word], self._points))
+            self._emit(section_cuts.with_direction(self._section, AXES[word], self._points))
 
     def _direction_typed(self, values: tuple[float, ...]) -> None:
         x, y, z = (*values, 0.0, 0.0)[:3]
@@ -185,18 +185,18 @@ class SectionEditor(QWidget):
         if any(direction) and self._section is not None and self._points is not None:
             self._typing = True
             try:
-                self._offer(section_cuts.turned(self._section, direction, self._points))
+                self._emit(section_cuts.with_direction(self._section, direction, self._points))
             finally:
                 self._typing = False
         elif not any(direction):
             self.direction.fields[0].setToolTip("A direction is needed: not all may be 0.")
 
     def _centre_typed(self, values: tuple[float, ...]) -> None:
-        self._tell(origin=(*values, 0.0)[:3])
+        self._emit_changed(origin=(*values, 0.0)[:3])
 
     def _position_typed(self, value: float) -> None:
         if self._section is not None:
-            self._offer(self._section.shape.at_position(self._section, value))
+            self._emit(self._section.shape.at_position(self._section, value))
 
     def _allowed(self, value: float) -> str:
         if self._section is None:
@@ -207,20 +207,20 @@ class SectionEditor(QWidget):
             return str(problem)
         return ""
 
-    def _let_go(self) -> None:
+    def _slider_released(self) -> None:
         if self._soon.isActive():
             self._soon.stop()
-            self._slid()
+            self._slider_moved()
         self.dragging.emit(False)
 
-    def _slid(self) -> None:
+    def _slider_moved(self) -> None:
         if self._section is None:
             return
         low, high = self._span
         # A radius of 0 is not allowed, and a plane through the outermost nodes cuts nothing.
         share = np.clip(self.slider.value() / STEPS, 1e-4, 1.0 - 1e-4)
         value = low + float(share) * (high - low)
-        self._offer(self._section.shape.at_position(self._section, value))
+        self._emit(self._section.shape.at_position(self._section, value))
 
 
 def _way(section: Section | None) -> tuple[object, ...]:

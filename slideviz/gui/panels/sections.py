@@ -16,7 +16,7 @@ from slideviz.gui.panels.section_editor import SectionEditor
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import (
     Part,
-    boxed,
+    as_widget,
     check_box,
     hint_label,
     in_column,
@@ -139,7 +139,7 @@ class SectionsPanel(Panel):
         add: list[Part] = [in_row(*rows[0], None, self.remove, spacing=5)]
         add += [in_row(*row, None, spacing=5) for row in rows[1:]]
         tools = (self.handle, self.flat, None, self.look, self.picture)
-        self.tools, self.rest = boxed(in_row(*tools, spacing=5)), QWidget()
+        self.tools, self.rest = as_widget(in_row(*tools, spacing=5)), QWidget()
         self.rest.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
         parts = (*add, self.hint, self.list, self.editor, self.tools, self.rest)
         in_column(*parts, wide=[self.list], spacing=5, on=self, margins=(6, 6, 6, 6))
@@ -279,7 +279,7 @@ def save_picture(window: Services, paper: PageFormat) -> None:
     window.settings.setValue("folder", str(path.parent))
     window.running.start_job(
         f"Drawing {path.name}",
-        lambda done: window.say(f"Saved {done}"),
+        lambda done: window.show_status(f"Saved {done}"),
         save_section,
         path,
         session,

@@ -14,7 +14,7 @@ from qtpy.QtWidgets import QLabel, QStackedWidget
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.panels.worst_table import WorstModel, WorstTable
-from slideviz.gui.responsiveness.timers import REST_MS, later
+from slideviz.gui.responsiveness.timers import REST_MS, single_shot
 from slideviz.gui.widgets.build import in_column, in_row, push_button
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import ask_and_write, is_seen, words_label
@@ -44,10 +44,10 @@ class WorstPanel(Panel):
     ) -> None:
         super().__init__(store)
         self._fly_to = fly_to
-        self._seen: tuple[object, ...] = ()
+        self._listed_key: tuple[object, ...] = ()
         self._last = 0.0
         self._marked: int | None = None
-        self._told: tuple[object, ...] = ()
+        self._info_key: tuple[object, ...] = ()
         self.model = WorstModel()
         # The model's signals keep the panel alive: as its child, the model is deleted with it.
         self.model.setParent(self)
@@ -74,7 +74,7 @@ class WorstPanel(Panel):
         )
         parts = (self.stack, self.info, in_row(self.back, None, self.export))
         in_column(*parts, wide=[self.stack], spacing=3, on=self, margins=(4, 4, 4, 4))
-        self._soon = later(self, lambda: self._fill(self.store.session))
+        self._timer = single_shot(self, lambda: self._fill(self.store.session))
         for keys, function in (
             (QKeySequence(Qt.Key.Key_Escape), self.unmark),
             (QKeySequence(QKeySequence.StandardKey.Copy), self.copy_rows),
@@ -86,7 +86,7 @@ class WorstPanel(Panel):
 
     def _make_table(self) -> WorstTable:
         table = WorstTable(self.model)
-        table.gone_to.connect(self._go)
+        table.row_activated.connect(self._fly_to_row)
         table.clicked.connect(self._clicked)
         self.model.modelReset.connect(lambda: self._sync_mark(self.store.session))
         return table
@@ -95,7 +95,7 @@ class WorstPanel(Panel):
 
     def take_theme(self, _scheme: ColorScheme) -> None:
         """Write the facts of the marked cell again, in the colors of another theme."""
-        self._told = ()
+        self._info_key = ()
         self._sync_mark(self.store.session)
 
     def sync(self, session: Session) -> None:
@@ -108,13 +108,13 @@ class WorstPanel(Panel):
             self.info.hide()
             self.words.setText("Open a mesh first. Then this panel lists its worst cells.")
             self.model.show(None)
-            self._seen = ()
-        elif is_seen(self) and self._key(session) != self._seen:
+            self._listed_key = ()
+        elif is_seen(self) and self._key(session) != self._listed_key:
             since = (time.monotonic() - self._last) * 1000.0
             if since >= REST_MS:
                 self._fill(session)
-            elif not self._soon.isActive():
-                self._soon.start(round(REST_MS - since))
+            elif not self._timer.isActive():
+                self._timer.start(round(REST_MS - since))
         if is_seen(self):
             self._sync_mark(session)
 
@@ -129,9 +129,9 @@ class WorstPanel(Panel):
 
     def _fill(self, session: Session) -> None:
         """Make the list of the step that is shown."""
-        if session.frame is None or self._key(session) == self._seen:
+        if session.frame is None or self._key(session) == self._listed_key:
             return
-        self._seen, self._last = self._key(session), time.monotonic()
+        self._listed_key, self._last = self._key(session), time.monotonic()
         at = session.frames.index(session.frame)
         what = measure(session.view.color_by)
         worst = worst_cells(session.frames, at, what)
@@ -156,9 +156,9 @@ class WorstPanel(Panel):
         self.info.setVisible(cell is not None)
         if cell is not None:
             key = session.frame, cell, axis_of(session)
-            if key != self._told:
+            if key != self._info_key:
                 # Finding the nearest boundary of a large mesh takes a while.
-                self._told = key
+                self._info_key = key
                 self.info.setText(info_text(session, cell))
                 self.info.setToolTip(info_text(session, cell, every=True))
 
@@ -166,12 +166,12 @@ class WorstPanel(Panel):
         super().paintEvent(event)
         session = self.store.session
         # While the panel was behind another tab, the list was not filled.
-        if session.frame is not None and self._key(session) != self._seen:
+        if session.frame is not None and self._key(session) != self._listed_key:
             QTimer.singleShot(0, self, lambda: self.sync(self.store.session))
 
     # What the user does ----------------------------------------------------------------
 
-    def _go(self, row: int) -> None:
+    def _fly_to_row(self, row: int) -> None:
         cell = self.model.cell(row)
         self.store.change(changes.mark_cell, cell)
         self._fly_to(cell)
@@ -181,13 +181,13 @@ class WorstPanel(Panel):
         self.store.change(changes.show_frame, len(self.store.session.frames) - 1)
         self._fill(self.store.session)
         if self.model.worst is not None:
-            self._go(self.model.row_of(int(self.model.worst.cells[0])))
+            self._fly_to_row(self.model.row_of(int(self.model.worst.cells[0])))
 
     def _clicked(self, index: QModelIndex) -> None:
         if self.model.cell(index.row()) == self.store.session.view.marked_cell:
             self.unmark()
         else:
-            self._go(index.row())
+            self._fly_to_row(index.row())
 
     def unmark(self) -> None:
         """Remove the mark from the marked cell."""

@@ -46,7 +46,7 @@ TIPS = {
 }
 
 
-def digits_apart(values: FloatArray) -> int:
+def distinguishing_digits(values: FloatArray) -> int:
     """Return the number of decimals, `FEWEST` to `MOST`, that tell most of values (n,) apart."""
     different = len(np.unique(values.round(MOST)))
     for digits in range(FEWEST, MOST):
@@ -67,7 +67,7 @@ def place_digits(names: Sequence[str], places: FloatArray) -> list[int]:
     return [min(n, 2) if angle else length for n, angle in zip(each, angles, strict=True)]
 
 
-def digits_more(places: FloatArray, digits: Sequence[int]) -> int:
+def spare_digits(places: FloatArray, digits: Sequence[int]) -> int:
     """Return how many more digits than given tell places (n, d) apart, `MOST_MORE` at most."""
     different = len(np.unique(places, axis=0))
     for more in range(MOST_MORE):
@@ -105,15 +105,15 @@ class WorstModel(QAbstractTableModel):
         if worst is not None:
             self.names, self.places = coordinates(worst.positions, around)
             digits = place_digits(self.names, self.places)
-            self._more = digits_more(self.places, digits)
+            self._more = spare_digits(self.places, digits)
             self._decimals = [count + self._more for count in digits]
             self._figures = [
                 3 + count - decimals(column)
                 for count, column in zip(self._decimals, self.places.T, strict=True)
             ]
-            self._digits = digits_apart(worst.values[~worst.inverted])
+            self._digits = distinguishing_digits(worst.values[~worst.inverted])
             self._mixed = len(set(worst.kinds)) > 1
-        self._arrange()
+        self._sort_rows()
         self.endResetModel()
 
     def cell(self, row: int) -> int:
@@ -189,10 +189,10 @@ class WorstModel(QAbstractTableModel):
     def sort(self, column: int, order: Qt.SortOrder = Qt.SortOrder.AscendingOrder) -> None:
         self._by, self._down = column, order == Qt.SortOrder.DescendingOrder
         self.beginResetModel()
-        self._arrange()
+        self._sort_rows()
         self.endResetModel()
 
-    def _arrange(self) -> None:
+    def _sort_rows(self) -> None:
         """Sort the rows by the selected column; equal ones stay in the order of their quality."""
         if self.worst is None:
             self.order = np.empty(0, np.int64)
@@ -215,12 +215,12 @@ class WorstTable(QTableView):
 
     Signals
     -------
-    gone_to(int)
+    row_activated(int)
         The row to which a key moved, or on which Return was pressed. Qt's own signal of the
         current row is emitted too often: the focus alone makes the first row current.
     """
 
-    gone_to = Signal(int)
+    row_activated = Signal(int)
 
     def __init__(self, model: WorstModel) -> None:
         super().__init__()
@@ -248,12 +248,12 @@ class WorstTable(QTableView):
         header.setFont(letters)
         header.setStretchLastSection(True)
         header.setMinimumSectionSize(32)
-        model.modelReset.connect(self._share)
+        model.modelReset.connect(self._measure_columns)
         header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         header.setSortIndicator(QUALITY, Qt.SortOrder.AscendingOrder)
         self.setSortingEnabled(True)
 
-    def _share(self) -> None:
+    def _measure_columns(self) -> None:
         """Measure the width that each column needs; it never shrinks for the same columns."""
         model = self.model()
         assert isinstance(model, WorstModel)
@@ -271,9 +271,9 @@ class WorstTable(QTableView):
             room += 8 + (ARROW if column == QUALITY else 0)
             self._needed.append(max(room, before[column]))
         if self._needed != before:
-            self._spread()
+            self._distribute_width()
 
-    def _spread(self) -> None:
+    def _distribute_width(self) -> None:
         """Spread the spare width over the columns, unless the user has resized one."""
         now = [self.columnWidth(column) for column in range(len(self._needed))]
         # The last column stretches: its width says nothing about the user.
@@ -286,7 +286,7 @@ class WorstTable(QTableView):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._spread()
+        self._distribute_width()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         before = self.currentIndex().row()
@@ -294,4 +294,4 @@ class WorstTable(QTableView):
         row = self.currentIndex().row()
         enter = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
         if row >= 0 and (row != before or enter):
-            self.gone_to.emit(row)
+            self.row_activated.emit(row)

@@ -78,7 +78,7 @@ class WarmupThread(QObject):
 
     def watch(self) -> None:
         """Tell of compilation in other threads too, as of a job, until all loops are compiled."""
-        self._watched.enter_context(compilation_watched(self._begun))
+        self._watched.enter_context(compilation_watched(self._compilation_begun))
 
     def start(self) -> None:
         """Start the thread, unless it was started before."""
@@ -94,7 +94,7 @@ class WarmupThread(QObject):
     def _run(self) -> None:
         # Numba's threads are started here, and inherit this thread's low priority.
         try:
-            jit_warmup.warm_up(self._begun, self._stop.is_set)
+            jit_warmup.warm_up(self._compilation_begun, self._stop.is_set)
         except RuntimeError:  # the interpreter shuts down, and no thread pool takes work
             if not self._stop.is_set():
                 raise
@@ -103,20 +103,20 @@ class WarmupThread(QObject):
         gc.freeze()
         self._watched.close()
         if self._compiles:
-            self._tell(False)
+            self._emit_compiling(False)
 
-    def _begun(self) -> None:
+    def _compilation_begun(self) -> None:
         if not self._compiles:
             self._compiles = True
-            self._tell(True)
+            self._emit_compiling(True)
 
-    def _tell(self, compiling: bool) -> None:
+    def _emit_compiling(self, compiling: bool) -> None:
         # The window may be gone by now.
         with contextlib.suppress(RuntimeError):
             self.compiling.emit(compiling)
 
 
-def ready_numerics() -> None:
+def import_numerics() -> None:
     """Import the numerics before any thread is started, and lower their threads' priority.
 
     NumPy's BLAS gets `NUMPY_THREADS` if SciPy has a BLAS of its own.
@@ -124,7 +124,7 @@ def ready_numerics() -> None:
     # Once, here: if two threads (the warm-up and a run) import Numba at the same time, one finds
     # it partly initialized.
     import_module("slideviz.solver.deform")
-    hold_libraries_back()
+    lower_library_priority()
     blas = ThreadpoolController().select(user_api="blas").lib_controllers
     numpys = [one for one in blas if "numpy.libs" in one.filepath]
     if len(numpys) < len(blas):
@@ -132,7 +132,7 @@ def ready_numerics() -> None:
             one.set_num_threads(NUMPY_THREADS)
 
 
-def be_quick() -> GarbageCollector:
+def tune_interpreter() -> GarbageCollector:
     """Set Python's thread switching and garbage collection up for a responsive window.
 
     Returns
@@ -157,7 +157,7 @@ def start_thread(work: Callable[[], object], name: str, daemon: bool = True) -> 
     """
 
     def run() -> None:
-        stand_back()
+        lower_priority()
         work()
 
     thread = Thread(target=run, name=name, daemon=daemon)
@@ -165,7 +165,7 @@ def start_thread(work: Callable[[], object], name: str, daemon: bool = True) -> 
     return thread
 
 
-def stand_back(thread: int | None = None) -> None:
+def lower_priority(thread: int | None = None) -> None:
     """Lower the priority of a thread (default: this one), and of those that it starts.
 
     Without a graphics card, the GUI thread draws on the processors that compute. Only on Linux.
@@ -182,7 +182,7 @@ def stand_back(thread: int | None = None) -> None:
             os.setpriority(os.PRIO_PROCESS, thread, before + NICENESS)
 
 
-def hold_libraries_back() -> None:
+def lower_library_priority() -> None:
     """Lower the priority of the threads that libraries such as BLAS have started. Called once.
 
     They are recognized by their name: unlike threads of Qt and of the graphics driver, they have
@@ -197,7 +197,7 @@ def hold_libraries_back() -> None:
         # A thread may have ended meanwhile.
         with contextlib.suppress(OSError):
             if int(task.name) not in pythons and (task / "comm").read_text() == name:
-                stand_back(int(task.name))
+                lower_priority(int(task.name))
 
 
 class GarbageCollector(QObject):
@@ -211,7 +211,7 @@ class GarbageCollector(QObject):
         super().__init__(parent)
         self._timer = QTimer(self)
         self._timer.setInterval(GARBAGE_MS)
-        self._timer.timeout.connect(self.look)
+        self._timer.timeout.connect(self.collect_if_due)
 
     def start(self) -> None:
         """Switch Python's automatic collection off, and collect from this timer instead."""
@@ -223,7 +223,7 @@ class GarbageCollector(QObject):
         self._timer.stop()
         gc.enable()
 
-    def look(self) -> None:
+    def collect_if_due(self) -> None:
         """Collect garbage, if `GARBAGE_OBJECTS` were made since the last time."""
         if gc.get_count()[0] < GARBAGE_OBJECTS:
             return

@@ -112,7 +112,7 @@ READ_MS = 100
 """Interval at which a run that was asked for at the start checks whether its file is read."""
 
 
-def later(parent: QObject | None, call: Callable[[], object], wait_ms: int = 0) -> QTimer:
+def single_shot(parent: QObject | None, call: Callable[[], object], wait_ms: int = 0) -> QTimer:
     """Return a single-shot timer that calls ``call``, ``wait_ms`` after it was last started.
 
     At 0 ms it calls in the next turn of the event loop, once for all starts in this one.

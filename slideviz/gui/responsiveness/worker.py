@@ -19,7 +19,7 @@ from qtpy.QtCore import QObject, Qt, QTimer, Signal
 
 from slideviz.errors import Cancelled
 from slideviz.gui.responsiveness.threads import start_thread
-from slideviz.gui.responsiveness.timers import CLOSING_S, NEWS_S, TURN_MS, later
+from slideviz.gui.responsiveness.timers import CLOSING_S, NEWS_S, TURN_MS, single_shot
 from slideviz.session.jobs import JobProgress, raise_if_cancelled
 from slideviz.session.pieces import InThread
 
@@ -31,7 +31,7 @@ class PieceRunner(QObject):
 
     Signals
     -------
-    came(object)
+    yielded(object)
         A value that the generator yielded, if neither None nor a `InThread`.
     done(object)
         The generator's return value. Nothing is emitted for one that was stopped.
@@ -39,7 +39,7 @@ class PieceRunner(QObject):
         The error that it raised.
     """
 
-    came = Signal(object)
+    yielded = Signal(object)
     done = Signal(object)
     failed = Signal(object)
 
@@ -47,12 +47,12 @@ class PieceRunner(QObject):
         super().__init__(parent)
         self._pieces: Generator[object, Any, Any] | None = None
         self._runner = self._make_runner()
-        self._timer = later(self, lambda: self._go_on(next), TURN_MS)
+        self._timer = single_shot(self, lambda: self._advance(next), TURN_MS)
 
     def _make_runner(self) -> JobRunner:
         runner = JobRunner(self)
-        runner.finished.connect(lambda value: self._go_on(lambda pieces: pieces.send(value)))
-        runner.failed.connect(lambda error: self._go_on(lambda pieces: pieces.throw(error)))
+        runner.finished.connect(lambda value: self._advance(lambda pieces: pieces.send(value)))
+        runner.failed.connect(lambda error: self._advance(lambda pieces: pieces.throw(error)))
         return runner
 
     @property
@@ -77,7 +77,7 @@ class PieceRunner(QObject):
         if pieces is not None:
             pieces.close()
 
-    def _go_on(self, step: Callable[[Generator[object, Any, Any]], object]) -> None:
+    def _advance(self, step: Callable[[Generator[object, Any, Any]], object]) -> None:
         assert self._pieces is not None
         try:
             piece = step(self._pieces)
@@ -94,10 +94,10 @@ class PieceRunner(QObject):
                 return
             self._timer.start()
             if piece is not None:
-                self.came.emit(piece)
+                self.yielded.emit(piece)
 
 
-def raise_again(error: Exception) -> None:
+def reraise(error: Exception) -> None:
     """Raise an error: a slot for `failed` that passes it to the window's handler of exceptions."""
     raise error
 
@@ -116,7 +116,7 @@ class JobRunner(QObject):
 
     Signals
     -------
-    doing(Doing)
+    progressed(Doing)
         The newest progress that the job reported.
     kept(list)
         All other items reported since the last emission, in order.
@@ -125,7 +125,7 @@ class JobRunner(QObject):
         per job, after all its reports.
     """
 
-    doing = Signal(object)
+    progressed = Signal(object)
     kept = Signal(list)
     finished = Signal(object)
     cancelled = Signal()
@@ -214,7 +214,7 @@ class JobRunner(QObject):
             self._woken = False
         if news is not None:
             self._delivered_s = time.monotonic()
-            self.doing.emit(news)
+            self.progressed.emit(news)
         if items:
             self.kept.emit(items)
         if end is None:

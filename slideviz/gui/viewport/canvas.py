@@ -15,7 +15,7 @@ from qtpy.QtGui import QContextMenuEvent, QKeyEvent, QMouseEvent, QResizeEvent, 
 from qtpy.QtWidgets import QApplication, QWidget
 from vtkmodules.vtkRenderingCore import vtkProp
 
-from slideviz.gui.responsiveness.timers import REPAINT_MS, later
+from slideviz.gui.responsiveness.timers import REPAINT_MS, single_shot
 from slideviz.session.pieces import PART_CELLS, portions
 
 
@@ -33,13 +33,13 @@ class RepaintCoalescer(QObject):
         self._view = view
         self._window: QWidget | None = None
         self._held = False
-        self._timer = later(self, self._paint, REPAINT_MS)
+        self._timer = single_shot(self, self._paint, REPAINT_MS)
 
-    def ask(self) -> None:
+    def request(self) -> None:
         """Schedule a repaint."""
         window = self._view.window()
         if window is not self._window:
-            self._let_go()
+            self._release_updates()
             window.installEventFilter(self)
             self._window = window
         if not self._timer.isActive():
@@ -48,13 +48,13 @@ class RepaintCoalescer(QObject):
     def end(self) -> None:
         """Stop delaying repaints of the window."""
         self._timer.stop()
-        self._let_go()
+        self._release_updates()
 
     def _paint(self) -> None:
         self._view.update()
-        self._let_go()
+        self._release_updates()
 
-    def _let_go(self) -> None:
+    def _release_updates(self) -> None:
         if self._held and self._window is not None:
             self._held = False
             QCoreApplication.postEvent(self._window, QEvent(QEvent.Type.UpdateRequest))
@@ -62,7 +62,7 @@ class RepaintCoalescer(QObject):
     def eventFilter(self, _window: QObject, event: QEvent) -> bool:
         if event.type() != QEvent.Type.UpdateRequest or not self._timer.isActive():
             return False
-        # The event is filtered out and posted again by `_let_go`: Qt takes it for handled.
+        # The event is filtered out and posted again by `_release_updates`: Qt takes it for handled.
         self._held = True
         return True
 
@@ -133,7 +133,7 @@ class View3D(QtInteractor):
         """Schedule one repaint; pyvista calls this after almost every change of the scene."""
         if hasattr(self, "_repaints") and not self._closed:
             self._rendered = True
-            self._repaints.ask()
+            self._repaints.request()
 
     render_soon = render
 

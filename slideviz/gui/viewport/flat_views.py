@@ -11,7 +11,7 @@ from qtpy.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.panels.curves import CurveCanvas
-from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.linked_views import TitleBar
 from slideviz.gui.viewport.view_mouse import CellMouse
@@ -230,7 +230,7 @@ class CurveView(QWidget):
         if self.rows:
             self.area.plot()
         else:
-            self.area.say(NOTHING)
+            self.area.show_text(NOTHING)
 
     def drawing(self) -> Draw:
         """Return a function that draws the present curves into a figure."""
@@ -316,7 +316,7 @@ class FlatView(QWidget):
     def _connect(self, store: Store) -> None:
         self.view.signals.zoomed.connect(self._zoomed)
         self.view.signals.resized.connect(self._resized)
-        self._refit = later(self, self.fit)
+        self._refit = single_shot(self, self.fit)
         CellMouse(self.view, self.scene, store)
         # The rulers follow the camera, whether the mouse or the program moves it.
         moved = self._camera_moved

@@ -12,7 +12,7 @@ from vtkmodules.vtkInteractionWidgets import (
 )
 
 from slideviz.color_scheme import SELECTED_COLOR, ColorScheme
-from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.point_handle import (
     HANDLE_COLOR,
@@ -116,7 +116,7 @@ class PlaneHandle:
         self.widget.SetInteractor(view.iren.interactor)
         self._bounds: list[float] = []
         self.dragging = False
-        self._soon = later(None, self.report)
+        self._soon = single_shot(None, self.report)
         for event, call in (
             ("StartInteractionEvent", lambda *_: self._grab(True)),
             ("InteractionEvent", lambda *_: self._soon.start()),

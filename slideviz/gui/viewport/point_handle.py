@@ -20,7 +20,7 @@ from qtpy.QtGui import QMouseEvent
 from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
 
 from slideviz.color_scheme import SELECTED_COLOR, ColorScheme
-from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.responsiveness.timers import single_shot
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.scene.actors import draw_in_front
@@ -83,7 +83,7 @@ class PointHandle(QObject, Generic[Grasp]):
         self._start: tuple[Grasp, FloatArray] | None = None
         self._at: FloatArray | None = None
         self._overlay = Overlay(view)
-        self._soon = later(self, self.report)
+        self._soon = single_shot(self, self.report)
         view.installEventFilter(self)
         # Each drawing may have another camera or size.
         watched, event, put = view.renderer, "StartEvent", self.put

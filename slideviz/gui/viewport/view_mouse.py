@@ -13,7 +13,7 @@ from qtpy.QtWidgets import QToolTip
 
 from slideviz.gui.panels.boundaries import boundary_menu
 from slideviz.gui.panels.worst import info_text
-from slideviz.gui.responsiveness.timers import SLOW_FRAME_S, STILL_MS, later
+from slideviz.gui.responsiveness.timers import SLOW_FRAME_S, STILL_MS, single_shot
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.scene.flat_scene import FlatScene
 from slideviz.scene.scene import Scene
@@ -36,7 +36,7 @@ class CoarseWhileMoving(QObject):
     def __init__(self, view: View3D, scene: Scene) -> None:
         super().__init__(view)
         self.view, self.scene = view, scene
-        self._timer = later(self, self._draw_fully, STILL_MS)
+        self._timer = single_shot(self, self._draw_fully, STILL_MS)
         view.signals.moving.connect(self._draw_coarsely)
         view.signals.released.connect(self._draw_fully)
 

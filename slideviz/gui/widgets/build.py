@@ -35,7 +35,7 @@ from slideviz.gui.widgets.labels import wrapped
 
 Part = QWidget | QLayout | int | None
 """An item of a row or column; None is a stretch, a number a space in pixels."""
-Do = Callable[..., object] | SignalInstance
+Slot = Callable[..., object] | SignalInstance
 Box = TypeVar("Box", bound=QBoxLayout)
 
 # Layouts -----------------------------------------------------------------------------------
@@ -80,7 +80,7 @@ def _filled(layout: Box, parts: Sequence[Part], wide: Sequence[Part], spacing: i
     return layout
 
 
-def boxed(layout: QLayout) -> QWidget:
+def as_widget(layout: QLayout) -> QWidget:
     """Return a new widget with a layout, without margins."""
     widget = QWidget()
     layout.setContentsMargins(0, 0, 0, 0)
@@ -94,7 +94,7 @@ def grow_fields(form: QFormLayout, spacing: int = 4) -> None:
     form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
 
 
-class FoldingRow(QWidget):
+class WrappingRow(QWidget):
     """A row with some parts at the left and some at the right, which are below where it is narrow.
 
     Parameters
@@ -190,7 +190,7 @@ def on_screen(content: QWidget, dialog: QWidget) -> QWidget:
 # Buttons -----------------------------------------------------------------------------------
 
 
-def push_button(text: str, tip: str, do: Do, name: str = "") -> QPushButton:
+def push_button(text: str, tip: str, do: Slot, name: str = "") -> QPushButton:
     """Return a push button with a text that calls ``do`` when clicked; ``name``: object name."""
     button = QPushButton(text)
     button.setObjectName(name)
@@ -201,7 +201,7 @@ def push_button(text: str, tip: str, do: Do, name: str = "") -> QPushButton:
 
 def tool_button(
     tip: str,
-    do: Do | None = None,
+    do: Slot | None = None,
     *,
     image: str = "",
     text: str = "",
@@ -227,7 +227,7 @@ def tool_button(
     return button
 
 
-def check_box(text: str, tip: str, toggled: Do | None = None, name: str = "") -> QCheckBox:
+def check_box(text: str, tip: str, toggled: Slot | None = None, name: str = "") -> QCheckBox:
     """Return a check box."""
     box = QCheckBox(text)
     box.setObjectName(name)
@@ -238,7 +238,7 @@ def check_box(text: str, tip: str, toggled: Do | None = None, name: str = "") ->
 
 
 def number_box(
-    low: int, high: int, value: int, changed: Do | None = None, *, unit: str = "", tip: str = ""
+    low: int, high: int, value: int, changed: Slot | None = None, *, unit: str = "", tip: str = ""
 ) -> QSpinBox:
     """Return a spin box for a whole number from ``low`` to ``high``, with its unit as suffix."""
     box = QSpinBox()
@@ -250,7 +250,7 @@ def decimal_box(
     low: float,
     high: float,
     value: float,
-    changed: Do | None = None,
+    changed: Slot | None = None,
     *,
     unit: str = "",
     tip: str = "",
@@ -262,7 +262,7 @@ def decimal_box(
     return _completed(box, value, changed, unit, tip)
 
 
-def _completed(box: Any, value: float, changed: Do | None, unit: str, tip: str) -> Any:
+def _completed(box: Any, value: float, changed: Slot | None, unit: str, tip: str) -> Any:
     box.setValue(value)
     box.setSuffix(unit)
     box.setToolTip(tip)

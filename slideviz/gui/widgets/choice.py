@@ -44,13 +44,13 @@ class Choice(QComboBox):
         if index >= 0 and index != self.currentIndex():
             self.setCurrentIndex(index)
 
-    def offer(self, value: object, offered: bool) -> None:
+    def set_item_enabled(self, value: object, offered: bool) -> None:
         """Let the entry of a value be chosen, or not."""
         model = self.model()
         assert isinstance(model, QStandardItemModel)
         model.item(self.findData(value)).setEnabled(offered)
 
-    def explain(self, tips: Mapping[str, str]) -> None:
+    def set_tips(self, tips: Mapping[str, str]) -> None:
         """Set the tooltips of entries, by their values."""
         for value, tip in tips.items():
             self.setItemData(self.findData(value), wrapped(tip), Qt.ItemDataRole.ToolTipRole)

@@ -22,7 +22,7 @@ from typing import Protocol
 from qtpy.QtCore import QObject, QtMsgType, Signal, qInstallMessageHandler, qVersion
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.responsiveness.timers import COUNTING_MS, later
+from slideviz.gui.responsiveness.timers import COUNTING_MS, single_shot
 from slideviz.system.cleanup import is_alive, private_file, private_folder
 
 REST_S = 5.0
@@ -80,7 +80,7 @@ class ErrorReporter(QObject):
         self._clock = clock
         self._known: dict[tuple[object, ...], tuple[int, float]] = {}
         self._shown: tuple[object, ...] = ()
-        self._timer = later(self, self._count_again, COUNTING_MS)
+        self._timer = single_shot(self, self._count_again, COUNTING_MS)
         self._came.connect(self._take)
 
     def show(self, error: BaseException) -> None:

@@ -86,14 +86,14 @@ def short_text(value: float, scale: float = 0.0) -> str:
     return exact if len(exact) <= SHORT else f"{float(value):.6g}"
 
 
-def _say_kept(field: QWidget, problem: str, value: str) -> None:
+def _report_restored(field: QWidget, problem: str, value: str) -> None:
     """Say in the status bar that a field was left with an invalid text."""
     window = main_window(field)
     if window is not None:
-        window.say(f"Invalid: {problem}; the value is still {value}.")
+        window.show_status(f"Invalid: {problem}; the value is still {value}.")
 
 
-def _own_step(field: QLineEdit, event: QEvent) -> bool | None:
+def _undo_in_field(field: QLineEdit, event: QEvent) -> bool | None:
     """Undo or redo in a field on Ctrl+Z or Ctrl+Y, while there is something of its own.
 
     Returns whether there was; None for other events. What is not its own is left to the window. On
@@ -110,27 +110,27 @@ def _own_step(field: QLineEdit, event: QEvent) -> bool | None:
     own = field.isUndoAvailable() if undoes else field.isRedoAvailable()
     event.setAccepted(own)
     if not own:
-        _forget(field)  # what was typed here before is older than what the window does now
+        _clear_undo(field)  # what was typed here before is older than what the window does now
     elif event.type() == QEvent.Type.KeyPress:
-        with _taking_back(field):
+        with _as_undo(field):
             (field.undo if undoes else field.redo)()
     return own
 
 
-def _forget(field: QLineEdit) -> None:
+def _clear_undo(field: QLineEdit) -> None:
     """Leave nothing that the field itself could undo or redo."""
     if field.isUndoAvailable() or field.isRedoAvailable():
         field.setText(field.text())
 
 
 @contextmanager
-def _taking_back(field: QWidget) -> Iterator[None]:
+def _as_undo(field: QWidget) -> Iterator[None]:
     """Let the session take a value that it had before as its own undo, not as a new change."""
     window = main_window(field)
     if window is None:
         yield
         return
-    with window.store.taking_back():
+    with window.store.reverting():
         yield
 
 
@@ -138,7 +138,7 @@ class TextField(QLineEdit):
     """A field for a text, in which Ctrl+Z and Ctrl+Y act first on what is typed."""
 
     def event(self, event: QEvent) -> bool:
-        own = _own_step(self, event)
+        own = _undo_in_field(self, event)
         return super().event(event) if own is None else own
 
 
@@ -318,12 +318,12 @@ class NumberField(TextField):
         super().focusOutEvent(event)
         if not self.problem:
             self.setModified(False)
-            _forget(self)
+            _clear_undo(self)
             self._write()
 
     def _edited(self) -> None:
         if self.problem:
-            self._withdraw()
+            self._revert_text()
         else:
             self._value = self._typed()
             # Before `mark`: who listens to ``marked`` shows the value, and needs the new one.
@@ -335,15 +335,15 @@ class NumberField(TextField):
         if not self.problem:
             self._before = self._value
             return
-        self._withdraw()
-        _say_kept(self, self.problem, self._text())
+        self._revert_text()
+        _report_restored(self, self.problem, self._text())
         self.mark()
 
-    def _withdraw(self) -> None:
+    def _revert_text(self) -> None:
         """Take back a valid beginning of a text that is not valid."""
         if self._value != self._before:
             self._value = self._before
-            with _taking_back(self):
+            with _as_undo(self):
                 self.changed.emit(self._value)
 
     def mark(self) -> None:
@@ -371,7 +371,7 @@ class NumberBox(QSpinBox):
         self._before = self.value()
         # No single signal covers each change of the text, by the user or by the program.
         for change in (self.lineEdit().textChanged, self.editingFinished, self.valueChanged):
-            change.connect(lambda *_: self._look())
+            change.connect(lambda *_: self._validate())
 
     def validate(self, text: str, at: int) -> tuple[QValidator.State, str, int]:
         """Accept every character, so that 2.5 is not typed as 25."""
@@ -394,16 +394,16 @@ class NumberBox(QSpinBox):
         if self.fault:
             with QSignalBlocker(self):
                 self.setValue(self.value())
-            self._look()
+            self._validate()
 
     def event(self, event: QEvent) -> bool:
-        own = _own_step(self.lineEdit(), event)
+        own = _undo_in_field(self.lineEdit(), event)
         return super().event(event) if own is None else own
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if self.fault and event.key() == Qt.Key.Key_Escape:
             self.setValue(self._before)
-            self._look()
+            self._validate()
         # Return would replace an invalid text by a number that nobody typed.
         elif not self.fault or event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             super().keyPressEvent(event)
@@ -416,7 +416,7 @@ class NumberBox(QSpinBox):
         if typed and word.startswith(typed):
             self.setValue(self.minimum())
             self.lineEdit().setSelection(len(typed), len(word))
-            self._look()
+            self._validate()
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         if not self.fault:
@@ -426,10 +426,10 @@ class NumberBox(QSpinBox):
     def focusOutEvent(self, event: QFocusEvent) -> None:
         typed, bad = self.text(), self.fault
         super().focusOutEvent(event)
-        _forget(self.lineEdit())
+        _clear_undo(self.lineEdit())
         if bad:
             self.setValue(self._before)
-            _say_kept(self, bad, self.text())
+            _report_restored(self, bad, self.text())
             self.lineEdit().setText(typed)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
@@ -440,14 +440,14 @@ class NumberBox(QSpinBox):
         if self.value() != value:
             with QSignalBlocker(self):
                 self.setValue(value)
-            self._look()
+            self._validate()
 
     def set_tip(self, text: str) -> None:
         """Set the tooltip, which is shown while the value is valid."""
         self._tip = text
         self.setToolTip(wrapped(self.fault or text))
 
-    def _look(self) -> None:
+    def _validate(self) -> None:
         fault = self.problem
         if fault != self.fault:
             self.fault = fault

@@ -158,7 +158,7 @@ class WideLabel(QScrollArea):
         self.setWidgetResizable(True)
         self.setWidget(self.label)
 
-    def say(self, text: str) -> None:
+    def show_text(self, text: str) -> None:
         """Show a text from its beginning; hide the label if it is empty."""
         self.label.setText(text)
         self.setVisible(bool(text))

@@ -29,11 +29,11 @@ class FieldWatch(QObject):
             *panel.findChildren(NumberBox),
         ]
         for field in self._fields:
-            field.marked.connect(self.look)
+            field.marked.connect(self.report)
         # Another motion or method may hide or disable a field.
-        store.listen(lambda *_: self.look())
+        store.listen(lambda *_: self.report())
 
-    def look(self) -> None:
+    def report(self) -> None:
         """Write the faults of the visible, enabled fields to the session."""
         faults = tuple(
             f"{_title(field, self.panel)}: {field.fault}."
@@ -127,5 +127,5 @@ class Panel(QWidget):
         for canvas in self.findChildren(PlotCanvas):
             canvas.set_scheme(scheme)
 
-    def lead_to(self, missing: Requirement) -> None:
+    def focus_requirement(self, missing: Requirement) -> None:
         """Put the cursor into the field by which a missing requirement of a run is met."""

@@ -17,7 +17,13 @@ from qtpy.QtWidgets import QLabel, QSizePolicy, QStackedWidget, QWidget
 
 from slideviz.color_scheme import LIGHT, ColorScheme
 from slideviz.errors import SlidevizError
-from slideviz.gui.responsiveness.timers import LOOK_MS, MOST_REST, REST_MS, REST_TIMES, later
+from slideviz.gui.responsiveness.timers import (
+    LOOK_MS,
+    MOST_REST,
+    REST_MS,
+    REST_TIMES,
+    single_shot,
+)
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import hint_label
 from slideviz.gui.widgets.plot_image import Draw, Picture, PlotFormat, draw_in_thread
@@ -64,12 +70,12 @@ class PlotCanvas(QWidget):
         self._picture = Picture()
         self._coming: Future[Picture] | None = None
         self._before: Future[Picture] | None = None
-        self._timer = later(self, self.fill)
+        self._timer = single_shot(self, self.fill)
         # The image is polled, not signalled: the thread must not refer to a widget that may be
         # deleted.
         self._look_after = QTimer(self)
         self._look_after.setInterval(LOOK_MS)
-        self._look_after.timeout.connect(self._take)
+        self._look_after.timeout.connect(self._show_image)
         self.setMinimumSize(120, 100)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
@@ -91,19 +97,19 @@ class PlotCanvas(QWidget):
 
     # Drawing ---------------------------------------------------------------------------
 
-    def ask(self) -> None:
+    def request_draw(self) -> None:
         """Schedule a drawing; a hidden plot is drawn when it is shown."""
         self._stale = True
         if is_seen(self) and not self.busy:
             since = (time.monotonic() - self._last) * 1000.0
-            self._timer.start(max(0, round(self._rest_ms() - since)))
+            self._timer.start(max(0, round(self._least_interval_ms() - since)))
 
     def wipe(self) -> None:
         """Show “Drawing…” instead of the image until the next one, as it is of another plot."""
         self.wiped, self._before = True, self._coming
         self.update()
 
-    def _rest_ms(self) -> float:
+    def _least_interval_ms(self) -> float:
         """Return the least time between two drawings, in ms: longer, the longer one takes."""
         return min(max(REST_MS, REST_TIMES * 1000.0 * self._picture.seconds), MOST_REST * REST_MS)
 
@@ -118,7 +124,7 @@ class PlotCanvas(QWidget):
         self._coming = draw_in_thread(self.drawing(), paper, self._picture.place)
         self._look_after.start()
 
-    def _take(self) -> None:
+    def _show_image(self) -> None:
         """Show the image being drawn, if it is done."""
         if self._coming is None or not self._coming.done():
             return
@@ -131,12 +137,12 @@ class PlotCanvas(QWidget):
         self.update()
         self.drawn.emit()
         if self._stale:
-            self.ask()
+            self.request_draw()
 
     def set_scheme(self, scheme: ColorScheme) -> None:
         """Draw in another color scheme."""
         self.scheme = scheme
-        self.ask()
+        self.request_draw()
 
     # Places ----------------------------------------------------------------------------
 
@@ -166,7 +172,7 @@ class PlotCanvas(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._last = 0.0  # without delay: the present image is shown stretched
-        self.ask()
+        self.request_draw()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
@@ -184,7 +190,7 @@ class PlotCanvas(QWidget):
             painter.fillRect(self.rect(), QColor(self.scheme.background))
         painter.end()
         if self._stale:
-            self.ask()
+            self.request_draw()
 
 
 class PlotArea(QStackedWidget):
@@ -203,7 +209,7 @@ class PlotArea(QStackedWidget):
         """Return whether a text is shown instead of the plot."""
         return self.currentWidget() is self.words
 
-    def say(self, text: str) -> None:
+    def show_text(self, text: str) -> None:
         """Show a text instead of the plot."""
         self.words.setText(text)
         self.setCurrentWidget(self.words)
@@ -211,7 +217,7 @@ class PlotArea(QStackedWidget):
     def plot(self) -> None:
         """Show the plot, and draw it anew."""
         self.setCurrentWidget(self.canvas)
-        self.canvas.ask()
+        self.canvas.request_draw()
 
 
 def is_seen(widget: QWidget) -> bool:
@@ -264,7 +270,7 @@ def ask_and_write(
         return
     if window is not None:
         window.settings.setValue("folder", str(path.parent))
-        window.say(f"Saved {path}")
+        window.show_status(f"Saved {path}")
 
 
 def ask_and_write_plot(parent: QWidget, title: str, name: str, draw_on: Draw) -> None:

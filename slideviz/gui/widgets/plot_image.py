@@ -23,7 +23,7 @@ DPI = 100
 THREAD = "slideviz-plot"
 """Name of the threads that draw plots."""
 
-_ONE = Lock()  # matplotlib is not made for several threads
+_DRAWING_LOCK = Lock()  # matplotlib is not made for several threads
 
 Draw = Callable[[Figure, Style], None]
 """A function that fills a figure in a style; it is called in another thread: without widgets."""
@@ -86,7 +86,7 @@ def _arrange(figure: Figure, place: AxesPlace) -> AxesPlace:
     axes = figure.axes[0]
     digits = [len(f"{end:.0f}") for end in axes.get_ylim()]
     labels = axes.get_xlabel(), axes.get_ylabel(), axes.get_title(), axes.get_yscale()
-    key = (*figure.bbox.size, figure.dpi, *labels, *digits, *_last_tick(axes), *_beside(axes))
+    key = (*figure.bbox.size, figure.dpi, *labels, *digits, *_last_tick(axes), *_legend_texts(axes))
     if key != place.key:
         engine = figure.get_layout_engine()
         assert engine is not None
@@ -105,7 +105,7 @@ def _last_tick(axes: Axes) -> tuple[int, bool]:
     return (len(texts[-1]), inside[-1] > low + 0.9 * (high - low)) if texts else (0, False)
 
 
-def _beside(axes: Axes) -> list[str]:
+def _legend_texts(axes: Axes) -> list[str]:
     """Return the texts of a legend beside the axes, which makes them narrower; else none."""
     legend = axes.get_legend()
     if legend is None or legend.get_bbox_to_anchor().width > 0:
@@ -119,7 +119,7 @@ def draw_in_thread(draw_on: Draw, paper: PlotFormat, place: AxesPlace) -> Future
 
     def work() -> None:
         try:
-            with _ONE:
+            with _DRAWING_LOCK:
                 coming.set_result(picture(draw_on, paper, place))
         except Exception as error:
             # Any error: the future passes it on to the GUI thread.

@@ -42,7 +42,7 @@ class Services(QMainWindow):
     dock_manager: Docks
     """The docks with the panels."""
 
-    def say(self, text: str) -> None:
+    def show_status(self, text: str) -> None:
         """Show a short message in the status bar; an empty text clears it."""
         raise NotImplementedError
 

@@ -34,7 +34,7 @@ class VectorField(QWidget):
         self._labels = [QLabel(name) for name in names]
         for label, field in zip(self._labels, self.fields, strict=True):
             field.setAccessibleName(label.text())
-            field.changed.connect(lambda _: self._tell())
+            field.changed.connect(lambda _: self._emit_changed())
         pairs = chain(*zip(self._labels, self.fields, strict=True))
         line = in_row(*pairs, wide=self.fields, spacing=4)
         line.setContentsMargins(0, 0, 0, 0)
@@ -55,7 +55,7 @@ class VectorField(QWidget):
         """Return why the numbers are not valid together; empty if they are."""
         return self._allowed(self.value)
 
-    def _tell(self) -> None:
+    def _emit_changed(self) -> None:
         if not self.problem:
             self._good = self.value
             self.changed.emit(self.value)
