@@ -178,7 +178,7 @@ def test_what_is_said_can_be_read_to_its_end(window, passage, qtbot):
     ]
     qtbot.waitUntil(lambda: bar.maximum() > 0)
     assert panel.status.height() < 4 * high
-    panel._say("")
+    panel._show_status("")
     assert not panel.status.isVisible()
 
 
@@ -438,7 +438,7 @@ def test_closing_asks_about_designs_that_go_on(
     assert "The sweep still runs (0 of 500 designs done) and will be stopped." in asked[0][0]
     # The question counts on while it is there.
     now = asked[0][2]
-    passage._came([DesignRow(1, min=0.5)])
+    passage._results_arrived([DesignRow(1, min=0.5)])
     assert "(1 of 500 designs done)" in now()
     assert passage.runner.busy
     # What is done can be saved before it is stopped.

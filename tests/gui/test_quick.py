@@ -188,7 +188,7 @@ def read():
     mine = os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
     return [os.getpriority(os.PRIO_PROCESS, numbers[name]) - mine for name in ("library", "python")]
 before = read()
-threads.hold_libraries_back()
+threads.lower_library_priority()
 print(before, read(), timers.NICENESS)
 os._exit(0)
 """
@@ -203,9 +203,9 @@ def test_the_window_goes_before_threads_of_libraries():
 
 
 NUMERICS = """
-from slideviz.gui.responsiveness.threads import ready_numerics
+from slideviz.gui.responsiveness.threads import import_numerics
 
-ready_numerics()
+import_numerics()
 from threadpoolctl import threadpool_info
 blas = [one for one in threadpool_info() if one["user_api"] == "blas"]
 numpys = [one["num_threads"] for one in blas if "numpy.libs" in one["filepath"]]

@@ -254,12 +254,12 @@ def test_another_mesh_forgets_removed_runs(store, cube):
 names = st.lists(st.sampled_from(["left", "right", "top", "bottom"]), min_size=1, unique=True)
 intents = st.one_of(
     st.tuples(st.just("set_role"), names.map(tuple), st.sampled_from(list(ROLES))),
-    st.tuples(st.just("confirm")),
-    st.tuples(st.just("confirm"), names.map(tuple)),
+    st.tuples(st.just("confirm_guesses")),
+    st.tuples(st.just("confirm_guesses"), names.map(tuple)),
     st.tuples(st.just("add_motion"), st.sampled_from(["top", "left", ""])),
     st.tuples(st.just("remove_motion"), st.integers(0, 5)),
     st.tuples(st.just("move_motion"), st.integers(0, 5), st.sampled_from([-1, 1])),
-    st.tuples(st.just("show"), names.map(tuple), st.booleans()),
+    st.tuples(st.just("show_boundaries"), names.map(tuple), st.booleans()),
     st.tuples(st.just("isolate"), names.map(tuple)),
     st.tuples(st.just("select"), names.map(tuple)),
     st.tuples(st.just("mark_cell"), st.none() | st.integers(0, 15)),
@@ -270,7 +270,7 @@ intents = st.one_of(
     st.tuples(st.just("show_run"), st.integers(0, 4)),
     st.tuples(st.just("show_beside"), st.none() | st.integers(0, 4)),
     st.tuples(st.just("remove_run"), st.integers(0, 4)),
-    st.tuples(st.just("take_settings"), st.integers(0, 4)),
+    st.tuples(st.just("adopt_settings"), st.integers(0, 4)),
     st.tuples(st.just("undo")),
     st.tuples(st.just("redo")),
 )
