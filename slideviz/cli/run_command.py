@@ -197,12 +197,14 @@ def _stream(
 def _draw(arguments: argparse.Namespace, case: Case, done: RunResult, name: str) -> None:
     """Write the picture of the quality after the last step."""
     from slideviz.export.offscreen_renderer import PICTURE_SIZE, picture
-    from slideviz.session.opening import of_runs
+    from slideviz.session.opening import session_of_runs
     from slideviz.session.state import Run, StepFrame
 
     last = done.steps[-1]
     named = StepFrame(replace(last.mesh, name=name), done.quality, last)
-    session = of_runs(StepFrame(done.mesh, done.undeformed), [Run(1, case, (named,), "done")])
+    session = session_of_runs(
+        StepFrame(done.mesh, done.undeformed), [Run(1, case, (named,), "done")]
+    )
     picture(session, arguments.picture, arguments.picture_size or PICTURE_SIZE, arguments.zoom)
 
 
