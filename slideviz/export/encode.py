@@ -101,7 +101,6 @@ def writer(file: Path, settings: EncoderSettings) -> AbstractContextManager[Add]
 
 @contextmanager
 def _mp4(file: Path, settings: EncoderSettings) -> Iterator[Add]:
-    """Write an MP4 with H.264 as every browser plays it, encoded by ffmpeg."""
     fps = Fraction(settings.fps).limit_denominator(1000)
     rate = fps * max(1, -(-MIN_FPS // fps))
     with atomic_write(file, SlidevizError) as out, tempfile.TemporaryFile() as log:

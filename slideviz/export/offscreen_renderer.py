@@ -295,7 +295,6 @@ class OffscreenRenderer:
         self._keep_room(options)
 
     def _seen(self, options: PictureOptions) -> Iterator[Mesh]:
-        """Yield the states of the mesh that an overview must show whole."""
         for run in self.session.runs:
             yield from (frame.mesh for frame in run.frames)
         if options.film and self.session.mesh is not None:

@@ -96,7 +96,6 @@ def save_section(
 
 
 def _shown(session: Session, name: str, section: Section) -> SectionInRun:
-    """Return the cut of a section in one view, which is called ``name``."""
     frame = session.frame
     assert frame is not None
     by = session.view.color_by

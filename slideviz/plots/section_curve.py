@@ -142,7 +142,6 @@ def steps(curve: Curve) -> tuple[FloatArray, FloatArray]:
 
 
 def _areas(axes: Any, curve: Curve, colors: Colors, bottom: float) -> None:
-    """Fill the area from ``bottom`` to a curve, in the colors of its values."""
     from matplotlib.collections import PolyCollection
 
     shown = PolyCollection(
@@ -159,7 +158,6 @@ def _areas(axes: Any, curve: Curve, colors: Colors, bottom: float) -> None:
 
 
 def _folded(axes: Any, curve: Curve, style: Style) -> None:
-    """Mark the positions of inverted cells by areas over the whole height."""
     from matplotlib.collections import PolyCollection
 
     low, high = axes.get_ylim()

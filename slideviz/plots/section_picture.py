@@ -331,7 +331,6 @@ def _head(figure: Any, name: str, words: str, *, lines: Sequence[str]) -> None:
 
 
 def _curves(figure: Any, shown: Sequence[SectionInRun], section: Section) -> None:
-    """Draw the values along a line or circle into one plot, with areas below the first run's."""
     rows = []
     for one in reversed(shown):
         if one.drawn:

@@ -344,7 +344,6 @@ def shown_measure(session: Session) -> Quantity:
 
 
 def _colors(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
-    """Return the color of each bar: that of its middle value in the view."""
     import matplotlib as mpl
 
     low, high = session.color_range

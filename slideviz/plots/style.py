@@ -89,7 +89,6 @@ def series_number(series: int | None, index: int) -> int:
 
 
 def _brightness(color: str) -> int:
-    """Return the sum of red, green and blue of a color ``#rrggbb``."""
     return sum(bytes.fromhex(color[1:]))
 
 

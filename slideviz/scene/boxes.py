@@ -73,7 +73,6 @@ class BoxLayer(KeyedLayer):
             self._label(boxes, mesh.dim, lift)
 
     def _add(self, shape: Any, name: str, color: str) -> Any:
-        """Return a new actor of a lattice's lines and points."""
         actor = self.stage.add(shape, name, lighting=False, pickable=False)
         scale = self.stage.pixel_scale
         actor.prop.color = color
@@ -82,7 +81,6 @@ class BoxLayer(KeyedLayer):
         return actor
 
     def _label(self, boxes: dict[str, Box], dim: int, lift: float) -> None:
-        """Write the names of the boxes and of their directions."""
         at, words = [], []
         for name, box in boxes.items():
             first, i, j, k = (box.points[end] for end in ENDS)

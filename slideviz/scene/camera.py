@@ -109,7 +109,6 @@ class Camera:
         return self._around(chain((np.asarray(shape.points) for shape in shapes), clouds))
 
     def _cameras(self) -> list[Camera]:
-        """Return this camera and the one beside it, if there is one."""
         return [self] if self.beside is None else [self, self.beside]
 
     def _around(self, clouds: Iterable[FloatArray]) -> tuple[Any, float, float]:

@@ -155,7 +155,6 @@ class FlatScene:
         draw_in_front(mapper)
 
     def _draw_mark(self) -> None:
-        """Draw the edges of the marked cell, if the section shows it."""
         assert self.polygons is not None
         marked = None if self.session.in_file else self.session.view.marked_cell
         mine = np.flatnonzero(self.polygons.cells == marked)

@@ -101,7 +101,6 @@ class GhostLayer(Layer):
                 self._draw_wire(key, color, not rim_moves(points, surface, session.mesh))
 
     def _draw_wire(self, key: str, color: str, wanted: bool) -> None:
-        """Show the edges of a ghost's faces in front of everything, or hide them."""
         shape = self._shapes[key]
         wanted = wanted and shape.n_cells <= MOST_WIRE
         if wanted or f"{key}{WIRE}" in self._actors:

@@ -70,7 +70,6 @@ class LegendLayer(KeyedLayer):
 
     @property
     def _has_lines(self) -> bool:
-        """Return whether there are lines about points or rings above the bar."""
         return bool(self.stage.point_words or self.stage.ring_words)
 
     def _place(self) -> None:

@@ -59,7 +59,6 @@ class MarkLayer(Layer):
             self._drawn[FACES].mapper.scalar_visibility = True
 
     def _add(self, mesh: Mesh, cell: int) -> None:
-        """Make the actors of another cell, in place of the present ones."""
         for name in self._drawn:
             self.stage.remove(name)
         self._drawn = {}
@@ -82,7 +81,6 @@ class MarkLayer(Layer):
             draw_in_front(actor.mapper)
 
     def _place(self, mesh: Mesh, cell: int) -> None:
-        """Move the actors to the cell's place in a deformed mesh."""
         at, lift = mesh.points[nodes_of(mesh, cell)], 3.0 * self.stage.lift(mesh)
         actors.place(self._shapes[OUTLINE], at, lift)
         actors.place(self._shapes[DOT], at.mean(axis=0)[None], lift)

@@ -167,7 +167,6 @@ class BoundaryLayer(Layer):
         return DrawnBoundary(surface, shape, actor)
 
     def _add_band(self, surface: Surface, points: FloatArray) -> Band:
-        """Return a new band of a boundary, hidden or shown by `_style`."""
         rim = actors.rim_shape(surface, points, self._lift)
         band = self.stage.add(rim, f"selected:{surface.name}", lighting=False)
         band.prop.color = SELECTED_COLOR
@@ -335,7 +334,6 @@ class ThresholdLayer(Layer):
             actor.prop.show_edges = False
 
     def _draw(self, session: Session) -> None:
-        """Draw the cells within the threshold; in place if they are the same as before."""
         frame, threshold = session.frame, session.view.threshold
         assert frame is not None
         assert threshold is not None

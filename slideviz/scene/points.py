@@ -62,7 +62,6 @@ class PointLayer(Layer):
         return typed.only(np.concatenate(shown) if shown else np.empty(0, np.int64))
 
     def _fill(self, typed: TypedNodes, session: Session) -> None:
-        """Draw other nodes, and set their words in the legend."""
         self._drawn = typed
         count = len(typed.nodes)
         present = [NODE_TYPES[kind] for kind in typed.present]
@@ -90,7 +89,6 @@ class PointLayer(Layer):
         return lifted(session.frame.mesh.points[nodes], 4.0 * self.stage.lift(session.mesh))
 
     def _make(self) -> Any:
-        """Return the new actor of the points, added to the plotter."""
         mapper = pv.DataSetMapper(dataset=self._shape)
         # A depth offset, so that faces and edges do not cut into the points.
         mapper.SetResolveCoincidentTopologyToPolygonOffset()

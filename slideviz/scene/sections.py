@@ -123,7 +123,6 @@ class SectionLayer(Layer):
             self._draw_lines(new, neighbours)
 
     def _draw_lines(self, session: Session, neighbours: dict[int, FloatArray]) -> None:
-        """Draw the lines of a 2D mesh's sections, across the mesh and its neighbouring passages."""
         assert session.frame is not None
         mesh, sections = session.frame.mesh, dict(shown_sections(session))
         key = (mesh, sections, tuple(neighbours), self.stage.scheme)

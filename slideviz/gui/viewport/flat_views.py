@@ -173,7 +173,6 @@ def is_larger_stacked(extent: tuple[float, float], available: tuple[int, int]) -
 
 
 def _direction(swapped: bool, stacked: bool) -> QHBoxLayout.Direction:
-    """Return the layout direction from the first flat view to the second."""
     directions = QHBoxLayout.Direction
     if stacked:
         return directions.BottomToTop if swapped else directions.TopToBottom
@@ -245,7 +244,6 @@ class CurveView(QWidget):
         self.rows = ()
 
     def _picked(self, position: float) -> None:
-        """Mark the cell at a position along the last curve, of the shown run; none beside it."""
         if self.rows and not self.area.empty:
             self.store.change(changes.mark_cell, self.rows[-1].curve.cell_at(position))
 
@@ -368,7 +366,6 @@ class FlatView(QWidget):
                 one._ranges = one.scene.ranges()
 
     def _camera_moved(self) -> None:
-        """Update the rulers and the linked view after the camera changed."""
         self._sync_rulers()
         partner = self._partner
         # Drawing sets the clipping planes, which modifies the camera but does not move it.

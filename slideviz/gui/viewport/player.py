@@ -268,7 +268,6 @@ class ResultsLabel(QLabel):
         self.setToolTip("" if shown == full else "<br>".join(full))
 
     def _width_of(self, parts: list[str]) -> float:
-        """Return the width of the parts in a row with their separators, in pixels."""
         document = QTextDocument()
         document.setDefaultFont(self.font())
         document.setDocumentMargin(0.0)

@@ -359,7 +359,6 @@ class AxisHandle(PointHandle[tuple[Section, PlaceOnSection]]):
         return section.sized(rounded(size, section.size))
 
     def _draw_frame(self, lines: list[FloatArray], color: str) -> None:
-        """Draw the frame: polylines of points (k, 3)."""
         # A reference in Python: a data set that only VTK holds may come back without points.
         self._drawn = shape = pv.PolyData()
         # Given to the constructor, the points would become vertex cells and be drawn.

@@ -127,7 +127,6 @@ class SectionViews(QSplitter):
             self.handles.clear()
 
     def _shown(self, session: Session) -> list[tuple[View3D, Scene, Mesh]]:
-        """Return the 3D views, each with its scene and the mesh of the frame it shows."""
         sessions = (session, second_session(session) or session)
         pairs = zip(self.viewing.views_and_scenes(), sessions, strict=False)
         return [(view, scene, one.frame.mesh) for (view, scene), one in pairs if one.frame]

@@ -48,7 +48,6 @@ class CoarseWhileMoving(QObject):
         self._timer.start()
 
     def _draw_fully(self) -> None:
-        """Draw the boundaries in full detail again."""
         self._timer.stop()
         if self.scene.draw_coarse(False):
             self.view.render_soon()

@@ -91,7 +91,6 @@ class Viewing(QWidget):
         view.signals.zoomed.connect(lambda where, factor: self._zoomed(view, scene, where, factor))
 
     def _make_second(self, session: Session) -> None:
-        """Make the second view, and link its camera with that of the first."""
         detail = self._before is not None or self.scene.camera.sees_detail()
         self.second = self._make_view()
         self._place(session.view.swapped)
@@ -112,7 +111,6 @@ class Viewing(QWidget):
         self.second_made.emit()
 
     def _swap(self, swapped: bool) -> None:
-        """Put the second view to the left if ``swapped``, else to the right."""
         if (self._grid.itemAtPosition(1, 0).widget() is self.second) == swapped:
             return
         fitted = self._leader.camera.fitted
@@ -136,7 +134,6 @@ class Viewing(QWidget):
             self._grid.setColumnStretch(column, width)
 
     def _place(self, swapped: bool) -> None:
-        """Put both views into the grid: the second to the left if ``swapped``."""
         assert self.second is not None
         pair = (self.second, self.view) if swapped else (self.view, self.second)
         for view in pair:
@@ -168,7 +165,6 @@ class Viewing(QWidget):
         self.render()
 
     def _drop_second(self) -> None:
-        """Close the second view, if there is one, and give the first one all the room."""
         if self.second is None:
             return
         self.second_leaves.emit()
@@ -250,7 +246,6 @@ class Viewing(QWidget):
         return list(zip(views, self._scenes(), strict=True))
 
     def _scenes(self) -> tuple[Scene, ...]:
-        """Return the scenes of the views, one or two."""
         return (self.scene,) if self.second_scene is None else (self.scene, self.second_scene)
 
     # Mouse -----------------------------------------------------------------------------
