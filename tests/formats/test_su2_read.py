@@ -4,9 +4,9 @@ import tracemalloc
 
 import numpy as np
 import pytest
+import slideviz.formats.su2.scan as su2_scan
 from su2_samples import MESSY, SAMPLES, SOLID, SQUARE, ZONES, assert_same, bits, save
 
-import slideviz.formats.su2.scan as su2_scan
 from slideviz.formats.files import read
 from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.check import unused_nodes
@@ -59,7 +59,7 @@ def test_byte_order_mark_is_skipped(tmp_path):
 def test_size_of_the_blocks_does_not_matter(tmp_path, monkeypatch, name, block):
     path = save(tmp_path, SAMPLES[name])
     whole = read(path)
-    monkeypatch.setattr("slideviz.formats.su2.scan.BLOCK_BYTES", block)
+    monkeypatch.setattr("slideviz.formats.su2.lines.BLOCK_BYTES", block)
     small = read(path)
     assert_same(small, whole)
     assert len(small.origin.rows) > len(whole.origin.rows)

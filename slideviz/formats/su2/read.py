@@ -10,9 +10,8 @@ from pathlib import Path
 from slideviz.errors import printable
 from slideviz.formats.source import Source, open_source
 from slideviz.formats.su2.keyword_blocks import boxes_elsewhere, find_blocks, find_bounds
-from slideviz.formats.su2.lines import Rows, number_of
+from slideviz.formats.su2.lines import Rows, number_of, scan
 from slideviz.formats.su2.numbers import parse_cells, parse_points
-from slideviz.formats.su2.scan import scan
 from slideviz.formats.su2.send_receive import find_halo
 from slideviz.formats.su2.text import boundaries_elsewhere
 from slideviz.formats.su2.zone import find_zone

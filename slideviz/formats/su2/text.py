@@ -11,9 +11,8 @@ import numpy as np
 from slideviz.errors import MeshError
 from slideviz.formats.source import open_source
 from slideviz.formats.su2.keyword_blocks import KeywordBlock, find_blocks, find_bounds, is_ffd
-from slideviz.formats.su2.lines import Lines, number_of
+from slideviz.formats.su2.lines import Lines, number_of, scan
 from slideviz.formats.su2.numbers import fill_points, parse_cells
-from slideviz.formats.su2.scan import scan
 from slideviz.formats.su2.zone import TextZone, find_zone
 from slideviz.mesh.model import FloatArray
 from slideviz.system.threads import Tick
