@@ -3,21 +3,231 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
-from itertools import pairwise
-from pathlib import Path
+from collections.abc import (
+    Iterator,
+    Sequence,
+)
+from dataclasses import (
+    dataclass,
+    replace,
+)
+from itertools import (
+    pairwise,
+    product,
+)
+from pathlib import (
+    Path,
+)
 
-from slideviz.errors import printable
-from slideviz.formats.source import Source, open_source
-from slideviz.formats.su2.keyword_blocks import boxes_elsewhere, find_blocks, find_bounds
-from slideviz.formats.su2.lines import Rows, number_of, scan
-from slideviz.formats.su2.numbers import parse_cells, parse_points
-from slideviz.formats.su2.send_receive import find_halo
-from slideviz.formats.su2.text import boundaries_elsewhere
-from slideviz.formats.su2.zone import find_zone
-from slideviz.mesh.interfaces import find_interfaces
-from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh, Origin
-from slideviz.system.threads import Tick
+import numpy as np
+
+from slideviz.errors import (
+    printable,
+)
+from slideviz.formats.source import (
+    Source,
+    open_source,
+)
+from slideviz.formats.su2.keyword_blocks import (
+    boxes_elsewhere,
+    find_blocks,
+    find_bounds,
+)
+from slideviz.formats.su2.lines import (
+    Lines,
+    Rows,
+    number_of,
+    scan,
+)
+from slideviz.formats.su2.numbers import (
+    parse_cells,
+    parse_points,
+)
+from slideviz.formats.su2.text import (
+    boundaries_elsewhere,
+)
+from slideviz.formats.su2.zone import (
+    SendRows,
+    TextZone,
+    find_zone,
+)
+from slideviz.mesh.halo import (
+    FITS,
+    Halo,
+    RigidMotion,
+    fit_motion,
+    make_halo,
+)
+from slideviz.mesh.interfaces import (
+    find_interfaces,
+)
+from slideviz.mesh.model import (
+    Cells,
+    FloatArray,
+    IntArray,
+    Marker,
+    Mesh,
+    Origin,
+)
+from slideviz.system.threads import (
+    Tick,
+)
+
+HaloAndRemarks = tuple[Halo | None, tuple[str, ...]]
+"""The halo, None if there is none or it cannot be used; and remarks, a sentence each."""
+
+
+def find_halo(lines: Lines, zone: TextZone, mesh: Mesh) -> HaloAndRemarks:
+    """Return the halo that the ``SEND_RECEIVE`` markers of a zone describe, and remarks on it."""
+    if not zone.sends:
+        return None, ()
+    sends, receives = ([s for s in zone.sends if s.domain == to] for to in (b"1", b"-1"))
+    tables = [_table(lines, part, len(mesh.points)) for part in (sends, receives)]
+    if any(t is None for t in tables) or len(zone.sends) != len(sends) + len(receives):
+        return None, (_unused("their rows are no `1 node transform`, or of another partition"),)
+    donors, receivers = (np.asarray(t) for t in tables)
+    if len(donors) != len(receivers):
+        return None, (_unused(f"{len(donors)} nodes send and {len(receivers)} receive"),)
+    if len(np.unique(receivers[:, 0])) != len(receivers):
+        return None, (_unused("a node receives twice"),)
+    return _tied(mesh, donors[:, 0], receivers, _transforms(lines, zone))
+
+
+def _unused(why: str) -> str:
+    """Return the remark on a halo that cannot be used."""
+    return (
+        f"the SEND_RECEIVE markers tie no halo to its donors ({why}); they are kept, but the nodes "
+        "are treated like all others, so make the halo anew"
+    )
+
+
+def _tied(
+    mesh: Mesh, donors: IntArray, receivers: IntArray, given: dict[int, FloatArray]
+) -> HaloAndRemarks:
+    """Return the halo of those pairs whose motion is found, and remarks.
+
+    Parameters
+    ----------
+    donors : (h,)
+        Nodes.
+    receivers : (h, 2)
+        Nodes and their ``PERIODIC_INDEX``.
+    given : dict of int to (3, 3)
+        Centre, angles and translation by ``PERIODIC_INDEX``.
+    """
+    remarks: list[str] = []
+    motions: list[RigidMotion] = []
+    which = np.full(len(donors), -1)
+    for index in np.unique(receivers[:, 1]).tolist():
+        mine = receivers[:, 1] == index
+        nodes = receivers[mine, 0]
+        tries = list(_readings(given[index], mesh.dim)) if index in given else []
+        motion, remark = _best(mesh, index, donors[mine], nodes, tries)
+        remarks += [remark] if remark else []
+        if motion is not None:
+            which[mine] = len(motions)
+            motions.append(motion)
+    used = which >= 0
+    if not used.any():
+        return None, tuple(remarks)
+    return make_halo(mesh, receivers[used, 0], donors[used], motions, which[used]), tuple(remarks)
+
+
+def _best(
+    mesh: Mesh, index: int, donors: IntArray, receivers: IntArray, tries: Sequence[RigidMotion]
+) -> tuple[RigidMotion | None, str]:
+    """Return the motion that best moves donors (k,) to receivers (k,), and a remark ("" if none).
+
+    It is one of ``tries`` if any fits, else possibly the one fitted to the points. None if it
+    misses most receivers. ``index`` is their ``PERIODIC_INDEX``.
+    """
+    before, after = mesh.points[donors], mesh.points[receivers]
+    allowed = FITS * float(np.ptp(mesh.points, axis=0).max())
+
+    def misfit(motion: RigidMotion) -> FloatArray:
+        return np.asarray(np.linalg.norm(motion.at(before) - after, axis=1))
+
+    def rank(motion: RigidMotion) -> tuple[int, float]:
+        far = misfit(motion)
+        return int(np.count_nonzero(far > allowed)), float(far.max())
+
+    fitted = fit_motion(before, after)
+    # A motion of the file is preferred to the fitted one, as long as it fits.
+    motion = min(tries, key=rank, default=fitted)
+    if rank(motion)[0]:
+        motion = min(motion, fitted, key=rank)
+    far, name = misfit(motion), f"PERIODIC_INDEX= {index}"
+    wrong = int(np.count_nonzero(far > allowed))
+    if 2 * wrong > len(far):
+        return None, _unused(f"no motion brings the donors of {name} onto their receivers")
+    if wrong:
+        worst = int(np.argmax(far))
+        return motion, (
+            f"{wrong} of {len(far)} halo nodes are not where {name} puts them (node "
+            f"{receivers[worst]} is {far[worst]:.3g} off); they follow their donors from where "
+            "they are, so make the halo anew if the solver needs it exact"
+        )
+    if motion is fitted:
+        what = "does not fit its halo" if tries else "is missing"
+        return motion, f"{name} {what}; the motion found by matching the nodes is used"
+    return motion, ""
+
+
+def _table(lines: Lines, parts: Sequence[SendRows], count: int) -> IntArray | None:
+    """Return node and ``PERIODIC_INDEX`` of each row, (r, 2), or None if any row is wrong.
+
+    ``count`` is the number of nodes.
+    """
+    pieces = (piece for part in parts for piece in part.rows)
+    rows = [row.split()[:3] for piece in pieces for _, row in lines.numeric(piece)]
+    if not rows or any(len(row) < 3 or not all(w.isdigit() for w in row) for row in rows):
+        return None
+    table = np.array(rows, dtype="S18").astype(np.int64)
+    return table[:, 1:] if table[:, 1].max() < count else None
+
+
+def _transforms(lines: Lines, zone: TextZone) -> dict[int, FloatArray]:
+    """Return centre, angles and translation (rows of (3, 3)) by PERIODIC_INDEX, where readable."""
+    found = {}
+    for section in zone.unknown:
+        if section.key == "PERIODIC_INDEX" and section.value.isdigit():
+            words = b" ".join(lines.line(k) for k in range(section.line + 1, section.stop)).split()
+            try:
+                numbers = np.array([float(word) for word in words[:9]])
+            except ValueError:
+                continue
+            if len(numbers) == 9 and np.isfinite(numbers).all():
+                found[int(section.value)] = numbers.reshape(3, 3)
+    return found
+
+
+def _readings(transform: FloatArray, dim: int) -> Iterator[RigidMotion]:
+    """Yield the 16 motions that centre, angles and translation (rows of (3, 3)) may mean.
+
+    They differ in the unit of the angles, the order of rotations, whether the translation comes
+    before or after, and the direction.
+    """
+    centre, angles, shift = transform[0], transform[1], transform[2]
+    for unit, order in product((1.0, np.pi / 180.0), ((2, 1, 0), (0, 1, 2))):
+        rotation = np.eye(3)
+        for axis in order:
+            rotation = rotation @ _about(axis, unit * float(angles[axis]))
+        for before in (0.0, 1.0):  # is the translation made after, or before the rotation
+            moved = rotation @ (before * shift - centre) + centre + (1.0 - before) * shift
+            yield RigidMotion(rotation[:dim, :dim], moved[:dim])
+            back = rotation.T
+            yield RigidMotion(back[:dim, :dim], (-back @ moved)[:dim])
+
+
+def _about(axis: int, angle: float) -> FloatArray:
+    """Return the rotation (3, 3) by an angle in radians about Cartesian axis 0, 1 or 2."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    out = np.eye(3)
+    out[i, i] = out[j, j] = np.cos(angle)
+    out[j, i] = np.sin(angle)
+    out[i, j] = -out[j, i]
+    return out
+
 
 _SCANNED = 0.2
 """Part of the time of reading a file, as told to the progress, that finding its lines takes."""
