@@ -159,7 +159,7 @@ def _require_mesh_ending(file: Path) -> None:
     from slideviz.formats.table import MESHIO, format_for
 
     if format_for(file).writer == MESHIO.writer:
-        from slideviz.formats.meshio.calls import formats_of
+        from slideviz.formats.meshio.bridge import formats_of
 
         formats_of(file)
 

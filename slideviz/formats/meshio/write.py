@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import MeshError, path_error
-from slideviz.formats.meshio.bridge import MESHIO_TYPES
-from slideviz.formats.meshio.calls import formats_of, load, meshio_errors
+from slideviz.formats.meshio.bridge import MESHIO_TYPES, formats_of, load, meshio_errors
 from slideviz.formats.table import WriteOptions, write_blocks
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import IntArray, Mesh
