@@ -19,9 +19,8 @@ from slideviz.formats.losses import OTHER_ZONES, lost_of_text, sentence_of_lost
 from slideviz.formats.su2.lines import Piece
 from slideviz.formats.su2.text import Text, find_text
 from slideviz.formats.su2.write import box_edits, moved_rows, patched_blocks, require_text_names
-from slideviz.formats.su2b.copying import checksums
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zone
-from slideviz.formats.su2b.partial import BINARY, finish_head, partial_file
+from slideviz.formats.su2b.partial import BINARY, checksums, finish_head, partial_file
 from slideviz.formats.su2b.write import require_binary_names
 from slideviz.formats.table import format_of
 from slideviz.mesh.model import Mesh
