@@ -8,7 +8,7 @@ import numpy as np
 
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.unique_rows import row_groups
+from slideviz.mesh.nearest import row_groups
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, sorted_nodes
-from slideviz.mesh.unique_rows import row_groups, sorted_in_rows
+from slideviz.mesh.nearest import row_groups, sorted_in_rows
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 

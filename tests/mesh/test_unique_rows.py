@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from slideviz.mesh.unique_rows import row_groups, sorted_in_rows
+from slideviz.mesh.nearest import row_groups, sorted_in_rows
 
 TABLES = hnp.arrays(
     np.int64,

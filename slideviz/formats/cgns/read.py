@@ -23,7 +23,7 @@ from slideviz.formats.meshio.markers import in_node_sets
 from slideviz.mesh.cached_boundary import outer_facets, smooth_parts
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
-from slideviz.mesh.unique_rows import row_groups
+from slideviz.mesh.nearest import row_groups
 
 
 @dataclass(frozen=True, eq=False)
