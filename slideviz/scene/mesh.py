@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slideviz.color_scheme import SELECTED_COLOR
-from slideviz.mesh.enclosing import enclosing_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED
-from slideviz.mesh.surfaces import Surface
+from slideviz.mesh.surfaces import Surface, enclosing_of
 from slideviz.scene import actors
 from slideviz.scene.actors import CELL, POINT, VALUES, Band, DrawnBoundary, part_shape, see_through
 from slideviz.scene.stage import Layer, Stage

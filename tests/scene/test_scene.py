@@ -7,9 +7,8 @@ from builders import grid, halo_text
 
 import slideviz as sv
 from slideviz.color_scheme import COLOR_MAP, DARK, INVERTED_COLOR, LIGHT
-from slideviz.mesh.enclosing import enclosed, is_closed
 from slideviz.mesh.quality import quality
-from slideviz.mesh.surfaces import facet_connectivity, find_surfaces
+from slideviz.mesh.surfaces import enclosed, facet_connectivity, find_surfaces, is_closed
 from slideviz.scene.mesh import GLASS
 from slideviz.scene.pick import to_display
 from slideviz.scene.scene import Scene
