@@ -20,12 +20,11 @@ from slideviz.case.motion import displacements
 from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
 from slideviz.formats.source import unreadable
 from slideviz.formats.table import format_for, holds_quality
-from slideviz.mesh.coarse import coarse_surfaces
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
-from slideviz.mesh.surfaces import Surface, enclosing_of, find_surfaces
+from slideviz.mesh.surfaces import Surface, coarse_surfaces, enclosing_of, find_surfaces
 from slideviz.session.large import first_frame, frame_of, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.opening import open_mesh

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from slideviz.mesh import coarse
-from slideviz.mesh.coarse import coarse_surfaces
-from slideviz.mesh.surfaces import find_surfaces
+from slideviz.mesh.surfaces import coarse_surfaces, find_surfaces
 from slideviz.samples.table import sample
 
 
