@@ -23,6 +23,7 @@ from slideviz.mesh.jacobians import (
     UNPROVEN,
     VALID,
     check_cells,
+    decide_unproven,
     measure,
     write_corners,
 )
@@ -30,7 +31,6 @@ from slideviz.mesh.metrics import METRICS, total
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality_derivative import QualityDerivative, derivative_of
-from slideviz.mesh.validity import decide_unproven
 from slideviz.system.threads import in_parts
 from slideviz.terms import Metric
 

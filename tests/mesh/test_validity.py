@@ -7,14 +7,15 @@ import pytest
 
 from slideviz.mesh.jacobians import (
     INVERTED,
+    LEVELS,
     UNPROVEN,
     VALID,
     hexahedron_coefficients,
     prism_coefficients,
+    subdivide,
 )
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality
-from slideviz.mesh.validity import LEVELS, subdivide
 from tests.oracles import quality as oracle
 
 # In twentieths; found by a search over random cells. All corner Jacobians are positive.
