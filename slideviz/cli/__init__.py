@@ -13,9 +13,8 @@ import traceback
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from slideviz.cli.exit_codes import CANCELLED, DONE, WRONG_INPUT
 from slideviz.cli.processes import launched, run_shared
-from slideviz.cli.terminal import terminal
+from slideviz.cli.terminal import CANCELLED, DONE, WRONG_INPUT, terminal
 from slideviz.errors import Cancelled, SlidevizError
 
 if TYPE_CHECKING:

@@ -66,8 +66,8 @@ def add_compare(calls: argparse._SubParsersAction) -> None:
 def compare(arguments: argparse.Namespace) -> int:
     """Deform a mesh by several methods, write table, plots and pictures; return the exit code."""
     from slideviz import read
-    from slideviz.cli.exit_codes import DONE
     from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
+    from slideviz.cli.terminal import DONE
     from slideviz.errors import CaseError
     from slideviz.study.combinations import COMPARED_METHODS, MODES, announcement, refused, warm
     from slideviz.study.table import terminal_head

@@ -32,8 +32,8 @@ def convert(arguments: argparse.Namespace) -> int:
 def _convert(arguments: argparse.Namespace) -> int:
     from functools import partial
 
-    from slideviz.cli.exit_codes import DONE
     from slideviz.cli.output_paths import OutputPath, require_output_paths
+    from slideviz.cli.terminal import DONE
     from slideviz.formats.convert import convert
 
     require_output_paths(arguments, OutputPath(arguments.output, "OUT", is_mesh=True))
@@ -74,8 +74,8 @@ def _convert_streamed(arguments: argparse.Namespace) -> int:
     """Convert a mesh piece by piece; return the exit code."""
     from functools import partial
 
-    from slideviz.cli.exit_codes import DONE
     from slideviz.cli.progress import Bar
+    from slideviz.cli.terminal import DONE
     from slideviz.solver.steps import Progress
     from slideviz.streaming.converting import convert_streamed
 

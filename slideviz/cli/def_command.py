@@ -185,8 +185,8 @@ def variable_rows(surface: MovingSurface) -> list[dict[str, Any]]:
 def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, begin: float) -> int:
     """Write the undeformed mesh with the boxes that the configuration defines; return the code."""
     from slideviz import write
-    from slideviz.cli.exit_codes import DONE
     from slideviz.cli.report import print_remarks, save_json
+    from slideviz.cli.terminal import DONE
     from slideviz.design.su2.boxes import set_boxes
     from slideviz.formats.losses import warning_of_losses
 

@@ -32,10 +32,10 @@ def run_dot(arguments: argparse.Namespace) -> int:
 
 
 def _run_dot(arguments: argparse.Namespace) -> int:
-    from slideviz.cli.exit_codes import DONE
     from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import print_remarks, save_json
+    from slideviz.cli.terminal import DONE
     from slideviz.design.su2.gradients import design_gradients
     from slideviz.design.su2.sensitivities import sensitivity_file
     from slideviz.errors import CaseError

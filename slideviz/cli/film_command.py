@@ -86,9 +86,9 @@ def add_film(calls: argparse._SubParsersAction) -> None:
 
 def film(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, and write its steps as a film; return the exit code."""
-    from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.cli.progress import Bar
+    from slideviz.cli.terminal import DONE, INVERTED
     from slideviz.export.encode import film_kind
     from slideviz.export.film import FilmOptions, check_film, require_pair_width
     from slideviz.export.film import film as draw

@@ -48,8 +48,8 @@ def _report(arguments: argparse.Namespace, mesh: Mesh, counts: CellCounts, found
     counts, found
         Counts and quality of the whole mesh.
     """
-    from slideviz.cli.exit_codes import DONE
     from slideviz.cli.report import info_report, save_json, table
+    from slideviz.cli.terminal import DONE
     from slideviz.mesh.periodic import find_pairs
 
     report = info_report(mesh, find_pairs(mesh), counts, found)

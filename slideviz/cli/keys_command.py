@@ -13,7 +13,7 @@ def add_keys(calls: argparse._SubParsersAction) -> None:
 def keys(_: argparse.Namespace) -> int:
     """Print the reference of all case keys; return the exit code."""
     from slideviz.case.cfg import describe_keys
-    from slideviz.cli.exit_codes import DONE
+    from slideviz.cli.terminal import DONE
 
     print(describe_keys())
     return DONE

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from slideviz.cli.exit_codes import DONE
+from slideviz.cli.terminal import DONE
 from slideviz.errors import SlidevizError
 
 if TYPE_CHECKING:

@@ -84,7 +84,6 @@ def _report(
 
     ``worst`` are numbers and VTK types of the worst cells, ``reference`` is the undeformed mesh.
     """
-    from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.report import (
         histogram_lines,
         quality_lines,
@@ -92,6 +91,7 @@ def _report(
         save_json,
         table,
     )
+    from slideviz.cli.terminal import DONE, INVERTED
 
     report = quality_report(name, found, worst)
     report |= {"reference": str(reference) if reference else None}

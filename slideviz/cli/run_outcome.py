@@ -134,8 +134,8 @@ def report_warnings(report: dict, folded: Folded, advice: str, *, quiet: bool) -
     quiet : bool
         Leave out notes; warnings stay.
     """
-    from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.report import print_remarks
+    from slideviz.cli.terminal import DONE, INVERTED
 
     print_remarks(report["warnings"], quiet=quiet)
     if report["quality"]["inverted"]:

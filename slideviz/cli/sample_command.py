@@ -29,8 +29,8 @@ def add_sample(calls: argparse._SubParsersAction) -> None:
 
 def sample(arguments: argparse.Namespace) -> int:
     """Write a sample case, or list the samples; return the exit code."""
-    from slideviz.cli.exit_codes import DONE
     from slideviz.cli.report import table
+    from slideviz.cli.terminal import DONE
     from slideviz.samples.table import SAMPLES, write_sample
 
     if arguments.name is None:

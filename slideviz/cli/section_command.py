@@ -192,8 +192,8 @@ def _scene(arguments: argparse.Namespace, case: Case | None) -> _Scene:
 
 def _report(arguments: argparse.Namespace, scene: _Scene, shown: SectionInRun) -> int:
     """Print the numbers of the cut or write them as JSON, and return the exit code."""
-    from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.report import save_json
+    from slideviz.cli.terminal import DONE, INVERTED
 
     mesh, chosen = scene.mesh, scene.chosen
     summary = shown.paint.summary(shown.ids)

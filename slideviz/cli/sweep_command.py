@@ -68,9 +68,9 @@ def sweep(arguments: argparse.Namespace) -> int:
     from slideviz import read
     from slideviz import sweep as sweep_of
     from slideviz.case.words import counted
-    from slideviz.cli.exit_codes import DONE
     from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
     from slideviz.cli.report import save_json
+    from slideviz.cli.terminal import DONE
     from slideviz.design.sweeps.results import RESULTS
     from slideviz.design.sweeps.table import read_designs
     from slideviz.errors import CaseError
@@ -117,8 +117,8 @@ def _print_columns(case: Any) -> int:
     """Print the possible columns of a table of designs, with the case's values; return the code."""
     from slideviz.case.key import FILES, VIEW
     from slideviz.case.keys import KEYS
-    from slideviz.cli.exit_codes import DONE
     from slideviz.cli.report import table
+    from slideviz.cli.terminal import DONE
     from slideviz.design.sweeps.columns import numbers_of
 
     numbers = numbers_of(case)

@@ -9,12 +9,37 @@ from __future__ import annotations
 import os
 import sys
 import unicodedata
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
-from contextvars import ContextVar
-from typing import Any, TextIO
+from collections.abc import (
+    Callable,
+    Iterator,
+)
+from contextlib import (
+    contextmanager,
+    redirect_stderr,
+    redirect_stdout,
+    suppress,
+)
+from contextvars import (
+    ContextVar,
+)
+from typing import (
+    Any,
+    TextIO,
+)
 
-from slideviz.errors import SlidevizError
+from slideviz.errors import (
+    SlidevizError,
+)
+
+DONE = 0
+WRONG_INPUT = 1
+"""The mesh or the case is wrong."""
+WRONG_USAGE = 2
+"""The arguments are wrong; argparse itself exits with this code."""
+INVERTED = 3
+"""Done, but cells are inverted."""
+CANCELLED = 130
+
 
 _SIMPLER = str.maketrans({"█": "#", "▏": "|", "…": "...", "’": "'", "“": '"', "”": '"'})
 """Replacements for characters that the encoding of the terminal does not have."""
