@@ -3,13 +3,48 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Sequence
-from importlib import import_module
-from pathlib import Path
-from typing import Any, NoReturn
+import sys
+from collections.abc import (
+    Iterable,
+    Sequence,
+)
+from importlib import (
+    import_module,
+)
+from pathlib import (
+    Path,
+)
+from typing import (
+    Any,
+    NoReturn,
+)
 
-from slideviz import __version__
-from slideviz.errors import nearest
+from slideviz import (
+    __version__,
+)
+from slideviz.errors import (
+    nearest,
+)
+
+
+def window(arguments: argparse.Namespace) -> int:
+    """Open the window, with a file if one is given; return the exit code."""
+    from slideviz.errors import CaseError, nearest
+    from slideviz.export.offscreen import display_fault
+
+    if arguments.file is not None and not arguments.file.exists():
+        raise CaseError(
+            f"{arguments.file}: there is no such file, and no such command "
+            f"(commands: {', '.join(arguments.commands)})"
+            f"{nearest(str(arguments.file), arguments.commands)}"
+        )
+    why = display_fault() if sys.platform.startswith("linux") else ""
+    if why:
+        raise CaseError(f"there is no screen ({why}); `slideviz run CASE` works without one")
+    from slideviz.gui.app import launch
+
+    return launch(arguments.file, run=arguments.run)
+
 
 COMMANDS = {
     "run": "run_command",
@@ -100,7 +135,6 @@ def _base(**options: object) -> _Parser:
 
 
 def _window_parser() -> argparse.ArgumentParser:
-    from slideviz.cli.window_command import window
 
     parser = _base(usage="slideviz [FILE] | slideviz {%s} ..." % ",".join(COMMANDS))  # noqa: UP031
     parser.add_argument("--version", action="version", version=f"slideviz {__version__}")
