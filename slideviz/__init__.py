@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from slideviz.design.deformer import Deformer
     from slideviz.design.sweeps.sweep import sweep
     from slideviz.errors import ConditionWarning, SlidevizError, ToleranceWarning
-    from slideviz.formats.convert import convert
-    from slideviz.formats.files import read, write
+    from slideviz.formats.files import convert, read, write
     from slideviz.mesh.model import Cells, Marker, Mesh
     from slideviz.mesh.quality import Quality, quality
     from slideviz.mesh.quality_derivative import QualityDerivative

@@ -34,7 +34,7 @@ def _convert(arguments: argparse.Namespace) -> int:
 
     from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.cli.terminal import DONE
-    from slideviz.formats.convert import convert
+    from slideviz.formats.files import convert
 
     require_output_paths(arguments, OutputPath(arguments.output, "OUT", is_mesh=True))
     if _is_to_be_streamed(arguments):

@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slideviz.errors import MeshError
-from slideviz.formats.convert import convert
-from slideviz.formats.files import read, write
+from slideviz.formats.files import convert, read, write
 from slideviz.formats.su2b import read as su2b
 from slideviz.formats.su2b import write as su2b_write
 from slideviz.formats.su2b.elements import element_blocks
