@@ -63,7 +63,7 @@ _HOME = {
     "Step": "solver.deform",
     "ToleranceWarning": "errors",
     "Translate": "case.model",
-    "convert": "formats.convert",
+    "convert": "formats.files",
     "deform": "solver.deform",
     "quality": "mesh.quality",
     "read": "formats.files",

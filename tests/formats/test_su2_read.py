@@ -4,9 +4,9 @@ import tracemalloc
 
 import numpy as np
 import pytest
-import slideviz.formats.su2.scan as su2_scan
 from su2_samples import MESSY, SAMPLES, SOLID, SQUARE, ZONES, assert_same, bits, save
 
+import slideviz.formats.su2.lines as su2_lines
 from slideviz.formats.files import read
 from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.check import unused_nodes
@@ -136,7 +136,7 @@ def test_unused_nodes_are_allowed_and_listed(tmp_path):
 
 
 def test_progress_rises_to_one(tmp_path, monkeypatch):
-    monkeypatch.setattr(su2_scan, "BLOCK_BYTES", 16)
+    monkeypatch.setattr(su2_lines, "BLOCK_BYTES", 16)
     seen = []
     read(save(tmp_path, SOLID), progress=seen.append)
     assert len(seen) > 20

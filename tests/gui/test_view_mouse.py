@@ -6,7 +6,7 @@ from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 
 from slideviz.gui.viewport import view_mouse
-from slideviz.mesh import coarse
+from slideviz.mesh import surfaces
 from slideviz.samples.table import write_sample
 from slideviz.scene.actors import VALUES
 from slideviz.sections.model import Section
@@ -22,8 +22,8 @@ def stator_file(tmp_path_factory):
 
 @pytest.fixture
 def stator(driver, stator_file, monkeypatch, qtbot):
-    monkeypatch.setattr(coarse, "LEAST", 0)
-    monkeypatch.setattr(coarse, "CUBES", 10)
+    monkeypatch.setattr(surfaces, "LEAST", 0)
+    monkeypatch.setattr(surfaces, "CUBES", 10)
     monkeypatch.setattr(view_mouse, "SLOW_FRAME_S", -1.0)
     driver.open(stator_file)
     qtbot.waitUntil(lambda: not driver.window.view.veiled)

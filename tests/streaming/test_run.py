@@ -18,7 +18,7 @@ import slideviz as sv
 from slideviz.cli import run
 from slideviz.cli.options import changed
 from slideviz.errors import CaseError, MeshError, NodeError, UnsoundError
-from slideviz.formats.su2b import copying
+from slideviz.formats.su2b import partial
 from slideviz.formats.su2b.layout import MAGIC
 from slideviz.formats.su2b.partial import names_of
 from slideviz.samples.table import write_sample
@@ -335,7 +335,7 @@ def flip(path, at):
 def test_what_is_copied_and_then_changed_by_another_is_copied_again(tmp_path, monkeypatch, at):
     """The first bytes of the zone, its cells, and its markers behind the points."""
     monkeypatch.setattr(output, "CHUNK", 60)
-    monkeypatch.setattr(copying, "_PIECE", 4096)
+    monkeypatch.setattr(partial, "_PIECE", 4096)
     case = made(tmp_path, "square", 25, ("STEPS=1",))
     out, move = tmp_path / "out.su2b", output.move
     stream(case, out)
@@ -559,7 +559,7 @@ def test_two_processes_do_not_write_one_file(tmp_path):
 def test_a_copy_is_the_same_where_the_system_cannot_copy_by_itself(tmp_path, monkeypatch):
     case = made(tmp_path, "square", 8, ("STEPS=1",))
     stream(case, tmp_path / "one.su2b")
-    monkeypatch.setattr(copying, "_PIECE", 100)
+    monkeypatch.setattr(partial, "_PIECE", 100)
     monkeypatch.delattr(os, "copy_file_range")
     stream(case, tmp_path / "two.su2b")
     assert (tmp_path / "one.su2b").read_bytes() == (tmp_path / "two.su2b").read_bytes()

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from slideviz.mesh import coarse
 from slideviz.mesh.surfaces import coarse_surfaces, find_surfaces
 from slideviz.samples.table import sample
 
@@ -16,7 +15,7 @@ def stator():
 
 @pytest.fixture
 def made(stator, monkeypatch):
-    monkeypatch.setattr(coarse, "LEAST", 0)
+    monkeypatch.setattr("slideviz.mesh.surfaces.LEAST", 0)
     mesh, surfaces = stator
     return mesh, surfaces, coarse_surfaces(surfaces, mesh.points, 12)
 
