@@ -8,12 +8,29 @@ free. Each step begins with the deformed mesh, without stresses.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
-from slideviz.baselines.multigrid import LinearSolution, solve
-from slideviz.baselines.stiffness import Conditions, ShapeBlock, assemble
+from slideviz.baselines.conditions import (
+    Body,
+    cartesian_normals,
+    conditions,
+    held,
+    held_rows,
+    rigid_motions,
+    unknowns,
+)
+from slideviz.baselines.elastic_forces import Forces
+from slideviz.baselines.multigrid import (
+    Level,
+    LinearSolution,
+    conjugate_gradients,
+    hierarchy,
+    solve,
+)
+from slideviz.baselines.stiffness import assemble
 from slideviz.errors import DeformError
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
@@ -21,7 +38,222 @@ from slideviz.rbf.classify import RANK_TOLERANCE
 from slideviz.rbf.constraint_rows import AGREE, merge
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.methods import within
+from slideviz.rbf.operations import difference_from, each_of, points
 from slideviz.rbf.problem import PhaseTimer, Problem, Solution
+from slideviz.rbf.solve import enough_threads
+from slideviz.rbf.tape import (
+    Array,
+    Variable,
+    dot,
+    function,
+    gather,
+    inverse,
+    join,
+    length,
+    multiply,
+    put,
+    recorded,
+    solution,
+    take,
+    transform,
+    unit,
+    value,
+)
+
+EXACT = 1e-13
+"""Residual ratio at which the solver ends: derivatives are to be exact."""
+
+ENOUGH = 1e-8
+"""Largest residual ratio that is accepted."""
+
+
+class Equilibrium:
+    """The displacement of an elastic body, at given positions.
+
+    Parameters
+    ----------
+    problem : Problem
+        The step; its positions and normals may be variables of a tape.
+    nodes : (m,) int64
+        Nodes with known displacement, ascending; of coinciding nodes, the one that represents them.
+    name : str
+        Begins the names of its choices, to tell two solutions of one step apart.
+    """
+
+    def __init__(self, problem: Problem, body: Body, nodes: IntArray, *, name: str) -> None:
+        assert problem.frozen is not None
+        self._body, self._coords, self._same = body, problem.coords, problem.same_as
+        self._nodes, self._choose, self._name = nodes, problem.frozen.choose, name
+        self._place, self._turn = unknowns(problem, body, nodes)
+        self._inside = np.flatnonzero(self._place >= 0)
+        self._count = int(self._place.max(initial=-1)) + 1
+        self._at = points(body.frame, problem.coords)
+        self._nothing = np.zeros_like(value(problem.coords))
+        self._held = self._directions(problem)
+        self._forces = Forces.at(value(self._at), body.parts)
+        self._levels = self._make()
+
+    def displacement(self, data: Array) -> Array:
+        """Return the displacement (..., n, d) in the frame, of all nodes.
+
+        Parameters
+        ----------
+        data : (..., m, d)
+            Displacement of the known nodes, in the frame.
+
+        Raises
+        ------
+        DeformError
+            The equations cannot be solved well enough.
+        """
+        known = self._known(data)
+        right = -value(self._collected(self._force(known)))
+        inverse_times = partial(each_of, self._solved)
+        found: Array = inverse_times(right)
+        if any(isinstance(x, Variable) for x in (self._coords, data)):
+            left = self._collected(self._force(self._moved(value(found)) + known))
+            found = solution(left, value(found), inverse_times)
+        return difference_from(self._body.frame, self._at, self._moved(found) + known)
+
+    def _make(self) -> list[Level]:
+        """Return the multigrid levels of the stiffness matrix."""
+        at = value(self._at)
+        axes = np.tile(np.eye(at.shape[1])[:, None], (self._count, 1))
+        held_by = [(at, value(direction)) for at, direction in self._held]
+        free = np.moveaxis(value(_without(axes, held_by)), 0, 1)
+        given = held(self._place, self._turn, free, np.zeros_like(at))
+        matrix = assemble(at, self._body.parts, given)[0]
+        with enough_threads(0.0):  # the coarsest matrix is small
+            return hierarchy(matrix, rigid_motions(at, given))
+
+    def _solved(self, right: FloatArray) -> FloatArray:
+        """Return the unknowns (k, d) for a right-hand side (k, d); DeformError above `ENOUGH`."""
+        if not right.any():
+            return np.zeros_like(right)
+        start = np.zeros(right.size)
+        with enough_threads(0.0):
+            found = conjugate_gradients(self._levels, right.ravel(), start, tolerance=EXACT)
+        if not found.residual_ratio <= ENOUGH:
+            raise DeformError(
+                f"the equations of linear elasticity were solved to {found.residual_ratio:.1g} "
+                f"only, in {found.iterations} iterations, so that derivatives would not be exact; "
+                "use more STEPS, or METHOD= rbf"
+            )
+        return found.x.reshape(right.shape)
+
+    def _known(self, data: Array) -> Array:
+        """Return the Cartesian displacement (..., n, d) of known nodes; zero for other nodes."""
+        frame, same = self._body.frame, self._same
+        rows = np.flatnonzero(np.isin(same, self._nodes))
+        base = take(self._coords, rows)
+        by = take(data, np.searchsorted(self._nodes, same[rows]))
+        moved = points(frame, base + by) - points(frame, base) if frame.cylindrical else by
+        return put(self._nothing, rows, moved)
+
+    def _force(self, moved: Array) -> Array:
+        """Return the nodal forces (..., n, d) of a Cartesian displacement (..., n, d)."""
+        forces, u = self._forces, value(moved)
+        each = partial(each_of, forces.of)
+        return recorded(
+            each(u),
+            (moved, each, each),
+            (
+                self._at,
+                partial(each_of, lambda t: forces.pushed(u, t)),
+                partial(each_of, lambda g: forces.pulled(u, g)),
+            ),
+        )
+
+    def _moved(self, unknown: Array) -> Array:
+        """Return the displacement (..., n, d) of unknowns (..., k, d); zero for known nodes."""
+        free = take(_without(unknown, self._held), self._place[self._inside])
+        turned = transform(self._turn[self._inside], free)
+        return put(self._nothing, self._inside, turned)
+
+    def _collected(self, forces: Array) -> Array:
+        """Return the forces (..., k, d) on the unknowns, of nodal forces (..., n, d)."""
+        inside = take(forces, self._inside)
+        back = np.swapaxes(self._turn[self._inside], 1, 2)
+        found = gather(transform(back, inside), self._place[self._inside], self._count)
+        return _without(found, self._held)
+
+    def _directions(self, problem: Problem) -> list[tuple[IntArray, Array]]:
+        """Return pairs of blocks of unknowns (h,) and unit directions (h, d) that hold them.
+
+        A block is in a pair once. Directions of a block are orthonormal (`conditions`).
+        """
+        rows = held_rows(problem, self._body, self._place)
+        cartesian = _cartesian(
+            self._body.frame, take(self._coords, problem.normal_nodes), problem.normals
+        )
+        full = join(cartesian, rows.axis) if len(rows.axis) else cartesian
+        if len(rows.images):
+            full = put(full, rows.images, transform(rows.back, take(full, rows.images)))
+        out: list[tuple[IntArray, Array]] = []
+        for k in range(int(rows.turn.max(initial=-1)) + 1):
+            here = np.flatnonzero(rows.turn == k)
+            at = rows.place[here]
+            left = take(full, rows.order[here])
+            for others, direction in out:
+                row = np.full(self._count, len(others))
+                row[others] = np.arange(len(others))
+                before = take(
+                    join(direction, np.zeros((1, value(problem.coords).shape[1]))), row[at]
+                )
+                left = left - multiply(before, dot(left, before))
+            size = length(left)
+            new = self._choose(
+                f"{self._name} held {k}", partial(_longer, value(size), RANK_TOLERANCE)
+            )
+            out.append((at[new], unit(take(left, new))))
+        return out
+
+
+def _without(vectors: Array, directions: Sequence[tuple[IntArray, Array]]) -> Array:
+    """Return vectors (..., k, d) of unknowns without their part along the held directions."""
+    for at, direction in directions:
+        along = multiply(direction, dot(take(vectors, at), direction))
+        vectors = vectors - gather(along, at, value(vectors).shape[-2])
+    return vectors
+
+
+def _longer(size: FloatArray, least: float) -> IntArray:
+    """Return the indices where ``size`` (m, 1) is above ``least``."""
+    return np.flatnonzero(size[:, 0] > least)
+
+
+def _cartesian(frame: Frame, coords: Array, normals: Array) -> Array:
+    """Return what ``slideviz.baselines.elastic.cartesian_normals`` does, on a tape."""
+    if not any(isinstance(x, Variable) for x in (coords, normals)):
+        return cartesian_normals(frame, value(coords), value(normals))
+    if not frame.cylindrical:
+        return normals
+    assert frame.axis is not None
+    d = value(normals).shape[1]
+    basis = axis_basis(frame.axis)[:, :d]
+
+    def column(x: Array, k: int) -> Array:
+        return transform(np.eye(d)[k : k + 1], x)
+
+    angle = value(column(coords, 1)) / frame.radius + frame.theta0
+    turn = column(coords, 1)
+    slope = 1.0 / frame.radius
+    cos = function(turn, np.cos(angle), -slope * np.sin(angle))
+    sin = function(turn, np.sin(angle), slope * np.cos(angle))
+    r, least = column(coords, 0), 1e-9 * frame.radius
+    far = value(r) > least
+    per = inverse(function(r, np.maximum(value(r), least), far.astype(float)))
+    across, around = column(normals, 0), multiply(column(normals, 1) * frame.radius, per)
+    parts = [
+        multiply(across, cos) - multiply(around, sin),
+        multiply(across, sin) + multiply(around, cos),
+        *([column(normals, 2)] if d == 3 else []),
+    ]
+    total: Array = np.zeros(value(normals).shape)
+    for part, row in zip(parts, basis, strict=False):
+        total = total + transform(row[:, None], part)
+    return unit(total)
+
 
 HOPELESS = 1e-3
 """Largest residual ratio of a usable solution; above ``multigrid.TOLERANCE`` there is a warning."""
@@ -47,16 +279,15 @@ def deform_elastic(problem: Problem, timer: PhaseTimer, body: Body) -> Solution:
     displacement, warnings = _equilibrium(problem, timer, body, nodes, values)
     sliding = np.concatenate([problem.edge, problem.surface])
     if len(sliding):
-        free = within(problem, sliding, displacement[sliding])
+        free = within(problem, sliding, take(displacement, sliding))
         with timer.phase("project"):
-            slid = problem.project(sliding, free)
-        nodes, values = np.concatenate([nodes, sliding]), np.concatenate([values, slid])
-        if np.abs(slid - free).max() > AGREE * problem.basis.radius:
-            start = displacement
-            displacement, warnings = _equilibrium(problem, timer, body, nodes, values, start)
-    displacement[nodes] = values
+            slid: Array = problem.project(sliding, free)
+        nodes, values = np.concatenate([nodes, sliding]), join(values, slid)
+        gap = np.abs(value(slid) - value(free)).max()
+        if problem.choose("again", lambda: gap > AGREE * problem.basis.radius):
+            displacement, warnings = _equilibrium(problem, timer, body, nodes, values, displacement)
     return Solution(
-        displacement,
+        put(displacement, nodes, values, overwrite=True),
         len(merge(problem, nodes, values)[0]),
         0.0,
         np.empty(0, np.int64),
@@ -70,32 +301,42 @@ def _equilibrium(
     timer: PhaseTimer,
     body: Body,
     nodes: IntArray,
-    values: FloatArray,
-    start: FloatArray | None = None,
-) -> tuple[FloatArray, tuple[str, ...]]:
-    """Return the displacement of all nodes in the frame (n, d), and warnings of the solver.
+    values: Array,
+    start: Array | None = None,
+) -> tuple[Array, tuple[str, ...]]:
+    """Return the displacement of all nodes in the frame (..., n, d), and warnings of the solver.
+
+    In a frozen step it is solved to rounding, for derivatives are to be exact (`Equilibrium`).
 
     Parameters
     ----------
-    nodes, values : (m,), (m, d)
+    nodes, values : (m,), (..., m, d)
         Nodes with known displacement, in the frame.
     start : (n, d), optional
         A guess of the displacement, in the frame.
     """
+    if problem.frozen is not None:
+        merged, data = merge(problem, nodes, values)
+        name = "free" if start is None else "slid"
+        equilibrium: Equilibrium = problem.frozen.fixed(
+            f"{name} body", lambda: Equilibrium(problem, body, merged, name=name)
+        )
+        return equilibrium.displacement(data), ()
+    coords = value(problem.coords)
     with timer.phase("solve") as tick:
-        points = body.frame.points(problem.coords)
-        given = conditions(problem, body, nodes, values)
-        matrix, right = assemble(points, body.parts, given, lambda f: tick(ASSEMBLING * f))
-        guess = np.zeros((len(given.free), points.shape[1]))
+        at = body.frame.points(coords)
+        given = conditions(problem, body, nodes, value(values))
+        matrix, right = assemble(at, body.parts, given, lambda f: tick(ASSEMBLING * f))
+        guess = np.zeros((len(given.free), at.shape[1]))
         inside = np.flatnonzero(given.place >= 0)
         if start is not None:
-            moved = body.frame.points(problem.coords + start) - points
+            moved = body.frame.points(coords + value(start)) - at
             turned = np.einsum("mji,mj->mi", given.turn[inside], moved[inside])
             guess[given.place[inside]] = turned
         found = solve(
             matrix,
             right,
-            rigid_motions(points, given),
+            rigid_motions(at, given),
             guess.ravel(),
             lambda f: tick(ASSEMBLING + (1.0 - ASSEMBLING) * f),
         )
@@ -103,7 +344,7 @@ def _equilibrium(
         shift = given.known.copy()
         unknown = found.x.reshape(guess.shape)[given.place[inside]]
         shift[inside] = np.einsum("mij,mj->mi", given.turn[inside], unknown)
-        displacement = body.frame.difference(points, shift)
+        displacement = body.frame.difference(at, shift)
     return displacement, warnings
 
 
@@ -128,197 +369,3 @@ def _warnings(found: LinearSolution) -> tuple[str, ...]:
         f"{found.iterations} iterations; look at the result with care, or use more STEPS"
     )
     return (sentence,)
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """The mesh as an elastic body, the same over all steps."""
-
-    parts: list[ShapeBlock]
-    """Its elements."""
-    frame: Frame
-    """The frame of the problem's displacements; the body is solved in Cartesian ones."""
-    axis: np.ndarray
-    """(n,): nodes on the axis of a cylindrical frame, which move along it only."""
-
-
-def conditions(problem: Problem, body: Body, nodes: IntArray, values: FloatArray) -> Conditions:
-    """Return the conditions of the body when ``nodes`` (m,) are displaced by ``values`` (m, d).
-
-    ``values`` are in the frame. Coinciding nodes and periodic images share one block of unknowns.
-    Sliding nodes that are not among ``nodes`` do not move along their normals. Nodes of no cell
-    have displacement zero.
-
-    Raises
-    ------
-    DeformError
-        Coinciding nodes are asked to move differently.
-    """
-    same = problem.same_as
-    first, data = merge(problem, nodes, values)
-    given = np.zeros(problem.coords.shape)
-    given[first] = data
-    place, turn = unknowns(problem, body, first)
-    known = np.where(np.isin(same, first)[:, None], given[same], 0.0)
-    free = _projections(problem, body, place, int(place.max(initial=-1)) + 1)
-    return held(place, turn, free, _cartesian(problem, body.frame, known))
-
-
-def unknowns(problem: Problem, body: Body, known: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return each node's block of unknowns (n,), -1 if it has none, and R_i (n, d, d).
-
-    Parameters
-    ----------
-    known : (m,)
-        Nodes with known displacement; of coinciding nodes, the one that represents them.
-    """
-    same = problem.same_as
-    n, d = problem.coords.shape
-    used = np.zeros(n, bool)
-    for part in body.parts:
-        used[part.nodes] = True
-    open_nodes = np.flatnonzero(used & ~np.isin(same, known))
-    place = np.full(n, -1, np.int64)
-    place[open_nodes] = np.unique(same[open_nodes], return_inverse=True)[1]
-    turn = np.tile(np.eye(d), (n, 1, 1))
-    images = open_nodes[same[open_nodes] != open_nodes]
-    turn[images] = _turns(problem, body.frame, images)
-    return place, turn
-
-
-def held(place: IntArray, turn: FloatArray, free: FloatArray, known: FloatArray) -> Conditions:
-    """Return the conditions with the unknowns restricted by the projections ``free``.
-
-    Parameters
-    ----------
-    place, turn : (n,), (n, d, d)
-        As ``unknowns`` returns them.
-    free : (k, d, d)
-        P_k of each block of unknowns.
-    known : (n, d)
-        g_i.
-    """
-    inside = np.flatnonzero(place >= 0)
-    turn = turn.copy()
-    turn[inside] = turn[inside] @ free[place[inside]]
-    plain = np.all(turn == np.eye(turn.shape[1]), axis=(1, 2))
-    return Conditions(place, turn, plain, known, free)
-
-
-def _cartesian(problem: Problem, frame: Frame, displacement: FloatArray) -> FloatArray:
-    """Return Cartesian displacements (n, d) of displacements in the frame; zero rows stay zero."""
-    if not frame.cylindrical:
-        return displacement
-    moved = frame.points(problem.coords + displacement) - frame.points(problem.coords)
-    return np.where(np.any(displacement != 0, axis=1, keepdims=True), moved, 0.0)
-
-
-def _turns(problem: Problem, frame: Frame, nodes: IntArray) -> FloatArray:
-    """Return the rotations R_i (m, d, d) from the representatives' displacements to the nodes'."""
-    d = problem.coords.shape[1]
-    if not (frame.cylindrical and frame.period):
-        return np.tile(np.eye(d), (len(nodes), 1, 1))
-    apart = problem.coords[nodes, 1] - problem.coords[problem.same_as[nodes], 1]
-    angle = np.round(apart / frame.shift()[1]) * frame.period
-    turn = np.zeros((len(nodes), 3, 3))
-    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angle)
-    turn[:, 1, 0] = np.sin(angle)
-    turn[:, 0, 1] = -turn[:, 1, 0]
-    turn[:, 2, 2] = 1.0
-    assert frame.axis is not None
-    basis = axis_basis(frame.axis)
-    return (basis.T @ turn @ basis)[:, :d, :d]
-
-
-@dataclass(frozen=True, eq=False)
-class HeldRows:
-    """Directions in which unknowns may not move, as rows: normals of sliding nodes, then axis."""
-
-    axis: FloatArray
-    """(a, d): directions that hold nodes on the axis: rows after the problem's normals."""
-    images: IntArray
-    back: FloatArray
-    """`images`, `back` (i,) int64, (i, d, d) float64: the rows of periodic images, and the
-    rotations of their directions to the representative."""
-    order: IntArray
-    place: IntArray
-    turn: IntArray
-    """`order`, `place`, `turn` (r,): the rows that hold an unknown, sorted by its block; the block;
-    and the number of the row among those of the block, from 0."""
-
-
-def held_rows(problem: Problem, body: Body, place: IntArray) -> HeldRows:
-    """Return the rows that hold blocks of unknowns; ``place`` (n,) is the block of each node."""
-    nodes, across = problem.normal_nodes, np.zeros((0, problem.coords.shape[1]))
-    on_axis = np.flatnonzero(body.axis)
-    if len(on_axis):
-        assert body.frame.axis is not None
-        both = axis_basis(body.frame.axis)[:2, : across.shape[1]]
-        nodes = np.concatenate([nodes, np.repeat(on_axis, 2)])
-        across = np.tile(both, (len(on_axis), 1))
-    images = np.flatnonzero(problem.same_as[nodes] != nodes)
-    back = np.swapaxes(_turns(problem, body.frame, nodes[images]), 1, 2)
-    rows = np.flatnonzero(place[nodes] >= 0)
-    rows = rows[np.argsort(place[nodes[rows]], kind="stable")]
-    at = place[nodes[rows]]
-    return HeldRows(across, images, back, rows, at, np.arange(len(at)) - np.searchsorted(at, at))
-
-
-def _projections(problem: Problem, body: Body, place: IntArray, count: int) -> FloatArray:
-    """Return the projections P_k (count, d, d) on the directions in which unknowns may move."""
-    nodes, held = problem.normal_nodes, held_rows(problem, body, place)
-    own = cartesian_normals(body.frame, problem.coords[nodes], problem.normals)
-    normals = np.concatenate([own, held.axis])
-    normals[held.images] = np.einsum("mij,mj->mi", held.back, normals[held.images])
-    normals = normals[held.order]
-    free = np.tile(np.eye(problem.coords.shape[1]), (count, 1, 1))
-    # The first constraint of each block, then the second of each, and so on.
-    for k in range(int(held.turn.max(initial=-1)) + 1):
-        here, normal = held.place[held.turn == k], normals[held.turn == k]
-        left = np.einsum("mij,mj->mi", free[here], normal)
-        length = np.linalg.norm(left, axis=1)
-        # Normals that are nearly alike are one: those of the two sides of a periodic mesh.
-        new = length > RANK_TOLERANCE
-        unit = left[new] / length[new, None]
-        free[here[new]] -= unit[:, :, None] * unit[:, None, :]
-    return free
-
-
-def cartesian_normals(frame: Frame, coords: FloatArray, normals: FloatArray) -> FloatArray:
-    """Return the unit directions (m, d) to which Cartesian displacements must be perpendicular.
-
-    From normals (m, d) in the frame at ``coords`` (m, d). In a cylindrical frame displacements are
-    (dr, rho dtheta[, dz]), and rho dtheta is rho / r times the distance along the circle.
-    """
-    if not frame.cylindrical:
-        return np.array(normals)
-    assert frame.axis is not None
-    angle = coords[:, 1] / frame.radius + frame.theta0
-    d = normals.shape[1]
-    around = normals[:, 1] * frame.radius / np.maximum(coords[:, 0], 1e-9 * frame.radius)
-    local = np.zeros((len(normals), 3))
-    local[:, 0] = normals[:, 0] * np.cos(angle) - around * np.sin(angle)
-    local[:, 1] = normals[:, 0] * np.sin(angle) + around * np.cos(angle)
-    if d == 3:
-        local[:, 2] = normals[:, 2]
-    out = (local @ axis_basis(frame.axis))[:, :d]
-    return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300)
-
-
-def rigid_motions(points: FloatArray, conditions: Conditions) -> FloatArray:
-    """Return the rigid motions, projected on what the unknowns may do, (k d, 3) or (k d, 6).
-
-    ``points`` (n, d) are those of all nodes.
-    """
-    place = conditions.place
-    owner = np.zeros(len(conditions.free), np.int64)
-    owner[place[place >= 0][::-1]] = np.flatnonzero(place >= 0)[::-1]
-    d = points.shape[1]
-    x = points[owner]
-    x = (x - x.mean(axis=0)) / max(float(np.ptp(x)), 1e-300) if len(x) else x
-    pairs = [(0, 1)] if d == 2 else [(0, 1), (1, 2), (2, 0)]
-    modes = np.zeros((len(x), d, d + len(pairs)))
-    modes[:, range(d), range(d)] = 1.0
-    for column, (i, j) in enumerate(pairs, start=d):
-        modes[:, i, column], modes[:, j, column] = -x[:, j], x[:, i]
-    return (conditions.free @ modes).reshape(-1, modes.shape[2])

@@ -13,6 +13,7 @@ surfaces, each displaced by the nodes known before, and projected.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numba import prange
@@ -22,9 +23,11 @@ from slideviz.rbf import compiled
 from slideviz.rbf.compiled import BLOCK, OPTIONS, TARGETS_PER_TASK, one_minus_cos
 from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.evaluate import CHUNK, Basis, Tick, no_tick, padded_rows
-from slideviz.rbf.methods import within
+from slideviz.rbf.methods import largest_norm, within
+from slideviz.rbf.operations import columns, each_of
 from slideviz.rbf.problem import PhaseTimer, Problem, Solution
-from slideviz.rbf.slopes import TINY
+from slideviz.rbf.slopes import TINY, pull_positions, push_positions, sum_powers
+from slideviz.rbf.tape import Array, Variable, join, put, recorded, take, value
 from slideviz.system.jit_cache import njit
 
 
@@ -90,6 +93,75 @@ def weighted_means(
     return np.ascontiguousarray(out[: values.shape[1]].T)
 
 
+def weighted_mean(
+    basis: Basis,
+    targets: Array,
+    sources: Array,
+    values: Array,
+    source_weights: FloatArray,
+    power: float,
+    tick: Tick = no_tick,
+) -> Array:
+    """Return means (..., N, d) of values (..., n, d), as `weighted_means`.
+
+    Parameters
+    ----------
+    source_weights : (n,)
+        The weight g_j of each source.
+    """
+    x, c, v = value(targets), value(sources), value(values)
+
+    def mean(each: FloatArray) -> FloatArray:
+        return each_of(
+            lambda t: weighted_means(basis, x, c, t, source_weights, power=power, tick=tick), each
+        )
+
+    out = mean(v)
+    if not any(isinstance(part, Variable) for part in (targets, sources, values)):
+        return out
+    total = sum_powers(basis, x, c, source_weights[:, None], power)
+    heavy, means = source_weights[:, None] * v, out.copy()  # who owns the outcome may change it
+
+    def pushed(
+        moved: FloatArray | None = None, moved_sources: FloatArray | None = None
+    ) -> FloatArray:
+        above, below = (
+            push_positions(
+                basis, x, c, weights, moved=moved, moved_controls=moved_sources, power=power
+            )
+            for weights in (heavy, source_weights[:, None])
+        )
+        return (above - means * below) / total
+
+    def pulled(g: FloatArray, *, of_sources: bool) -> FloatArray:
+        above, below = g / total, (g * means).sum(axis=1, keepdims=True) / total
+        if of_sources:
+            return pull_positions(basis, c, x, heavy, above, power) - pull_positions(
+                basis, c, x, source_weights[:, None], below, power
+            )
+        return pull_positions(basis, x, c, above, heavy, power) - pull_positions(
+            basis, x, c, below, source_weights[:, None], power
+        )
+
+    def back(g: FloatArray) -> FloatArray:
+        return source_weights[:, None] * sum_powers(basis, c, x, g / total, power)
+
+    return recorded(
+        out,
+        (
+            targets,
+            lambda t: each_of(pushed, t),
+            lambda g: each_of(partial(pulled, of_sources=False), g),
+        ),
+        (
+            sources,
+            lambda t: each_of(lambda each: pushed(moved_sources=each), t),
+            lambda g: each_of(partial(pulled, of_sources=True), g),
+        ),
+        (values, mean, lambda g: each_of(back, g)),
+    )
+
+
 def deform_idw(problem: Problem, timer: PhaseTimer, weights: Weights) -> Solution:
     """Return the solution of one step: displacements are weighted means of those of the boundary.
 
@@ -102,25 +174,42 @@ def deform_idw(problem: Problem, timer: PhaseTimer, weights: Weights) -> Solutio
     for level in (problem.edge, problem.surface):
         if not len(level):
             continue
-        free = _at(problem, timer, nodes, values, level, weights)
+        free = _means(problem, timer, nodes, values, columns(problem.features, level), weights)[0]
         if problem.curved:
             free = within(problem, level, free)
         with timer.phase("project"):
-            slid = problem.project(level, free)
-        nodes, values = np.concatenate([nodes, level]), np.concatenate([values, slid])
-    field = _field(problem, nodes, values, weights)
-    with timer.phase("evaluate") as tick:
-        displacement = field.at(problem.features, problem.coords, tick)
-    errors = np.linalg.norm(displacement[nodes] - values, axis=1)
-    displacement[nodes] = values
+            slid: Array = problem.project(level, free)
+        nodes, values = np.concatenate([nodes, level]), join(values, slid)
+    displacement, field = _means(problem, timer, nodes, values, problem.features, weights)
+    errors = largest_norm(take(displacement, nodes) - values)
     return Solution(
-        displacement,
-        len(merge(problem, nodes, values)[0]),
-        float(errors.max(initial=0.0)),
+        put(displacement, nodes, values, overwrite=True),
+        len(field.values),
+        errors,
         np.empty(0, np.int64),
         float("nan"),
         field=field,
     )
+
+
+def _means(
+    problem: Problem,
+    timer: PhaseTimer,
+    known: IntArray,
+    values: Array,
+    targets: Array,
+    weights: Weights,
+) -> tuple[Array, WeightedField]:
+    """Return the displacements (..., m, d) at features (k, m), and their field.
+
+    From ``values`` (..., b, d) at nodes ``known`` (b,), coinciding nodes merged.
+    """
+    nodes, data = merge(problem, known, values)
+    sources, power = columns(problem.features, nodes), weights.power
+    own = problem.choose(f"weights of {len(known)}", lambda: weights.of(value(data)))
+    with timer.phase("evaluate") as tick:
+        means = weighted_mean(problem.basis, targets, sources, data, own, power, tick)
+    return means, WeightedField(problem.basis, value(sources), value(data), own, power)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,29 +236,6 @@ class WeightedField:
             power=self.power,
             tick=tick,
         )
-
-
-def _at(
-    problem: Problem,
-    timer: PhaseTimer,
-    known: IntArray,
-    values: FloatArray,
-    targets: IntArray,
-    weights: Weights,
-) -> FloatArray:
-    """Return the displacements (m, d) of ``targets`` (m,), from ``values`` at ``known`` nodes."""
-    field = _field(problem, known, values, weights)
-    with timer.phase("evaluate") as tick:
-        return field.at(problem.features[:, targets], problem.coords[targets], tick)
-
-
-def _field(
-    problem: Problem, known: IntArray, values: FloatArray, weights: Weights
-) -> WeightedField:
-    """Return the field of ``values`` (m, d) at nodes ``known`` (m,), coinciding nodes merged."""
-    nodes, values = merge(problem, known, values)
-    own = weights.of(values)
-    return WeightedField(problem.basis, problem.features[:, nodes], values, own, weights.power)
 
 
 @njit(inline="always", **OPTIONS)

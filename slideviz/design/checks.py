@@ -9,14 +9,14 @@ import numpy as np
 
 from slideviz.case.motion import ROUNDING
 from slideviz.design.accuracy_warnings import largest_condition
-from slideviz.design.frozen.loops import farthest
-from slideviz.design.frozen.operations import flat
 from slideviz.design.frozen.step import FrozenStep, StepState
-from slideviz.design.frozen.tape import value
 from slideviz.errors import DeformError, UnsoundError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf.images import FAR, largest_misfit, misfits
+from slideviz.rbf.loops import farthest
+from slideviz.rbf.operations import flat
 from slideviz.rbf.problem import Solution
+from slideviz.rbf.tape import value
 from slideviz.solver.growth import GROWTH, HOPELESS, unsoundness
 from slideviz.solver.setup import AUTO_TOLERANCE, Setup
 

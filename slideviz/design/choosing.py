@@ -9,11 +9,12 @@ from functools import partial
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.design.frozen.step import FrozenStep
+from slideviz.design.frozen.step import ChoiceCache, FrozenStep
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.problem import CarriedError, Levels, PhaseTimer, Problem, Solution
+from slideviz.rbf.tape import value
 from slideviz.solver.deform import Progress, all_steps, free_memory, require_memory
-from slideviz.solver.setup import Setup, elastic_body, idw_weights
+from slideviz.solver.setup import Setup
 from slideviz.solver.stepping import (
     Stepping,
     cartesian,
@@ -64,15 +65,12 @@ def choose_steps(
             )
             for old, new in zip(solutions, further, strict=True)
         ]
-    weights = idw_weights(case, mesh.dim) if case.method == "idw" else None
-    body = elastic_body(mesh, kept.frame, kept.axis) if case.method == "elastic" else None
     rows = [len(level) for found in solutions for levels in found.stages for level in levels]
     reuse = BYTES * sum(n**2 for n in rows) < free_memory()
     steps = tuple(
         FrozenStep(
             setup=kept,
             mesh=mesh,
-            sliding=case.sliding,
             part=part,
             first=k == 0,
             stages=solution.stages,
@@ -80,9 +78,8 @@ def choose_steps(
             condition=solution.condition,
             refined=solution.refined,
             error_estimate=solution.error_estimate,
-            weights=weights,
-            body=body,
             reuse=reuse,
+            choices=ChoiceCache({"flat": len(solution.stages) < 2}),
         )
         for k, (part, solution) in enumerate(zip(parts, solutions, strict=True))
     )
@@ -147,7 +144,7 @@ def _further(
             )
         )
         carried = made[-1].carried
-        coords = displaced_coords(setup, coords, made[-1].displacement, goal)
+        coords = displaced_coords(setup, coords, value(made[-1].displacement), goal)
         if mesh.halo is not None:
             points = cartesian(setup.frame, mesh.points, setup.coords, coords)
             coords = with_halo_copies(setup, mesh, mesh.halo, points, coords)[1]

@@ -19,14 +19,14 @@ from slideviz.design.accuracy_warnings import (
 )
 from slideviz.design.checks import Checks, facets_of, usual_edge
 from slideviz.design.choosing import choose_steps
-from slideviz.design.frozen.loops import to_points
 from slideviz.design.frozen.step import FrozenStep, StepState
-from slideviz.design.frozen.tape import Array, Tape, Variable, value
 from slideviz.design.known_nodes import known_node_map
 from slideviz.errors import CaseError, DeformError
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 from slideviz.rbf.images import FAR
+from slideviz.rbf.loops import to_points
+from slideviz.rbf.tape import Array, Tape, Variable, value
 from slideviz.solver.deform import Progress
 from slideviz.solver.prescribed import displaced, support_radius
 from slideviz.solver.setup import make_setup

@@ -8,12 +8,12 @@ import numpy as np
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.motion import ROUNDING
-from slideviz.design.frozen.operations import difference
-from slideviz.design.frozen.tape import Array, put, take, transform, value
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE
 from slideviz.rbf.images import ImageDisplacements
+from slideviz.rbf.operations import difference
+from slideviz.rbf.tape import Array, put, take, transform, value
 from slideviz.solver.prescribed import displaced
 from slideviz.solver.setup import Setup
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import NoReturn
 
 import numpy as np
@@ -11,6 +12,19 @@ from slideviz.errors import NodeError
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.problem import Problem
+from slideviz.rbf.tape import (
+    Array,
+    divide,
+    dot,
+    gather,
+    join,
+    length,
+    multiply,
+    put,
+    reshape,
+    take,
+    value,
+)
 
 AGREE = 1e-7
 """Displacements of coinciding nodes agree when they differ by at most this part of the support
@@ -31,28 +45,38 @@ class ConstraintRows:
 
     nodes: IntArray
     """(r,): rows of one node are neighbours."""
-    normals: FloatArray | None
+    normals: Array | None
     """(r, d): None: every row stands for all axes, and ``right`` has a column for each."""
-    right: FloatArray
+    right: Array
     """(r, m): m = d without normals, and 1 with them."""
 
     def followed_by(self, more: ConstraintRows) -> ConstraintRows:
         """Return these rows followed by ``more``; neither may have normals."""
         nodes = np.concatenate([self.nodes, more.nodes])
-        return ConstraintRows(nodes, None, np.concatenate([self.right, more.right]))
+        return ConstraintRows(nodes, None, join(self.right, more.right))
+
+    @property
+    def data(self) -> FloatArray:
+        """The values of ``right``."""
+        return value(self.right)
+
+    @property
+    def directions(self) -> FloatArray | None:
+        """The values of ``normals``."""
+        return None if self.normals is None else value(self.normals)
 
     def only(self, index: IntArray) -> ConstraintRows:
         """Return the rows with the numbers ``index`` (k,)."""
-        normals = None if self.normals is None else self.normals[index]
-        return ConstraintRows(self.nodes[index], normals, self.right[index])
+        normals = None if self.normals is None else take(self.normals, index)
+        return ConstraintRows(self.nodes[index], normals, take(self.right, index))
 
-    def by_position(self, coords: FloatArray) -> ConstraintRows:
+    def by_position(self, coords: Array) -> ConstraintRows:
         """Return the rows ordered by the coordinates (n, d) of their nodes."""
-        at = coords[self.nodes]
+        at = value(coords)[self.nodes]
         return self.only(np.lexsort([np.arange(len(at)), *at.T[::-1]]))
 
 
-def full_rows(problem: Problem, nodes: IntArray, values: FloatArray) -> ConstraintRows:
+def full_rows(problem: Problem, nodes: IntArray, values: Array) -> ConstraintRows:
     """Return the rows of nodes (m,) with displacements ``values`` (m, d), coinciding nodes merged.
 
     What the interpolants of earlier steps lack there is added to ``values``.
@@ -66,23 +90,24 @@ def sliding_rows(problem: Problem) -> ConstraintRows:
 
     Those of coinciding nodes are merged. Raises DeformError where they contradict each other.
     """
-    d = problem.values.shape[1]
-    nodes = np.concatenate([np.repeat(problem.known, d), problem.normal_nodes])
-    normals = np.concatenate([np.tile(np.eye(d), (len(problem.known), 1)), problem.normals])
-    values = problem.values + problem.carried_error(problem.known)
-    across = np.einsum("qd,qd->q", problem.carried_error(problem.normal_nodes), problem.normals)
-    right = np.concatenate([values.ravel(), across])
+    known, d = problem.known, value(problem.values).shape[-1]
+    nodes = np.concatenate([np.repeat(known, d), problem.normal_nodes])
+    normals = join(np.tile(np.eye(d), (len(known), 1)), problem.normals)
+    values = problem.values + problem.carried_error(known)
+    across = dot(problem.carried_error(problem.normal_nodes), problem.normals)
+    right = join(reshape(values, len(known) * d, 1), across)
     order = np.argsort(problem.same_as[nodes], kind="stable")
-    nodes, normals, right = nodes[order], normals[order], right[order]
+    nodes, normals, right = nodes[order], take(normals, order), take(right, order)
     representative = problem.same_as[nodes]
     starts = np.flatnonzero(np.r_[True, representative[1:] != representative[:-1]])
     count = np.diff(np.r_[starts, len(nodes)])
     mixed = np.maximum.reduceat(nodes, starts) != np.minimum.reduceat(nodes, starts)
     keep = np.ones(len(nodes), bool)
-    for size in np.unique(count[mixed]):
+    for size in np.unique(count[mixed]).tolist():
         rows = starts[mixed & (count == size), None] + np.arange(size)
-        _orthonormalise(problem, nodes, normals, right, rows, keep)
-    return ConstraintRows(representative[keep], normals[keep], right[keep, None])
+        normals, right = _orthonormalised(problem, nodes, normals, right, rows, keep)
+    kept = np.flatnonzero(keep)
+    return ConstraintRows(representative[kept], take(normals, kept), take(right, kept))
 
 
 def blocks(rows: ConstraintRows) -> IntArray:
@@ -95,27 +120,27 @@ def blocks(rows: ConstraintRows) -> IntArray:
     """
     if rows.normals is None or not len(rows.nodes):
         return np.zeros(len(rows.nodes), np.int64)
-    along = np.abs(rows.normals) > ALIGNED
+    along = np.abs(value(rows.normals)) > ALIGNED
     met = along.T.astype(float) @ along
     of_axis = components(len(met), *np.nonzero(met))
     return of_axis[np.argmax(along, axis=1)]
 
 
-def _orthonormalise(
+def _orthonormalised(
     problem: Problem,
     nodes: IntArray,
-    normals: FloatArray,
-    right: FloatArray,
+    normals: Array,
+    right: Array,
     rows: IntArray,
     keep: np.ndarray,
-) -> None:
-    """Orthonormalise the constraints of coinciding nodes in place; mark dependent ones in ``keep``.
+) -> tuple[Array, Array]:
+    """Return normals and right-hand sides with those of coinciding nodes orthonormalised.
 
     Raises DeformError where the right-hand sides of dependent constraints contradict each other.
 
     Parameters
     ----------
-    nodes, normals, right : (r,), (r, d), (r,)
+    nodes, normals, right : (r,), (r, d), (..., r, 1)
         The constraints, ``right`` their right-hand sides.
     rows : (g, k)
         The k rows of each group of coinciding nodes.
@@ -123,27 +148,37 @@ def _orthonormalise(
         Set to False where a constraint follows from others of its group.
     """
     for k, row in enumerate(rows.T):
-        n, b = normals[row], right[row]
+        n, b = take(normals, row), take(right, row)
         for other in rows.T[:k]:
-            share = np.einsum("gd,gd->g", n, normals[other]) * keep[other]
-            n = n - share[:, None] * normals[other]
-            b = b - share * right[other]
-        length = np.linalg.norm(n, axis=1)
-        new = length > INDEPENDENT
-        wrong = np.flatnonzero(~new & (np.abs(b) > AGREE * problem.basis.radius))
+            share = multiply(dot(n, take(normals, other)), keep[other, None].astype(float))
+            n = n - multiply(take(normals, other), share)
+            b = b - multiply(share, take(right, other))
+        size = length(n)
+        new = problem.choose(
+            f"independent {rows.shape[1]} {k}", partial(_above, value(size), INDEPENDENT)
+        )
+        off = np.abs(value(b)[..., 0])
+        wrong = np.argwhere(~new & (off > AGREE * problem.basis.radius))
         if len(wrong):
-            group = wrong[0]
-            disagree(problem, nodes[rows[group]], k, abs(float(b[group])))
-        scale = np.where(new, length, 1.0)
-        keep[row], normals[row], right[row] = new, n / scale[:, None], b / scale
+            disagree(problem, nodes[rows[wrong[0][-1]]], k, float(off[tuple(wrong[0])]))
+        mask = new[:, None].astype(float)
+        scale = multiply(size, mask) + (1.0 - mask)
+        keep[row] = new
+        normals, right = put(normals, row, divide(n, scale)), put(right, row, divide(b, scale))
+    return normals, right
 
 
-def merge(problem: Problem, nodes: IntArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
+def _above(size: FloatArray, least: float) -> np.ndarray:
+    """Return a mask (m,) of ``size`` (m, 1) above ``least``."""
+    return np.asarray(size[:, 0] > least)
+
+
+def merge(problem: Problem, nodes: IntArray, values: Array) -> tuple[IntArray, Array]:
     """Return one node (c,) for each group of coinciding nodes (m,), and the mean of its values.
 
     Parameters
     ----------
-    nodes, values : (m,), (m, d)
+    nodes, values : (m,), (..., m, d)
         Nodes, and their displacements in the frame.
 
     Raises
@@ -154,15 +189,14 @@ def merge(problem: Problem, nodes: IntArray, values: FloatArray) -> tuple[IntArr
     controls, group, count = np.unique(
         problem.same_as[nodes], return_inverse=True, return_counts=True
     )
-    data = np.zeros((len(controls), values.shape[1]))
-    data[group] = values
-    gap = np.abs(data[group] - values).max(axis=1, initial=0.0)
+    given = value(values)
+    data = np.zeros((*given.shape[:-2], len(controls), given.shape[-1]))
+    data[..., group, :] = given
+    gap = np.abs(data[..., group, :] - given).max(axis=-1, initial=0.0)
     if gap.max(initial=0.0) > AGREE * problem.basis.radius:
-        row = int(np.argmax(gap))
-        disagree(problem, nodes, row, float(gap[row]))
-    data[:] = 0.0
-    np.add.at(data, group, values)
-    return controls, data / count[:, None]
+        worst = np.unravel_index(int(np.argmax(gap)), gap.shape)
+        disagree(problem, nodes, int(worst[-1]), float(gap[worst]))
+    return controls, divide(gather(values, group, len(controls)), count[:, None].astype(float))
 
 
 def disagree(problem: Problem, nodes: IntArray, row: int, gap: float) -> NoReturn:

@@ -10,7 +10,7 @@ from slideviz.rbf.double_double import supports
 from slideviz.rbf.evaluate import Tick, matrix
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
-from slideviz.rbf.problem import Cycle, Interpolant, Levels, PhaseTimer, Problem
+from slideviz.rbf.problem import Cycle, Interpolant, Levels, PhaseTimer, Problem, first_occurrences
 from slideviz.rbf.refine import TRUSTED, System, check_points
 from slideviz.rbf.solve import (
     NOTHING,
@@ -21,6 +21,7 @@ from slideviz.rbf.solve import (
     saddle_condition,
     solve_saddle,
 )
+from slideviz.rbf.tape import Array, gather, multiply, value
 
 
 class ExactFit:
@@ -42,12 +43,12 @@ class ExactFit:
     short = ""
 
     def __init__(self, problem: Problem, timer: PhaseTimer) -> None:
-        d = problem.values.shape[1]
+        d = problem.dim
         self._problem, self._timer = problem, timer
         self._rows: ConstraintRows | None = None
         self._factors: dict[int, Factor] = {}
         self.history: tuple[Cycle, ...] = ()
-        self.found = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
+        self.interpolant = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
         """Of all rows added so far."""
         self.dropped: IntArray = np.empty(0, np.int64)
         """(m,): nodes of which the pivot guard left out a constraint."""
@@ -56,21 +57,21 @@ class ExactFit:
         self.error_estimate = self.refined = 0.0
 
     def add(self, rows: ConstraintRows) -> None:
-        """Add rows, solve with all rows added so far, and set ``found``."""
+        """Add rows, solve with all rows added so far, and set ``interpolant``."""
         problem, rows = self._problem, rows.by_position(self._problem.coords)
         if self._rows is not None:
             rows = self._rows.followed_by(rows)
         self._rows = rows
         with self._timer.phase("solve") as tick:
             if KERNELS[problem.basis.kernel].polynomial:
-                self.found, deficient = saddle_fit(problem, rows)
+                self.interpolant, deficient = saddle_fit(problem, rows)
                 self.dropped = np.unique(rows.nodes) if deficient else np.empty(0, np.int64)
                 self.error_estimate = max(
-                    self.error_estimate, saddle_error_estimate(problem, rows, self.found)
+                    self.error_estimate, saddle_error_estimate(problem, rows, self.interpolant)
                 )
                 self.stages += ((row_keys(rows),),)
                 return
-            weights = np.zeros_like(rows.right)
+            weights = np.zeros_like(rows.data)
             label, moves = problem.reach
             active, names = moves[label[rows.nodes]], row_keys(rows)
             solved = [
@@ -84,7 +85,7 @@ class ExactFit:
         left_out = np.concatenate(dropped)
         self.dropped = np.unique(rows.nodes[left_out])
         some = np.flatnonzero(active)
-        self.found = gathered(rows.only(some), weights[some])
+        self.interpolant = gathered(rows.only(some), weights[some])
         known = np.setdiff1d(np.arange(len(names)) if problem.lasting else some, left_out)
         self.stages += ((names[known],),)
 
@@ -98,18 +99,18 @@ class ExactFit:
         first = int(part[0])
         before = self._factors.get(first, NOTHING)
         done = len(before.kept) + len(before.dropped)
-        problem, new, right = self._problem, part[done:], rows.right[part]
+        problem, new, right = self._problem, part[done:], rows.data[part]
 
         def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
-            normals = None if rows.normals is None else rows.normals[index]
-            return problem.features[:, rows.nodes[index]], normals
+            normals = None if rows.directions is None else rows.directions[index]
+            return problem.place(rows.nodes[index]), normals
 
         system = matrix(problem.basis, place(new), place(part), tick)
         with enough_threads(len(system) * len(part) ** 2 / 3):
             factor = extend(before, system, tick)
             found = factor.solve(right)
         self._factors[first] = factor
-        largest = float(np.abs(rows.right).max(initial=0.0))
+        largest = float(np.abs(rows.data).max(initial=0.0))
         system_ = System(problem.basis, place(part), factor)
         weights[part], met = self._checked(system_, right, found, largest, tick)
         return part[factor.dropped[:0] if met else factor.dropped]
@@ -179,35 +180,30 @@ def row_keys(rows: ConstraintRows) -> IntArray:
     return np.stack([rows.nodes, place - first], axis=1)
 
 
-def gathered(
-    rows: ConstraintRows, weights: FloatArray, tail: FloatArray | None = None
-) -> Interpolant:
+def gathered(rows: ConstraintRows, weights: Array, tail: Array | None = None) -> Interpolant:
     """Return the interpolant with a weight for each row, (r, m), summed up for each node.
 
     ``tail`` (q, d) are the coefficients of the polynomial's terms.
     """
-    if rows.normals is None:
+    if rows.directions is None:
         return Interpolant(rows.nodes, weights, tail)
-    nodes, first, group = np.unique(rows.nodes, return_index=True, return_inverse=True)
-    total = np.zeros((len(nodes), rows.normals.shape[1]))
-    np.add.at(total, group, weights * rows.normals)
-    order = np.argsort(first)
-    return Interpolant(nodes[order], total[order], tail)
+    nodes, place = first_occurrences(rows.nodes)
+    return Interpolant(nodes, gather(multiply(rows.directions, weights), place, len(nodes)), tail)
 
 
 def row_terms(problem: Problem, rows: ConstraintRows) -> FloatArray:
     """Return the values of the polynomial's terms in each row, (r, q), or (r, q d) with normals."""
-    terms = linear_terms(problem.basis, problem.features[:, rows.nodes])
-    if rows.normals is None:
+    terms = linear_terms(problem.basis, problem.place(rows.nodes))
+    if rows.directions is None:
         return terms
-    return np.einsum("rq,rd->rqd", terms, rows.normals).reshape(len(terms), -1)
+    return np.einsum("rq,rd->rqd", terms, rows.directions).reshape(len(terms), -1)
 
 
 def saddle_fit(problem: Problem, rows: ConstraintRows) -> tuple[Interpolant, bool]:
     """Return the interpolant with polynomial, and whether the system was singular."""
-    place = problem.features[:, rows.nodes], rows.normals
-    solved = solve_saddle(matrix(problem.basis, place), row_terms(problem, rows), rows.right)
-    d = problem.values.shape[1]
+    place = problem.place(rows.nodes), rows.directions
+    solved = solve_saddle(matrix(problem.basis, place), row_terms(problem, rows), rows.data)
+    d = problem.dim
     return gathered(rows, solved.weights, solved.tail.reshape(-1, d)), solved.rank_deficient
 
 
@@ -215,7 +211,7 @@ def condition_with_terms(problem: Problem, rows: ConstraintRows) -> float:
     """Return the condition number of the system of ``rows`` with the polynomial."""
     if not len(rows.nodes):
         return 1.0
-    place = problem.features[:, rows.nodes], rows.normals
+    place = problem.place(rows.nodes), rows.directions
     return saddle_condition(matrix(problem.basis, place), row_terms(problem, rows))
 
 
@@ -224,13 +220,13 @@ def saddle_error_estimate(problem: Problem, rows: ConstraintRows, found: Interpo
 
     As a part of the largest displacement; 0 where it is below `TRUSTED`.
     """
-    largest = float(np.abs(rows.right).max(initial=0.0))
-    met = found.at(problem, rows.nodes)
-    if rows.normals is not None:
-        met = np.einsum("rd,rd->r", met, rows.normals)[:, None]
-    lacking = ConstraintRows(rows.nodes, rows.normals, rows.right - met)
+    largest = float(np.abs(rows.data).max(initial=0.0))
+    met = value(found.at(problem, rows.nodes))
+    if rows.directions is not None:
+        met = np.einsum("rd,rd->r", met, rows.directions)[:, None]
+    lacking = ConstraintRows(rows.nodes, rows.directions, rows.data - met)
     field = saddle_fit(problem, lacking)[0].field(problem)
-    field_error = np.abs(field.interpolated(check_points(problem.features[:, rows.nodes]))).max(
+    field_error = np.abs(field.interpolated(check_points(problem.place(rows.nodes)))).max(
         initial=0.0
     )
     return float(field_error / largest) if field_error > TRUSTED * largest else 0.0

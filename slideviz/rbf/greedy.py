@@ -70,9 +70,9 @@ class GreedyFit:
         """
         assert problem.reduction is not None
         self._problem, self._timer, self._settings = problem, timer, problem.reduction
-        d = problem.values.shape[1]
+        d = problem.dim
         self.history, self.short = history, ""
-        self.found = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
+        self.interpolant = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
         """The chosen nodes, in the order of their choice, and their coefficients, summed over the
         levels (Eq. 2.38)."""
         self.dropped: IntArray = np.empty(0, np.int64)
@@ -85,14 +85,14 @@ class GreedyFit:
         none = np.empty(0, np.int64)
         rows = ConstraintRows(none, None, np.empty((0, d)))
         self._among = Candidates(rows, none, none, none, np.empty(0))
-        self._level = GreedyLevel(problem, self._among, self.found)
+        self._level = GreedyLevel(problem, self._among, self.interpolant)
         self._known = problem.beginning()
         self._given, self._used = problem.stages[done:], list[int]()
         self._one_level = not self._settings.multilevel
 
     def _new_level(self) -> None:
         """Begin a level, which has to meet what the levels before it lack."""
-        self._level = GreedyLevel(self._problem, self._among, self.found)
+        self._level = GreedyLevel(self._problem, self._among, self.interpolant)
 
     def add(self, rows: ConstraintRows) -> None:
         """Meet these constraints too, and select until all errors are below the tolerance."""
@@ -104,7 +104,7 @@ class GreedyFit:
             self._level.extend_candidates(self._among)
         with self._timer.phase("select"):
             self._select()
-        self.stages += (self.found.levels,)
+        self.stages += (self.interpolant.levels,)
 
     def _select(self) -> None:
         """Run cycles until the error is below the tolerance, or nothing is left to choose."""
@@ -123,7 +123,7 @@ class GreedyFit:
             residual, errors = self._misfit(target)
             goal = self._level_goal(errors)
         rule = LevelLimit(errors.max(initial=0.0), len(self._among.rows.nodes))
-        given_up, best = False, (errors, self.found)
+        given_up, best = False, (errors, self.interpolant)
         while True:
             self._record(errors)
             enough = errors.max(initial=0.0) <= settings.tolerance
@@ -139,12 +139,12 @@ class GreedyFit:
                 break
             residual, errors = self._misfit(target)
             if errors.max() < best[0].max():
-                best = errors, self.found
+                best = errors, self.interpolant
             self._timer.report("select", self._fraction(errors))
         self._note_dropped(errors)
         self.short = self._shortfall(errors)
         if self.short and not self._full() and errors.max() > WORSE * best[0].max():
-            self.found = best[1]
+            self.interpolant = best[1]
             self._new_level()
             self._record(best[0])
 
@@ -186,7 +186,7 @@ class GreedyFit:
     def _full(self) -> bool:
         """Return whether as many nodes as MAX_CONTROL_NODES allows are chosen."""
         limit = self._settings.max_nodes
-        return limit is not None and len(self.found.nodes) >= limit
+        return limit is not None and len(self.interpolant.nodes) >= limit
 
     def _fraction(self, errors: FloatArray) -> float:
         """Return the progress, 0 to 1: how far the error has fallen towards the tolerance.
@@ -203,7 +203,7 @@ class GreedyFit:
             len(self.history) + 1,
             self._number,
             float(errors.max(initial=0.0)),
-            len(self.found.nodes),
+            len(self.interpolant.nodes),
             perf_counter() - self._start,
         )
         self.history = (*self.history, cycle)
@@ -218,7 +218,7 @@ class GreedyFit:
         self.dropped = np.unique(among.rows.nodes[among.first[over & excluded]])
 
     def _grow(self, target: FloatArray, residual: FloatArray, errors: FloatArray) -> bool:
-        """Pick nodes and solve with them, which sets ``found``; tell whether any could be picked.
+        """Pick nodes and solve with them, which sets ``interpolant``; return whether any could be.
 
         Parameters
         ----------
@@ -241,7 +241,7 @@ class GreedyFit:
             with enough_threads(4.0 * (done + count) * len(rows) * done):
                 if level.pick(rows, residual[rows], count=count, floor=floor, target=target):
                     level.solve(target)
-                    self.found = level.found
+                    self.interpolant = level.interpolant
                     return True
             # All of the pool fell to the pivot guard: try the next ones.
             open_[pooled] = False
@@ -252,8 +252,8 @@ class GreedyFit:
         ``errors`` (c,) are multiplied with the candidates' ``tie_breaker``, and negative where one
         cannot be picked; ``residual`` (r, m).
         """
-        among, d = self._among, self._problem.values.shape[1]
-        normals, vectors = among.rows.normals, residual
+        among, d = self._among, self._problem.dim
+        normals, vectors = among.rows.directions, residual
         if normals is not None:
             vectors = np.zeros((len(errors), d))
             np.add.at(vectors, among.candidate, residual * normals)
@@ -261,7 +261,7 @@ class GreedyFit:
             errors,
             vectors,
             self._settings,
-            chosen=len(self.found.nodes),
+            chosen=len(self.interpolant.nodes),
             chosen_in_level=self._level.nodes,
             per_node=max(1, len(among.candidate) // max(1, len(errors))),
         )
@@ -269,7 +269,7 @@ class GreedyFit:
     def _append(self, rows: IntArray, target: FloatArray) -> None:
         """Add rows that were chosen in the step before, or for other data, to the level."""
         self._level.append_rows(rows, target)
-        self.found = self._level.found
+        self.interpolant = self._level.interpolant
 
     def _append_given_levels(self) -> bool:
         """Add the levels that were chosen for other data (``Problem.stages``) to the fit.

@@ -17,6 +17,7 @@ from slideviz.rbf.kernels import KERNELS, PLAIN
 from slideviz.rbf.problem import Interpolant, Problem
 from slideviz.rbf.reduction import Reduction
 from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise, solve_lower
+from slideviz.rbf.tape import value
 
 POOL = 768
 """Largest number of rows in the pool of a block."""
@@ -236,7 +237,7 @@ class Candidates:
         """Return the candidates of ``rows``, which must be sorted by position."""
         new = np.r_[True, rows.nodes[1:] != rows.nodes[:-1]] if len(rows.nodes) else []
         first = np.flatnonzero(new)
-        ranked = tie_breaker(problem.coords[rows.nodes[first]])
+        ranked = tie_breaker(value(problem.coords)[rows.nodes[first]])
         return cls(rows, blocks(rows), np.cumsum(new, dtype=np.int64) - 1, first, ranked)
 
     def with_rows(self, problem: Problem, more: ConstraintRows) -> Candidates:
@@ -247,8 +248,8 @@ class Candidates:
     def values(self, problem: Problem, sum_: Interpolant) -> FloatArray:
         """Return the left-hand side of each row, (r, m), for the interpolant ``sum_``."""
         rows = self.rows
-        s = sum_.at(problem, rows.nodes[self.first])[self.candidate]
-        return s if rows.normals is None else np.einsum("rd,rd->r", s, rows.normals)[:, None]
+        s = value(sum_.at(problem, rows.nodes[self.first]))[self.candidate]
+        return s if rows.directions is None else np.einsum("rd,rd->r", s, rows.directions)[:, None]
 
     def errors(self, residual: FloatArray) -> FloatArray:
         """Return the error of each candidate: the length of its residual (r, m), (c,)."""
@@ -328,17 +329,17 @@ class GreedyLevel:
         # which nodes add most, and the weights come from the system with the polynomial.
         self._tailed, self.singular = KERNELS[problem.basis.kernel].polynomial, False
         self._basis = replace(problem.basis, kernel=PLAIN) if self._tailed else problem.basis
-        self.increment = Interpolant(np.empty(0, np.int64), previous_levels.weights[:0])
+        self.increment = Interpolant(np.empty(0, np.int64), np.empty((0, problem.dim)))
         self.chosen: IntArray = np.empty(0, np.int64)
         """(k,): the chosen rows, in the order of their choice."""
         self.excluded = np.zeros(len(candidates.rows.nodes), bool)
         """(r,): rows that cannot be chosen any more: they are, or would make the system
         singular."""
         count = int(candidates.block.max(initial=0)) + 1
-        self._grown = [GrowingFactor(candidates.rows.right.shape[1]) for _ in range(count)]
+        self._grown = [GrowingFactor(candidates.rows.data.shape[1]) for _ in range(count)]
 
     @property
-    def found(self) -> Interpolant:
+    def interpolant(self) -> Interpolant:
         """The sum of all levels so far."""
         return self.previous_levels.plus(self.increment)
 
@@ -359,7 +360,7 @@ class GreedyLevel:
 
     def targets(self) -> FloatArray:
         """Return what this level has to meet: the data less the levels before, (r, m)."""
-        right = self._among.rows.right
+        right = self._among.rows.data
         if not len(self.previous_levels.nodes):
             return right
         return right - self._among.values(self._problem, self.previous_levels)
@@ -367,7 +368,7 @@ class GreedyLevel:
     def _rows(self, target: FloatArray) -> ConstraintRows:
         """Return the chosen rows, with their data from the target (r, m)."""
         all_, chosen = self._among.rows, self.chosen
-        normals = None if all_.normals is None else all_.normals[chosen]
+        normals = None if all_.directions is None else all_.directions[chosen]
         return ConstraintRows(all_.nodes[chosen], normals, target[chosen])
 
     def solve(self, target: FloatArray) -> None:
@@ -376,7 +377,7 @@ class GreedyLevel:
         if self._tailed:
             found, self.singular = saddle_fit(self._problem, rows)
         else:
-            weights = np.empty_like(rows.right)
+            weights = np.empty_like(rows.data)
             for factor in self._grown:
                 weights[factor.turn] = factor.weights()
             found = gathered(rows, weights)
@@ -458,10 +459,10 @@ class GreedyLevel:
 
     def _remaining(self, factor: GrowingFactor, rows: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return L^-1 G of p rows of the factor's block, (k, p), and their Schur complement."""
-        nodes, normals = self._among.rows.nodes, self._among.rows.normals
+        nodes, normals = self._among.rows.nodes, self._among.rows.directions
 
         def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
-            features = self._problem.features[:, nodes[index]]
+            features = self._problem.place(nodes[index])
             return features, None if normals is None else normals[index]
 
         schur = matrix(self._basis, place(rows))
@@ -473,7 +474,7 @@ class GreedyLevel:
     def condition(self) -> float:
         """Return an estimate of the condition number of the system of all blocks."""
         if self._tailed:
-            return condition_with_terms(self._problem, self._rows(self._among.rows.right))
+            return condition_with_terms(self._problem, self._rows(self._among.rows.data))
         factors = [factor.lower for factor in self._grown]
         with enough_threads(20.0 * max(len(lower) for lower in factors) ** 2):
             return condition(*factors)

@@ -6,13 +6,17 @@ direct sliding only the normals of the nodes that slide (thesis section 2.4.1), 
 sliding (2.4.2) finds the displacement of these by projection first. The fit meets the
 constraints: `ExactFit` all at once, `GreedyFit` by a selection of them. The errors that are left
 at boundary nodes are spread to the nodes near them (section 2.5.1, Eq. 2.30 and 2.31).
+
+Everything here is made of operations on arrays or on variables of a tape (`slideviz.rbf.tape`), so
+that derivatives follow. What is discrete is chosen by ``Problem.choose``, and what is fitted,
+projected and corrected in a frozen step by ``Problem.frozen``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -32,6 +36,7 @@ from slideviz.rbf.problem import (
     Solution,
 )
 from slideviz.rbf.reduction import GAMMA
+from slideviz.rbf.tape import Array, add_at, dot, join, multiply, put, take, value
 from slideviz.system.threads import in_parts
 
 ROUNDING = 1e-14
@@ -46,10 +51,14 @@ NEGLIGIBLE = 1e-14
 """Errors below this part of the support radius are rounding, and are not spread."""
 
 
+IMAGES = (0, -1, 1)
+"""Periods by which the sources of the correction are shifted, in this order."""
+
+
 class Fit(Protocol):
     """An interpolant to which constraints are added: `ExactFit` or `GreedyFit`, with attributes."""
 
-    found: Interpolant
+    interpolant: Interpolant
     dropped: IntArray
     short: str
     history: tuple[Cycle, ...]
@@ -83,10 +92,10 @@ def pseudo_sliding(problem: Problem, timer: PhaseTimer) -> Solution:
         if len(level):
             slid = _slide(problem, timer, fit, level)
             # A node that coincides with one of an earlier level is in the system already.
-            new = ~np.isin(problem.same_as[level], problem.same_as[nodes])
-            nodes, values = np.concatenate([nodes, level]), np.concatenate([values, slid])
+            new = np.flatnonzero(~np.isin(problem.same_as[level], problem.same_as[nodes]))
+            nodes, values = np.concatenate([nodes, level]), join(values, slid)
             merge(problem, nodes, values)
-            fit.add(full_rows(problem, level[new], slid[new]))
+            fit.add(full_rows(problem, level[new], take(slid, new)))
     return _finish(problem, timer, fit, nodes, values)
 
 
@@ -107,34 +116,33 @@ def direct_sliding(problem: Problem, timer: PhaseTimer) -> Solution:
         free = within(problem, sliding, free)
     with timer.phase("project"):
         slid = problem.project(sliding, free)
-    gap = np.abs(slid - free).max(axis=1, initial=0.0)
-    if not problem.curved and gap.max(initial=0.0) <= AGREE * problem.basis.radius:
+    gap = np.abs(value(slid) - value(free)).max(axis=-1, initial=0.0)
+    nearly = AGREE * problem.basis.radius
+    if problem.choose("flat", lambda: not problem.curved and gap.max(initial=0.0) <= nearly):
         # A straight edge of a curved surface: its nodes leave it a little along the normals.
-        off = gap[:, None] > ROUNDING * largest_coordinate(problem.coords)
-        slid = np.where(off, slid, free)
-        return _finish(problem, timer, fit, nodes, np.concatenate([problem.values, slid]))
-    values = np.concatenate([problem.values, slid])
+        rounding = ROUNDING * largest_coordinate(value(problem.coords))
+        off = problem.choose("off", lambda: np.flatnonzero(gap > rounding))
+        slid = put(free, off, take(slid, off))
+        return _finish(problem, timer, fit, nodes, join(problem.values, slid))
+    values = join(problem.values, slid)
     second = _fit(problem, timer, fit)
     second.add(full_rows(problem, nodes, values))
-    found = _finish(problem, timer, second, nodes, values)
+    solution = _finish(problem, timer, second, nodes, values)
     return replace(
-        found,
-        stages=(*fit.stages, *found.stages),
-        error_estimate=max(fit.error_estimate, found.error_estimate),
-        refined=max(fit.refined, found.refined),
+        solution,
+        stages=(*fit.stages, *solution.stages),
+        error_estimate=np.maximum(fit.error_estimate, solution.error_estimate),
+        refined=max(fit.refined, solution.refined),
     )
 
 
-def within(problem: Problem, nodes: IntArray, free: FloatArray) -> FloatArray:
-    """Return displacements ``free`` (m, d) of sliding nodes without their part along normals."""
-    row = np.full(len(problem.features[0]), -1)
+def within(problem: Problem, nodes: IntArray, free: Array) -> Array:
+    """Return displacements ``free`` (..., m, d) of sliding nodes less their part along normals."""
+    row = np.full(len(problem.same_as), -1)
     row[nodes] = np.arange(len(nodes))
     at = row[problem.normal_nodes]
-    normals, at = problem.normals[at >= 0], at[at >= 0]
-    off = np.einsum("qd,qd->q", free[at], normals)
-    within = free.copy()
-    np.subtract.at(within, at, off[:, None] * normals)
-    return within
+    normals, at = take(problem.normals, np.flatnonzero(at >= 0)), at[at >= 0]
+    return add_at(free, at, -multiply(normals, dot(take(free, at), normals)))
 
 
 SLIDING_METHODS: dict[str, Callable[[Problem, PhaseTimer], Solution]] = {
@@ -147,6 +155,9 @@ SLIDING_METHODS: dict[str, Callable[[Problem, PhaseTimer], Solution]] = {
 
 def _fit(problem: Problem, timer: PhaseTimer, first: Fit | None = None) -> Fit:
     """Return a fit without rows, greedy with data reduction; ``first``: the fit before, if any."""
+    if problem.frozen is not None:
+        frozen: Fit = problem.frozen.fit(problem)
+        return frozen
     if problem.reduction is None:
         return ExactFit(problem, timer)
     if first is None:
@@ -154,14 +165,15 @@ def _fit(problem: Problem, timer: PhaseTimer, first: Fit | None = None) -> Fit:
     return GreedyFit(problem, timer, first.history, done=len(first.stages))
 
 
-def _at(problem: Problem, timer: PhaseTimer, fit: Fit, nodes: IntArray | slice) -> FloatArray:
-    """Return the interpolated displacements (m, d) of nodes."""
+def _at(problem: Problem, timer: PhaseTimer, fit: Fit, nodes: IntArray | slice) -> Array:
+    """Return the interpolated displacements (..., m, d) of nodes."""
+    out = problem.frozen.out if problem.frozen and isinstance(nodes, slice) else None
     with timer.phase("evaluate") as tick:
-        return fit.found.at(problem, nodes, tick)
+        return fit.interpolant.at(problem, nodes, tick, out)
 
 
-def _slide(problem: Problem, timer: PhaseTimer, fit: Fit, level: IntArray) -> FloatArray:
-    """Return the interpolated displacements (m, d) of sliding nodes ``level`` (m,), projected.
+def _slide(problem: Problem, timer: PhaseTimer, fit: Fit, level: IntArray) -> Array:
+    """Return the interpolated displacements (..., m, d) of sliding nodes (m,), projected.
 
     On curved boundaries the part along the normals is removed before the projection: the point
     closest to a node that was pushed through a thin profile is on the profile's other side.
@@ -170,65 +182,79 @@ def _slide(problem: Problem, timer: PhaseTimer, fit: Fit, level: IntArray) -> Fl
     if problem.curved:
         free = within(problem, level, free)
     with timer.phase("project"):
-        return problem.project(level, free)
+        slid: Array = problem.project(level, free)
+    return slid
+
+
+def largest_norm(vectors: Array) -> Any:
+    """Return the largest length of rows (..., n, d): a float, or (...,) of several designs."""
+    size = np.linalg.norm(value(vectors), axis=-1).max(axis=-1, initial=0.0)
+    return float(size) if size.ndim == 0 else size
 
 
 def _finish(
-    problem: Problem, timer: PhaseTimer, fit: Fit, nodes: IntArray, values: FloatArray
+    problem: Problem, timer: PhaseTimer, fit: Fit, nodes: IntArray, values: Array
 ) -> Solution:
     """Return the solution: evaluate at all nodes, set boundary nodes exactly, spread their errors.
 
-    ``values`` (b, d) are the exact displacements of the boundary nodes ``nodes`` (b,).
+    ``values`` (..., b, d) are the exact displacements of the boundary nodes ``nodes`` (b,).
     """
     displacement = _at(problem, timer, fit, slice(None))
-    errors = values - displacement[nodes]
+    errors = values - take(displacement, nodes)
     total, carried = problem.carried_error(nodes) + errors, None
     if problem.reduction is not None:
         order = np.argsort(nodes)
-        carried = CarriedError(nodes[order], total[order])
+        carried = CarriedError(nodes[order], take(total, order))
     left_out = np.isin(problem.same_as[nodes], fit.dropped)
     lost = 0.0
     if problem.reduction is None:
-        lost = float(np.linalg.norm(errors[~left_out], axis=1).max(initial=0.0))
-    off = lost > LOST * np.linalg.norm(values, axis=1).max(initial=0.0)
+        lost = largest_norm(take(errors, np.flatnonzero(~left_out)))
+    off = np.any(lost > LOST * largest_norm(values))
+    needed = bool(problem.reduction is not None or len(fit.dropped) or off)
     correction = None
-    if problem.reduction is not None or len(fit.dropped) or off:
-        correction = correction_of(problem, nodes, errors)
+    if problem.frozen is not None:
+        displacement = problem.frozen.correct(problem, displacement, nodes, errors, needed=needed)
+    elif needed:
+        correction = correction_of(problem, nodes, value(errors))
     if correction is not None:
         with timer.phase("correct") as tick:
-            correct(problem, displacement, nodes, correction, tick)
-    displacement[nodes] = values
-    control = _in_system(fit)
-    return Solution(
-        displacement,
-        len(control),
-        float(np.linalg.norm(total, axis=1).max(initial=0.0)),
+            correct(problem, value(displacement), nodes, correction, tick)
+    solution = Solution(
+        put(displacement, nodes, values, overwrite=True),
+        0,
+        largest_norm(total),
         fit.dropped,
         fit.condition(),
         fit.history,
-        control=control,
         carried=carried,
-        dropped_error=float(np.linalg.norm(errors[left_out], axis=1).max(initial=0.0)),
         short=fit.short,
         lost=lost,
         error_estimate=fit.error_estimate,
         refined=fit.refined,
-        field=replace(fit.found.field(problem), correction=correction),
         stages=fit.stages,
+    )
+    if problem.frozen is not None:
+        return solution
+    control = _in_system(fit)
+    return replace(
+        solution,
+        control_nodes=len(control),
+        control=control,
+        dropped_error=largest_norm(take(errors, np.flatnonzero(left_out))),
+        field=replace(fit.interpolant.field(problem), correction=correction),
     )
 
 
 def _in_system(fit: Fit) -> IntArray:
     """Return the nodes of the interpolant (c,) that the pivot guard did not leave out."""
     rows = [np.empty(0, np.int64), *(level[:, 0] for level in fit.stages[-1])]
-    return fit.found.nodes[np.isin(fit.found.nodes, np.concatenate(rows))]
+    return fit.interpolant.nodes[np.isin(fit.interpolant.nodes, np.concatenate(rows))]
 
 
 def correction_of(problem: Problem, nodes: IntArray, errors: FloatArray) -> Correction | None:
     """Return the correction that spreads errors at boundary nodes; None where they are rounding.
 
-    Its radius is ``gamma`` times the largest error (Eq. 2.31), as in
-    ``slideviz.design.frozen.spread.chosen_correction``.
+    Its radius is ``gamma`` times the largest error (Eq. 2.31).
 
     Parameters
     ----------
@@ -241,10 +267,10 @@ def correction_of(problem: Problem, nodes: IntArray, errors: FloatArray) -> Corr
     radius = (problem.reduction.gamma if problem.reduction else GAMMA) * largest
     # Nodes that coincide, or are images of each other, count once.
     once = np.unique(problem.same_as[nodes], return_index=True)[1]
-    at = problem.coords[nodes[once]]
+    at = value(problem.coords)[nodes[once]]
     sources, lacking = problem.cartesian(at), errors[once]
     if np.any(problem.shift):
-        images = [problem.cartesian(at + s * problem.shift) for s in (-1, 1)]
+        images = [problem.cartesian(at + s * problem.shift) for s in IMAGES[1:]]
         sources, lacking = np.concatenate([sources, *images]), np.tile(lacking, (3, 1))
     from scipy.spatial import cKDTree  # takes long to load
 
@@ -264,7 +290,7 @@ def correct(
 
     def correct_part(part: slice) -> None:
         targets = part.start + np.flatnonzero(free[part])
-        hit, taken = correction.near(problem.cartesian(problem.coords[targets]))
+        hit, taken = correction.near(problem.cartesian(value(problem.coords)[targets]))
         displacement[targets[hit]] += taken
 
     in_parts(correct_part, len(displacement), tick)

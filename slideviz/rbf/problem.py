@@ -8,17 +8,20 @@ from dataclasses import dataclass
 from dataclasses import field as made_by
 from functools import cached_property
 from time import perf_counter
+from typing import Any, Protocol
 
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import Basis, Tick, connected, no_tick
 from slideviz.rbf.field import Field, RadialField
+from slideviz.rbf.operations import columns, radial_sum, terms
 from slideviz.rbf.reduction import Reduction
+from slideviz.rbf.tape import Array, gather, join, product, put, take, value
 
-Project = Callable[[IntArray, FloatArray], FloatArray]
-"""Takes nodes (m,) and displacements (m, d); returns those that bring the nodes back on their
-boundary, (m, d)."""
+Project = Callable[[IntArray, Any], Any]
+"""Takes nodes (m,) and displacements (..., m, d); returns those that bring the nodes back on their
+boundary, (..., m, d)."""
 
 Levels = tuple[IntArray, ...]
 """The rows of each level of an interpolant, (r, 2), as ``exact.row_keys`` gives them: the node,
@@ -58,26 +61,51 @@ class Cycle:
     """Since the selection began."""
 
 
+class Frozen(Protocol):
+    """The discrete choices of a step, kept for any displacement (`slideviz.design.frozen`)."""
+
+    out: FloatArray | None
+    """(..., n, d): where the displacement of all nodes may be written."""
+
+    def choose(self, name: str, make: Callable[[], Any]) -> Any:
+        """Return the choice of this name; ``make`` makes it the first time."""
+
+    def fit(self, problem: Problem) -> Any:
+        """Return a fit (`slideviz.rbf.methods.Fit`) whose rows were chosen before."""
+
+    def correct(
+        self, problem: Problem, displacement: Array, nodes: IntArray, errors: Array, *, needed: bool
+    ) -> Array:
+        """Return the displacement (..., n, d) with errors (..., b, d) at nodes (b,) spread."""
+
+    def fixed(self, name: str, make: Callable[[], Any]) -> Any:
+        """Return what depends on positions only; ``make`` makes it at new positions."""
+
+    def project(self, nodes: IntArray, free: Array) -> Array:
+        """Return displacements (..., m, d) of sliding nodes (m,), projected as chosen before."""
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """What the interpolation of one step needs, in the working frame.
 
     Of periodic images, ``known``, ``edge``, ``surface`` and ``normal_nodes`` have the one that
-    represents them.
+    represents them. For derivatives, ``features``, ``values``, ``normals`` and ``coords`` are
+    variables on a tape; ``values`` may have leading axes, for several designs.
     """
 
     basis: Basis
-    features: FloatArray
+    features: Array
     """(k, n): of all nodes, at their current positions."""
     known: IntArray
     """(a,): nodes whose displacement is given, by ``values`` (a, d)."""
-    values: FloatArray
+    values: Array
     edge: IntArray
     surface: IntArray
     """`edge`, `surface` (c,), (e,): sliding nodes, in the order in which pseudo sliding projects
     them."""
     normal_nodes: IntArray
-    normals: FloatArray
+    normals: Array
     """`normal_nodes`, `normals` (q,) int64, (q, d) float64: the constraints of the sliding nodes:
     unit directions of no displacement."""
     same_as: IntArray
@@ -89,7 +117,7 @@ class Problem:
     """Whether slid nodes must be projected after direct sliding."""
     cartesian: Callable[[FloatArray], FloatArray]
     """Returns the Cartesian points (m, d) of coordinates (m, d)."""
-    coords: FloatArray
+    coords: Array
     shift: FloatArray
     """`coords`, `shift` (n, d), (d,): current positions in the frame, and one period in it (zero:
     none), for the correction."""
@@ -103,6 +131,21 @@ class Problem:
     lasting: bool = False
     """Whether the factor will be used for other data too (as for gradients). Then its accuracy is
     tested with other data, too."""
+    frozen: Frozen | None = None
+    """The choices of a step whose derivatives are wanted; None in a run, which makes its own."""
+
+    def choose(self, name: str, make: Callable[[], Any]) -> Any:
+        """Return a discrete choice: made in a run, and kept under its name in a frozen step."""
+        return make() if self.frozen is None else self.frozen.choose(name, make)
+
+    @property
+    def dim(self) -> int:
+        """Components of a displacement."""
+        return int(value(self.values).shape[-1])
+
+    def place(self, nodes: IntArray) -> FloatArray:
+        """Return the features (k, m) of nodes."""
+        return value(self.features)[:, nodes]
 
     @cached_property
     def reach(self) -> tuple[IntArray, np.ndarray]:
@@ -112,16 +155,16 @@ class Problem:
         """
         nodes = np.concatenate([self.known, self.edge, self.surface, self.normal_nodes])
         nodes = np.unique(self.same_as[nodes])
-        label = np.zeros(self.features.shape[1], np.int64)
-        label[nodes] = connected(self.basis, self.features[:, nodes])
+        label = np.zeros(len(self.same_as), np.int64)
+        label[nodes] = connected(self.basis, self.place(nodes))
         moves = np.zeros(int(label.max(initial=0)) + 1, bool)
-        moves[label[self.same_as[self.known[self.values.any(axis=1)]]]] = True
+        moves[label[self.same_as[self.known[value(self.values).any(axis=1)]]]] = True
         return label, moves if moves.any() else ~moves
 
-    def carried_error(self, nodes: IntArray) -> FloatArray:
-        """Return the errors (m, d) that the interpolants of all steps before left at nodes (m,)."""
+    def carried_error(self, nodes: IntArray) -> Array:
+        """Return the errors (..., m, d) that the interpolants of earlier steps left at nodes."""
         if self.before is None or self.before.carried is None:
-            return np.zeros((len(nodes), self.values.shape[1]))
+            return np.zeros((len(nodes), self.dim))
         return self.before.carried.at(nodes)
 
     def beginning(self) -> IntArray:
@@ -143,21 +186,23 @@ class CarriedError:
 
     nodes: IntArray
     """(b,): sorted, each once."""
-    values: FloatArray
-    """(b, d): prescribed less interpolated displacement, in the frame."""
+    values: Array
+    """(..., b, d): prescribed less interpolated displacement, in the frame."""
 
-    def at(self, nodes: IntArray) -> FloatArray:
-        """Return the errors at nodes (m,), (m, d); zero at nodes that are not in ``nodes``."""
+    def at(self, nodes: IntArray) -> Array:
+        """Return the errors (..., m, d) at nodes (m,); zero at nodes that are not in ``nodes``."""
         row = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
-        return np.where((self.nodes[row] == nodes)[:, None], self.values[row], 0.0)
+        errors, outside = take(self.values, row), np.flatnonzero(self.nodes[row] != nodes)
+        nothing = np.zeros((len(outside), value(errors).shape[-1]))
+        return put(errors, outside, nothing) if len(outside) else errors
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
     """The result of one step: displacements, control nodes and errors."""
 
-    displacement: FloatArray
-    """(n, d): of all nodes, in the frame."""
+    displacement: Array
+    """(..., n, d): of all nodes, in the frame."""
     control_nodes: int
     """Nodes in the final system, coinciding ones counted once."""
     max_error: float
@@ -203,31 +248,47 @@ class Interpolant:
 
     nodes: IntArray
     """(c,): the control nodes."""
-    weights: FloatArray
-    """(c, d): coefficients alpha, ``sum_a w_a n_a`` over the constraints of each node."""
-    tail: FloatArray | None = None
-    """(q, d): coefficients beta of the polynomial's terms."""
+    weights: Array
+    """(..., c, d): coefficients alpha, ``sum_a w_a n_a`` over the constraints of each node."""
+    tail: Array | None = None
+    """(..., q, d): coefficients beta of the polynomial's terms."""
     levels: Levels = ()
     """The rows that it meets, of each level."""
 
-    def at(self, problem: Problem, nodes: IntArray | slice, tick: Tick = no_tick) -> FloatArray:
-        """Return the displacements (m, d) of nodes in the frame."""
-        return self.field(problem).interpolated(problem.features[:, nodes], tick)
+    def at(
+        self,
+        problem: Problem,
+        nodes: IntArray | slice,
+        tick: Tick = no_tick,
+        out: FloatArray | None = None,
+    ) -> Array:
+        """Return the displacements (..., m, d) of nodes in the frame, in ``out`` if given."""
+        x = problem.features
+        here = x if isinstance(nodes, slice) else columns(x, nodes)
+        if not len(self.nodes):
+            return np.zeros((value(here).shape[1], value(self.weights).shape[-1]))
+        s = radial_sum(problem.basis, here, columns(x, self.nodes), self.weights, out, tick)
+        return s if self.tail is None else s + product(terms(problem.basis, here), self.tail)
 
     def field(self, problem: Problem) -> RadialField:
         """Return the field of this interpolant, without a correction."""
-        controls = problem.features[:, self.nodes]
-        return RadialField(problem.basis, controls, self.weights, self.tail)
+        tail = None if self.tail is None else value(self.tail)
+        return RadialField(problem.basis, problem.place(self.nodes), value(self.weights), tail)
 
     def plus(self, other: Interpolant) -> Interpolant:
         """Return the sum of two interpolants, each node once, in the order of first occurrence."""
-        nodes = np.concatenate([self.nodes, other.nodes])
-        weights = np.concatenate([self.weights, other.weights])
-        unique, first, group = np.unique(nodes, return_index=True, return_inverse=True)
-        total = np.zeros((len(unique), weights.shape[1]))
-        np.add.at(total, group, weights)
-        order = np.argsort(first)
+        nodes, place = first_occurrences(np.concatenate([self.nodes, other.nodes]))
+        weights = gather(join(self.weights, other.weights), place, len(nodes))
         tail = other.tail if self.tail is None else self.tail
         if self.tail is not None and other.tail is not None:
             tail = self.tail + other.tail
-        return Interpolant(unique[order], total[order], tail, (*self.levels, *other.levels))
+        return Interpolant(nodes, weights, tail, (*self.levels, *other.levels))
+
+
+def first_occurrences(nodes: IntArray) -> tuple[IntArray, IntArray]:
+    """Return each of nodes (r,) once, in the order of first occurrence, and its place, (r,)."""
+    unique, first, group = np.unique(nodes, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return unique[order], rank[group]

@@ -17,6 +17,7 @@ from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.problem import PhaseTimer
+from slideviz.rbf.tape import value
 from slideviz.solver.setup import Setup, make_setup
 from slideviz.solver.stepping import Stepping, problem_at, renumbered
 from slideviz.solver.steps import Progress, Step, Trial
@@ -211,7 +212,7 @@ def _systems(setup: Setup, case: Case, *, lasting: bool) -> list[int]:
         int(moves[label[setup.same_as[each]]].sum())
         for each in (problem.known, np.concatenate([problem.known, problem.edge, problem.surface]))
     )
-    normals = problem.normals[moves[label[setup.same_as[problem.normal_nodes]]]]
+    normals = value(problem.normals)[moves[label[setup.same_as[problem.normal_nodes]]]]
     if case.sliding != "ds" or not len(normals):
         return [nodes]
     dim = setup.coords.shape[1]

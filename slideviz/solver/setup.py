@@ -26,7 +26,7 @@ from slideviz.solver.domain import Domain, find_domain
 from slideviz.solver.prescribed import fitted_radius, largest_of, prescribe, support_radius
 
 if TYPE_CHECKING:
-    from slideviz.baselines.elastic import Body
+    from slideviz.baselines.conditions import Body
     from slideviz.baselines.idw import Weights
 
 EXACT_NODES = 2000
@@ -295,7 +295,7 @@ def _method(
 
 def elastic_body(mesh: Mesh, frame: Frame, axis: np.ndarray) -> Body:
     """Return the mesh as an elastic body, without its halo."""
-    from slideviz.baselines.elastic import Body
+    from slideviz.baselines.conditions import Body
     from slideviz.baselines.stiffness import blocks
 
     return Body(blocks(without_halo(mesh)[0].cells), frame, axis)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,15 +15,18 @@ from slideviz.errors import DeformError, Note, UnsoundError
 from slideviz.mesh.check import within
 from slideviz.mesh.halo import Halo
 from slideviz.mesh.interfaces import torn_interfaces
-from slideviz.mesh.model import FloatArray, Mesh, sealed
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.quality import Quality, quality
 from slideviz.rbf.constraint_rows import AGREE
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import largest_misfit, misfits
 from slideviz.rbf.kernels import KERNELS
-from slideviz.rbf.problem import PhaseTimer, Problem, Solution
+from slideviz.rbf.operations import features
+from slideviz.rbf.problem import Frozen, PhaseTimer, Problem, Solution
 from slideviz.rbf.refine import NOTED, TRUSTED
+from slideviz.rbf.tape import Array, put, take, value
 from slideviz.solver.growth import farthest_node, stray_warning, unsoundness
+from slideviz.solver.normals import sliding_normals
 from slideviz.solver.setup import Setup
 from slideviz.solver.steps import Progress, Step, Trial
 from slideviz.system.threads import in_parts
@@ -77,7 +81,7 @@ class Stepping:
             timer = PhaseTimer(self._phase_report(index + 1, total), seconds)
             goal = setup.coords[setup.known] + setup.target * part
             solution = one_step(setup, coords, goal, timer, before)
-            moved = displaced_coords(setup, coords, solution.displacement, goal)
+            moved = displaced_coords(setup, coords, value(solution.displacement), goal)
             points = cartesian(setup.frame, mesh.points, setup.coords, moved)
             if mesh.halo is not None:
                 points, moved = with_halo_copies(setup, mesh, mesh.halo, points, moved)
@@ -197,10 +201,11 @@ def renumbered(steps: list[Step], tried: tuple[Trial, ...]) -> Iterator[Step]:
 
 def one_step(
     setup: Setup,
-    coords: FloatArray,
-    goal: FloatArray,
+    coords: Array,
+    goal: Array,
     timer: PhaseTimer,
     before: Solution | None,
+    frozen: Frozen | None = None,
 ) -> Solution:
     """Return the solution of one step from ``coords`` (n, d), with the displacement of all nodes.
 
@@ -209,41 +214,59 @@ def one_step(
 
     Parameters
     ----------
-    goal : (a, d)
+    goal : (..., a, d)
         Coordinates of the known nodes after the step.
     before : Solution or None
         The solution of the step before.
+    frozen : Frozen or None
+        The choices of a step whose derivatives are wanted; None in a run.
     """
-    found = setup.solve(problem_at(setup, coords, goal, before), timer)
+    solution = setup.solve(problem_at(setup, coords, goal, before, frozen), timer)
     first, second = setup.images.T
-    found.displacement[second] = found.displacement[first]
-    return found
+    displacement = put(
+        solution.displacement, second, take(solution.displacement, first), overwrite=True
+    )
+    return replace(solution, displacement=displacement)
 
 
 def problem_at(
-    setup: Setup, coords: FloatArray, goal: FloatArray, before: Solution | None = None
+    setup: Setup,
+    coords: Array,
+    goal: Array,
+    before: Solution | None = None,
+    frozen: Frozen | None = None,
 ) -> Problem:
     """Return the problem of the step from ``coords`` (n, d) with known nodes at ``goal`` (a, d)."""
-    once = setup.once(setup.known)
+    once = np.flatnonzero(setup.once(setup.known))
     known, classes = setup.known[once], setup.classes
-    normal_nodes, normals = setup.constraints(coords)
+
+    def fixed(name: str, make: Callable[[], Any]) -> Any:
+        return make() if frozen is None else frozen.fixed(name, make)
+
+    def project(nodes: IntArray, free: Array) -> Array:
+        if frozen is not None:
+            return frozen.project(nodes, free)
+        return setup.project(value(coords), nodes, value(free))
+
+    normal_nodes, normals = fixed("normals", lambda: sliding_normals(setup, coords))
     return Problem(
         basis=setup.basis,
-        features=setup.frame.features(coords),
+        features=fixed("features", lambda: features(setup.frame, coords)),
         known=known,
-        values=goal[once] - coords[known],
+        values=take(goal, once) - take(coords, known),
         edge=classes.edge[setup.once(classes.edge)],
         surface=classes.surface[setup.once(classes.surface)],
         normal_nodes=normal_nodes,
         normals=normals,
         same_as=setup.same_as,
-        project=lambda nodes, free: setup.project(coords, nodes, free),
+        project=project,
         curved=setup.tracks.curved,
         cartesian=setup.frame.points,
         coords=coords,
         shift=setup.frame.shift(),
         reduction=setup.reduction,
         before=before,
+        frozen=frozen,
     )
 
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
-from slideviz.design.frozen.operations import columns, radial_sum, terms
 from slideviz.design.frozen.solve import (
     LeastSquares,
     MeasuredSystem,
@@ -18,28 +17,15 @@ from slideviz.design.frozen.solve import (
     full_factor,
     solved,
 )
-from slideviz.design.frozen.tape import (
-    Array,
-    Variable,
-    dot,
-    gather,
-    join,
-    multiply,
-    product,
-    reshape,
-    solution,
-    take,
-    transpose,
-    value,
-)
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows
 from slideviz.rbf.double_double import supports
-from slideviz.rbf.evaluate import Basis, matrix
-from slideviz.rbf.exact import parts, row_keys
+from slideviz.rbf.evaluate import matrix
+from slideviz.rbf.exact import gathered, parts, row_keys
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
-from slideviz.rbf.problem import Levels
+from slideviz.rbf.operations import columns, radial_sum, terms
+from slideviz.rbf.problem import Cycle, Interpolant, Levels, Problem
 from slideviz.rbf.refine import System
 from slideviz.rbf.solve import (
     NOTHING,
@@ -50,40 +36,36 @@ from slideviz.rbf.solve import (
     pseudo_inverse,
     saddle_system,
 )
+from slideviz.rbf.tape import (
+    Array,
+    Variable,
+    dot,
+    join,
+    multiply,
+    product,
+    reshape,
+    solution,
+    take,
+    transpose,
+    value,
+)
 
 Keep = Callable[[str, Callable[[], Any]], Any]
 """Returns the object kept under a name; calls the function to make it if there is none yet."""
 
 
-@dataclass(frozen=True, eq=False)
-class Sum:
-    """A sum of radial functions, as `slideviz.rbf.problem.Interpolant`, on a tape."""
-
-    nodes: IntArray
-    """(c,): the control nodes."""
-    weights: Array
-    """(..., c, d)."""
-    tail: Array | None = None
-    """(..., q, d) or None: coefficients of the polynomial's terms."""
-
-
-@dataclass(eq=False)
-class TapedRows:
-    """Constraint rows whose data are on a tape: as ``ConstraintRows``, ``right`` (..., r, m)."""
-
-    nodes: IntArray
-    normals: Array | None
-    right: Array
-
-
 class FrozenFit:
-    """The interpolant of one step, whose rows were chosen before."""
+    """The interpolant of one step, whose rows were chosen before (`slideviz.rbf.methods.Fit`)."""
+
+    short = ""
+    history: tuple[Cycle, ...] = ()
+    refined = 0.0
 
     def __init__(
         self,
-        basis: Basis,
-        features: Array,
-        dim: int,
+        problem: Problem,
+        stages: Iterator[tuple[str, Levels]],
+        dropped: IntArray,
         *,
         chosen: Keep,
         fixed: Keep,
@@ -94,8 +76,10 @@ class FrozenFit:
 
         Parameters
         ----------
-        features : (k, n)
-            Of all nodes, at their current positions.
+        stages
+            Name and rows of each system that is to come in this step.
+        dropped : (m,)
+            Nodes that the pivot guard left out of the systems.
         chosen, fixed
             Keep discrete choices, and what depends on positions only (in the first step, where
             positions are always the same).
@@ -104,73 +88,42 @@ class FrozenFit:
         checked
             Whether the error of solutions is estimated (``error_estimate``).
         """
-        self._basis, self._features, self._dim = basis, features, dim
+        basis = problem.basis
+        self._problem, self._to_come, self.dropped = problem, stages, dropped
+        self._basis, self._features = basis, problem.features
+        self._dim = problem.dim
         self._chosen, self._fixed = chosen, fixed
         tailed = KERNELS[basis.kernel].polynomial
         self._refined, self._checked = refined and supports(basis), checked and not tailed
-        self.error_estimate: FloatArray = np.zeros(())
-        """(...,): as of a ``Solution``."""
-        self._rows: TapedRows | None = None
+        self.error_estimate: Any = np.zeros(())
+        self.stages: tuple[Levels, ...] = ()
+        self._rows: ConstraintRows | None = None
         self._factors: dict[int, tuple[IntArray, Factor]] = {}
-        self.found: Sum | None = None
-        """Of all rows added so far; None before any."""
+        self.interpolant = Interpolant(np.empty(0, np.int64), np.empty((0, self._dim)))
 
-    def add(self, rows: TapedRows, levels: Levels, stage: str) -> None:
-        """Add rows, solve with those in ``levels`` of all rows added so far, and set ``found``.
+    def condition(self) -> float:
+        """Return NaN: the condition number is that of the reference."""
+        return float("nan")
 
-        ``stage`` begins the names of what is kept.
-        """
+    def add(self, rows: ConstraintRows) -> None:
+        """Add rows, solve with those chosen of all rows added so far, and set ``interpolant``."""
+        stage, levels = next(self._to_come)
         if self._rows is not None:
-            nodes = np.concatenate([self._rows.nodes, rows.nodes])
-            rows = TapedRows(nodes, None, join(self._rows.right, rows.right))
+            rows = self._rows.followed_by(rows)
         self._rows = rows
-        names = row_keys(ConstraintRows(rows.nodes, None, np.empty((0, 0))))
-        sums: list[Sum] = []
+        keys = row_keys(rows)
+        self.interpolant = Interpolant(np.empty(0, np.int64), np.empty((0, self._dim)))
         for level, wanted in enumerate(levels):
-            index = self._chosen(f"{stage} rows {level}", partial(_at, names, wanted))
-            normals = None if rows.normals is None else take(rows.normals, index)
-            right = take(rows.right, index)
-            if sums:
-                settled = self.at(rows.nodes[index], self._plus(sums))
-                right = right - (settled if normals is None else dot(settled, normals))
-            part = TapedRows(rows.nodes[index], normals, right)
-            sums.append(self._solved(part, index, level, stage))
-        self.found = self._plus(sums) if sums else None
+            index = self._chosen(f"{stage} rows {level}", partial(_at, keys, wanted))
+            part = rows.only(index)
+            if level:
+                before = self.interpolant.at(self._problem, part.nodes)
+                met = before if part.normals is None else dot(before, part.normals)
+                part = replace(part, right=part.right - met)
+            solved = self._solved(part, index, level, stage)
+            self.interpolant = self.interpolant.plus(solved) if level else solved
 
-    def at(
-        self,
-        nodes: IntArray | slice,
-        found: Sum | None = None,
-        *,
-        out: FloatArray | None = None,
-    ) -> Array:
-        """Return the displacements (..., m, d) of nodes in the frame.
-
-        Of ``found``, or of the fit's. ``out`` (..., m, d) is where they may be written.
-        """
-        found = found or self.found
-        x = self._features
-        here = x if isinstance(nodes, slice) else columns(x, nodes)
-        if found is None:
-            return np.zeros((value(here).shape[1], self._dim))
-        s = radial_sum(self._basis, here, columns(x, found.nodes), found.weights, out)
-        if found.tail is not None:
-            s = s + product(terms(self._basis, here), found.tail)
-        return s
-
-    def _plus(self, sums: list[Sum]) -> Sum:
-        """Return the sum of all levels, each node once, in the order of first occurrence."""
-        if len(sums) == 1:
-            return sums[0]
-        nodes, place = _firsts(np.concatenate([each.nodes for each in sums]))
-        weights = gather(join(*(each.weights for each in sums)), place, len(nodes))
-        tails = [each.tail for each in sums if each.tail is not None]
-        tail = None
-        for each in tails:
-            tail = each if tail is None else tail + each
-        return Sum(nodes, weights, tail)
-
-    def _solved(self, rows: TapedRows, index: IntArray, level: int, stage: str) -> Sum:
+    def _solved(self, rows: ConstraintRows, index: IntArray, level: int, stage: str) -> Interpolant:
         """Return the interpolant of ``rows``, those with the numbers ``index`` among all rows."""
         count, m = len(rows.nodes), value(rows.right).shape[-1]
         solve, extra = self._solver(rows, index, level, stage)
@@ -189,17 +142,13 @@ class FrozenFit:
                 if isinstance(solve, MeasuredSystem):
                     forward, back = solve.tangent, solve.adjoint
                 found = solution(met(value(found)) - data, value(found), forward, back)
-        weights = take(found, np.arange(count))
         tail = None
         if extra:
             tail = take(found, count + np.arange(extra))
             tail = reshape(tail, extra * m // self._dim, self._dim)
-        if rows.normals is None:
-            return Sum(rows.nodes, weights, tail)
-        nodes, place = _firsts(rows.nodes)
-        return Sum(nodes, gather(multiply(rows.normals, weights), place, len(nodes)), tail)
+        return gathered(rows, take(found, np.arange(count)), tail)
 
-    def _system_times(self, rows: TapedRows, found: FloatArray, *, extra: int) -> Array:
+    def _system_times(self, rows: ConstraintRows, found: FloatArray, *, extra: int) -> Array:
         """Return the system times ``found`` (n, m), a constant, for the derivative of the system.
 
         Zeros where the system is constant. ``extra`` of the n unknowns are the polynomial's.
@@ -224,7 +173,7 @@ class FrozenFit:
         return join(s, *below)
 
     def _solver(
-        self, rows: TapedRows, index: IntArray, level: int, stage: str
+        self, rows: ConstraintRows, index: IntArray, level: int, stage: str
     ) -> tuple[Callable[[FloatArray], FloatArray], int]:
         """Return the solver of the system of ``rows``, and how many unknowns a polynomial adds."""
         place = value(self._features)[:, rows.nodes]
@@ -327,15 +276,6 @@ class FrozenFit:
             return out
 
         return solve, total
-
-
-def _firsts(nodes: IntArray) -> tuple[IntArray, IntArray]:
-    """Return each of nodes (r,) once, in the order of first occurrence, and its place, (r,)."""
-    unique, first, group = np.unique(nodes, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return unique[order], rank[group]
 
 
 def _at(names: IntArray, wanted: IntArray) -> IntArray:

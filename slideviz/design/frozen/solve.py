@@ -10,11 +10,11 @@ from functools import partial
 import numpy as np
 
 from slideviz.case.words import wrong_by
-from slideviz.design.frozen.tape import Array, recorded, value
 from slideviz.errors import ConditionWarning, DeformError
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.refine import TRUSTED, System
 from slideviz.rbf.solve import Factor, enough_threads
+from slideviz.rbf.tape import Array, recorded, value
 
 REMEDY = (
     "use DATA_REDUCTION= YES with a larger tolerance, a less smooth RBF_KERNEL such as "

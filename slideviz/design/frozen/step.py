@@ -1,9 +1,9 @@
 """One step of a deformation with everything discrete kept, for any displacement.
 
-The same mathematics as in `slideviz.rbf.methods` and `slideviz.solver.stepping`, on a tape;
-without a variable it computes values only. Discrete choices are made when the step runs first, at
-the reference design, and kept: rows of the systems, primitives that nodes are projected on,
-nearest boundary nodes and radius of the correction.
+`slideviz.solver.stepping.one_step` with variables of a tape; without a variable it computes values
+only. Discrete choices are made when the step runs first, at the reference design, and kept: rows
+of the systems, primitives that nodes are projected on, nearest boundary nodes and radius of the
+correction.
 """
 
 from __future__ import annotations
@@ -11,23 +11,40 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from dataclasses import field as made_by
+from functools import partial
+from itertools import count
 from typing import Any
 
 import numpy as np
 
-from slideviz.baselines.elastic import Body
-from slideviz.baselines.idw import Weights
-from slideviz.design.frozen.baselines import Elasticity, Weighting
-from slideviz.design.frozen.interpolation import Interpolation
-from slideviz.design.frozen.loops import keep_undeformed, shift
-from slideviz.design.frozen.method import Method
-from slideviz.design.frozen.operations import coords as coords_of
-from slideviz.design.frozen.operations import points
-from slideviz.design.frozen.tape import Array, multiply, put, recorded, take, transform, value
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.rbf.problem import Levels
+from slideviz.design.frozen.correction import FrozenCorrection, frozen_correction, shares
+from slideviz.design.frozen.fit import FrozenFit
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
+from slideviz.rbf.loops import add_correction, keep_undeformed, shift
+from slideviz.rbf.methods import ROUNDING
+from slideviz.rbf.operations import coords as coords_of
+from slideviz.rbf.operations import points
+from slideviz.rbf.problem import Levels, PhaseTimer, Problem, Solution
+from slideviz.rbf.projection import projection_matrices
+from slideviz.rbf.tape import (
+    Array,
+    Variable,
+    mixed,
+    multiply,
+    put,
+    recorded,
+    take,
+    transform,
+    value,
+)
 from slideviz.solver.setup import Setup
-from slideviz.terms import Sliding
+from slideviz.solver.stepping import one_step
+
+CHECKED = 1e11
+"""Above this condition number, the errors of solutions are estimated for each design; with data
+reduction only those of derivatives, for points have a tolerance that is larger than rounding."""
+
+_SILENT = PhaseTimer(lambda _phase, _fraction: None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,16 +53,25 @@ class StepState:
 
     coords: Array
     """(..., n, d): positions in the frame."""
-    carried: Array | None = None
-    """(..., b, d) or None: the errors that the interpolants of all steps so far left at the
-    boundary nodes ``of`` (b,); None without data reduction."""
-    of: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
-    max_error: FloatArray = made_by(default_factory=lambda: np.zeros(()))
-    lost: FloatArray = made_by(default_factory=lambda: np.zeros(()))
-    error_estimate: FloatArray = made_by(default_factory=lambda: np.zeros(()))
-    """`max_error`, `lost`, `error_estimate` (...,): as of a ``Solution``."""
+    solution: Solution | None = None
+    """Of the step; its errors are arrays (...,). None before the first step."""
     points: Array = made_by(default_factory=lambda: np.empty((0, 0)))
     """(..., n, d): Cartesian positions; empty before the first step."""
+
+    @property
+    def max_error(self) -> FloatArray:
+        """As of a ``Solution``, (...,)."""
+        return np.asarray(self.solution.max_error if self.solution else 0.0)
+
+    @property
+    def lost(self) -> FloatArray:
+        """As of a ``Solution``, (...,)."""
+        return np.asarray(self.solution.lost if self.solution else 0.0)
+
+    @property
+    def error_estimate(self) -> FloatArray:
+        """As of a ``Solution``, (...,)."""
+        return np.asarray(self.solution.error_estimate if self.solution else 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +94,6 @@ class FrozenStep:
     setup: Setup
     mesh: Mesh
     """Undeformed."""
-    sliding: Sliding
     part: float
     """Part of the whole displacement that is made after this step, up to 1."""
     first: bool
@@ -84,10 +109,6 @@ class FrozenStep:
     ordinary solutions, as of a ``Solution``; else 0."""
     error_estimate: float = 0.0
     """As of a ``Solution``, at the reference."""
-    weights: Weights | None = None
-    """Settings of inverse distance weighting, if that is the method."""
-    body: Body | None = None
-    """The elastic body, if the method is linear elasticity."""
     reuse: bool = False
     """Whether a later step keeps the factors of the last positions that it began at."""
     choices: ChoiceCache = made_by(default_factory=ChoiceCache)
@@ -134,11 +155,12 @@ class FrozenStep:
         """
         setup = self.setup
         goal = _shifted(setup.coords[setup.known], multiply(target, np.array([[self.part]])))
-        solved = self._method(self, before, goal, out).run()
-        displacement = solved.displacement
-        if len(setup.images):
-            first, second = setup.images.T
-            displacement = put(displacement, second, take(displacement, first), overwrite=True)
+        run = _Run(self, before.coords, out)
+        solution = one_step(setup, before.coords, goal, _SILENT, before.solution, run)
+        displacement = solution.displacement
+        if out is not None and displacement is not out:
+            out[:] = value(displacement)
+            displacement = out
         on = np.flatnonzero(setup.axis)
         if len(on):
             held = np.ones(setup.coords.shape[1])
@@ -147,21 +169,7 @@ class FrozenStep:
             displacement = put(displacement, on, still, overwrite=True)
         moved = _shifted(before.coords, displacement, overwrite=True)
         moved = put(moved, setup.known, goal, overwrite=True)
-        return StepState(
-            moved,
-            solved.carried,
-            solved.of,
-            solved.max_error,
-            solved.lost,
-            error_estimate=solved.error_estimate,
-        )
-
-    @property
-    def _method(self) -> type[Method]:
-        """Return the class of the method."""
-        if self.weights is not None:
-            return Weighting
-        return Interpolation if self.body is None else Elasticity
+        return StepState(moved, replace(solution, displacement=np.empty((0, 0))))
 
     def _with_points(self, moved: Array) -> tuple[Array, Array]:
         """Return coordinates and Cartesian points, with copies in a halo moved, too."""
@@ -177,6 +185,117 @@ class FrozenStep:
         overwrite = at is not moved
         at = put(at, copies, _shifted(start, follow), overwrite=overwrite)
         return put(moved, copies, coords_of(frame, take(at, copies)), overwrite=overwrite), at
+
+
+class _Run:
+    """One run of a step: `slideviz.rbf.problem.Frozen` at some positions."""
+
+    def __init__(self, step: FrozenStep, coords: Array, out: FloatArray | None) -> None:
+        self._step, self._setup, self._coords = step, step.setup, coords
+        self.out, self.choose = out, step.choices
+        self._projections = count()
+        self._stages = ((f"stage {k}", levels) for k, levels in enumerate(step.stages))
+
+    def fixed(self, name: str, make: Callable[[], Any]) -> Any:
+        """Return what depends on positions only: kept in the first step."""
+        return self._step.constants(name, make) if self._step.first else make()
+
+    def fit(self, problem: Problem) -> FrozenFit:
+        """Return a fit of this step without rows."""
+        step = self._step
+        return FrozenFit(
+            problem,
+            self._stages,
+            step.dropped,
+            chosen=step.choices,
+            fixed=step.factors(value(self._coords)),
+            refined=step.refined > 0.0,
+            checked=step.condition > CHECKED,
+        )
+
+    def correct(
+        self, problem: Problem, displacement: Array, nodes: IntArray, errors: Array, *, needed: bool
+    ) -> Array:
+        """Return the displacement with the boundary correction of errors added."""
+        correction: FrozenCorrection | None = self.choose(
+            "correction",
+            lambda: frozen_correction(problem, nodes, value(errors)) if needed else None,
+        )
+        if correction is None:
+            return displacement
+        frame = self._setup.frame
+        means = correction.mixing(value(errors).shape[-2])
+        part = self.fixed("shares", lambda: shares(frame, self._coords, correction))
+        if displacement is self.out and not isinstance(part, Variable):
+            add_correction(self.out, correction.targets, means, part[:, 0], value(errors))
+            return displacement
+        more = multiply(mixed(means, errors), part)
+        more = take(displacement, correction.targets) + more
+        return put(displacement, correction.targets, more, overwrite=True)
+
+    def project(self, nodes: IntArray, free: Array) -> Array:
+        """Return the displacements (..., m, d) of sliding nodes projected on their boundary.
+
+        On the plane of the facet, the line of the edge or the vertex that is closest at the
+        reference.
+        """
+        setup, base = self._setup, take(self._coords, nodes)
+        name = f"project {next(self._projections)}"
+        anchor, matrix = self.choose(name, partial(self._tracked, nodes, value(base), value(free)))
+        away = transform(matrix - np.eye(matrix.shape[-1]), base - anchor)
+        slid = _plus_unless_rounding(
+            transform(matrix, free), away, ROUNDING * largest_coordinate(setup.coords)
+        )
+        copy, origin, turn = self.choose(f"ties of {name}", lambda: self._ties(nodes))
+        if len(copy):
+            slid = put(slid, copy, transform(turn, take(slid, origin)))
+        held = np.ones((len(nodes), matrix.shape[-1]))
+        held[setup.axis[nodes], :2] = 0.0
+        held[np.isin(nodes, setup.held)] = 0.0
+        return slid if held.all() else multiply(slid, held)
+
+    def _tracked(
+        self, nodes: IntArray, base: FloatArray, free: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the closest point of each displaced node (m, d), and the projection (m, d, d).
+
+        See `slideviz.rbf.projection.projection_matrices`.
+        """
+        tracks = self._setup.tracks
+        label, at = tracks.of_node[nodes], base + free
+        anchor, matrix = base.copy(), np.zeros((*base.shape, base.shape[1]))
+        for index in np.unique(label[label >= 0]).tolist():
+            rows = np.flatnonzero(label == index)
+            found, which = tracks.tracks[index].nearest(at[rows])
+            anchor[rows] = found
+            matrix[rows] = projection_matrices(
+                tracks.tracks[index].simplices(which), at[rows], found
+            )
+        return anchor, matrix
+
+    def _ties(self, nodes: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
+        """Return copies among ``nodes``, the nodes that they follow, both as places, and rotations.
+
+        Rotations (t, d, d) turn displacements of the latter into those of the copies, in the frame.
+        """
+        setup, halo, d = self._setup, self._setup.halo, self._setup.coords.shape[1]
+        if halo is None:
+            return np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, d, d))
+        row = np.full(len(setup.coords), -1)
+        row[nodes] = np.arange(len(nodes))
+        copy, origin = row[halo.receivers], row[halo.donors]
+        both = (copy >= 0) & (origin >= 0)
+        turn = halo.rotations[both]
+        if setup.frame.cylindrical:
+            turn = np.broadcast_to(np.eye(d), turn.shape)
+        return copy[both], origin[both], turn
+
+
+def _plus_unless_rounding(slid: Array, away: Array, least: float) -> Array:
+    """Return ``slid + away``, without rows of ``away`` up to ``least``: rest keeps every bit."""
+    off = value(away)
+    off = np.where(np.abs(off).max(axis=-1, keepdims=True) <= least, 0.0, off)
+    return slid + (replace(away, value=off) if isinstance(away, Variable) else off)
 
 
 def _shifted(start: Array, by: Array, *, overwrite: bool = False) -> Array:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
-from slideviz.baselines.idw import weighted_means
-from slideviz.design.frozen.loops import place
-from slideviz.design.frozen.tape import Array, Linear, Link, Variable, recorded, value
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.evaluate import Basis, evaluate, matrix, reached
+from slideviz.rbf.evaluate import Basis, Tick, evaluate, matrix, no_tick, reached
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.frames import Frame, coords_slopes, features_slopes, points_slopes
-from slideviz.rbf.slopes import pull_positions, push_positions, sum_powers
+from slideviz.rbf.loops import place
+from slideviz.rbf.slopes import pull_positions, push_positions
 from slideviz.rbf.solve import enough_threads
+from slideviz.rbf.tape import Array, Linear, Link, Variable, recorded, value
 from slideviz.system.threads import in_parts
 
 PAIRS = 1_000_000
@@ -125,6 +123,7 @@ def radial_sum(
     controls: Array,
     weights: Array,
     out: FloatArray | None = None,
+    tick: Tick = no_tick,
 ) -> Array:
     """Return the sum of weighted radial functions (..., N, d), at targets (k, N).
 
@@ -142,7 +141,7 @@ def radial_sum(
         return many(basis, c, x, g)
 
     return recorded(
-        many(basis, x, c, w, out),
+        many(basis, x, c, w, out, tick),
         (
             targets,
             lambda t: each_of(lambda each: push_positions(basis, x, c, w, moved=each), t),
@@ -170,10 +169,11 @@ def many(
     controls: FloatArray,
     weights: FloatArray,
     out: FloatArray | None = None,
+    tick: Tick = no_tick,
 ) -> FloatArray:
     """Return the values of `radial_sum`; each radial function is computed once for all weights."""
     if weights.ndim == 2:
-        return evaluate(basis, targets, controls, weights)
+        return evaluate(basis, targets, controls, weights, tick)
     ahead, (n, d) = weights.shape[:-2], weights.shape[-2:]
     wide = np.ascontiguousarray(np.moveaxis(weights.reshape(-1, n, d), 0, 1).reshape(n, -1))
     total = targets.shape[1]
@@ -219,70 +219,4 @@ def terms(basis: Basis, x: Array) -> Array:
             lambda t: np.einsum("nqk,...kn->...nq", slopes, t),
             lambda g: np.einsum("nqk,...nq->...kn", slopes, g),
         ),
-    )
-
-
-def weighted_mean(
-    basis: Basis,
-    targets: Array,
-    sources: Array,
-    values: Array,
-    source_weights: FloatArray,
-    power: float,
-) -> Array:
-    """Return means (..., N, d) of values (..., n, d), as ``slideviz.baselines.idw.weighted_means``.
-
-    Parameters
-    ----------
-    source_weights : (n,)
-        The weight g_j of each source.
-    """
-    x, c, v = value(targets), value(sources), value(values)
-
-    def mean(each: FloatArray) -> FloatArray:
-        return each_of(lambda t: weighted_means(basis, x, c, t, source_weights, power=power), each)
-
-    out = mean(v)
-    if not any(isinstance(part, Variable) for part in (targets, sources, values)):
-        return out
-    total = sum_powers(basis, x, c, source_weights[:, None], power)
-    heavy, means = source_weights[:, None] * v, out.copy()  # who owns the outcome may change it
-
-    def pushed(
-        moved: FloatArray | None = None, moved_sources: FloatArray | None = None
-    ) -> FloatArray:
-        above, below = (
-            push_positions(
-                basis, x, c, weights, moved=moved, moved_controls=moved_sources, power=power
-            )
-            for weights in (heavy, source_weights[:, None])
-        )
-        return (above - means * below) / total
-
-    def pulled(g: FloatArray, *, of_sources: bool) -> FloatArray:
-        above, below = g / total, (g * means).sum(axis=1, keepdims=True) / total
-        if of_sources:
-            return pull_positions(basis, c, x, heavy, above, power) - pull_positions(
-                basis, c, x, source_weights[:, None], below, power
-            )
-        return pull_positions(basis, x, c, above, heavy, power) - pull_positions(
-            basis, x, c, below, source_weights[:, None], power
-        )
-
-    def back(g: FloatArray) -> FloatArray:
-        return source_weights[:, None] * sum_powers(basis, c, x, g / total, power)
-
-    return recorded(
-        out,
-        (
-            targets,
-            lambda t: each_of(pushed, t),
-            lambda g: each_of(partial(pulled, of_sources=False), g),
-        ),
-        (
-            sources,
-            lambda t: each_of(lambda each: pushed(moved_sources=each), t),
-            lambda g: each_of(partial(pulled, of_sources=True), g),
-        ),
-        (values, mean, lambda g: each_of(back, g)),
     )

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.design.frozen.tape import (
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.topology import TINY
+from slideviz.rbf.frames import corners as corners_of
+from slideviz.rbf.tape import (
     Array,
     Variable,
     add,
@@ -25,10 +29,9 @@ from slideviz.design.frozen.tape import (
     unit,
     value,
 )
-from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.topology import TINY
-from slideviz.rbf.frames import corners as corners_of
-from slideviz.solver.setup import Setup
+
+if TYPE_CHECKING:
+    from slideviz.solver.setup import Setup
 
 TURN = {2: np.array([[0.0, 1.0], [-1.0, 0.0]])}
 """Rotates the direction of a segment (2D) into its normal."""

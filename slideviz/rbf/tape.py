@@ -11,12 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from slideviz.mesh.model import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Linear = Callable[[FloatArray], FloatArray]
 """A linear map of arrays (..., n, c)."""
@@ -148,6 +150,17 @@ def multiply(a: Array, b: Array) -> Array:
     )
 
 
+def divide(a: Array, b: Array) -> Array:
+    """Return a / b, element by element; b may have a single column."""
+    x, y = value(a), value(b)
+    out = x / y
+    return recorded(
+        out,
+        (a, lambda t: t / y, lambda g: g / y),
+        (b, lambda t: -out / y * t, lambda g: _fitted(-out / y * g, y)),
+    )
+
+
 def function(x: Array, result: FloatArray, slope: FloatArray) -> Array:
     """Return ``result``, a function of each element of x, recorded with derivatives ``slope``."""
     return recorded(result, (x, lambda t: t * slope, lambda g: g * slope))
@@ -272,6 +285,21 @@ def gather(x: Array, rows: IntArray, count: int) -> Array:
     v = value(x)
     return recorded(
         sums(v, rows, count), (x, lambda t: sums(t, rows, count), lambda g: g[..., rows, :])
+    )
+
+
+def add_at(x: Array, rows: IntArray, more: Array) -> Array:
+    """Return x (..., n, c) with ``more`` (..., m, c) added to rows (m,), which may repeat."""
+    v, w = value(x), value(more)
+    out = np.array(
+        np.broadcast_to(v, (*np.broadcast_shapes(v.shape[:-2], w.shape[:-2]), *v.shape[-2:]))
+    )
+    np.add.at(out, (..., rows, slice(None)), w)  # type: ignore[arg-type]
+    n = v.shape[-2]
+    return recorded(
+        out,
+        (x, lambda t: t, lambda g: g),
+        (more, lambda t: sums(t, rows, n), lambda g: g[..., rows, :]),
     )
 
 
