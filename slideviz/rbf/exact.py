@@ -185,10 +185,10 @@ def gathered(rows: ConstraintRows, weights: Array, tail: Array | None = None) ->
 
     ``tail`` (q, d) are the coefficients of the polynomial's terms.
     """
-    if rows.directions is None:
+    if rows.normals is None:
         return Interpolant(rows.nodes, weights, tail)
     nodes, place = first_occurrences(rows.nodes)
-    return Interpolant(nodes, gather(multiply(rows.directions, weights), place, len(nodes)), tail)
+    return Interpolant(nodes, gather(multiply(rows.normals, weights), place, len(nodes)), tail)
 
 
 def row_terms(problem: Problem, rows: ConstraintRows) -> FloatArray:
