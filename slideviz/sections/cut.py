@@ -185,11 +185,13 @@ def crossed_cells(
     """
     crossed = np.zeros(len(mesh.cells), bool)
     for matrix in matrices:
-        level = np.nan_to_num(section.distance(transformed(mesh.points, matrix)), nan=np.inf)
+        still = np.array_equal(matrix, np.eye(4))
+        points = mesh.points if still else transformed(mesh.points, matrix)
+        level = np.nan_to_num(section.distance(points), nan=np.inf)
         level[np.abs(level) <= near] = 0.0
-        at, starts = level[mesh.cells.connectivity], mesh.cells.offsets[:-1]
-        low, high = np.minimum.reduceat(at, starts), np.maximum.reduceat(at, starts)
-        crossed |= (low <= 0) & (high >= 0)
+        for ids, nodes in mesh.cells.by_type.values():
+            for side in (level < 0, level <= 0):
+                crossed[ids] |= _patterns(nodes, side) > 0
     return crossed
 
 

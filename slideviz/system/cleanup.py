@@ -114,7 +114,7 @@ def open_temporary(path: Path, *, new: bool = False, buffering: int = -1) -> Bin
         if problem.errno != errno.ELOOP:
             raise
         said = f"{path} is a symbolic link, whose target would be overwritten; remove the link"
-        raise OSError(errno.ELOOP, said, str(path)) from problem
+        raise OSError(errno.EINVAL, said, str(path)) from problem
     if not stat.S_ISREG(os.fstat(opened).st_mode):
         os.close(opened)
         raise OSError(errno.EINVAL, f"{path} is a device or pipe; remove it", str(path))
