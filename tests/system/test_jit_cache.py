@@ -1,13 +1,17 @@
 """A damaged cache of compiled code is compiled again, and harms nobody."""
 
+import inspect
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
-from numba.core import event
+from numba.core import environment, event
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 from slideviz.system.jit_cache import njit
 
@@ -39,6 +43,49 @@ def compilations(function=double) -> int:
     with event.install_listener("numba:compile", listener):
         assert njit(cache=True)(function)(3.0) == function(3.0)
     return listener.count
+
+
+PRIVATE = {
+    IndexDataCacheFile: {
+        "__init__": "self cache_path filename_base source_stamp",
+        "_load_index": "self",
+        "_save_index": "self overloads",
+        "_load_data": "self name",
+        "_save_data": "self name data",
+        "_data_path": "self name",
+        "_dump": "self obj",
+        "_open_for_write": "self filepath",
+    },
+    FunctionCache: {
+        "__init__": "self py_func",
+        "load_overload": "self sig target_context",
+        "save_overload": "self sig data",
+        "_load_overload": "self sig target_context",
+        "_guard_against_spurious_io_errors": "self",
+    },
+    environment: {
+        "_rebuild_env": "modname consts env_name",
+        "lookup_environment": "env_name",
+    },
+}
+"""Private parts of Numba that `slideviz.system.jit_cache` replaces or calls: their parameters."""
+
+
+def test_numba_has_the_private_parts_that_the_cache_replaces():
+    remedy = "adapt system/jit_cache.py, then the range of numba in pyproject.toml"
+    for owner, parts in PRIVATE.items():
+        for name, wanted in parts.items():
+            there = getattr(owner, name, None)
+            has = there and " ".join(inspect.signature(there).parameters)
+            what = f"{owner.__name__}.{name}({has}), not ({wanted})"
+            assert has == wanted, f"Numba {numba.__version__} has {what}: {remedy}"
+    made = FunctionCache(half)
+    parts = [made._cache_path, made._impl.filename_base, made._impl.locator.get_source_stamp()]
+    file = IndexDataCacheFile(*parts)
+    assert all(hasattr(file, name) for name in ("_index_path", "_version", "_source_stamp")), remedy
+    assert hasattr(made, "_cache_file"), remedy
+    assert hasattr(numba.njit(half), "_cache"), remedy
+    assert isinstance(environment.Environment._memo, Mapping), remedy
 
 
 @pytest.fixture
