@@ -11,13 +11,15 @@ from slideviz.case import motion
 from slideviz.case.displacement import Displacements
 from slideviz.case.method_keys import automatic_radius
 from slideviz.case.model import Case, Translate
-from slideviz.design.accuracy_warnings import (
+from slideviz.design.checks import (
+    Checks,
+    facets_of,
     note_of_refinement,
+    usual_edge,
     warn_of_condition,
     warn_of_error_estimate,
     warn_of_errors,
 )
-from slideviz.design.checks import Checks, facets_of, usual_edge
 from slideviz.design.choosing import choose_steps
 from slideviz.design.frozen.step import FrozenStep, StepState
 from slideviz.design.known_nodes import known_node_map

@@ -14,7 +14,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Scale, Translate
-from slideviz.design.accuracy_warnings import warn_of_condition, warn_of_error_estimate
+from slideviz.design.checks import warn_of_condition, warn_of_error_estimate
 from slideviz.design.frozen.solve import full_factor
 from slideviz.errors import ConditionWarning, DeformError, Note, ToleranceWarning
 from slideviz.rbf.reduction import Reduction
