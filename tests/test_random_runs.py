@@ -8,7 +8,7 @@ import pytest
 from slideviz.errors import DeformError
 from slideviz.formats.files import read
 from slideviz.solver.deform import deform
-from tools.laws import attempt
+from tools.laws import laws
 from tools.laws.__main__ import main, of_seed, save
 from tools.laws.cases import random_run
 from tools.laws.check import check
@@ -58,7 +58,7 @@ def spoilt(monkeypatch, seed, change):
         change(run, points)
         return [*before, replace(last, mesh=last.mesh.with_points(points))]
 
-    monkeypatch.setattr(attempt, "deform", spoil)
+    monkeypatch.setattr(laws, "deform", spoil)
     return {law for law, _ in check(run).broken}
 
 
@@ -111,7 +111,7 @@ def test_an_error_of_the_program_is_a_violation(monkeypatch, capsys):
     def broken(case, mesh):
         raise ZeroDivisionError("no")
 
-    monkeypatch.setattr(attempt, "deform", broken)
+    monkeypatch.setattr(laws, "deform", broken)
     assert main(["--runs", "1"]) == 1
     assert "ending: ZeroDivisionError" in capsys.readouterr().out
 
@@ -120,7 +120,7 @@ def test_a_refusal_must_have_a_known_reason(monkeypatch):
     def refused(case, mesh):
         raise DeformError("out of luck at 0.125")
 
-    monkeypatch.setattr(attempt, "deform", refused)
+    monkeypatch.setattr(laws, "deform", refused)
     outcome = of_seed(0)
     assert outcome.ended == "refused: out of luck at #"
     assert [law for law, _ in outcome.broken] == ["refusal"]
@@ -131,8 +131,8 @@ def test_a_run_that_does_not_end_is_a_violation(monkeypatch):
         while True:
             pass
 
-    monkeypatch.setattr(attempt, "deform", forever)
-    monkeypatch.setattr(attempt, "LIMIT_S", 0.2)
+    monkeypatch.setattr(laws, "deform", forever)
+    monkeypatch.setattr(laws, "LIMIT_S", 0.2)
     [(law, text)] = of_seed(0).broken
     assert law == "ending"
     assert "TooLong" in text

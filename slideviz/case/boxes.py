@@ -281,7 +281,6 @@ def _stays(name: str) -> Note:
 
 
 def _mean(several: list[Displacements]) -> Displacements:
-    """Return the mean of displacements of the same nodes."""
     if len(several) == 1:
         return several[0]
     vectors = np.mean([each.vectors for each in several], axis=0)

@@ -231,7 +231,6 @@ def _bump(motion: OnAirfoil, by: str, form: str = ".4g") -> str:
 
 
 def _control(motion: Ffd | FfdCamber | FfdThickness) -> str:
-    """Return the control points that a motion moves, and their box, in words."""
     at = ", ".join("all" if index < 0 else str(index) for index in motion.index)
     return f"({at}) of {_box(motion)}"
 

@@ -189,7 +189,15 @@ class Checks:
                     lost=float(lost[k]),
                 )
                 setup = replace(self.setup, target=target)
-                unsound = unsoundness(setup, self.mesh, solution, coords[k], part, self.least)
+                unsound = unsoundness(
+                    setup,
+                    self.mesh,
+                    solution,
+                    coords[k],
+                    part=part,
+                    farthest=float(far[k]),
+                    least=self.least,
+                )
                 if unsound:
                     raise UnsoundError(f"step {index}: {unsound}")
 

@@ -225,7 +225,6 @@ def _is_polar(box: Box, kind: str) -> bool:
 
 
 def _directions(box: Box, kind: str) -> tuple[int, ...]:
-    """Return the direction, 0 to 2, of each index of a kind."""
     return (0, 2) if _is_polar(box, kind) else DIRECTIONS[kind]
 
 

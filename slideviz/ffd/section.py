@@ -93,7 +93,6 @@ def _require_count(mesh: Mesh, lines: list[str], names: list[str]) -> None:
 
 
 def _error(mesh: Mesh, line: int, why: str) -> MeshError:
-    """Return the error about a line of the section, with its place in the file if it is known."""
     at = next(islice(chain.from_iterable(mesh.origin.ffd_at), line, None), None)
     place = mesh.name if at is None else f"{mesh.name}:{at + 1}"
     return MeshError(f"{place}: {why}")
@@ -106,7 +105,6 @@ def key_of(line: str) -> str:
 
 
 def _value(line: str) -> str:
-    """Return the value of a keyword line, without a comment."""
     return line.partition("%")[0].partition("=")[2].strip()
 
 
@@ -411,19 +409,16 @@ def _written(box: Box, dim: int) -> Iterator[str]:
 
 
 def _control_lines(points: FloatArray) -> Iterator[str]:
-    """Yield the lines of all control points (I, J, K, 3)."""
     yield f"FFD_CONTROL_POINTS= {points[..., 0].size}\n"
     for index in np.ndindex(points.shape[:3]):
         yield _control_row(points, *index) + "\n"
 
 
 def _control_row(points: FloatArray, i: int, j: int, k: int) -> str:
-    """Return the row of a control point, without a line break."""
     return f"{i}\t{j}\t{k}\t" + _tabbed(points[i, j, k].tolist())
 
 
 def _surface_lines(box: Box) -> Iterator[str]:
-    """Yield the lines of the embedded surface points of a box."""
     yield f"FFD_SURFACE_POINTS= {sum(len(nodes) for nodes, _ in box.embedded.values())}\n"
     for marker, (nodes, uvw) in box.embedded.items():
         for node, at in zip(nodes.tolist(), uvw.tolist(), strict=True):

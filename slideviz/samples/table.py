@@ -278,6 +278,5 @@ def _in_folder(case: Case, folder: Path, name: str, ending: str) -> Case:
 
 
 def _displacement_text(table: Displacements) -> str:
-    """Return the text of a displacement file, with all digits of its numbers."""
     rows = zip(table.nodes.tolist(), table.vectors.tolist(), strict=True)
     return "".join("\t".join([str(node), *map(repr, row)]) + "\n" for node, row in rows)

@@ -90,7 +90,6 @@ def zone_of(grid: Structured) -> ZoneContent:
 
 
 def _element(grid: Structured) -> int:
-    """Return the VTK identifier of the cells."""
     return QUADRILATERAL if grid.dim == 2 else HEXAHEDRON
 
 
@@ -172,7 +171,6 @@ def _roles(markers: tuple[Marker, ...]) -> dict[str, Role]:
 
 
 def _motions(dim: int, variant: str) -> tuple[Motion, ...]:
-    """Return the motions of the block of the square (dim 2) or the cube (dim 3)."""
     if variant == "translate":
         return (Translate("BLOCK", TRANSLATION),)
     shift = (*SHIFT[:2], 0.0) if variant == "flat" else SHIFT[:dim]
@@ -297,12 +295,10 @@ class Layout:
 
     @cached_property
     def _nodes(self) -> HollowGrid:
-        """Return the numbering of nodes: those inside the block are left out."""
         return HollowGrid(self.n + 1, tuple(a + 1 for a in self.start), self.stop)
 
     @cached_property
     def _cells(self) -> HollowGrid:
-        """Return the numbering of cells."""
         return HollowGrid(self.n, self.start, self.stop)
 
     @property

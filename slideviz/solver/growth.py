@@ -15,7 +15,7 @@ import numpy as np
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.rbf.problem import Solution
 from slideviz.solver.setup import Setup
-from slideviz.system.threads import PART, in_parts
+from slideviz.system.threads import in_parts
 
 GROWTH = 5.0
 """A displacement overshoots where it is longer than this times the reach of the motion (`_reach`).
@@ -42,7 +42,9 @@ def unsoundness(
     mesh: Mesh,
     solution: Solution,
     moved: FloatArray,
+    *,
     part: float,
+    farthest: float,
     least: float = 0.0,
 ) -> str | None:
     """Return why the result of a step cannot be right, and what helps; None where it may be.
@@ -54,6 +56,8 @@ def unsoundness(
         radius: so a body that turns about the axis carries no node farther than itself.
     part : float
         The part of the whole displacement that is reached after the step, 0 to 1.
+    farthest : float
+        The largest displacement of all nodes, in the frame.
     least : float
         A length: the whole displacement counts as at least so long, where it is smaller.
     """
@@ -65,14 +69,7 @@ def unsoundness(
             f"{_cause(setup, mesh, moved)}"
         )
     asked, largest = largest, max(largest, part * least)
-    longest = np.zeros(-(-len(moved) // PART))
-
-    def measure(part: slice) -> None:
-        length = np.linalg.norm(moved[part] - setup.coords[part], axis=1)
-        longest[part.start // PART] = length.max()
-
-    in_parts(measure, len(moved))
-    if longest.max() <= GROWTH * largest:
+    if farthest <= GROWTH * largest:
         return None  # as nearly always: the motion reaches that far at least
     shift = moved - setup.coords
     length = np.linalg.norm(shift, axis=1)

@@ -88,7 +88,8 @@ class Stepping:
             if not within(points, np.finfo(float).max):
                 raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
             step = self._made(index + 1, total, points, solution, timer, part)
-            unsound = unsoundness(setup, mesh, solution, moved, part)
+            farthest = farthest_node(setup.coords, moved)
+            unsound = unsoundness(setup, mesh, solution, moved, part=part, farthest=farthest.length)
             failure = UnsoundError(f"step {index + 1}: {unsound}") if unsound else None
             if halve:
                 try:
@@ -113,7 +114,8 @@ class Stepping:
             warnings += [f"step {index}: {text}" for text in solution.warnings]
             stray = []
             if self.rate is None and self.case.method == "rbf":
-                farthest = farthest_node(mesh.points, points)
+                if setup.frame.cylindrical:
+                    farthest = farthest_node(mesh.points, points)
                 stray = stray_warning(setup, mesh, points, farthest)
             least = max(
                 least, (solution.error_estimate, solution.refined, index, solution.condition)
@@ -331,7 +333,6 @@ def with_halo_copies(
 
 
 def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
-    """Return the warning that the selection of control nodes ended above its tolerance."""
     assert setup.reduction is not None
     return (
         f"step {index}: the data reduction ended with {solution.control_nodes} control nodes at "

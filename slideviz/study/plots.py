@@ -64,7 +64,6 @@ def facets(rows: Sequence[CombinationRow]) -> tuple[Facet, ...]:
 
 
 def _titles(row: CombinationRow) -> tuple[str, str]:
-    """Return the names of method and mode of a row."""
     return COMPARED_METHODS[row.combination.method][0], MODES[row.combination.periodic]
 
 
@@ -206,22 +205,18 @@ def _outcomes(lines: Sequence[FacetLine]) -> list[plots.Outcome]:
 
 
 def _minimum(axes: Axes, lines: Sequence[FacetLine]) -> None:
-    """Draw the lowest quality against the number of steps."""
     plots.against_steps(axes, _outcomes(lines), "minimum", _QUIET)
 
 
 def _mean(axes: Axes, lines: Sequence[FacetLine]) -> None:
-    """Draw the mean quality against the number of steps."""
     plots.against_steps(axes, _outcomes(lines), "mean", _QUIET)
 
 
 def _seconds(axes: Axes, lines: Sequence[FacetLine]) -> None:
-    """Draw the time against the number of steps."""
     plots.against_steps(axes, _outcomes(lines), "seconds", _QUIET)
 
 
 def _histogram(every: Sequence[FacetLine]) -> _Draw:
-    """Return a function that draws histograms of lines, with the same intervals for all facets."""
     good = [_values(line)[~_inverted(line)] for line in every]
     values = np.concatenate([*good, [1.0]])
     edges = np.linspace(*rounded_out(float(values.min()), float(values.max())), _BINS + 1)
@@ -238,19 +233,16 @@ def _histogram(every: Sequence[FacetLine]) -> _Draw:
 
 
 def _inverted(line: FacetLine) -> np.ndarray:
-    """Return a mask of the inverted cells among the counted ones."""
     found = result_of(line).quality
     return np.asarray(found.status[found.counted] == INVERTED)
 
 
 def _values(line: FacetLine) -> np.ndarray:
-    """Return the quality of the counted cells."""
     found = result_of(line).quality
     return found.values[found.counted]
 
 
 def _by_step(axes: Axes, lines: Sequence[FacetLine]) -> None:
-    """Draw the lowest and mean quality after each step."""
     runs = []
     for line in lines:
         result = result_of(line)
@@ -260,7 +252,6 @@ def _by_step(axes: Axes, lines: Sequence[FacetLine]) -> None:
 
 
 def _convergence(axes: Axes, lines: Sequence[FacetLine]) -> None:
-    """Draw the error against the control nodes, of the greedy selection of the first step."""
     runs = []
     for line in lines:
         if not result_of(line).history:
@@ -280,8 +271,6 @@ def _convergence(axes: Axes, lines: Sequence[FacetLine]) -> None:
 
 
 def _span(make: Profiler, what: Literal["minimum", "mean"]) -> _Draw:
-    """Return a function that draws profiles along the span."""
-
     def draw(axes: Axes, lines: Sequence[FacetLine]) -> None:
         spanwise(axes, [make(line) for line in lines], what, style=_QUIET)
 
@@ -349,7 +338,6 @@ def _is_cross(gid: str) -> bool:
 
 
 def _same_height(together: Sequence[Axes]) -> None:
-    """Give all axes the same vertical limits and scale, so that they can be compared."""
     scales = {axes.get_yscale() for axes in together}
     log = "log" in scales
     for axes in together:

@@ -132,5 +132,4 @@ def _reason(problem: str, given: list[str] | None) -> str:
 
 
 def _cell(text: str, column: StudyColumn) -> str:
-    """Return a text, right-aligned to the width of its column on a terminal."""
     return text.rjust(max(len(column.head), 8 if column.form.endswith("f") else 5))

@@ -12,8 +12,7 @@ from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.kernels import KERNELS, PLAIN
 from slideviz.rbf.reduction import Reduction
 from slideviz.terms import SLIDING, Role
-from tools.laws.draw import Rng
-from tools.laws.made import Made, Period
+from tools.laws.draw import Made, Period, Rng
 from tools.laws.meshes import nearest_neighbour, random_mesh
 
 
@@ -91,7 +90,6 @@ def _roles(rng: Rng, made: Made, moving: tuple[str, ...], period: Period | None)
 
 
 def _method(rng: Rng, period: Period | None) -> dict[str, Any]:
-    """Return method, way of sliding and periodicity."""
     others = len(SLIDING) - 1
     sliding = str(rng.choice([*SLIDING], p=[0.2, *[0.8 / others] * others]))
     out: dict[str, Any] = {
@@ -110,7 +108,6 @@ def _method(rng: Rng, period: Period | None) -> dict[str, Any]:
 
 
 def _radial(rng: Rng) -> dict[str, Any]:
-    """Return the radial function and its radius."""
     kernel = PLAIN if rng.random() < 0.5 else str(rng.choice(list(KERNELS)))
     out: dict[str, Any] = {"kernel": kernel}
     if rng.random() < 0.3:
@@ -126,7 +123,6 @@ def _steps(rng: Rng) -> int:
 
 
 def _reduction(rng: Rng, extent: float) -> Reduction:
-    """Return settings of the selection of control nodes."""
     tolerance = float(10.0 ** rng.uniform(-6, -2))
     relative = rng.random() < 0.5
     return Reduction(
@@ -145,7 +141,6 @@ def _reduction(rng: Rng, extent: float) -> Reduction:
 def _motions(
     rng: Rng, mesh: Mesh, moving: tuple[str, ...], period: Period | None
 ) -> tuple[Motion, ...]:
-    """Return the same one or two motions for each of the moving markers."""
     nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in moving]))
     points = mesh.points[nodes]
     size = max(float(np.ptp(points, axis=0).max()), 1e-300)

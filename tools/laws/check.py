@@ -11,9 +11,8 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
-from tools.laws.attempt import told, tried
 from tools.laws.cases import Run
-from tools.laws.laws import LAWS
+from tools.laws.laws import LAWS, told, tried
 from tools.laws.oracle import distance, goals, nodes_with, simplices
 
 PLAIN = (

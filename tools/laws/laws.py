@@ -7,22 +7,63 @@ are in parts of the mesh: ``ROUND`` of its largest coordinate for what is exact 
 
 from __future__ import annotations
 
+import signal
+import traceback
+import warnings
 from collections.abc import Callable, Iterator
+from types import FrameType
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from slideviz.case.model import Translate
+from slideviz.case.model import Case, Translate
+from slideviz.mesh.model import Mesh
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.reduction import GAMMA
+from slideviz.solver.deform import deform
 from slideviz.solver.steps import Step
-from tools.laws.attempt import told, tried
 from tools.laws.cases import Run
 from tools.laws.meshes import images, renumbered
 from tools.laws.oracle import Frame, carried, goals, nodes_with
 from tools.laws.surfaces import off_surface
+
+LIMIT_S = 60.0
+"""Seconds that one deformation may take: the meshes are small."""
+
+
+class TooLong(BaseException):
+    """A deformation did not come to an end; no handler of the program may catch it."""
+
+
+def tried(case: Case, mesh: Mesh) -> tuple[list[Step] | None, BaseException | None]:
+    """Return the steps of a deformation, or what ended it before."""
+    before = signal.signal(signal.SIGALRM, _ring)
+    signal.setitimer(signal.ITIMER_REAL, LIMIT_S)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)
+            return list(deform(case, mesh)), None
+    except (Exception, TooLong) as problem:
+        return None, problem
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def _ring(_number: int, _frame: FrameType | None) -> None:
+    raise TooLong(f"more than {LIMIT_S:.0f} s")
+
+
+def told(problem: BaseException | None) -> str:
+    """Return an error and where it came from, in one line."""
+    assert problem is not None
+    last = traceback.extract_tb(problem.__traceback__)
+    place = next((f for f in reversed(last) if "slideviz" in f.filename), last[-1])
+    where = f"{place.filename.rpartition('slideviz/')[2]}:{place.lineno}"
+    return f"{type(problem).__name__} at {where}: {str(problem)[:200]}"
+
 
 ROUND = 500 * np.finfo(float).eps
 SAME = {"rbf": 1e-9, "idw": 1e-9, "elastic": 1e-7}

@@ -12,8 +12,7 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from tests import builders
 from tools.laws import shapes
-from tools.laws.draw import Rng
-from tools.laws.made import Made, Period
+from tools.laws.draw import Made, Period, Rng
 from tools.laws.oracle import carried
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from slideviz.case.model import Case, FromFile, Motion, Radial, Rotate, Scale
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray, Marker, Mesh
-from tools.laws.made import Period
+from tools.laws.draw import Period
 
 
 def carried(period: Period, points: FloatArray) -> FloatArray:

@@ -9,8 +9,7 @@ from slideviz.samples import table
 from slideviz.samples.airfoil import airfoil_mesh
 from tests import builders
 from tools.laws import draw
-from tools.laws.draw import Rng
-from tools.laws.made import Made, Period
+from tools.laws.draw import Made, Period, Rng
 
 SAMPLES = {"square": (4, 16), "polar": (4, 16), "hexahedron": (3, 7), "cylindrical": (3, 7)}
 """Samples by name, and the sizes that are small enough; the blade passage is one of its own."""

@@ -97,7 +97,6 @@ def distance_to_any(sides: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def _flat(sides: FloatArray, rounding: float) -> bool:
-    """Return whether all simplices lie in one plane."""
     corners = sides.reshape(-1, sides.shape[2])
     middle = corners - corners.mean(axis=0)
     normal = np.linalg.svd(middle, full_matrices=False)[2][-1]

@@ -55,7 +55,6 @@ def _history(case, mesh, line: Greedy, tolerance: float) -> tuple[Cycle, ...]:
 
 
 def _nodes(path: Path, made) -> Path:
-    """Write how many control nodes each tolerance takes."""
     with path.open("w", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["method", "selection", "tolerance", "control_nodes"])

@@ -118,7 +118,6 @@ def _read(output: Path) -> dict[Key, str]:
 
 
 def _undeformed(output: Path) -> dict[Key, str]:
-    """Return the qualities of the meshes before they are deformed."""
     from slideviz import read
 
     found: dict[Key, str] = {}
@@ -143,7 +142,6 @@ def _markdown(lines: list[Line]) -> str:
 
 
 def _short(text: str) -> str:
-    """Return a number with six digits at most."""
     if not text or text == INVERTED or "." not in text:
         return text
     return f"{float(text):.6g}"

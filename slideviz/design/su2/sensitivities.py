@@ -57,7 +57,6 @@ def is_number(word: str) -> bool:
 
 
 def _csv(path: Path) -> tuple[list[str], FloatArray]:
-    """Return the names of the columns and the rows of a restart in text."""
     text, _ = read_text(path, "file of sensitivities")
     head, _, body = text.partition("\n")
     names = [name.strip().strip('"').strip() for name in head.split(",")]
@@ -300,7 +299,6 @@ def _nearest(found: Sensitivities, points: FloatArray) -> tuple[float, np.ndarra
 
 
 def _ordered(path: Path, names: list[str], table: FloatArray, mesh: Mesh) -> Sensitivities:
-    """Return the sensitivities of a table of all points."""
     letters = "xyz"[: mesh.dim]
     column = {name.lower(): place for place, name in enumerate(names)}
     wanted = [f"sensitivity_{letter}" for letter in letters]
@@ -329,7 +327,6 @@ def _ordered(path: Path, names: list[str], table: FloatArray, mesh: Mesh) -> Sen
 
 
 def _unordered(path: Path, mesh: Mesh) -> Sensitivities:
-    """Return the sensitivities of a file whose rows are matched by position."""
     rows = [row for row in _rows(path) if row]
     dim = mesh.dim
     width = len(rows[0]) if rows else 0

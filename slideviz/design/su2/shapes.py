@@ -295,7 +295,6 @@ class Shapes:
 
 
 def _shown(point: FloatArray) -> str:
-    """Return a point in words."""
     return f"({', '.join(f'{value:.6g}' for value in point)})"
 
 

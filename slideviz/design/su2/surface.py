@@ -268,7 +268,7 @@ class MovingSurface:
 
         Raises CaseError where it is not finite.
         """
-        with _large_numbers_told(self.config):
+        with _overflow_as_case_error(self.config):
             return self._finite(self.displacer.displacement())
 
     def slope(self, place: int, part: int = 0, undeformed: bool = False) -> FloatArray:
@@ -285,7 +285,7 @@ class MovingSurface:
         """
         if self.idle[place]:
             return np.zeros((len(self.nodes), self.mesh.dim))
-        with _large_numbers_told(self.config):
+        with _overflow_as_case_error(self.config):
             return self._finite(self.displacer.slope(place, part, undeformed))
 
     def _finite(self, vectors: FloatArray) -> FloatArray:
@@ -331,8 +331,7 @@ class MovingSurface:
 
 
 @contextmanager
-def _large_numbers_told(config: Su2Config) -> Iterator[None]:
-    """Context in which an OverflowError is a CaseError about the variables."""
+def _overflow_as_case_error(config: Su2Config) -> Iterator[None]:
     try:
         with np.errstate(all="ignore"):
             yield
@@ -359,7 +358,7 @@ def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
     listed = [mesh.marker(name).nodes for name in config.markers]
     nodes = np.unique(np.concatenate([np.empty(0, np.int64), *listed]))
     nodes = np.arange(len(mesh.points)) if group == "grid" else nodes
-    with _large_numbers_told(config):
+    with _overflow_as_case_error(config):
         displacer = DISPLACERS[group](config, mesh, nodes)
     left = [] if group == "ffd" else _left_behind(config, mesh)
     if group == "grid" and mesh.halo is not None:

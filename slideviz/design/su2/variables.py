@@ -288,7 +288,6 @@ def _with_values(
 
 
 def _contradictions(variables: list[DesignVariable]) -> list[str]:
-    """Return why variables cannot stand in one list."""
     first = variables[0] if variables else None
     if first is None or len(variables) == 1:
         return []
