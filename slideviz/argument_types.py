@@ -126,7 +126,8 @@ def _require(called: str, owner: object, given: Iterable[tuple[str, object]]) ->
         wrong = _misfit(value, needed.get(name, Any), name)
         if wrong is not None:
             raise ArgumentError(
-                f"{called}: {wrong.place} is {_said(wrong.value)}; expected {_words(wrong.needed)}"
+                f"{called}: {wrong.place} is {_value_text(wrong.value)}; expected "
+                f"{_words(wrong.needed)}"
             )
 
 
@@ -218,7 +219,7 @@ def _parts(value: Any, hint: Any, place: str) -> Iterator[tuple[object, Any, str
             yield each, inner[at if fixed else 0], f"{place}[{at}]"
 
 
-def _said(value: object) -> str:
+def _value_text(value: object) -> str:
     """Return a wrong argument in words: its value if that is short, else its type."""
     plain = isinstance(value, str | int | float | list | tuple | dict | None)
     is_short = plain and len(repr(value)) <= _SHORT

@@ -91,6 +91,53 @@ def test_a_name_of_a_class_means_one_thing_in_its_package():
     assert {name: files for name, files in places.items() if len(files) > 1} == {}
 
 
+EVERYDAY = (
+    "anew came doubt found given goes going kept looked own rated rest room said stands tell told "
+    "whole"
+)
+"""Words that name nothing, as a name or with one underscore before it."""
+STRUCK = (
+    "ALONE Alone Answer Around Beside Course Doing FrozenSpread Given Kept Lag Looked Make Memento "
+    "Paper Plan Rated Reel Rest Shot Spread Take Tally Tallying Watch Whole actions_ arranging "
+    "as_drawn barred both_ways crowded differing docks_ dress exposing favour given_for "
+    "given_input given_mesh in_order keep_view kept_view moved_by picturing posing "
+    "require_ordinary require_right row_names seen_beside settled tell_all tell_lost twofold "
+    "unmoved usable ways_of"
+)
+"""Names that had one reader, who wrote them; each has a better one in a textbook's index."""
+
+
+def test_names_are_those_of_textbooks():
+    struck = {*STRUCK.split(), *EVERYDAY.split(), *(f"_{word}" for word in EVERYDAY.split())}
+    found = set()
+    for path in sorted(PACKAGE.rglob("*.py")):
+        place = str(path.relative_to(PACKAGE))
+        names = {path.stem}
+        for part in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names |= _defined(part)
+            assert not (isinstance(part, ast.Name) and "colour" in part.id.lower()), place
+        found |= {f"{place}: {name}" for name in names if name in struck or "colour" in name}
+    assert found == {"formats/hdf5.py: tell"}  # of Python's files
+
+
+def _defined(part: ast.AST) -> set[str]:
+    """Return the names of functions and classes, and those in the body of a module or class."""
+    if isinstance(part, ast.FunctionDef):
+        return {part.name}
+    if not isinstance(part, ast.ClassDef | ast.Module):
+        return set()
+    names = {part.name} if isinstance(part, ast.ClassDef) else set()
+    for line in part.body:
+        targets = line.targets if isinstance(line, ast.Assign) else []
+        targets = [line.target] if isinstance(line, ast.AnnAssign) else targets
+        names |= {name.id for target in targets for name in ast.walk(target) if _is_stored(name)}
+    return names
+
+
+def _is_stored(part: ast.AST) -> bool:
+    return isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store)
+
+
 CITED = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 IN_FILE = re.compile(r"((?:`\w+`(?:, | and |, and )?)+) in `([\w/.]+\.py)`")
 

@@ -58,7 +58,7 @@ def _write_definition(boxes: tuple[Definition, ...]) -> str:
     )
 
 
-def _whole(words: list[Word], least: int) -> Degrees:
+def _integers(words: list[Word], least: int) -> Degrees:
     values = [number(word.text) for word in words]
     if len(values) != 3 or any(value != int(value) or value < least for value in values):
         listed = ", ".join(word.text for word in words)
@@ -68,7 +68,7 @@ def _whole(words: list[Word], least: int) -> Degrees:
 
 
 def _read_degrees(text: str) -> tuple[Degrees, ...]:
-    return tuple(_whole(group, 0) for group in _groups(text))
+    return tuple(_integers(group, 0) for group in _groups(text))
 
 
 def _write_degrees(degrees: tuple[Degrees, ...]) -> str:
@@ -113,7 +113,7 @@ def ffd_contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
 
 DEFINITION = Kind("(NAME, 8 corners x, y, z) ; ...", _read_definition, _write_definition)
 DEGREES = Kind("(i, j, k) ; ...", _read_degrees, _write_degrees)
-ORDERS = Kind("i, j, k", lambda text: _whole(list_of(text), 1), _write_orders)
+ORDERS = Kind("i, j, k", lambda text: _integers(list_of(text), 1), _write_orders)
 
 _ROWS = (
     setting(

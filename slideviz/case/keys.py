@@ -14,7 +14,7 @@ from slideviz.case.key import BOUNDARIES, FILES, MOTION, PERIODICITY, QUALITY, K
 from slideviz.case.method_keys import METHOD_ROWS, REDUCTION_ROWS
 from slideviz.case.model import Case, FromFile, Motion
 from slideviz.case.motion_text import MOTIONS
-from slideviz.case.values import AXIS, NAMES, PAIRS, PATH, POINT, YES_NO, choice, one_of, whole
+from slideviz.case.values import AXIS, NAMES, PAIRS, PATH, POINT, YES_NO, choice, integer, one_of
 from slideviz.case.view_keys import VIEW_ROWS
 from slideviz.errors import CaseError
 from slideviz.formats.table import FILE_FORMATS
@@ -165,7 +165,9 @@ _ROWS = (
         "mesh_out_format",
         "SU2's text or binary, whatever the ending of the file.",
     ),
-    setting("ZONE", FILES, whole(1), "zone", "The zone to deform, from 1, of a mesh with several."),
+    setting(
+        "ZONE", FILES, integer(1), "zone", "The zone to deform, from 1, of a mesh with several."
+    ),
     role("MARKER_MOVING", NAMES, "moving", "Boundaries whose displacement is prescribed."),
     role("MARKER_FIXED", NAMES, "fixed", "Boundaries that stay, as do those in no list."),
     role("MARKER_SLIDING", NAMES, "sliding", "Boundaries along which their nodes may slide."),

@@ -11,7 +11,7 @@ from typing import Any
 
 from slideviz.case.key import METHOD, NO_DEFAULT, REDUCTION, Key, other_method, setting
 from slideviz.case.model import Case
-from slideviz.case.values import MAX_STEPS, YES_NO, Kind, one_of, real, whole
+from slideviz.case.values import MAX_STEPS, YES_NO, Kind, integer, one_of, real
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
 from slideviz.terms import (
@@ -164,7 +164,7 @@ REDUCTION_ROWS = (
     ),
     greedy(
         "LVL_SIZE",
-        whole(1),
+        integer(1),
         "level_size",
         "Number of control nodes of a level.",
         label="A level ends at",
@@ -193,7 +193,7 @@ REDUCTION_ROWS = (
     ),
     greedy(
         "MAX_CONTROL_NODES",
-        whole(1),
+        integer(1),
         "max_nodes",
         "Stop at this number of control nodes in any case.",
         run_label="",
@@ -285,7 +285,7 @@ METHOD_ROWS = (
     setting(
         "STEPS",
         METHOD,
-        replace(or_auto(whole(1), "auto"), span=(0, MAX_STEPS)),
+        replace(or_auto(integer(1), "auto"), span=(0, MAX_STEPS)),
         "steps",
         "Steps in which the deformation is applied; auto tries 1, 2, 3, 5, 8, 13, 21 and 34, "
         "halves steps that fold a cell, and takes the fewest that are enough.",

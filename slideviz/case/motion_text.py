@@ -251,7 +251,7 @@ def _read_ffd(marker: Target, rest: list[Word]) -> Ffd:
             "shift: ffd, BOX, 2, 1, 0, dx, dy, dz; in 2D ffd, BOX, 2, 1, dx, dy will do"
         )
     count = (len(items) - 1) // 2
-    i, j, k = (*_whole(items[1 : 1 + count]), -1)[:3]
+    i, j, k = (*_integers(items[1 : 1 + count]), -1)[:3]
     dx, dy, dz = (*(number(word.text) for word in items[1 + count :]), 0.0)[:3]
     return Ffd(marker, name, (i, j, k), (dx, dy, dz))
 
@@ -329,7 +329,7 @@ def _read_column(
             "expected the box, the column of control points i, j (-1 is all of a direction) and "
             f"the amount: {VERB_OF[kind]}, BOX, 2, 1, 0.01; in 2D {VERB_OF[kind]}, BOX, 2, 0.01"
         )
-    i, j = (*_whole(items[1:-1]), -1)[:2]
+    i, j = (*_integers(items[1:-1]), -1)[:2]
     return kind(marker, name, (i, j), number(items[-1].text))
 
 
@@ -343,12 +343,12 @@ def _read_twist(marker: Target, rest: list[Word]) -> FfdTwist:
             "the axis (x, y, z or three numbers) and a point on it: ffd-twist, BOX, 2, 5.0, y, "
             "0.25, 0, 0"
         )
-    (plane,) = _whole(items[1:2])
+    (plane,) = _integers(items[1:2])
     axis, point = read_axis(items[3 : 3 + n_axis]), read_vector(items[3 + n_axis :], "the point")
     return FfdTwist(marker, items[0].text, plane, number(items[2].text), point, axis)
 
 
-def _whole(words: list[Word]) -> list[int]:
+def _integers(words: list[Word]) -> list[int]:
     """Return indices of control points, whole numbers from -1."""
     at = [number(word.text) for word in words]
     if any(value != int(value) or value < -1 for value in at):

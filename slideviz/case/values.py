@@ -99,7 +99,7 @@ def one_of(terms: Mapping[Any, Term], also: Mapping[str, str] | None = None) -> 
     return replace(kind, entry="choice", words=labels(terms), tips=tips)
 
 
-def whole(low: int) -> Kind:
+def integer(low: int) -> Kind:
     """Return the kind of whole numbers from ``low``."""
     allowed = f"a whole number from {low}"
 

@@ -13,7 +13,7 @@ import numpy as np
 from slideviz.case.key import VIEW, Key
 from slideviz.case.model import Case
 from slideviz.case.section_shapes import SECTION_SHAPES, names
-from slideviz.case.values import NAMES, Kind, choice, vector_text, whole
+from slideviz.case.values import NAMES, Kind, choice, integer, vector_text
 from slideviz.case.words import list_of, number
 from slideviz.errors import CaseError, shown
 from slideviz.terms import COLOR_BY, COLOR_MAPS, POINTS_SHOWN, SHOWN
@@ -140,7 +140,7 @@ VIEW_ROWS = (
     _row("VIEW_THRESHOLD", numbers(2, "two rising numbers", True), "Only cells between them."),
     _row("VIEW_POINTS", choice({w: w for w in POINTS_SHOWN}), "Nodes drawn as points."),
     _row("VIEW_SHOW", words(tuple(map(hyphened, SHOWN))), "What is drawn beside the boundaries."),
-    _row("VIEW_COPIES", whole(-1), "Passages drawn on each side; -1 draws all."),
+    _row("VIEW_COPIES", integer(-1), "Passages drawn on each side; -1 draws all."),
     _row("VIEW_HIDDEN", NAMES, "Boundaries that are not drawn."),
     _row("VIEW_SECTIONS", SECTIONS, f"Sections of the mesh, each by a {names()}."),
     _row(

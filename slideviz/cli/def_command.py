@@ -65,7 +65,7 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
             f"{file}: is not in the working folder, but beside {arguments.case}; paths are "
             f"relative to the working folder, as in SU2: change to {arguments.case.parent} first"
         )
-    if not file.exists() and "MESH_FILENAME" not in config.given:
+    if not file.exists() and "MESH_FILENAME" not in config.present:
         hints = [text for text in config.case.warnings if "did you mean MESH_FILENAME?" in text]
         raise CaseError(
             f"{arguments.case}: MESH_FILENAME is missing, and there is no {file}, SU2's default; "
@@ -119,7 +119,7 @@ def _run_def(arguments: argparse.Namespace) -> int:
     def attempt(design: Su2Config) -> tuple[MovingSurface, list[Step]]:
         surface = first if design is config else make_surface(design, mesh)
         moves, case = surface.displacement.any(), surface.case()
-        if surface.whole or not moves:
+        if surface.moves_whole_mesh or not moves:
             return surface, [at_rest(case, surface.moved() if moves else mesh)]
         return surface, run_steps(arguments, case, mesh)
 

@@ -99,7 +99,7 @@ class _Scene:
     base: Mesh | None
     """`mesh`, `base`: the mesh and, where there is a reference, the undeformed one; with
     ``--stream`` only the cells that the section can cut."""
-    found: Quality
+    quality: Quality
     """Quality of the cells of ``mesh``."""
     chosen: Section
     matrices: dict[int, FloatArray]
@@ -133,7 +133,7 @@ def section(arguments: argparse.Namespace) -> int:
     )
     scene = _scene(arguments, case)
     mesh, chosen = scene.mesh, scene.chosen
-    painted = paint(mesh, scene.found, arguments.color, scene.base)
+    painted = paint(mesh, scene.quality, arguments.color, scene.base)
     painted = replace(painted, color_map=arguments.map)
     cutter = Cutter.of(mesh)
     pieces = show_passages(cutter, mesh.points, chosen, scene.matrices)
@@ -243,7 +243,7 @@ def _section_and_passages(
 
     asked = arguments.asked
     chosen = replace(
-        asked.section, whole=mesh.dim == 2 if arguments.whole is None else arguments.whole
+        asked.section, whole_cells=mesh.dim == 2 if arguments.whole is None else arguments.whole
     )
     pair: Pair | None = None
     if not asked.axis or arguments.copies:
@@ -272,5 +272,5 @@ def _as_json(chosen: Section) -> dict[str, Any]:
         "direction": list(chosen.direction),
         "radius": None,
         **own,
-        "whole": chosen.whole,
+        "whole": chosen.whole_cells,
     }

@@ -121,7 +121,7 @@ def _shown(session: Session, name: str, section: Section) -> SectionInRun:
 def _choice(session: Session, section: Section) -> CellsInRange | None:
     """Return the cells within the view's threshold; None without one, and for a curve."""
     frame, threshold = session.frame, session.view.threshold
-    curve = session.mesh is not None and session.mesh.dim == 2 and not section.whole
+    curve = session.mesh is not None and session.mesh.dim == 2 and not section.whole_cells
     if frame is None or threshold is None or curve:
         return None
     return CellsInRange.of(frame.shown_values(session.view.color_by, session.mesh), threshold)

@@ -148,17 +148,17 @@ def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: f
     paint.draw(axes, cells if only is None else only.among(cells), alpha=faint)
     box = box_around(mesh.points[cutter.used])
     for _, section in shown_sections(session):
-        cut = cutter.show(mesh.points, replace(section, whole=False), only)
+        cut = cutter.show(mesh.points, replace(section, whole_cells=False), only)
         if len(cut):
             ends = list(cut.points[cut.connectivity, :2].reshape(-1, 2, 2))
             style: dict[str, Any]
             for kind, colors in ((RIM, {"colors": PAPER.text}), (BAND, paint.lines(cut))):
                 style = {"linewidths": WIDTHS[kind] * pixel_pt, "zorder": _ORDER[kind]}
                 axes.add_collection(LineCollection(ends, **style, **colors), autolim=False)
-            if section.whole:
+            if section.whole_cells:
                 paint.draw(axes, cutter.show(mesh.points, section, only), zorder=_ORDER[NAME])
         # The thin line is above whole cells, and below a band.
-        order = _ORDER[NAME] + 0.05 if section.whole else _ORDER[RIM] - 0.05
+        order = _ORDER[NAME] + 0.05 if section.whole_cells else _ORDER[RIM] - 0.05
         line: dict[str, Any] = {
             "colors": PAPER.text,
             "linewidths": _CUT * pixel_pt,

@@ -67,13 +67,13 @@ class Running(QObject):
         banner.shown.connect(self._forget_run)
         store.listen(self._hide_other)
         self.runner.progressed.connect(self.progressed)
-        self.runner.progressed.connect(self._tell)
-        self.runner.kept.connect(lambda frames: store.change(changes.add_frames, frames))
+        self.runner.progressed.connect(self._show_progress)
+        self.runner.yielded.connect(lambda frames: store.change(changes.add_frames, frames))
         self.runner.finished.connect(self._finished)
         self.runner.cancelled.connect(self._cancelled)
         self.runner.failed.connect(self._failed)
 
-    def _tell(self, doing: JobProgress) -> None:
+    def _show_progress(self, doing: JobProgress) -> None:
         self.status_changed.emit(doing.text)
 
     def start_job(

@@ -254,7 +254,7 @@ class MainWindow(Services):
     def show_opened(self, opened: jobs.Opened) -> None:
         """Show a mesh or case that was just opened, in place of the present one."""
         session = opened.session
-        if not opened.kept:
+        if not opened.has_view:
             session = changes.inherit_view(session, self.store.session.view)
         self.banner.hide()
         self.start.hide()

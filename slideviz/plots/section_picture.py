@@ -410,7 +410,7 @@ def _laid_beside(
         flat, labels = laid_flat(one.drawn, section, style.in_space, near)
         if near is None:
             near = section.shape.middle_angle(section, one.drawn[min(one.drawn, key=abs)])
-        if not section.whole or not flat.points[:, 2].any():
+        if not section.whole_cells or not flat.points[:, 2].any():
             # All is in one plane, where folded cells overlap others: draw them last.
             flat = flat.with_last(one.paint.inverted[flat.cells])
         flats.append(flat)

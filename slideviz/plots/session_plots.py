@@ -211,7 +211,7 @@ def facts_of(session: Session, cuts: Cuts, section: Section) -> str:
 
 
 def _line(section: Section) -> Section:
-    return replace(section, whole=False)
+    return replace(section, whole_cells=False)
 
 
 LEAST_SPREAD = 0.05

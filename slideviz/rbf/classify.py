@@ -31,9 +31,9 @@ class FansAround:
     """All fans, with what decides which of them are one surface."""
 
     node: IntArray
-    own: IntArray
-    """`node`, `own` (m,): the node that represents the fan's node and its periodic images, and the
-    fan's node itself."""
+    fan_node: IntArray
+    """`node`, `fan_node` (m,): the node that represents the fan's node and its periodic images, and
+    the fan's node itself."""
     role: np.ndarray
     """(m,) str: role of the fan's marker."""
     normals: FloatArray
@@ -86,9 +86,9 @@ def _one_sided(around: FansAround, chosen: IntArray) -> IntArray:
     A periodic boundary and its image are one surface, seen from both sides: of its two opposite
     fans the one at the representative node is kept.
     """
-    image = around.own[chosen] != around.node[chosen]
+    image = around.fan_node[chosen] != around.node[chosen]
     chosen = chosen[np.lexsort([chosen, image, around.node[chosen]])]
-    node, own = around.node[chosen], around.own[chosen]
+    node, own = around.node[chosen], around.fan_node[chosen]
     first = np.searchsorted(node, node)
     rows = np.flatnonzero(own != node)
     drop = np.zeros(len(chosen), bool)
@@ -118,7 +118,7 @@ def _clusters(around: FansAround, local: IntArray, size: IntArray) -> IntArray:
     """
     label = np.empty(len(local), np.int64)
     role = np.unique(around.role[local].astype(str), return_inverse=True)[1]
-    normals, own = around.normals[local], around.own[local]
+    normals, own = around.normals[local], around.fan_node[local]
     _join(size, normals, role, own, around.smooth, around.merge, label)
     return label
 

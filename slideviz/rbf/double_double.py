@@ -265,7 +265,7 @@ class Residuals:
     """Its kernel is one of ``FUNCTIONS``."""
     place: tuple[FloatArray, FloatArray | None]
     """Features (k, n) of the node of each row, and its unit direction (n, d) or None."""
-    _kept: dict[int, tuple[FloatArray, FloatArray]] = made_by(default_factory=dict)
+    _cache: dict[int, tuple[FloatArray, FloatArray]] = made_by(default_factory=dict)
 
     def __call__(
         self, right: FloatArray, weights: FloatArray, low: FloatArray, tick: Tick = no_tick
@@ -301,8 +301,8 @@ class Residuals:
 
         Kept for the next call where G has at most `KEPT` rows.
         """
-        if part.start in self._kept:
-            return self._kept[part.start]
+        if part.start in self._cache:
+            return self._cache[part.start]
         features, normals = self.place
         x = np.zeros((4, n))
         x[: len(features)] = features
@@ -313,7 +313,7 @@ class Residuals:
         with one_at_a_time(100 * found.size):
             _fill(x, across, part.start, period_over_pi, scale, power, np.array(terms), found, rest)
         if n <= KEPT:
-            self._kept[part.start] = found, rest
+            self._cache[part.start] = found, rest
         return found, rest
 
 

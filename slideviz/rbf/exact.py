@@ -98,7 +98,7 @@ class ExactFit:
         """
         first = int(part[0])
         before = self._factors.get(first, NOTHING)
-        done = len(before.kept) + len(before.dropped)
+        done = len(before.retained) + len(before.dropped)
         problem, new, right = self._problem, part[done:], rows.data[part]
 
         def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:

@@ -77,7 +77,7 @@ def find_images(
 class ImageDisplacements:
     """Copies the displacements of given nodes to their periodic images."""
 
-    given: IntArray
+    prescribed: IntArray
     """(k,): sorted, each once."""
     vectors: FloatArray
     """(k, d): the displacements of the given nodes in the frame."""
@@ -86,15 +86,15 @@ class ImageDisplacements:
 
     @cached_property
     def _row(self) -> IntArray:
-        """For each representative (n,) the place of its first image in ``given``, from 1; or 0."""
+        """Place of the first image of each representative (n,) in ``prescribed``, from 1; or 0."""
         # Memory for zeros is taken only where something is written.
         row = np.zeros(len(self.representative), np.int64)
-        row[self.representative[self.given[::-1]]] = np.arange(len(self.given), 0, -1)
+        row[self.representative[self.prescribed[::-1]]] = np.arange(len(self.prescribed), 0, -1)
         return row
 
     def source(self, nodes: IntArray) -> IntArray:
         """Return the given node whose displacement each of nodes (m,) has, (m,); -1 if none."""
-        return np.r_[-1, self.given][self._row[self.representative[nodes]]]
+        return np.r_[-1, self.prescribed][self._row[self.representative[nodes]]]
 
     def at(self, nodes: IntArray) -> FloatArray:
         """Return the displacements (m, d) of nodes (m,); zero for nodes without a given image."""
@@ -106,10 +106,10 @@ class ImageDisplacements:
 
         In any component, in the mesh's length unit.
         """
-        gap = np.abs(self.vectors - self.at(self.given)).max(axis=1, initial=0.0)
+        gap = np.abs(self.vectors - self.at(self.prescribed)).max(axis=1, initial=0.0)
         if gap.max(initial=0.0) > allowed:
             worst = int(np.argmax(gap))
-            node = self.given[worst]
+            node = self.prescribed[worst]
             refuse(int(node), int(self.source(node[None])[0]), float(gap[worst]))
 
 

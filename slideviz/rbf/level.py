@@ -450,10 +450,12 @@ class GreedyLevel:
                 part = rows[self._among.block[rows] == k]
                 left, schur = self._remaining(factor, part)
                 made = factorise(schur)
-                turn = len(self.chosen) + np.arange(len(made.kept))
-                factor.append(part[made.kept], turn, beside=left[:, made.kept].T, corner=made.lower)
+                turn = len(self.chosen) + np.arange(len(made.retained))
+                factor.append(
+                    part[made.retained], turn, beside=left[:, made.retained].T, corner=made.lower
+                )
                 factor.follow(target)
-                self.chosen = np.concatenate([self.chosen, part[made.kept]])
+                self.chosen = np.concatenate([self.chosen, part[made.retained]])
             self.excluded[rows] = True
             self.solve(target)
 

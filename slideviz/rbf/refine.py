@@ -86,7 +86,7 @@ class System:
     """Features (k, n) of the node of each row, and its unit direction (n, d) or None."""
     factor: Factor
     """Without the rows that the pivot guard left out."""
-    _kept: dict[str, Any] = made_by(default_factory=dict)
+    _cache: dict[str, Any] = made_by(default_factory=dict)
 
     def rough_data(self) -> FloatArray:
         """Return test data: a sine wave along each axis, over the extent of the nodes.
@@ -225,10 +225,10 @@ class System:
         At the points `check_points` the nodes.
         """
         features, normals = self.place
-        if "checks" not in self._kept:
+        if "checks" not in self._cache:
             points = check_points(features)
-            self._kept["checks"] = matrix(self.basis, (points, None), (features, None))
-        checks: FloatArray = self._kept["checks"]
+            self._cache["checks"] = matrix(self.basis, (points, None), (features, None))
+        checks: FloatArray = self._cache["checks"]
         along = [weights] if normals is None else [weights * n[:, None] for n in normals.T]
         found = [np.abs(checks @ each).max(axis=0, initial=0.0) for each in along]
         return np.asarray(np.max(found, axis=0))
@@ -237,25 +237,25 @@ class System:
         """Return a factor of all rows; for those that were left out it is not exact (`SHIFT`)."""
         if not len(self.factor.dropped):
             return self.factor
-        if "whole" not in self._kept:
-            self._kept["whole"] = with_dropped_rows(self.basis, self.place, self.factor)
-        full_factor: Factor = self._kept["whole"]
+        if "whole" not in self._cache:
+            self._cache["whole"] = with_dropped_rows(self.basis, self.place, self.factor)
+        full_factor: Factor = self._cache["whole"]
         return full_factor
 
     def _double_factor(self, tick: Tick) -> DoubleFactor | None:
         """Return the factor with twice the digits; None of a large or a singular system."""
-        if "double" not in self._kept:
+        if "double" not in self._cache:
             small = self.place[0].shape[1] <= DENSE and supports(self.basis)
             found = DoubleFactor.of(self._residuals(), tick) if small else None
-            self._kept["double"] = found
-        factor: DoubleFactor | None = self._kept["double"]
+            self._cache["double"] = found
+        factor: DoubleFactor | None = self._cache["double"]
         return factor
 
     def _residuals(self) -> Residuals:
         """Return what computes residuals of this system with twice the precision."""
-        if "residuals" not in self._kept:
-            self._kept["residuals"] = Residuals(self.basis, self.place)
-        residuals: Residuals = self._kept["residuals"]
+        if "residuals" not in self._cache:
+            self._cache["residuals"] = Residuals(self.basis, self.place)
+        residuals: Residuals = self._cache["residuals"]
         return residuals
 
 
@@ -266,7 +266,7 @@ def with_dropped_rows(
 
     Ten times `SHIFT`, and so on, where the rows are not positive definite with that.
     """
-    kept, dropped = factor.kept, factor.dropped
+    kept, dropped = factor.retained, factor.dropped
     features, normals = place
     outside = features[:, dropped], None if normals is None else normals[dropped]
     rows = matrix(basis, outside, place)

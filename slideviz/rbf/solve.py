@@ -153,11 +153,11 @@ def enough_threads(flops: float) -> AbstractContextManager[object]:
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """The Cholesky factor L of a system G (n, n) without some rows: L L^T = G[kept][:, kept]."""
+    """The Cholesky factor L of the ``retained`` rows and columns of a system G (n, n)."""
 
     lower: FloatArray
     """(k, k): L."""
-    kept: IntArray
+    retained: IntArray
     """(k,): the rows of G that are in the system, in order."""
     dropped: IntArray
     """(n - k,): rows left out because their remaining pivot is below the guard."""
@@ -165,8 +165,8 @@ class Factor:
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the weights (n, m) for right-hand sides (n, m); zero in dropped rows."""
         out = np.zeros_like(right, dtype=float)
-        half = solve_lower(self.lower, right[self.kept])
-        out[self.kept] = solve_lower(self.lower, half, transposed=True)
+        half = solve_lower(self.lower, right[self.retained])
+        out[self.retained] = solve_lower(self.lower, half, transposed=True)
         return out
 
 
@@ -280,7 +280,7 @@ def extend(before: Factor, rows: FloatArray, tick: Tick = no_tick) -> Factor:
     lower = np.zeros((done + more, done + more), order="F")
     lower[:done, :done] = before.lower
     if done:
-        lower[done:, :done] = solve_lower(before.lower, rows[:, before.kept].T).T
+        lower[done:, :done] = solve_lower(before.lower, rows[:, before.retained].T).T
     for start in range(0, more, BLOCK):
         stop = min(more, start + BLOCK)
         here, below = slice(done + start, done + stop), slice(done + stop, None)
@@ -294,7 +294,7 @@ def extend(before: Factor, rows: FloatArray, tick: Tick = no_tick) -> Factor:
             rest[dropped[start:stop]] = 0.0
             lower[below, here] = rest.T
         tick((stop / more) ** 2)
-    kept = np.concatenate([before.kept, old + np.flatnonzero(~dropped)])
+    kept = np.concatenate([before.retained, old + np.flatnonzero(~dropped)])
     if not dropped.any():
         return Factor(lower, kept, before.dropped)
     stay = np.concatenate([np.arange(done), done + np.flatnonzero(~dropped)])

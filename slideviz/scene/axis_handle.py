@@ -54,7 +54,7 @@ def frame_of(section: Section, patch: Patch) -> list[FloatArray]:
     margin = _MARGIN * float(np.hypot(*size))
     low, high = patch.along[0] - margin, patch.along[1] + margin
     first, last = patch.angles[0] - margin / girth, patch.angles[1] + margin / girth
-    closed = patch.whole or last - first > TURN
+    closed = patch.is_full_ring or last - first > TURN
     if closed:
         first, last = patch.angles[0], patch.angles[0] + TURN
     angle = np.linspace(first, last, int(np.ceil((last - first) / _CHORD)) + 2)

@@ -105,13 +105,13 @@ class FlatScene:
         flat = shape.flatten(section, cut, ahead, ahead) if len(cut) else cut
         # Where the section lies stays, whatever cells of it are shown.
         self._all = flat
-        if only is not None and section.whole and len(cut):
+        if only is not None and section.whole_cells and len(cut):
             part = self.cuts.of(session.frame.mesh, section, only=only)
             near = shape.middle_angle(section, cut, ahead)
             flat = shape.flatten(section, part, near, ahead) if len(part) else part
         elif only is not None:
             flat = only.among(flat)
-        if not section.whole and len(flat):
+        if not section.whole_cells and len(flat):
             # All is in one plane, where folded cells overlap others: they are drawn last.
             status = cut_frame(session.frame, section).quality.status
             flat = flat.with_last(status[flat.cells] == INVERTED)
@@ -134,8 +134,8 @@ class FlatScene:
     def _style(self, section: Section) -> None:
         prop = self._shown.actor.prop
         prop.color = plain_color(self.stage.scheme)
-        prop.lighting = section.whole
-        prop.ambient, prop.diffuse = (0.6, 0.4) if section.whole else (1.0, 0.0)
+        prop.lighting = section.whole_cells
+        prop.ambient, prop.diffuse = (0.6, 0.4) if section.whole_cells else (1.0, 0.0)
         prop.line_width = 1.0
         view = self.session.view
         self.stage.edges(prop, "edges" in view.drawn, view.color_by == "role")

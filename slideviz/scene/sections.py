@@ -182,7 +182,7 @@ class SectionLayer(Layer):
             one = self.drawn[name] = SectionDrawn(PolygonActor(self.stage, name))
         if one.made_of != key:
             polygons = self.cuts.of(frame.mesh, section, matrix, only)
-            if frame.mesh.dim == 2 or not section.whole:
+            if frame.mesh.dim == 2 or not section.whole_cells:
                 # Folded cells overlap in one plane: draw the inverted ones last.
                 polygons = polygons.with_last(cut.quality.status[polygons.cells] == INVERTED)
             one.shown.show(polygons, LIFTS[kind] * self.stage.lift(frame.mesh))
@@ -196,13 +196,13 @@ class SectionLayer(Layer):
     def _style(self, kind: str, shown: PolygonActor, section: Section, session: Session) -> None:
         prop, scheme = shown.actor.prop, self.stage.scheme
         prop.color = scheme.text if kind == RIM else plain_color(scheme)
-        solid = session.mesh is not None and session.mesh.dim == 3 and section.whole
+        solid = session.mesh is not None and session.mesh.dim == 3 and section.whole_cells
         # A cut has exactly the colors of the bar; whole cells need shading.
         prop.lighting = solid
         prop.ambient, prop.diffuse = (0.6, 0.4) if solid else (1.0, 0.0)
         self.stage.edges(prop, "edges" in session.view.drawn, session.view.color_by == "role")
         if session.mesh is not None and session.mesh.dim == 2:
-            prop.line_width = 1.0 if section.whole else WIDTHS.get(kind, WIDTHS[BAND])
+            prop.line_width = 1.0 if section.whole_cells else WIDTHS.get(kind, WIDTHS[BAND])
 
 
 def _kinds(section: Section, session: Session) -> dict[str, Section]:
@@ -213,8 +213,8 @@ def _kinds(section: Section, session: Session) -> dict[str, Section]:
     section = replace(section, name="")
     kinds = {NAME: section}
     if session.mesh is not None and session.mesh.dim == 2:
-        line = replace(section, whole=False)
-        kinds |= {BAND: line, RIM: line} if section.whole else {RIM: line}
+        line = replace(section, whole_cells=False)
+        kinds |= {BAND: line, RIM: line} if section.whole_cells else {RIM: line}
     return kinds
 
 
@@ -261,7 +261,7 @@ class CutLines:
             self.stage.remove(name)
             del self._actors[name], self._shapes[name]
         for name, section in wanted.items():
-            self._draw(name, trace(section, box), lift * (ABOVE if section.whole else BELOW))
+            self._draw(name, trace(section, box), lift * (ABOVE if section.whole_cells else BELOW))
 
     def _draw(self, name: str, parts: list[FloatArray], lift: float) -> None:
         actor = self._actors.get(name)

@@ -103,7 +103,7 @@ class Patch:
     """(k, 2): some places of the cut, with angles in the range of ``angles``."""
 
     @property
-    def whole(self) -> bool:
+    def is_full_ring(self) -> bool:
         """Return whether the patch goes all the way round the axis."""
         return self.angles[1] - self.angles[0] > _WHOLE
 

@@ -104,7 +104,7 @@ class Cutter:
         self, points: FloatArray, section: Section, only: CellsInRange | None = None
     ) -> Polygons:
         """Return the cut cells, whole or cut as the section says; with ``only``, some of them."""
-        if not section.whole:
+        if not section.whole_cells:
             found = self.cut(points, section)
             return found if only is None else only.among(found)
         ids = self.which_cells(points, section)

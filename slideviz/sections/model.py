@@ -49,7 +49,7 @@ class Section:
     zero."""
     radius: float = 0.0
     """The radius of the cylinder; 0 for others."""
-    whole: bool = False
+    whole_cells: bool = False
     """Whether the cells it cuts are shown whole, instead of cut."""
     name: str = ""
     """The user's name for it; empty: the words of `describe`."""

@@ -212,15 +212,15 @@ class JobProgress:
 class Opened:
     """The result of `open_file`: the session, and the boundaries ready to be drawn.
 
-    ``kept`` is whether the case file has a view, ``camera`` the camera in it. ``ghosts`` are the
-    moved boundaries, their displacement files read; ``coarse`` the boundaries of a large mesh with
+    ``has_view`` is whether the case file has a view, ``camera`` the camera in it. ``ghosts`` are
+    the moved boundaries, their displacement files read; ``coarse`` the boundaries of a large mesh with
     fewer facets.
     """
 
     session: Session
     surfaces: tuple[Surface, ...]
     ghosts: Ghosts
-    kept: bool = False
+    has_view: bool = False
     camera: Camera | None = None
     coarse: tuple[Surface, ...] = ()
 

@@ -206,7 +206,7 @@ def _text(section: Section) -> SectionText:
     return (
         section.kind,
         tuple(float(n) for n in numbers),
-        section.whole,
+        section.whole_cells,
         section.flat,
         section.shown,
     )
@@ -216,7 +216,7 @@ def _section(text: SectionText) -> Section:
     kind, numbers, whole, flat, shown = text
     *size, a, b, c, x, y, z = numbers
     section = Section.of(kind, (x, y, z), (a, b, c), sum(size))
-    return replace(section, whole=whole, shown=shown, flat=flat)
+    return replace(section, whole_cells=whole, shown=shown, flat=flat)
 
 
 def files_beside(case: Case, path: Path, folder: Path) -> dict[Path, Path]:

@@ -74,7 +74,7 @@ _SLABS: WeakKeyDictionary[Mesh, dict[Section, StepFrame]] = WeakKeyDictionary()
 
 def cut_key(section: Section) -> Section:
     """Return a section with defaults for all that does not change which cells it cuts."""
-    return replace(section, name="", shown=True, flat=False, whole=False)
+    return replace(section, name="", shown=True, flat=False, whole_cells=False)
 
 
 def slab_of(mesh: Mesh, section: Section) -> StepFrame | None:
@@ -162,7 +162,7 @@ def first_section(kind: str, session: Session, pair: Pair | None = None) -> Sect
         axis, origin = case.axis, case.origin
     at, way = triple(np.asarray(origin)), triple(np.asarray(axis))
     section = Section.of(kind, at, way, shape.terms.size.usual if shape.terms.size else 0.0)
-    section = replace(section, whole=mesh.dim == 2)
+    section = replace(section, whole_cells=mesh.dim == 2)
     return shape.first(section, _shown_points(session))
 
 
@@ -266,7 +266,7 @@ class Cuts:
         slab = slab_of(mesh, section)
         if slab is None or matrix is not None or not len(slab.mesh.cells):
             return NO_POLYGONS
-        key = slab, section.whole
+        key = slab, section.whole_cells
         if key not in self._slabs:
             while len(self._slabs) >= CACHE_SIZE:
                 self._slabs.pop(next(iter(self._slabs)))

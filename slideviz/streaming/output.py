@@ -109,7 +109,7 @@ class Output:
                     break
                 tick((k + 1) / len(done))
 
-    def found(self) -> str:
+    def resume_message(self) -> str:
         """Return a sentence on how much a stopped run has left to go on with."""
         done, total = self._opened().done, len(parts(self.source.n_points))
         if done:

@@ -213,7 +213,7 @@ def stream(
             replaces=replaces,
         )
         if resume:
-            note(out.found())
+            note(out.resume_message())
 
         def read() -> Mesh:
             with timer.phase("read") as tick:

@@ -64,7 +64,7 @@ _drafts: set[Path] = set()
 """Files and folders to remove when the program ends early."""
 _processes: set[Process] = set()
 """Processes to kill when the program ends early."""
-_kept: dict[Path, str] = {}
+_partial: dict[Path, str] = {}
 """Partial files that stay then, and the sentence on each for the user."""
 
 
@@ -146,23 +146,23 @@ def clean_up() -> None:
 def removed_at_stop(path: Path) -> Iterator[None]:
     """Context in which a file is removed if the program ends, unless `keep_partial` is called."""
     _drafts.add(path)
-    _kept.pop(path, None)
+    _partial.pop(path, None)
     try:
         yield
     finally:
         _drafts.discard(path)
-        _kept.pop(path, None)
+        _partial.pop(path, None)
 
 
 def keep_partial(path: Path, words: str) -> None:
     """Let a partial file stay if the program ends; ``words`` tell the user so."""
     _drafts.discard(path)
-    _kept[path] = words
+    _partial[path] = words
 
 
 def leftover_message() -> str:
     """Return the words of `keep_partial` on the latest file that stays, else `NOTHING_LEFT`."""
-    kept = (words for path, words in reversed(_kept.items()) if path.exists())
+    kept = (words for path, words in reversed(_partial.items()) if path.exists())
     return next(kept, NOTHING_LEFT)
 
 

@@ -59,7 +59,7 @@ def in_parts(
     """
     parts = iter([slice(first, min(first + PART, count)) for first in range(0, count, PART)])
 
-    def rest(tell: Callable[[float], object]) -> None:
+    def run_remaining(tell: Callable[[float], object]) -> None:
         try:
             for part in parts:
                 tell(part.start / count)
@@ -71,11 +71,11 @@ def in_parts(
 
     helpers = min(cores(), -(-count // PART)) - 1 if count > PART else 0
     if helpers <= 0:
-        rest(tick)
+        run_remaining(tick)
         return
     with ThreadPoolExecutor(helpers) as pool:
-        others = [pool.submit(rest, lambda _: None) for _ in range(helpers)]
-        rest(tick)
+        others = [pool.submit(run_remaining, lambda _: None) for _ in range(helpers)]
+        run_remaining(tick)
     for other in others:
         other.result()
 

@@ -327,7 +327,7 @@ def test_only_chosen_cells_are_drawn(renderer):
 
 def test_a_drawing_has_the_sections_of_the_view_and_the_other_cells_faintly(renderer):
     line = Section("plane", (0.0, 1.5, 0.0), (0.0, 1.0, 0.0))
-    circle = Section("cylinder", (2.0, 2.0, 0.0), radius=1.0, whole=True)
+    circle = Section("cylinder", (2.0, 2.0, 0.0), radius=1.0, whole_cells=True)
     plain = draw_vector(renderer, PLAIN).axes[0]
     assert plain.collections[0].get_alpha() is None
     renderer.session = changes.set_view(renderer.session, sections=(line, circle))

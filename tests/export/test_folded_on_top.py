@@ -57,7 +57,7 @@ def red_part(image):
 VIEWS = {
     "whole": {},
     "threshold": {"threshold": (-1.0, 1.0)},
-    "section": {"sections": (Section("plane", (0, 0.5, 0), (0, 1, 0), whole=True),)},
+    "section": {"sections": (Section("plane", (0, 0.5, 0), (0, 1, 0), whole_cells=True),)},
 }
 
 
@@ -78,7 +78,7 @@ def test_inverted_cells_are_seen_in_a_drawing(base, folded):
 
 
 def test_inverted_cells_are_seen_in_the_picture_of_a_section(base, folded):
-    section = Section("plane", (0, 0.5, 0), (0, 1, 0), whole=True)
+    section = Section("plane", (0, 0.5, 0), (0, 1, 0), whole_cells=True)
     pieces = {0: Cutter.of(folded).show(folded.points, section)}
     painted = paint(folded, quality(folded, base), "size-skew", base)
     figure = draw_section([SectionInRun(pieces, painted)], section, SectionStyle())

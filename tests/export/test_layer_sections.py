@@ -91,7 +91,7 @@ def count(plotter, color, within=14):
 
 @pytest.mark.parametrize("whole", [False, True])
 def test_exactly_the_cells_that_are_cut_are_drawn(scene, cube, whole):
-    section = Section("plane", (0.0, 0.0, 0.46), (0.0, 0.0, 1.0), whole=whole)
+    section = Section("plane", (0.0, 0.0, 0.46), (0.0, 0.0, 1.0), whole_cells=whole)
     opened(scene, cube, sections=(section,), color_by="size-skew")
     wanted = crossing(cube, 2, 0.46)
     assert 0 < len(wanted) < len(cube.cells)
@@ -233,7 +233,7 @@ def halved(session):
 
 @pytest.mark.parametrize("whole", [False, True])
 def test_a_range_leaves_its_cells_of_a_section_only(scene, cube, whole):
-    section = replace(MIDDLE, whole=whole)
+    section = replace(MIDDLE, whole_cells=whole)
     session = opened(scene, bent(cube), sections=(section,), color_by="size-skew")
     cut, full = cells_of(scene), scene.sections.drawn["section:0"].polygons
     some, kept = halved(session)
@@ -309,7 +309,7 @@ def test_the_cell_under_the_mouse_is_that_of_the_section(scene, cube):
 
 
 LINE = Section("plane", (0.0, 1.5, 0.0), (0.0, 1.0, 0.0))
-WHOLE = replace(LINE, whole=True)
+WHOLE = replace(LINE, whole_cells=True)
 
 
 def test_in_2d_a_plane_is_a_line_or_the_cells_on_it(scene, square):
@@ -408,7 +408,7 @@ def test_a_first_plane_cuts_the_longest_extent_in_the_middle(square):
     plane = section_cuts.first_section("plane", session)
     assert plane.direction == (1.0, 0.0, 0.0)
     assert plane.shape.position(plane) == 6.0
-    assert plane.whole
+    assert plane.whole_cells
 
 
 def test_a_first_cylinder_has_the_axis_of_the_period(stator):
@@ -493,7 +493,7 @@ def test_a_flat_section_says_what_it_cuts_and_what_is_under_the_mouse(scene, fla
 
 @pytest.mark.parametrize("whole", [False, True])
 def test_a_flat_section_has_the_cells_of_the_range_and_says_so(scene, flat_plotter, cube, whole):
-    section = replace(MIDDLE, whole=whole)
+    section = replace(MIDDLE, whole_cells=whole)
     session = opened(scene, bent(cube), sections=(section,), color_by="size-skew")
     flat = FlatScene(flat_plotter, scene.sections.cuts)
     flat.update(session, section)
@@ -661,7 +661,7 @@ def test_the_picture_of_a_section_has_the_cells_of_the_range(cube, tmp_path, mon
 def test_sections_of_a_drawing_have_the_cells_of_the_range(square, whole):
     session = open_mesh(StepFrame(square, quality(square)), None)
     session = changes.set_view(
-        session, color_by="size-skew", sections=(replace(LINE, whole=whole),)
+        session, color_by="size-skew", sections=(replace(LINE, whole_cells=whole),)
     )
 
     def colored():

@@ -83,7 +83,7 @@ def test_a_plane_is_added_moved_shown_whole_and_removed_and_each_drag_undone_as_
         Qt.MouseButton.LeftButton,
         pos=QPoint(8, panel.editor.whole.height() // 2),
     )
-    assert sections(window)[0].whole
+    assert sections(window)[0].whole_cells
     driver.click(panel.remove)
     assert sections(window) == ()
     assert "section:0" not in window.scene.plotter.actors
@@ -467,7 +467,7 @@ def test_another_mesh_and_a_closed_window_have_no_handle_and_no_flat_view(
     assert panel.add["plane"].text() == "Line"
     assert panel.add["cylinder"].text() == "Circle"
     driver.click(panel.add["plane"])
-    assert sections(window)[0].whole
+    assert sections(window)[0].whole_cells
     assert panel.list.item(0).text() == sections(window)[0].describe(2)
     assert window.scene.sections.drawn["section:0"].shown.shape.n_cells > 0
     answers("ask_unsaved", "discard")

@@ -21,7 +21,7 @@ class Ears:
         runner.cancelled.connect(lambda: self.end("cancelled", None))
         runner.failed.connect(lambda error: self.end("failed", error))
         runner.progressed.connect(self.doing.append)
-        runner.kept.connect(self.kept.extend)
+        runner.yielded.connect(self.kept.extend)
 
     def end(self, *what):
         self.ends.append(what)
@@ -43,7 +43,7 @@ def test_a_job_ends_with_finished_in_the_windows_thread(runner, qtbot):
 
 def test_every_kept_item_is_delivered_before_the_end_and_only_the_newest_news(runner, qtbot):
     ears, order = Ears(runner), []
-    runner.kept.connect(lambda items: order.append(len(items)))
+    runner.yielded.connect(lambda items: order.append(len(items)))
     runner.finished.connect(lambda _: order.append("end"))
 
     def job(report, stopped):

@@ -239,7 +239,7 @@ def test_the_picture_of_a_cut_is_the_curve(mesh):
 
 
 def test_the_picture_of_whole_cells_has_the_others_faintly_around_them(mesh):
-    whole = Section("plane", (0.0, 0.45, 0.0), (0.0, 1.0, 0.0), whole=True)
+    whole = Section("plane", (0.0, 0.45, 0.0), (0.0, 1.0, 0.0), whole_cells=True)
     figure = picture(mesh, whole)
     axes = figure.axes[0]
     faint, line, cells = axes.collections
@@ -279,7 +279,7 @@ def test_what_is_shown_around_a_cut_stays_on_the_mesh():
 
 def test_very_many_cells_are_an_area_without_lines(mesh, monkeypatch):
     monkeypatch.setattr(plot_cells, "MOST_EDGED", 10)
-    whole = Section("plane", (0.0, 0.45, 0.0), (0.0, 1.0, 0.0), whole=True)
+    whole = Section("plane", (0.0, 0.45, 0.0), (0.0, 1.0, 0.0), whole_cells=True)
     faint = picture(mesh, whole).axes[0].collections[0]
     assert faint.get_rasterized()
     assert np.allclose(faint.get_edgecolor(), faint.get_facecolor())

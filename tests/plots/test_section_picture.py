@@ -240,7 +240,7 @@ def test_thin_cells_have_thin_lines_and_lines_can_be_left_out():
 
 def test_in_space_the_nearest_polygon_is_last_and_axes_are_named():
     mesh = passage()
-    section = Section("cylinder", radius=0.7, whole=True)
+    section = Section("cylinder", radius=0.7, whole_cells=True)
     figure, shapes, _ = drawn(mesh, section, in_space=True)
     assert {"x", "y", "z"} <= set(words_of(figure))
     seen = in_space([Cutter.of(mesh).show(mesh.points, section)], section)
@@ -252,7 +252,7 @@ def test_in_space_the_nearest_polygon_is_last_and_axes_are_named():
 
 def test_a_2d_mesh_is_drawn_in_its_plane():
     mesh = square(6, block=False)
-    section = Section("plane", (0, 0.4, 0), (0, 1, 0), whole=True)
+    section = Section("plane", (0, 0.4, 0), (0, 1, 0), whole_cells=True)
     figure, shapes, _ = drawn(mesh, section)
     assert (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()) == ("x", "y")
     assert isinstance(shapes, PolyCollection)

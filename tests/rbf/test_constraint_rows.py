@@ -165,7 +165,7 @@ def test_a_factor_that_grows_is_the_factor_of_all(n, m, coincident_pairs, seed):
     full = matrix(Basis(2.5), (np.ascontiguousarray(x.T), None))
     first = extend(NOTHING, full[:n, :n])
     grown, whole = extend(first, full[n:]), factorise(full)
-    np.testing.assert_array_equal(grown.kept, whole.kept)
+    np.testing.assert_array_equal(grown.retained, whole.retained)
     np.testing.assert_array_equal(grown.dropped, whole.dropped)
     np.testing.assert_allclose(grown.lower, whole.lower, atol=1e-9)
     np.testing.assert_array_equal(np.triu(grown.lower, 1), 0.0)
@@ -177,8 +177,8 @@ def test_rows_left_out_before_stay_out():
     full = matrix(Basis(2.5), (np.ascontiguousarray(x.T), None))
     grown = extend(extend(NOTHING, full[:6, :6]), full[6:])
     np.testing.assert_array_equal(grown.dropped, [4, 9])
-    np.testing.assert_array_equal(grown.kept, [0, 1, 2, 3, 5, 6, 7, 8, 10, 11])
-    part = full[np.ix_(grown.kept, grown.kept)]
+    np.testing.assert_array_equal(grown.retained, [0, 1, 2, 3, 5, 6, 7, 8, 10, 11])
+    part = full[np.ix_(grown.retained, grown.retained)]
     np.testing.assert_allclose(grown.lower @ grown.lower.T, part, atol=1e-12)
 
 

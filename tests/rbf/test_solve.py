@@ -38,7 +38,7 @@ def test_coincident_nodes_are_left_out_and_told():
     factor = factorise(system(x))
     assert len(factor.dropped) == 2
     assert set(factor.dropped) < {3, 7, 15}
-    assert sorted([*factor.kept, *factor.dropped]) == list(range(20))
+    assert sorted([*factor.retained, *factor.dropped]) == list(range(20))
     weights = factor.solve(np.ones((20, 1)))
     assert not weights[factor.dropped].any()
     # The others are met, and so are the twins.
@@ -52,7 +52,7 @@ def test_what_is_left_out_has_a_pivot_below_the_guard():
     full = system(x)
     factor = factorise(full)
     assert 0 < len(factor.dropped) < 21
-    kept, dropped = factor.kept, factor.dropped
+    kept, dropped = factor.retained, factor.dropped
     inner = np.linalg.lstsq(full[np.ix_(kept, kept)], full[np.ix_(kept, dropped)], rcond=None)[0]
     pivots = 1.0 - np.einsum("kd,kd->d", full[np.ix_(kept, dropped)], inner)
     assert np.all(np.abs(pivots) < 30 * PIVOT_GUARD)
@@ -63,7 +63,7 @@ def test_the_factor_is_a_factor():
     x[5] = x[9]
     full = system(x)
     factor = factorise(full)
-    kept = np.ix_(factor.kept, factor.kept)
+    kept = np.ix_(factor.retained, factor.retained)
     np.testing.assert_allclose(factor.lower @ factor.lower.T, full[kept], atol=1e-12)
     np.testing.assert_array_equal(np.triu(factor.lower, 1), 0.0)
 

@@ -42,7 +42,7 @@ def test_the_middle_of_a_sector_is_in_it_wherever_it_lies(start):
 def test_a_whole_ring_has_two_circles():
     mesh = grid((3, 24, 4), wrap=1, place=ring((3, 24, 4), 0.5, 1.0, 360.0))
     patch = patch_in(CUT, mesh, Cuts())
-    assert patch.whole
+    assert patch.is_full_ring
     low, high = frame_of(CUT, patch)
     assert low[0] == pytest.approx(low[-1])
     assert high[0] == pytest.approx(high[-1])

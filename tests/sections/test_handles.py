@@ -8,7 +8,7 @@ from slideviz.sections.line import along, box_around, line_ends, trace
 from slideviz.sections.model import Section
 
 BOX = np.array([0.0, 0.0]), np.array([4.0, 2.0])
-LINE = Section("plane", (1.0, 0.5, 0.0), (1.0, 0.0, 0.0), whole=True)
+LINE = Section("plane", (1.0, 0.5, 0.0), (1.0, 0.0, 0.0), whole_cells=True)
 SLOPE = Section("plane", (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0))
 RING = Section("cylinder", (2.0, 1.0, 0.0), radius=0.5)
 
@@ -89,7 +89,7 @@ def test_a_line_moves_by_its_middle_and_across_itself_by_the_rest():
     moved = dragged(LINE, "line", way, BOX)
     assert moved.origin == pytest.approx((1.5, 0.5, 0.0))
     assert moved.direction == LINE.direction
-    assert moved.whole
+    assert moved.whole_cells
 
 
 def test_a_line_turns_about_its_middle():

@@ -182,7 +182,7 @@ def test_a_plane_cuts_a_2d_mesh_in_lines():
     ends = found.points[found.connectivity].reshape(-1, 2, 3)
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(1.0)
     assert found.cell_ids.tolist() == cut_cells(mesh, section)
-    whole = Cutter.of(mesh).show(mesh.points, replace(section, whole=True))
+    whole = Cutter.of(mesh).show(mesh.points, replace(section, whole_cells=True))
     assert whole.cells.tolist() == cut_cells(mesh, section)
     assert set(whole.sizes) <= {3, 4}
 
@@ -200,7 +200,7 @@ def test_a_cylinder_cuts_a_2d_mesh_in_a_circle(direction):
     assert 0.98 * 0.6 * np.pi < length < 0.6 * np.pi
     assert found.cell_ids.tolist() == cut_cells(mesh, section)
     assert Cutter.of(mesh).show(
-        mesh.points, replace(section, whole=True)
+        mesh.points, replace(section, whole_cells=True)
     ).cells.tolist() == cut_cells(mesh, section)
 
 
@@ -218,13 +218,13 @@ def test_a_section_beside_the_mesh_cuts_nothing():
     ):
         cutter = Cutter.of(mesh)
         assert len(cutter.cut(mesh.points, section)) == 0
-        assert len(cutter.show(mesh.points, replace(section, whole=True))) == 0
+        assert len(cutter.show(mesh.points, replace(section, whole_cells=True))) == 0
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_whole_cells_have_a_closed_surface_that_looks_outwards(kind):
     mesh = shaken(cube(5, kind, block=False), part=0.1)
-    section = Section("plane", (0.5, 0.5, 0.5), (1, 2, 3), whole=True)
+    section = Section("plane", (0.5, 0.5, 0.5), (1, 2, 3), whole_cells=True)
     cutter = Cutter.of(mesh)
     found = cutter.show(mesh.points, section)
     ids = cutter.which_cells(mesh.points, section)

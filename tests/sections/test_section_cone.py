@@ -314,7 +314,7 @@ def test_in_2d_it_says_what_it_needs():
 @pytest.mark.parametrize("in_space", [False, True])
 def test_it_is_drawn(tmp_path, whole, in_space):
     mesh = sector(200.0)
-    section = Section("cone", APEX, half_angle_deg=ANGLE, whole=whole)
+    section = Section("cone", APEX, half_angle_deg=ANGLE, whole_cells=whole)
     painted = paint(mesh, quality(mesh), "skew")
     pieces = {0: Cutter.of(mesh).show(mesh.points, section)}
     style = SectionStyle(size=(400, 300), in_space=in_space)

@@ -102,7 +102,7 @@ def test_the_sign_of_an_axis_does_not_matter():
 
 def test_whole_cells_keep_their_distance_from_the_cylinder():
     mesh = passage()
-    section = Section("cylinder", radius=0.7, whole=True)
+    section = Section("cylinder", radius=0.7, whole_cells=True)
     cut = Cutter.of(mesh).show(mesh.points, section)
     flat = flatten(cut, section)
     radii = np.unique(np.hypot(cut.points[:, 0], cut.points[:, 1]).round(9))

@@ -104,7 +104,7 @@ def test_sections_that_the_period_keeps():
     [
         Section("cylinder", radius=0.71),
         Section("plane", (0.6, 0.3, 0), (1, 0.2, 0)),
-        Section("plane", (0.6, 0.3, 0), (1, 0.2, 0), whole=True),
+        Section("plane", (0.6, 0.3, 0), (1, 0.2, 0), whole_cells=True),
     ],
 )
 def test_one_section_cuts_all_passages(section):
@@ -116,5 +116,5 @@ def test_one_section_cuts_all_passages(section):
     for number, matrix in passages(match(mesh, "per1", "per2"), 2).items():
         there = mesh.with_points(transformed(mesh.points, matrix))
         assert found[number].cell_ids.tolist() == cut_cells(there, section)
-        if not section.whole:
+        if not section.whole_cells:
             assert np.abs(section.distance(found[number].points)).max(initial=0) < 1e-12

@@ -16,7 +16,7 @@ from slideviz.case.key import MOTION
 from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, require_no_mesh
 from slideviz.case.model import Case
-from slideviz.case.values import YES_NO, real, whole
+from slideviz.case.values import YES_NO, integer, real
 from slideviz.case.words import list_of, number
 from slideviz.design.su2.variables import DesignVariable, misspelt, read_variables, supported
 from slideviz.errors import CaseError, Note, nearest, not_one_of, shown
@@ -38,7 +38,7 @@ READ_ALWAYS = {
     "RBF_GREEDY_TOLERANCE": real(0.0),
     "RBF_GREEDY_CORRECTION_FACTOR": real(0.0),
 }
-READ_WITH_RBF = {"RADIAL_BASIS_FUNCTION_PARAMETER": real(0.0), "DEFORM_NONLINEAR_ITER": whole(1)}
+READ_WITH_RBF = {"RADIAL_BASIS_FUNCTION_PARAMETER": real(0.0), "DEFORM_NONLINEAR_ITER": integer(1)}
 """Kinds of values; of keys that mean something else unless DEFORM_KIND is RBF."""
 FUNCTION = "KIND_RADIAL_BASIS_FUNCTION"
 
@@ -191,7 +191,7 @@ class Su2Config:
     """The keys that are not read."""
     named: dict[str, str]
     """For each marker with a role, the key that lists it."""
-    given: frozenset[str]
+    present: frozenset[str]
     """The keys that it has."""
 
     @property

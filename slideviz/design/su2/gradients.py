@@ -68,7 +68,7 @@ def design_gradients(
 
     def attempt(config: Su2Config) -> tuple[MovingSurface, Mesh]:
         surface = make_surface(config, mesh)
-        if surface.whole or not surface.displacement.any():
+        if surface.moves_whole_mesh or not surface.displacement.any():
             return surface, surface.moved()
         *_, last = deform(surface.case(), mesh, progress)
         return surface, last.mesh
@@ -96,7 +96,7 @@ def find_gradients(
     mesh = surface.mesh
     found = read_sensitivities(surface.config, mesh, surface.nodes)
     displacement = surface.displacement
-    if surface.whole:
+    if surface.moves_whole_mesh:
         matched = match(found, mesh, surface.nodes, lambda: surface.moved().points)
         moved = displacement if matched.at_design else np.zeros_like(displacement)
         warnings = (*surface.case().warnings, *matched.warnings)

@@ -295,7 +295,7 @@ class MovingSurface:
         return vectors
 
     @property
-    def whole(self) -> bool:
+    def moves_whole_mesh(self) -> bool:
         """Return whether all nodes of the mesh move as the variables say (``*_GRID``)."""
         return self.config.variables[0].group == "grid"
 
@@ -318,10 +318,10 @@ class MovingSurface:
             # All boundaries move as a body does, or grow: this kernel has that exactly inside.
             case = case.change(kernel="thin-plate")
         nodes, vectors, warnings = self.nodes, self.displacement, self.warnings
-        if self.whole or not self.config.markers:
+        if self.moves_whole_mesh or not self.config.markers:
             every = dict.fromkeys(self.mesh.marker_names, "moving")
             case = case.change(roles=every, sliding="none", periodic="none")
-        if self.whole:  # the mesh is moved already
+        if self.moves_whole_mesh:  # the mesh is moved already
             listed = [marker.nodes for marker in self.mesh.markers]
             nodes = np.unique(np.concatenate([np.empty(0, np.int64), *listed]))
             vectors = np.zeros((len(nodes), self.mesh.dim))

@@ -90,7 +90,7 @@ KINDS = {
 """SU2's kinds (8.3, and those of 7 that it dropped), by their name in DV_KIND."""
 WITHOUT_VALUE = ("nothing", "boxes", "file", "naca", "parabolic")
 """Groups whose values mean nothing."""
-ALONE = ("naca", "parabolic")
+EXCLUSIVE = ("naca", "parabolic")
 """Groups of which SU2 takes one variable only: it stops, and waits for a key."""
 
 
@@ -291,7 +291,7 @@ def _contradictions(variables: list[DesignVariable]) -> list[str]:
     first = variables[0] if variables else None
     if first is None or len(variables) == 1:
         return []
-    if first.group in ALONE:
+    if first.group in EXCLUSIVE:
         return [f"{first.kind} cannot be combined with others; make two runs"]
     others = {each.kind: None for each in variables if each.group != first.group}
     if first.group == "ffd" and others:

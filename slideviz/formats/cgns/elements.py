@@ -123,7 +123,7 @@ def _section(node: Node, n_points: int) -> tuple[int, Cells]:
 
     ``n_points`` is the number of the zone's vertices.
     """
-    kind = int(node.whole(2)[0])
+    kind = int(node.integers(2)[0])
     name = _NAMES[kind] if 0 <= kind < len(_NAMES) else str(kind)
     if kind not in _TYPES and kind != _MIXED:
         what = "polygons and polyhedra" if name.startswith("N") else "elements of high order"
@@ -131,12 +131,12 @@ def _section(node: Node, n_points: int) -> tuple[int, Cells]:
             f"has {what} ({name}), but slideviz needs linear elements ({', '.join(_VTK)}, MIXED); "
             "export the mesh with these"
         )
-    if (rind := node.child("Rind_t")) is not None and rind.whole(-1).any():
+    if (rind := node.child("Rind_t")) is not None and rind.integers(-1).any():
         raise rind.fault("the section has rind elements, which are not read; export without them")
-    start, end = node.needed("IndexRange_t", "ElementRange").whole(2).tolist()
+    start, end = node.needed("IndexRange_t", "ElementRange").integers(2).tolist()
     if not 1 <= start <= end:
         raise node.fault(f"its ElementRange is {start} to {end}; it must rise from 1 or more")
-    flat = node.needed("DataArray_t", "ElementConnectivity").whole(-1)
+    flat = node.needed("DataArray_t", "ElementConnectivity").integers(-1)
     count = end - start + 1
     if kind == _MIXED:
         types, flat = _mixed(node, flat, count)

@@ -177,10 +177,10 @@ def _blocks_meet(zone: CgnsZone, donor: CgnsZone, node: Node) -> tuple[IntArray,
     if zone.sides is not None or donor.sides is not None:
         raise node.fault("is for structured zones only; export it as GridConnectivity_t")
     dim = zone.dim
-    inside = node.needed("IndexRange_t", "PointRange").whole(2, dim)
-    outside = node.needed("IndexRange_t", "PointRangeDonor").whole(2, dim)
+    inside = node.needed("IndexRange_t", "PointRange").integers(2, dim)
+    outside = node.needed("IndexRange_t", "PointRangeDonor").integers(2, dim)
     given = node.child('"int[IndexDimension]"', "Transform")
-    turn = np.arange(1, dim + 1) if given is None else given.whole(dim)
+    turn = np.arange(1, dim + 1) if given is None else given.integers(dim)
     if sorted(np.abs(turn).tolist()) != list(range(1, dim + 1)):
         raise node.fault(
             f"its Transform is {turn.tolist()}, but must have 1 to {dim} once, each with a sign; "
@@ -212,10 +212,10 @@ def _lists_meet(zone: CgnsZone, donor: CgnsZone, node: Node) -> tuple[IntArray, 
     where = node.word("GridLocation_t", "Vertex", "GridLocation")
     if where != "Vertex":
         return _nearest(
-            zone, facets_of(zone, node), donor, faces_by_number(donor, other, other.whole(-1))
+            zone, facets_of(zone, node), donor, faces_by_number(donor, other, other.integers(-1))
         )
     here = _vertices(zone, node)
-    there = donor.nodes_at(other, other.whole(-1, len(donor.shape)))
+    there = donor.nodes_at(other, other.integers(-1, len(donor.shape)))
     if len(here) != len(there):
         raise other.fault(
             f"has {len(there)} vertices for {len(here)} of {zone.node.name}; an interface of type "
@@ -228,9 +228,9 @@ def _vertices(zone: CgnsZone, node: Node) -> IntArray:
     """Return the vertices (m,) of an interface in its zone, in the order of its list or range."""
     given = node.child("IndexArray_t", "PointList")
     if given is not None:
-        return zone.nodes_at(given, given.whole(-1, len(zone.shape)))
+        return zone.nodes_at(given, given.integers(-1, len(zone.shape)))
     area = node.needed("IndexRange_t", "PointRange")
-    low, high = np.sort(area.whole(2, len(zone.shape)), axis=0)
+    low, high = np.sort(area.integers(2, len(zone.shape)), axis=0)
     zone.nodes_at(area, np.stack((low, high)))
     return grid_nodes([np.arange(a - 1, b) for a, b in zip(low, high, strict=True)], zone.shape)
 

@@ -57,7 +57,7 @@ def read_cgns(path: Path) -> Mesh:
     with cgns_file(path) as root:
         require_own_folder(path)
         base = _base(root)
-        dim, physical = base.whole(2).tolist()
+        dim, physical = base.integers(2).tolist()
         if dim not in (2, 3) or not dim <= physical <= 3:
             raise base.fault(
                 f"has cells of dimension {dim} and {physical} coordinates; expected 2 or 3, and "

@@ -166,7 +166,7 @@ class Node:
             )
         return _words(data.tobytes() if data.dtype.kind == "S" else data.astype("u1").tobytes())
 
-    def whole(self, *shape: int) -> IntArray:
+    def integers(self, *shape: int) -> IntArray:
         """Return its value as integers, reshaped to ``shape``; -1 in it is any length.
 
         Raises

@@ -84,7 +84,7 @@ def read_zone(node: Node, dim: int, physical: int) -> CgnsZone:
         raise node.fault(
             f"its ZoneType is {kind!r}; it must be Structured or Unstructured: export it again"
         )
-    sizes = node.whole(3, -1)[0]
+    sizes = node.integers(3, -1)[0]
     shape = tuple(sizes.tolist())
     if len(shape) != (dim if kind == "Structured" else 1) or min(shape) < 2:
         raise node.fault(
@@ -111,7 +111,7 @@ def _points(zone: Node, shape: tuple[int, ...], count: int) -> tuple[FloatArray,
     Raises MeshError if a coordinate is missing, is of another type or shape, or is not finite.
     """
     grid = zone.needed("GridCoordinates_t", "GridCoordinates")
-    if (rind := grid.child("Rind_t")) is not None and rind.whole(-1).any():
+    if (rind := grid.child("Rind_t")) is not None and rind.integers(-1).any():
         raise rind.fault(
             "the coordinates have rind planes (copies of neighbours), which are not read; export "
             "the mesh without them"
@@ -160,7 +160,7 @@ def region_of(zone: CgnsZone, node: Node) -> Cells | IntArray:
     named = {one.name: one for one in found}
     elements = named.get("ElementRange", named.get("ElementList"))
     if elements is not None:
-        return faces_by_number(zone, elements, elements.whole(-1))
+        return faces_by_number(zone, elements, elements.integers(-1))
     given = named.get("PointRange", named.get("PointList"))
     if given is None:
         raise node.fault(
@@ -176,8 +176,8 @@ def region_of(zone: CgnsZone, node: Node) -> Cells | IntArray:
             "the mesh with one of them"
         )
     if zone.sides is not None and where != _BY_NODES:
-        return faces_by_number(zone, given, given.whole(-1))
-    indices = given.whole(-1, len(zone.shape))
+        return faces_by_number(zone, given, given.integers(-1))
+    indices = given.integers(-1, len(zone.shape))
     if given.name == "PointList":
         if where == _BY_NODES:
             return np.unique(zone.nodes_at(given, indices))
@@ -214,7 +214,7 @@ def faces_by_number(zone: CgnsZone, node: Node, numbers: IntArray) -> Cells:
             "names elements, which a structured zone does not have; export it with PointRange"
         )
     if node.name.endswith("Range"):
-        low, high = np.sort(node.whole(2)).tolist()
+        low, high = np.sort(node.integers(2)).tolist()
         have = zone.sides.numbers
         numbers = have[(have >= low) & (have <= high)]
         missing = [] if len(numbers) == high - low + 1 else [f"all of {low} to {high}"]

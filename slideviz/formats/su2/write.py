@@ -85,7 +85,7 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
     yield from (raw[a:b] for a, b in _ranges(0, begin))
     yield from _whole_zone(mesh)
     yield from _markers(mesh.markers, len(document.sends))
-    kept = (_whole(raw[a:b]) for a, b in (*document.sends, *document.unknown))
+    kept = (_with_line_break(raw[a:b]) for a, b in (*document.sends, *document.unknown))
     yield from (text for text in kept if boxes is None or not is_ffd(text))
     yield boxes or b""
     yield from (raw[a:b] for a, b in _ranges(end, raw.size))
@@ -324,6 +324,6 @@ def _cell_rows(cells: CellsOf, numbered: bool, block: tuple[int, int]) -> bytes:
     return out[:size].tobytes()
 
 
-def _whole(text: bytes) -> bytes:
+def _with_line_break(text: bytes) -> bytes:
     """Return the text of a section with a line break at its end."""
     return text if text.endswith(b"\n") else text + b"\n"

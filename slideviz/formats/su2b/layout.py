@@ -109,7 +109,7 @@ class BinaryFile:
         self.width, sign = MAGIC[head[:_INT]]
         self.order: Literal["<", ">"] = "<" if sign == "<" else ">"
         """The byte order."""
-        self.zones = self.whole(_INT, "the number of zones")
+        self.zones = self.integer(_INT, "the number of zones")
         """Number of zones by its head."""
         if self.zones < 1:
             raise self.error(_INT, f"the number of zones is {self.zones}, but at least 1 is needed")
@@ -178,7 +178,7 @@ class BinaryFile:
         """Return the bytes ``begin`` to ``end - 1``."""
         return self.array(begin, end - begin, np.uint8, "the zones").tobytes()
 
-    def whole(self, at: int, what: str) -> int:
+    def integer(self, at: int, what: str) -> int:
         """Return the integer of four bytes at byte ``at``."""
         return int(self.array(at, 1, f"{self.order}i4", what)[0])
 
@@ -236,12 +236,12 @@ def open_zone(path: Path, number: int | None) -> Iterator[tuple[BinaryFile, Zone
 
 def _zone(source: BinaryFile, begin: int, number: int) -> ZonePlace:
     """Return where zone ``number`` is, which begins at byte ``begin``; raise as `find_zones`."""
-    given = source.whole(begin, f"the number of zone {number}")
+    given = source.integer(begin, f"the number of zone {number}")
     if given != number:
         raise source.error(
             begin, f"zone {number} has the number {given}; zones are numbered from 1, so correct it"
         )
-    dim = source.whole(begin + _INT, "the dimension")
+    dim = source.integer(begin + _INT, "the dimension")
     if dim not in (2, 3):
         raise source.error(begin + _INT, f"the dimension is {dim}, but must be 2 or 3; correct it")
     cells = _elements(source, begin + 2 * _INT, "elements", dim + 3, numbered=True)
@@ -249,7 +249,7 @@ def _zone(source: BinaryFile, begin: int, number: int) -> ZonePlace:
     n_points = source.count(at, "the number of points")
     points = at + source.width
     at = source.require(points, n_points, source.point(dim).itemsize, "the points")
-    count = source.whole(at, "the number of markers")
+    count = source.integer(at, "the number of markers")
     if count < 0:
         raise source.error(at, f"the number of markers is {count}, but must not be negative")
     at += _INT

@@ -62,7 +62,7 @@ class DesignsJob(QObject):
         self.runner = JobRunner(self)
         self._timer = single_shot(self, self._flush, ROWS_MS)
         self.runner.progressed.connect(self._progressed)
-        self.runner.kept.connect(self._rows_done)
+        self.runner.yielded.connect(self._rows_done)
         self.runner.finished.connect(lambda _: self._end(""))
         self.runner.cancelled.connect(lambda: self._end("Stopped; the results are kept."))
         self.runner.failed.connect(lambda error: self._end(str(error), wrong=True))

@@ -77,7 +77,7 @@ class SectionEditor(QWidget):
         self.number.setFixedWidth(84)
         self.number.changed.connect(self._position_typed)
         tip = "Show the cells it cuts whole, instead of cut."
-        self.whole = check_box("Whole cells", tip, lambda on: self._emit_changed(whole=on))
+        self.whole = check_box("Whole cells", tip, lambda on: self._emit_changed(whole_cells=on))
 
     def _place_fields(self) -> None:
         form = QFormLayout(self)
@@ -134,7 +134,7 @@ class SectionEditor(QWidget):
         ):
             self.form.setRowVisible(widget, shown)
         with QSignalBlocker(self.whole):
-            self.whole.setChecked(section.whole)
+            self.whole.setChecked(section.whole_cells)
         self._sync_axes(flat)
         self._sync_place(section)
 

@@ -118,7 +118,7 @@ class JobRunner(QObject):
     -------
     progressed(Doing)
         The newest progress that the job reported.
-    kept(list)
+    yielded(list)
         All other items reported since the last emission, in order.
     finished(object), cancelled(), failed(Exception)
         The job returned a value; raised `Cancelled`; raised another error. Exactly one is emitted
@@ -126,7 +126,7 @@ class JobRunner(QObject):
     """
 
     progressed = Signal(object)
-    kept = Signal(list)
+    yielded = Signal(list)
     finished = Signal(object)
     cancelled = Signal()
     failed = Signal(object)
@@ -216,7 +216,7 @@ class JobRunner(QObject):
             self._delivered_s = time.monotonic()
             self.progressed.emit(news)
         if items:
-            self.kept.emit(items)
+            self.yielded.emit(items)
         if end is None:
             return
         self.busy = False

@@ -65,7 +65,7 @@ class Notice(Protocol):
 class ErrorReporter(QObject):
     """Receives the unexpected errors of a window: shows each once in its banner, then counts it."""
 
-    _came = Signal(object)
+    _reported = Signal(object)
 
     def __init__(
         self,
@@ -81,12 +81,12 @@ class ErrorReporter(QObject):
         self._known: dict[tuple[object, ...], tuple[int, float]] = {}
         self._shown: tuple[object, ...] = ()
         self._timer = single_shot(self, self._count_again, COUNTING_MS)
-        self._came.connect(self._take)
+        self._reported.connect(self._take)
 
     def show(self, error: BaseException) -> None:
         """Show an error, from any thread."""
         with contextlib.suppress(RuntimeError):  # the window may be gone
-            self._came.emit(error)
+            self._reported.emit(error)
 
     def _take(self, error: BaseException) -> None:
         self.count += 1
