@@ -213,8 +213,8 @@ class Opened:
     """The result of `open_file`: the session, and the boundaries ready to be drawn.
 
     ``has_view`` is whether the case file has a view, ``camera`` the camera in it. ``ghosts`` are
-    the moved boundaries, their displacement files read; ``coarse`` the boundaries of a large mesh with
-    fewer facets.
+    the moved boundaries, their displacement files read; ``coarse`` the boundaries of a large mesh
+    with fewer facets.
     """
 
     session: Session
