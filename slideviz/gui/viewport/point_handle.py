@@ -233,6 +233,9 @@ class InPlaneHandle(PointHandle[tuple[Section, Box]]):
     Places are in the mesh's plane, in its length unit.
     """
 
+    _in_view: tuple[tuple[object, ...], HandleParts | None] = (), None
+    """The parts in the visible part of the plane, after what they depend on."""
+
     def seen_box(self) -> Box:
         """Return the lower and upper corner of the part of the mesh's plane that the view shows.
 
@@ -248,7 +251,13 @@ class InPlaneHandle(PointHandle[tuple[Section, Box]]):
 
     def in_view(self) -> HandleParts | None:
         """Return the parts in the visible part of the plane, where the mouse can reach them."""
-        return None if self.section is None else handle_parts(self.section, self.seen_box())
+        if self.section is None:
+            return None
+        seen = self.seen_box()
+        key = (self.section, *seen[0], *seen[1])
+        if key != self._in_view[0]:
+            self._in_view = key, handle_parts(self.section, seen)
+        return self._in_view[1]
 
     def parts(self) -> list[tuple[Part, FloatArray]]:
         """Return the ends, the middle and the curve in pixels."""
@@ -292,6 +301,8 @@ class AxisHandle(PointHandle[tuple[Section, PlaceOnSection]]):
 
     _patch: Patch | None = None
     _drawn: pv.PolyData | None = None
+    _arrow: FloatArray = np.array([0.0, 1.0])
+    """The direction of the arrow, found with the ball's place."""
 
     def show(self, section: Section, scheme: ColorScheme, mesh: Mesh, deformed: Mesh) -> None:
         """Show the handle of a section, its frame around the patch that is cut of the mesh."""
@@ -327,19 +338,17 @@ class AxisHandle(PointHandle[tuple[Section, PlaceOnSection]]):
         angle, along = places[int(np.argmin(np.where(within, off, np.inf)))].tolist()
         return angle, along
 
-    def _ball(self) -> tuple[FloatArray, FloatArray]:
-        """Return the ball's pixel and how it moves with the section's size, (2,) each."""
-        assert self.section is not None
-        return pixel_and_slope(self.pixels_of, self.section, self.place, self.section.size)[:2]
-
     def parts(self) -> list[tuple[Part, FloatArray]]:
         """Return the ball, as the handle's middle."""
-        return [("middle", self._ball()[0][None])]
+        assert self.section is not None
+        size, place = self.section.size, self.place
+        at, slope, _ = pixel_and_slope(self.pixels_of, self.section, place, size)
+        self._arrow = slope / np.linalg.norm(slope)
+        return [("middle", at[None])]
 
     def arrow(self) -> FloatArray:
         """Return the unit vector in which the ball moves if the section grows."""
-        slope = self._ball()[1]
-        return slope / np.linalg.norm(slope)
+        return self._arrow
 
     def place_of(self, where: QPoint) -> FloatArray:
         """Return a position in the widget, (2,), in pixels from the lower left."""
