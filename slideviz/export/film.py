@@ -30,7 +30,7 @@ from slideviz.export.titles import (
 )
 from slideviz.mesh.quality import Quality, quality
 from slideviz.scene.overview import Zoom
-from slideviz.session.pieces import GoingOn, InThread, not_cancelled, run_inline
+from slideviz.session.pieces import CheckCancelled, InThread, not_cancelled, run_inline
 from slideviz.session.state import Session, StepFrame
 
 SIZES = {".mp4": (1280, 800), ".gif": (800, 500), ".png": (1600, 1000)}
@@ -346,7 +346,7 @@ def require_steps(
 
 
 def film_frame_at(
-    frames: Sequence[StepFrame], position: float, going_on: GoingOn = not_cancelled
+    frames: Sequence[StepFrame], position: float, going_on: CheckCancelled = not_cancelled
 ) -> FilmFrame:
     """Return the frame at a position in a run: a step, or a mesh between two steps.
 
@@ -361,7 +361,7 @@ def film_frame_at(
 
 
 def _blend(
-    start: StepFrame, end: StepFrame, part: float, first: StepFrame, going_on: GoingOn
+    start: StepFrame, end: StepFrame, part: float, first: StepFrame, going_on: CheckCancelled
 ) -> StepFrame:
     """Return a frame interpolated between two, with its own quality; ``part`` is 0 to 1.
 

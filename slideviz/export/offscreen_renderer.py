@@ -33,7 +33,7 @@ from slideviz.scene.overview import Overview, Zoom, lengths
 from slideviz.session.changes import show_frame
 from slideviz.session.opening import session_of_runs
 from slideviz.session.panes import shown_views
-from slideviz.session.pieces import appearing, run_to_end
+from slideviz.session.pieces import render_in_groups, run_to_end
 from slideviz.session.state import Run, Session, StepFrame
 from slideviz.system.atomic import atomic_write
 
@@ -111,7 +111,7 @@ class OffscreenRenderer:
         if self.like is not None:
             self._scene.set_motion_ghosts(self.like.motion_ghosts)
         if overview is None:  # in the window, which must stay responsive
-            yield from appearing(self._plotter)
+            yield from render_in_groups(self._plotter)
 
     def __enter__(self) -> OffscreenRenderer:
         return self

@@ -16,7 +16,7 @@ from slideviz.scene import actors
 from slideviz.scene.actors import VALUES, draw_in_front, part_shape
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
-from slideviz.session.inspect import middles, nodes_of
+from slideviz.session.inspect import cell_centers, nodes_of
 from slideviz.session.state import Session, StepFrame
 
 OUTLINE, FACES, DOT = "mark:outline", "mark:faces", "mark:dot"
@@ -157,7 +157,7 @@ class InvertedLayer(Layer):
         if not len(cells):
             return  # a mesh in its file has few of them in memory, or none
         self._shape = pv.PolyData(
-            lifted(middles(in_memory.mesh, cells), 4.0 * self.stage.lift(in_memory.mesh))
+            lifted(cell_centers(in_memory.mesh, cells), 4.0 * self.stage.lift(in_memory.mesh))
         )
         actor = self.stage.add(self._shape, NAME, lighting=False, pickable=False)
         size = next(size for least, size in reversed(SIZES) if len(cells) >= least)

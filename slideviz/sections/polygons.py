@@ -92,7 +92,7 @@ class Polygons:
     def take(self, order: IntArray) -> Polygons:
         """Return the polygons with the numbers ``order`` (t,), in that order; all points stay."""
         sizes = self.sizes[order]
-        corners = self.connectivity[np.repeat(self.offsets[order], sizes) + _ramps(sizes)]
+        corners = self.connectivity[np.repeat(self.offsets[order], sizes) + _ranges(sizes)]
         return Polygons(self.points, offsets_of(sizes), corners, self.cells[order])
 
     def with_last(self, chosen: np.ndarray) -> Polygons:
@@ -122,6 +122,6 @@ def offsets_of(sizes: IntArray) -> IntArray:
     return np.concatenate([[0], np.cumsum(sizes)])
 
 
-def _ramps(sizes: IntArray) -> IntArray:
+def _ranges(sizes: IntArray) -> IntArray:
     """Return 0, 1, ... size - 1 for every size in ``sizes`` (q,), one after the other."""
     return np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)

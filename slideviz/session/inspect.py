@@ -99,7 +99,7 @@ def worst_cells(
         cells,
         values[cells],
         frame.quality.status[cells] == INVERTED,
-        middles(frame.mesh, cells),
+        cell_centers(frame.mesh, cells),
         history.argmin(axis=0),
         tuple(ELEMENTS[int(vtk)].name for vtk in types),
         what,
@@ -121,7 +121,7 @@ def _listed(frame: StepFrame, extra: StepFrame, at: int, count: int) -> WorstCel
         np.where(drawn, at_own, len(frame.mesh.cells) + cells),
         values,
         extra.quality.status[cells] == INVERTED,
-        middles(extra.mesh, cells),
+        cell_centers(extra.mesh, cells),
         np.where(before <= values, 0, at),
         tuple(ELEMENTS[int(vtk)].name for vtk in extra.mesh.cells.types[cells]),
         "size-skew",
@@ -129,7 +129,7 @@ def _listed(frame: StepFrame, extra: StepFrame, at: int, count: int) -> WorstCel
     )
 
 
-def middles(mesh: Mesh, cells: IntArray) -> FloatArray:
+def cell_centers(mesh: Mesh, cells: IntArray) -> FloatArray:
     """Return the mean (k, d) of the nodes of each of ``cells`` (k,)."""
     return np.array([mesh.points[nodes_of(mesh, int(cell))].mean(axis=0) for cell in cells])
 

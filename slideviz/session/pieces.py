@@ -12,7 +12,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-GoingOn = Callable[[], None]
+CheckCancelled = Callable[[], None]
 """A function that is called often, and raises `slideviz.errors.Cancelled` to end the work."""
 Result = TypeVar("Result")
 
@@ -24,7 +24,7 @@ PART_CELLS = 10_000
 class InThread:
     """Work that draws nothing: who pulls the generator runs ``call`` and sends its result back."""
 
-    call: Callable[[GoingOn], Any]
+    call: Callable[[CheckCancelled], Any]
 
 
 def run_inline(pieces: Generator[object, Any, Result]) -> Generator[object, None, Result]:
@@ -63,7 +63,7 @@ def run_to_end(pieces: Generator[object, Any, Result]) -> Result:
             return value
 
 
-def portions(actors: Iterable[Any], cells: int = PART_CELLS) -> list[list[Any]]:
+def actor_groups(actors: Iterable[Any], cells: int = PART_CELLS) -> list[list[Any]]:
     """Return the visible actors in groups of at most ``cells`` faces, or of one larger actor."""
     parts: list[list[Any]] = [[]]
     count = 0
@@ -79,12 +79,12 @@ def portions(actors: Iterable[Any], cells: int = PART_CELLS) -> list[list[Any]]:
     return parts
 
 
-def appearing(plotter: Any) -> Iterator[None]:
+def render_in_groups(plotter: Any) -> Iterator[None]:
     """Render the actors of an off-screen plotter for the first time, group by group.
 
     Yields after each group, since sending a large mesh to the graphics card takes long.
     """
-    parts = portions(plotter.renderer.actors.values())
+    parts = actor_groups(plotter.renderer.actors.values())
     hidden = [actor for part in parts[1:] for actor in part]
     try:
         _show(hidden, False)
@@ -108,4 +108,4 @@ def _faces(actor: Any) -> int:
 
 
 def not_cancelled() -> None:
-    """Do nothing: the `GoingOn` of work that cannot be stopped."""
+    """Do nothing: the `CheckCancelled` of work that cannot be stopped."""

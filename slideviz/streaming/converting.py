@@ -23,7 +23,7 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray
 from slideviz.streaming.resources import require_disk_space, text_size
 from slideviz.streaming.skin import index_of, read_skin
 from slideviz.streaming.source import FileSource, Scratch
-from slideviz.streaming.stream_input import part_of
+from slideviz.streaming.stream_input import progress_share
 from slideviz.system.atomic import atomic_write
 from slideviz.system.threads import Tick
 from slideviz.terms import FileFormat
@@ -135,7 +135,7 @@ def convert_streamed(
 
 
 def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tick) -> None:
-    texts = [find_text(source, zone, part_of(tick, 0.0, 0.1))]
+    texts = [find_text(source, zone, progress_share(tick, 0.0, 0.1))]
     zones = texts[0].zone.bounds.zones
     if zone is None:
         texts += [find_text(source, number) for number in range(2, zones + 1)]
@@ -152,7 +152,9 @@ def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: T
     with atomic_write(target) as file:
         os.truncate(file.fileno(), layouts[-1].size)
         for k, layout in enumerate(layouts):
-            share = part_of(tick, 0.1 + 0.9 * k / len(layouts), 0.1 + 0.9 * (k + 1) / len(layouts))
+            share = progress_share(
+                tick, 0.1 + 0.9 * k / len(layouts), 0.1 + 0.9 * (k + 1) / len(layouts)
+            )
             write_layout(layout, Path(file.name), share)
         for block in file_head(len(layouts)):
             file.write(block)
@@ -185,7 +187,7 @@ def _to_text(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tic
         more = PLACE * max(place.cells.count for place in places)
         require_disk_space(target, target, sum(sizes) + more)
         for place in places:  # finds every mistake in the file, as reading it whole would
-            read_skin(source, place.number, part_of(tick, 0.0, 0.3))
+            read_skin(source, place.number, progress_share(tick, 0.0, 0.3))
         written = 0
         with atomic_write(target) as out:
             for block in _text_blocks(binary, places, Path(os.path.realpath(target)).parent):

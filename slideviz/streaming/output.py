@@ -102,7 +102,7 @@ class Output:
         """Take the parts as not done from the first one on whose bytes do not have its checksum."""
         done = parts(self.source.n_points)[: partial.done]
         arguments = self._mesh_file, self._zone, partial.path
-        with self._ranks.sharing(checking, *arguments) as do:
+        with self._ranks.sharing(checksum_reader, *arguments) as do:
             for k, found in enumerate(do(done)):
                 if found != partial.sums[k]:
                     partial.note(partial.sums[:k])
@@ -135,7 +135,10 @@ class Output:
         # Ranks must see what others write, and none write a page back with old bytes of others.
         synced = final or self._ranks.size > 1
         arguments = self._mesh_file, self._zone, partial.path, displacer.without_cells(), synced
-        with self._timer.phase("evaluate") as tick, self._ranks.sharing(moving, *arguments) as do:
+        with (
+            self._timer.phase("evaluate") as tick,
+            self._ranks.sharing(point_writer, *arguments) as do,
+        ):
             todo = parts(total, partial.done)
             for (_, end), checksum in zip(todo, do(todo), strict=True):
                 if final:
@@ -156,7 +159,10 @@ class Output:
             self._collector = RunCollector(self._stack, folder, count, metric)
         self._collector.reset()
         arguments = self._mesh_file, self._zone, partial.path, metric, listed
-        with self._timer.phase("quality") as tick, self._ranks.sharing(measuring, *arguments) as do:
+        with (
+            self._timer.phase("quality") as tick,
+            self._ranks.sharing(cell_measurer, *arguments) as do,
+        ):
             for (_, end), found in zip(parts(count), do(parts(count)), strict=True):
                 self._collector.add(found, listed)
                 tick(end / count)
@@ -198,10 +204,10 @@ def parts(count: int, done: int = 0) -> list[Part]:
 
 
 @contextmanager
-def moving(
+def point_writer(
     path: Path, zone: int | None, partial: Path, displacer: InteriorDisplacer, synced: bool
 ) -> Iterator[Callable[[Part], int]]:
-    """Context with a function that writes the deformed points of a part, as `move` does.
+    """Context with a function that writes the deformed points of a part, as `write_points` does.
 
     Undeformed points are read from a zone of ``path``, deformed ones written to ``partial``; with
     ``synced`` they are on the disk when the function returns.
@@ -210,12 +216,12 @@ def moving(
         points = FileSource.open(stack, (path, zone)).points
         out = os.open(partial, os.O_WRONLY | os.O_NOFOLLOW | (os.O_DSYNC if synced else 0))
         try:
-            yield lambda part: move(points, displacer, out, part)
+            yield lambda part: write_points(points, displacer, out, part)
         finally:
             os.close(out)
 
 
-def move(table: PointTable, displacer: InteriorDisplacer, out: int, part: Part) -> int:
+def write_points(table: PointTable, displacer: InteriorDisplacer, out: int, part: Part) -> int:
     """Write the deformed points of a part to a file descriptor; return the CRC-32 of its bytes."""
     at, rows = table.byte(part[0]), table.rows(part[0], part[1] - part[0])
     points = rows["x"].astype(np.float64)
@@ -231,7 +237,7 @@ def move(table: PointTable, displacer: InteriorDisplacer, out: int, part: Part) 
 
 
 @contextmanager
-def checking(path: Path, zone: int | None, partial: Path) -> Iterator[Callable[[Part], int]]:
+def checksum_reader(path: Path, zone: int | None, partial: Path) -> Iterator[Callable[[Part], int]]:
     """Context with a function that returns the CRC-32 of a part as it is in the file."""
     with ExitStack() as stack:
         points = FileSource.open(stack, (path, zone), moved=partial).points
@@ -239,7 +245,7 @@ def checking(path: Path, zone: int | None, partial: Path) -> Iterator[Callable[[
 
 
 @contextmanager
-def measuring(
+def cell_measurer(
     path: Path, zone: int | None, partial: Path, metric: Metric, listed: int
 ) -> Iterator[Callable[[Part], MeasuredBlock]]:
     """Context with a function that measures the quality of the cells of a part."""

@@ -221,7 +221,7 @@ def stream(
             remaining.next()
             return skin
 
-        displacer = _solved(case, read, out, remaining)
+        displacer = _deform_skin(case, read, out, remaining)
         give_back()
         remaining.next()
         out.displace(displacer, final=True)
@@ -234,7 +234,7 @@ def stream(
         out.finish(None if moved is displacer.skin.origin.ffd else moved)
     return RunResult(
         displacer.skin,
-        _of_whole(displacer, measured.farthest),
+        _steps_of_whole_mesh(displacer, measured.farthest),
         measured.after.quality(worst),
         measured.before.quality(),
         folded,
@@ -242,7 +242,7 @@ def stream(
     )
 
 
-def _solved(
+def _deform_skin(
     case: Case, read: Callable[[], Mesh], out: Output, report: ReportProgress
 ) -> InteriorDisplacer:
     """Read and deform the skin; return what displaces the rest of the mesh.
@@ -253,7 +253,7 @@ def _solved(
     skin = read()
     assert skin.part is not None
     give_back()
-    with _numbered(skin.part.points):
+    with _naming_file_nodes(skin.part.points):
         with timer.phase("classify"):
             setup = make_setup(case, skin)
         require_memory(setup, case)
@@ -276,7 +276,7 @@ def _solved(
 
 
 @contextmanager
-def _numbered(numbers: IntArray) -> Iterator[None]:
+def _naming_file_nodes(numbers: IntArray) -> Iterator[None]:
     """Context whose NodeErrors name nodes by ``numbers`` (n,): of the skin's nodes in the file."""
     try:
         yield
@@ -324,7 +324,7 @@ def about_run(case: Case) -> str:
     return hashlib.sha256(f"{text}{state.st_size} {state.st_mtime_ns}".encode()).hexdigest()
 
 
-def _of_whole(displacer: InteriorDisplacer, farthest: Farthest) -> tuple[Step, ...]:
+def _steps_of_whole_mesh(displacer: InteriorDisplacer, farthest: Farthest) -> tuple[Step, ...]:
     """Return the steps of the skin, with the ``node_counts`` of the whole mesh.
 
     The last one warns of the node of the whole mesh that went farthest, if it strays.

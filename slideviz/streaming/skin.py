@@ -107,22 +107,25 @@ def read_skin(
         used = np.zeros(place.n_points, bool)
         for marker in markers:
             used[marker.nodes] = True
-        with ranks.sharing(_cells_near, path, zone, np.flatnonzero(used)) as do:
+        with ranks.sharing(_boundary_cell_reader, path, zone, np.flatnonzero(used)) as do:
             tasks = range(0, place.cells.count, BLOCK)
-            cells, ids = _cells_at(
-                source, place, map(_ticking(progress, 0.0, 0.6, len(tasks)), do(tasks))
+            cells, ids = _join_boundary_cells(
+                source, place, map(_counting_progress(progress, 0.0, 0.6, len(tasks)), do(tasks))
             )
         used[cells.connectivity] = True
         numbers = np.flatnonzero(used)
-        with ranks.sharing(_points_near, path, zone) as do:
+        with ranks.sharing(_point_reader, path, zone) as do:
             starts = range(0, place.n_points, BLOCK)
             ends = np.searchsorted(numbers, [*starts, place.n_points])
             parts = [
                 (first, numbers[a:b])
                 for first, a, b in zip(starts, ends[:-1], ends[1:], strict=True)
             ]
-            numbers, points = _points_of(
-                source, place, numbers, map(_ticking(progress, 0.6, 1.0, len(parts)), do(parts))
+            numbers, points = _join_points(
+                source,
+                place,
+                numbers,
+                map(_counting_progress(progress, 0.6, 1.0, len(parts)), do(parts)),
             )
         others = list(boundaries_elsewhere(source, place))
     skin = Mesh(
@@ -143,7 +146,7 @@ def read_skin(
     return replace(skin, interfaces=find_interfaces(skin, others))
 
 
-def _ticking(tick: Tick, begin: float, end: float, count: int) -> Callable[[Any], Any]:
+def _counting_progress(tick: Tick, begin: float, end: float, count: int) -> Callable[[Any], Any]:
     """Return a function that returns its argument, and with each of ``count`` calls ticks.
 
     The fraction told to ``tick`` rises from ``begin`` to ``end``.
@@ -160,7 +163,7 @@ def _ticking(tick: Tick, begin: float, end: float, count: int) -> Callable[[Any]
 
 
 @dataclass(frozen=True, eq=False)
-class _Near:
+class _BoundaryCells:
     """Cells of a block of the file that may have a side on the boundary."""
 
     first: int
@@ -175,9 +178,9 @@ class _Near:
 
 
 @contextmanager
-def _cells_near(
+def _boundary_cell_reader(
     path: Path, zone: int | None, boundary: IntArray
-) -> Iterator[Callable[[int], _Near]]:
+) -> Iterator[Callable[[int], _BoundaryCells]]:
     """Context with a function that reads one block of cells and returns those near the boundary.
 
     ``boundary`` (k,) are the boundary's nodes; the function's argument is the place of the block's
@@ -187,14 +190,14 @@ def _cells_near(
         on = np.zeros(place.n_points, bool)
         on[boundary] = True
 
-        def read(first: int) -> _Near:
+        def read(first: int) -> _BoundaryCells:
             block = element_block(source, place, place.cells, place.dim, first, BLOCK)
             cells = Cells.from_types(block.types, block.nodes)
             _check_block(source, place, block, cells)
             near = np.add.reduceat(on[block.nodes], cells.offsets[:-1], dtype=np.int64)
             chosen = np.flatnonzero(near >= place.dim)
             kept = cells.take(chosen)
-            return _Near(
+            return _BoundaryCells(
                 first, kept.types, kept.connectivity, block.ids[chosen], index_of(block.ids)
             )
 
@@ -209,21 +212,21 @@ def index_of(ids: IntArray) -> Index:
     return ids
 
 
-def _cells_at(
-    source: BinaryFile, place: ZonePlace, found: Iterator[_Near]
+def _join_boundary_cells(
+    source: BinaryFile, place: ZonePlace, found: Iterator[_BoundaryCells]
 ) -> tuple[Cells, IntArray]:
     """Return the cells that may have a side on the boundary, ordered by their numbers, and these.
 
     Raises MeshError if two blocks have a cell of the same number.
     """
-    kept: list[_Near] = []
+    kept: list[_BoundaryCells] = []
     seen = np.zeros(place.cells.count, bool)
     for near in found:
         if seen[near.every].any():
             k = int(np.argmax(seen[near.every]))
             every = near.every
             index = every.start + k if isinstance(every, slice) else int(every[k])
-            raise _twice(source, place, near.first + k, index)
+            raise _repeated_index_error(source, place, near.first + k, index)
         seen[near.every] = True
         kept.append(near)
     if not kept:
@@ -246,13 +249,15 @@ def _check_block(source: BinaryFile, place: ZonePlace, block: ElementBlock, cell
         _, first, count = np.unique(block.ids, return_index=True, return_counts=True)
         if wrong.any() or (count > 1).any():
             k = int(np.argmax(wrong)) if wrong.any() else int(first[np.argmax(count)])
-            raise _twice(source, place, block.first + k, int(block.ids[k]))
+            raise _repeated_index_error(source, place, block.first + k, int(block.ids[k]))
     fault = first_fault(cells, place.n_points)
     if fault is not None:
         raise _cell_error(source, place, block.first + fault[0], fault[1])
 
 
-def _twice(source: BinaryFile, place: ZonePlace, element: int, index: int) -> MeshError:
+def _repeated_index_error(
+    source: BinaryFile, place: ZonePlace, element: int, index: int
+) -> MeshError:
     """Return the error for an element whose index is out of range or used twice."""
     return _cell_error(
         source,
@@ -274,7 +279,7 @@ Outer = dict[tuple[int, str], tuple[int, FloatArray]]
 
 
 @contextmanager
-def _points_near(
+def _point_reader(
     path: Path, zone: int | None
 ) -> Iterator[Callable[[tuple[int, IntArray]], tuple[FloatArray, Outer]]]:
     """Context with a function that reads one block of points.
@@ -297,7 +302,7 @@ def _points_near(
         yield read
 
 
-def _points_of(
+def _join_points(
     source: BinaryFile,
     place: ZonePlace,
     numbers: IntArray,
@@ -305,7 +310,7 @@ def _points_of(
 ) -> tuple[IntArray, FloatArray]:
     """Return ``numbers`` with those of the outermost points of all, sorted, and the points (k, d).
 
-    ``found`` are the results of `_points_near` for the blocks in order.
+    ``found`` are the results of `_point_reader` for the blocks in order.
     """
     blocks: list[FloatArray] = [np.empty((0, place.dim))]
     outer: Outer = {}

@@ -82,7 +82,7 @@ class CellBlock:
         return replace(self, mesh=mesh, base=base)
 
 
-_NO_CELLS = (
+_EMPTY = (
     np.empty(0, np.int64),
     np.empty(0, np.int64),
     Mesh(np.empty((0, 3)), Cells.from_types([], [])),
@@ -91,7 +91,7 @@ _NO_CELLS = (
 
 def join_blocks(blocks: Iterable[CellBlock]) -> CellBlock:
     """Return the cells of some blocks as one, by ascending number."""
-    every = list(blocks) or [CellBlock(*_NO_CELLS)]
+    every = list(blocks) or [CellBlock(*_EMPTY)]
     one, meshes = every[0], [block.mesh for block in every]
     ids = np.concatenate([block.ids for block in every])
     order = np.argsort(ids, kind="stable")

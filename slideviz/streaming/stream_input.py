@@ -72,10 +72,10 @@ class StreamInput:
         """
         if self.text is None:
             return read_skin(self.path, self.zone, tick, ranks)
-        return skin_of_text(self.text, self.path, part_of(tick, COPIED), ranks)
+        return skin_of_text(self.text, self.path, progress_share(tick, COPIED), ranks)
 
 
-def part_of(tick: Tick, begin: float, end: float = 1.0) -> Tick:
+def progress_share(tick: Tick, begin: float, end: float = 1.0) -> Tick:
     """Return a tick for a part of the work: its 0 to 1 becomes ``begin`` to ``end`` of ``tick``."""
     return lambda done: tick(begin + (end - begin) * done)
 
@@ -105,7 +105,7 @@ def _streamable(path: Path, zone: int | None, tick: Tick) -> Text:
     MeshError
         It has a mistake, or a halo: nodes that follow others are not all on the boundary.
     """
-    text = find_text(path, zone, part_of(tick, 0.0, SCANNED))
+    text = find_text(path, zone, progress_share(tick, 0.0, SCANNED))
     if text.zone.sends:
         raise text.lines.error(
             text.zone.sends[0].begin,
@@ -141,7 +141,7 @@ def open_read_only(
             open_temporary(ours, new=True).close()
             require_disk_space(ours, path, layout.size)
             os.truncate(ours, layout.size)
-            head = write_layout(layout, ours, part_of(tick, SCANNED, COPIED))
+            head = write_layout(layout, ours, progress_share(tick, SCANNED, COPIED))
             with open_temporary(ours) as file:
                 file.write(head)
         except OSError as problem:
@@ -208,13 +208,13 @@ def open_for_run(
     with partial_file(output, layout.size, about, resume=resume, more=BINARY) as copy:
         is_reused = (
             copy.done > 0
-            and checksums(copy.path, part_of(tick, SCANNED, COPIED), ranks) == copy.sums
+            and checksums(copy.path, progress_share(tick, SCANNED, COPIED), ranks) == copy.sums
         )
         require_disk_space(output, output, bytes_of_text(layout, is_text, later) - left)
         if not is_reused:
-            head = write_layout(layout, copy.path, part_of(tick, SCANNED, FILLED), ranks)
+            head = write_layout(layout, copy.path, progress_share(tick, SCANNED, FILLED), ranks)
             finish_head(copy.file, head)
-            copy.note(checksums(copy.path, part_of(tick, FILLED, COPIED), ranks))
+            copy.note(checksums(copy.path, progress_share(tick, FILLED, COPIED), ranks))
         with naming_text(text, copy.path):
             yield StreamInput(copy.path, None, text, is_reused)
         copy.remove()

@@ -138,7 +138,7 @@ class Ranks(SerialPool):
         self._broadcast(content)
         try:
             with (
-                limited(self.threads) as limit,
+                thread_limit(self.threads) as limit,
                 make(*arguments) as work,
                 # The other threads of this one wait for messages, which must not wait for it.
                 ThreadPoolExecutor(1, "slideviz-rank", limit) as pool,
@@ -151,7 +151,7 @@ class Ranks(SerialPool):
 
     def serve(self) -> None:
         """Do tasks for rank 0 in each of its `sharing` contexts, until its ``with ranks:`` ends."""
-        with limited(self.threads) as limit:
+        with thread_limit(self.threads) as limit:
             limit()
             while self._received(0.01)[1] is not None:
                 make, arguments = pickle.loads(self._broadcast(b""))
@@ -277,7 +277,7 @@ def _threads_of(near: Comm) -> int:
 
 
 @contextmanager
-def limited(threads: int) -> Iterator[Callable[[], None]]:
+def thread_limit(threads: int) -> Iterator[Callable[[], None]]:
     """Context that limits BLAS and `cores` to ``threads``, with a function that limits Numba.
 
     Numba's limit holds for the thread that calls that function.

@@ -12,7 +12,13 @@ from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.session import changes, pieces
 from slideviz.session.opening import open_mesh
-from slideviz.session.pieces import InThread, appearing, portions, run_inline, run_to_end
+from slideviz.session.pieces import (
+    InThread,
+    actor_groups,
+    render_in_groups,
+    run_inline,
+    run_to_end,
+)
 from slideviz.session.state import StepFrame
 
 PLAIN = PictureOptions((300, 200))
@@ -79,9 +85,9 @@ def named(plotter, parts):
 def test_portions_are_of_not_much_more_than_so_many_faces(plotter):
     actors = plotter.renderer.actors
     actors["plane 3"].SetVisibility(False)
-    found = named(plotter, portions(actors.values(), 6))
+    found = named(plotter, actor_groups(actors.values(), 6))
     assert found == [["plane 0", "plane 1"], ["plane 2", "words"]]
-    assert named(plotter, portions(actors.values(), 1)) == [
+    assert named(plotter, actor_groups(actors.values(), 1)) == [
         ["plane 0"],
         ["plane 1"],
         ["plane 2", "words"],
@@ -90,12 +96,12 @@ def test_portions_are_of_not_much_more_than_so_many_faces(plotter):
 
 @pytest.mark.parametrize("stop", [None, 1])
 def test_what_appears_part_by_part_is_all_there_in_the_end(plotter, monkeypatch, stop):
-    monkeypatch.setattr(pieces.portions, "__defaults__", (6,))
+    monkeypatch.setattr(pieces.actor_groups, "__defaults__", (6,))
     hidden = plotter.renderer.actors["plane 3"]
     hidden.SetVisibility(False)
     seen, drawn = [], []
     plotter.renderer.AddObserver("EndEvent", lambda *_: drawn.append(1))
-    parts = appearing(plotter)
+    parts = render_in_groups(plotter)
     for _ in parts:
         seen.append([actor.GetVisibility() for actor in plotter.renderer.actors.values()])
         if len(seen) == stop:
@@ -119,7 +125,7 @@ def test_a_picture_in_pieces_is_the_one_that_is_drawn_at_once(session, square, m
     surfaces = find_surfaces(square)
     with OffscreenRenderer(session, surfaces) as renderer:
         at_once = renderer.image(PLAIN)
-    monkeypatch.setattr(pieces.portions, "__defaults__", (3,))
+    monkeypatch.setattr(pieces.actor_groups, "__defaults__", (3,))
     with OffscreenRenderer(session, surfaces) as renderer:
         assert sum(1 for _ in renderer.prepare_steps()) > 10
         assert not list(renderer.prepare_steps()), "once"

@@ -403,7 +403,7 @@ def test_images_in_between_are_measured_and_written_beside_the_window(
 
 
 def test_a_preview_appears_in_pieces(opened, qtbot, monkeypatch):
-    monkeypatch.setattr(pieces.portions, "__defaults__", (100,))
+    monkeypatch.setattr(pieces.actor_groups, "__defaults__", (100,))
     ticks = []
     timer = QTimer()
     timer.timeout.connect(lambda: ticks.append(1))

@@ -24,7 +24,7 @@ from slideviz.scene.passages import (
 )
 from slideviz.scene.pick import to_display
 from slideviz.session import changes
-from slideviz.session.inspect import middles
+from slideviz.session.inspect import cell_centers
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.terms import NODE_TYPES, ROLES
@@ -208,7 +208,7 @@ def test_neighbours_follow_the_step_and_the_colors(scene, row):
 def test_neighbours_show_the_chosen_cells_only(scene, row):
     session = opened(scene, row, passages=1, edges=False, triad=False, color_by="skew")
     half = float(np.median(session.frame.values("skew")))
-    at = middles(row.mesh, np.arange(len(row.mesh.cells)))
+    at = cell_centers(row.mesh, np.arange(len(row.mesh.cells)))
     shifted = at + Period().of(session).vector
 
     def yellow(points):

@@ -41,12 +41,12 @@ from slideviz.streaming import skin
 from slideviz.formats import binary_copy
 from slideviz.formats.su2 import lines
 output.CHUNK, skin.BLOCK, lines.BLOCK_BYTES, binary_copy.PIECES = 37, 50, 700, 2
-move = output.move
+move = output.write_points
 def late(*given):
     time.sleep({pause})
     {hook}
     return move(*given)
-output.move = late
+output.write_points = late
 from slideviz.__main__ import _heed_signals
 _heed_signals()
 from slideviz.cli import run
@@ -361,7 +361,7 @@ def test_parts_come_in_order_and_none_is_begun_after_an_error():
 
 def test_threads_are_limited_for_a_time():
     before = threads.cores()
-    with ranks.limited(1):
+    with ranks.thread_limit(1):
         assert threads.cores() == 1
     assert threads.cores() == before
 
@@ -377,7 +377,7 @@ def test_parts_that_changed_since_are_made_again(tmp_path, monkeypatch):
         roles={"x_p": "moving"},
         motions=(sv.Translate("x_p", (0.1, 0.0)),),
     )
-    out, move, made = tmp_path / "out.su2b", output.move, []
+    out, move, made = tmp_path / "out.su2b", output.write_points, []
     stream(case, out)
     whole = out.read_bytes()
 
@@ -386,7 +386,7 @@ def test_parts_that_changed_since_are_made_again(tmp_path, monkeypatch):
             raise StoppedError
         return move(*given)
 
-    monkeypatch.setattr(output, "move", stopping)
+    monkeypatch.setattr(output, "write_points", stopping)
     with pytest.raises(StoppedError):
         stream(case, out)
     ours, _ = names_of(out)
@@ -395,7 +395,7 @@ def test_parts_that_changed_since_are_made_again(tmp_path, monkeypatch):
     assert place > 0
     data[place + 3] ^= 1
     ours.write_bytes(data.tobytes())
-    monkeypatch.setattr(output, "move", lambda *a: (made.append(a[-1]), move(*a))[1])
+    monkeypatch.setattr(output, "write_points", lambda *a: (made.append(a[-1]), move(*a))[1])
     told = []
     stream(case, out, resume=True, note=told.append)
     assert "continues after 3 of 10 parts" in told[0]

@@ -163,7 +163,7 @@ def test_resume_does_nothing_where_the_run_is_finished(tmp_path, monkeypatch, ca
     call = ["run", case, "-o", "out.su2b", "-q", "--stream", "--resume", "--json"]
     assert run([*call, "one.json"]) == code
     first = capsys.readouterr().err.splitlines()
-    monkeypatch.setattr(output, "move", lambda *_: pytest.fail("it is done again"))
+    monkeypatch.setattr(output, "write_points", lambda *_: pytest.fail("it is done again"))
     assert run([*call, "other.json"]) == code
     assert capsys.readouterr().err.splitlines() == first
     call = [word for word in call if word not in ("-q", "-o", "out.su2b")]
@@ -234,11 +234,11 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
     case = made(tmp_path, "square", 25, ("STEPS=2",))
     out = tmp_path / "out.su2b"
     stream(case, out)
-    whole, move = out.read_bytes(), output.move
+    whole, move = out.read_bytes(), output.write_points
     parts = -(-len(sv.read(case.mesh_file).points) // 60)
     out.write_bytes(b"older")
     for stop in sorted({0, 1, parts // 2, parts - 1}):
-        monkeypatch.setattr(output, "move", killed_at(move, 60 * stop))
+        monkeypatch.setattr(output, "write_points", killed_at(move, 60 * stop))
         with pytest.raises(KilledError):
             stream(case, out)
         assert out.read_bytes() == b"older"
@@ -247,7 +247,9 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
         with pytest.raises(MeshError, match="this is no SU2 binary mesh"):
             sv.read(ours, file_format="su2b")
         counted = []
-        monkeypatch.setattr(output, "move", lambda *a, seen=counted: (seen.append(1), move(*a))[1])
+        monkeypatch.setattr(
+            output, "write_points", lambda *a, seen=counted: (seen.append(1), move(*a))[1]
+        )
         told: list[str] = []
         stream(case, out, note=told.append, resume=True)
         assert (f"continues after {stop} of {parts} parts" in told[0]) == (stop > 0)
@@ -264,7 +266,7 @@ def test_a_damaged_note_begins_anew(tmp_path, monkeypatch, text):
     monkeypatch.setattr(output, "CHUNK", 60)
     case, out = made(tmp_path, "square", 8, ("STEPS=1",)), tmp_path / "out.su2b"
     with monkeypatch.context() as patch:
-        patch.setattr(output, "move", killed_at(output.move, 60))
+        patch.setattr(output, "write_points", killed_at(output.write_points, 60))
         with pytest.raises(KilledError):
             stream(case, out)
     _, note = names_of(out)
@@ -280,7 +282,7 @@ def test_an_early_end_tells_of_what_an_earlier_run_has_done(tmp_path, monkeypatc
     monkeypatch.setattr(output, "CHUNK", 60)
     case, out = made(tmp_path, "square", 8, ("STEPS=1",)), tmp_path / "out.su2b"
     with monkeypatch.context() as patch:
-        patch.setattr(output, "move", killed_at(output.move, 60))
+        patch.setattr(output, "write_points", killed_at(output.write_points, 60))
         with pytest.raises(KilledError):
             stream(case, out)
     ours, _ = names_of(out)
@@ -337,11 +339,11 @@ def test_what_is_copied_and_then_changed_by_another_is_copied_again(tmp_path, mo
     monkeypatch.setattr(output, "CHUNK", 60)
     monkeypatch.setattr(partial, "_PIECE", 4096)
     case = made(tmp_path, "square", 25, ("STEPS=1",))
-    out, move = tmp_path / "out.su2b", output.move
+    out, move = tmp_path / "out.su2b", output.write_points
     stream(case, out)
     whole = out.read_bytes()
     with monkeypatch.context() as patch:
-        patch.setattr(output, "move", killed_at(move, 120))
+        patch.setattr(output, "write_points", killed_at(move, 120))
         with pytest.raises(KilledError):
             stream(case, out)
     flip(names_of(out)[0], at % len(whole))
@@ -354,12 +356,12 @@ def test_what_is_copied_and_then_changed_by_another_is_copied_again(tmp_path, mo
 def test_another_case_or_a_changed_mesh_begins_anew(tmp_path, monkeypatch):
     monkeypatch.setattr(output, "CHUNK", 60)
     case = made(tmp_path, "square", 25, ("STEPS=2",))
-    out, move = tmp_path / "out.su2b", output.move
-    monkeypatch.setattr(output, "move", lambda *a: (_ for _ in ()).throw(KilledError()))
+    out, move = tmp_path / "out.su2b", output.write_points
+    monkeypatch.setattr(output, "write_points", lambda *a: (_ for _ in ()).throw(KilledError()))
     with pytest.raises(KilledError):
         stream(case, out)
     names_of(out)[1].write_text("no note")
-    monkeypatch.setattr(output, "move", move)
+    monkeypatch.setattr(output, "write_points", move)
     other = case.change(steps=1)
     told: list[str] = []
     stream(other, out, note=told.append, resume=True)
@@ -393,11 +395,11 @@ import sys, time
 from pathlib import Path
 import slideviz as sv
 from slideviz.streaming import output, run
-move = output.move
+move = output.write_points
 def slow(*a):
     time.sleep(0.05)
     return move(*a)
-output.move, output.CHUNK = slow, 30
+output.write_points, output.CHUNK = slow, 30
 run.stream(sv.Case.read(sys.argv[1]), Path(sys.argv[2]), resume=sys.argv[3] == "resume")
 """
 

@@ -242,7 +242,7 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, smal
     case = made(tmp_path, "square", 25, ("STEPS=2",))
     out = tmp_path / f"out.{ending}"
     stream(case, out)
-    whole, move, put = out.read_bytes(), output.move, binary_copy._write_points
+    whole, move, put = out.read_bytes(), output.write_points, binary_copy._write_points
     parts = -(-len(sv.read(case.mesh_file).points) // 60)
     out.write_bytes(b"older")
     for stop in (-1, 0, 3, parts - 1, *([parts] if ending == "su2" else [])):
@@ -258,7 +258,7 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, smal
             raise KilledError
 
         with monkeypatch.context() as patch:
-            patch.setattr(output, "move", stopping)
+            patch.setattr(output, "write_points", stopping)
             if stop == -1:
                 patch.setattr(binary_copy, "_write_points", killed)
             if stop == parts:
@@ -273,7 +273,7 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, smal
             patch.setattr(
                 binary_copy, "_write_points", lambda *a, s=made_again: s.append(1) or put(*a)
             )
-            patch.setattr(output, "move", lambda *a, seen=moved: seen.append(1) or move(*a))
+            patch.setattr(output, "write_points", lambda *a, seen=moved: seen.append(1) or move(*a))
             told: list[str] = []
             stream(case, out, note=told.append, resume=True)
         assert (f"continues after {stop} of {parts} parts" in told[0]) == (stop > 0)
@@ -290,7 +290,7 @@ def test_a_binary_copy_that_another_has_changed_is_made_anew(tmp_path, monkeypat
     case = made(tmp_path, "square", 25, ("STEPS=1",))
     out = tmp_path / f"out.{ending}"
     with monkeypatch.context() as patch:
-        patch.setattr(output, "move", killed_at(output.move, 120))
+        patch.setattr(output, "write_points", killed_at(output.write_points, 120))
         with pytest.raises(KilledError):
             stream(case, out)
     flip(names_of(out, ".binary")[0], 500)
@@ -344,7 +344,7 @@ def late(what):
         return what(*a)
     return slow
 output.CHUNK, lines.BLOCK_BYTES, binary_copy.PIECES = 60, 2000, 3
-output.move = late(output.move)
+output.write_points = late(output.write_points)
 binary_copy._write_cells = late(binary_copy._write_cells)
 from slideviz.streaming import stream_input
 stream_input.moved_rows = late(stream_input.moved_rows)

@@ -16,7 +16,7 @@ from qtpy.QtWidgets import QApplication, QWidget
 from vtkmodules.vtkRenderingCore import vtkProp
 
 from slideviz.gui.responsiveness.timers import REPAINT_MS, single_shot
-from slideviz.session.pieces import PART_CELLS, portions
+from slideviz.session.pieces import PART_CELLS, actor_groups
 
 
 class RepaintCoalescer(QObject):
@@ -145,7 +145,7 @@ class View3D(QtInteractor):
         """
         while self._veiled:
             self._unveil_next()
-        self._veiled = portions(self.renderer.actors.values(), PART_CELLS)[1:]
+        self._veiled = actor_groups(self.renderer.actors.values(), PART_CELLS)[1:]
         self.render()
 
     @property
