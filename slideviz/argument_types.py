@@ -125,10 +125,8 @@ def _require(called: str, owner: object, given: Iterable[tuple[str, object]]) ->
     for name, value in given:
         wrong = _misfit(value, needed.get(name, Any), name)
         if wrong is not None:
-            raise ArgumentError(
-                f"{called}: {wrong.place} is {_value_text(wrong.value)}; expected "
-                f"{_words(wrong.needed)}"
-            )
+            value_words, type_words = _value_words(wrong.value), _type_words(wrong.needed)
+            raise ArgumentError(f"{called}: {wrong.place} is {value_words}; expected {type_words}")
 
 
 @cache
@@ -219,14 +217,14 @@ def _parts(value: Any, hint: Any, place: str) -> Iterator[tuple[object, Any, str
             yield each, inner[at if fixed else 0], f"{place}[{at}]"
 
 
-def _value_text(value: object) -> str:
+def _value_words(value: object) -> str:
     """Return a wrong argument in words: its value if that is short, else its type."""
     plain = isinstance(value, str | int | float | list | tuple | dict | None)
     is_short = plain and len(repr(value)) <= _SHORT
     return repr(value) if is_short else f"of type {type(value).__name__}"
 
 
-def _words(hint: Any) -> str:
+def _type_words(hint: Any) -> str:
     """Return the words for a type in "expected ..."."""
     kind, inner = origin_of(hint) or hint, get_args(hint)
     if kind is Annotated:
@@ -236,11 +234,11 @@ def _words(hint: Any) -> str:
     if kind is Literal:
         return " or ".join(map(repr, inner))
     if len(members := _members(hint)) > 1:
-        *rest, last = (_words(one) for one in members if one is not str or Path not in members)
+        *rest, last = (_type_words(one) for one in members if one is not str or Path not in members)
         return f"{', '.join(rest)}, or {last}" if rest else last
     if kind not in (tuple, Sequence, Mapping):
         return _WORDS.get(kind.__name__, kind.__name__)
     fixed = kind is tuple and Ellipsis not in inner
     number = f"{len(inner)} " if fixed else f"a {kind.__name__.lower()} of "
-    each = _words(inner[kind is Mapping])
+    each = _type_words(inner[kind is Mapping])
     return number + "names to " * (kind is Mapping) + _SEVERAL.get(each, f"values, each {each}")

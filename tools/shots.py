@@ -26,7 +26,7 @@ from slideviz.gui.widgets.plot_canvas import PlotCanvas
 from slideviz.samples.table import sample, write_sample
 from slideviz.sections.model import Section
 from slideviz.session import changes
-from slideviz.system.cleanup import draft, ended
+from slideviz.system.cleanup import draft, killed_at_end
 
 if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow
@@ -275,7 +275,7 @@ def display() -> Iterator[None]:
     call = [program, "-displayfd", str(write), "-screen", "0", "1920x1080x24", "-nolisten", "tcp"]
     server = subprocess.Popen(call, pass_fds=[write], stderr=subprocess.DEVNULL)
     os.close(write)
-    with ended(server):
+    with killed_at_end(server):
         try:
             with os.fdopen(read) as number:
                 os.environ["DISPLAY"] = f":{number.readline().strip()}"

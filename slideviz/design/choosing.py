@@ -86,7 +86,7 @@ def choose_steps(
     return steps, points
 
 
-def _begun(
+def _continued(
     setup: Setup, stages: tuple[Levels, ...], problem: Problem, timer: PhaseTimer
 ) -> Solution:
     """Solve a problem whose selection begins with the rows ``stages``."""
@@ -94,7 +94,7 @@ def _begun(
 
 
 def _for_any_data(problem: Problem) -> Problem:
-    """Return the problem with its system to be tested for other data, too."""
+    """Also check conditioning for data other than the reference."""
     return replace(problem, lasting=True)
 
 
@@ -115,7 +115,6 @@ def _reference(
 
 
 def _report(report: Report, step: int, total: int, phase: str, fraction: float) -> None:
-    """Report progress."""
     report(Progress(step, total, phase, fraction))
 
 
@@ -137,7 +136,7 @@ def _further(
             control = np.concatenate([control, more[~np.isin(more, control)]])
         timer = PhaseTimer(partial(_report, report, k + 1, total))
         goal = setup.coords[setup.known] + setup.target * part
-        begun = replace(setup, solve=partial(_begun, setup, solution.stages))
+        begun = replace(setup, solve=partial(_continued, setup, solution.stages))
         made.append(
             one_step(
                 begun, coords, goal, timer, replace(solution, control=control, carried=carried)

@@ -278,7 +278,7 @@ class Deformer:
         return out
 
     def _run(self, target: Array) -> list[StepState]:
-        """Return the state after each step; ``target`` (..., a, d) as `Input.target` returns it."""
+        """Return the state after each step; ``target`` (..., a, d) by `KnownNodeMap.target`."""
         states = [StepState(self._setup.coords)]
         for step in self._steps:
             states.append(step.run(states[-1], target))

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from slideviz.errors import SlidevizError
 from slideviz.export.offscreen import png_bytes
 from slideviz.system.atomic import atomic_write, require_writable
-from slideviz.system.cleanup import draft, ended
+from slideviz.system.cleanup import draft, killed_at_end
 from slideviz.system.file_checks import require_no_input
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def _mp4(file: Path, settings: EncoderSettings) -> Iterator[Add]:
             except OSError:
                 _raise_ffmpeg(file, process, log)
 
-        with closing_pipe(pipe), ended(process):
+        with closing_pipe(pipe), killed_at_end(process):
             yield add
             try:
                 pipe.close()

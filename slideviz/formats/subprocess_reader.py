@@ -22,7 +22,7 @@ from pathlib import Path
 from slideviz.errors import MeshError, path_error
 from slideviz.formats.table import MESHIO, format_for
 from slideviz.mesh.model import Cells, Marker, Mesh
-from slideviz.system.cleanup import ended
+from slideviz.system.cleanup import killed_at_end
 from slideviz.system.threads import Tick
 
 # Limits of the process: several times what the slowest of meshio's readers needs.
@@ -60,7 +60,7 @@ def read_in_subprocess(path: Path, progress: Tick) -> Mesh:
         "OPENBLAS_NUM_THREADS": "1",
     }
     answer = bytearray()
-    with _started(path, command, environment) as reader, ended(reader):
+    with _started(path, command, environment) as reader, killed_at_end(reader):
         assert reader.stdout is not None
         while True:
             spent = time.monotonic() - begun

@@ -23,9 +23,7 @@ from slideviz.errors import (
 from slideviz.mesh.elements import (
     ELEMENTS,
 )
-from slideviz.system.jit_cache import (
-    njit,
-)
+from slideviz.system.jit_cache import njit
 from slideviz.terms import (
     CELL_STATES,
 )

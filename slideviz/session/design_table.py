@@ -15,13 +15,13 @@ from slideviz.case.key import FILES, MOTION, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.case.words import counted, is_number
-from slideviz.design.sweeps.columns import columns_of, numbers_of, own_values
+from slideviz.design.sweeps.columns import case_values, columns_of, numbers_of
 from slideviz.design.sweeps.sweep import sweep
 from slideviz.design.sweeps.table import (
     DesignRow,
     cells_of,
+    design_columns,
     head_of,
-    own_columns,
     read_designs,
     result_of,
 )
@@ -123,8 +123,8 @@ class DesignTable:
         """
         if case is None or not self.results or all(map(all, self.rows)):
             return self
-        own = own_values(case, columns_of(case, self.columns))
-        texts = {name: shown(value) for name, value in own.items()}
+        own = case_values(case, columns_of(case, self.columns))
+        texts = {name: value_text(value) for name, value in own.items()}
         rows = (zip(self.columns, row, strict=True) for row in self.rows)
         return replace(self, rows=tuple(tuple(c or texts[name] for name, c in row) for row in rows))
 
@@ -207,8 +207,8 @@ def column_choices(case: Case, dim: int) -> dict[str, str]:
         for name, key in KEYS.items()
         if key.group not in (FILES, VIEW, MOTION) and key.get(case) is not None
     }
-    found = own_values(case, {**numbers, **keys})
-    return {name: shown(value) for name, value in found.items()}
+    found = case_values(case, {**numbers, **keys})
+    return {name: value_text(value) for name, value in found.items()}
 
 
 def values_of(text: str) -> list[str]:
@@ -243,7 +243,7 @@ def values_of(text: str) -> list[str]:
     return [repr(value) for value in values.tolist()]
 
 
-def shown(value: str | float) -> str:
+def value_text(value: str | float) -> str:
     """Return a value as text, as short as possible without loss."""
     if isinstance(value, str):
         return value
@@ -263,7 +263,9 @@ def read_table(case: Case, path: Path) -> DesignTable:
     if len(found.rows) > MOST:
         raise CaseError(f"{path}: has {len(found.rows):,} designs; use `slideviz sweep` for them")
     columns = tuple(found.columns)
-    rows = tuple(tuple(shown(design.values[name]) for name in columns) for design in found.rows)
+    rows = tuple(
+        tuple(value_text(design.values[name]) for name in columns) for design in found.rows
+    )
     return DesignTable(columns, rows)
 
 
@@ -295,7 +297,7 @@ def read_results(path: Path) -> DesignTable:
         results = [replace(result_of(head, c), design=k) for k, c in enumerate(lines, start=1)]
     except (OSError, ValueError, KeyError) as problem:
         raise CaseError(f"{path}: is no table of results ({problem})") from problem
-    own = own_columns(head)
+    own = design_columns(head)
     done = [row for row in results if row.problem or row.steps]
     return DesignTable(tuple(head[own]), tuple(tuple(c[own]) for c in lines)).with_results(done)
 

@@ -71,9 +71,9 @@ class StepFrame:
         status = self.quality.status if cells is None else self.quality.status[cells]
         return np.where(status == INVERTED, np.nan, self.values(what, undeformed, cells))
 
-    def furthest(self, undeformed: Mesh) -> float:
+    def largest_displacement(self, undeformed: Mesh) -> float:
         """Return the largest displacement of a node, in the mesh's length unit."""
-        return furthest(self.mesh.points, undeformed.points)
+        return largest_displacement(self.mesh.points, undeformed.points)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +149,7 @@ def _mean_distances(now, before, nodes, offsets, cells, found):  # type: ignore[
         found[i] = total / (end - begin)
 
 
-def furthest(now: FloatArray, before: FloatArray) -> float:
+def largest_displacement(now: FloatArray, before: FloatArray) -> float:
     """Return the largest distance of a point ``now`` (n, d) from where it was ``before`` (n, d)."""
     if now is before or not len(now):
         return 0.0

@@ -80,7 +80,7 @@ COLUMNS: tuple[Column, ...] = (
 """The columns of the table; qualities and control nodes are those of a run's last step."""
 
 
-def best(runs: Sequence[Run]) -> frozenset[int]:
+def best_runs(runs: Sequence[Run]) -> frozenset[int]:
     """Return the numbers of the runs with the highest minimum quality for their motion.
 
     Runs of different motions cannot be compared, nor runs that did not come to their end. Minima
@@ -98,7 +98,7 @@ def best(runs: Sequence[Run]) -> frozenset[int]:
     return frozenset(found)
 
 
-def described(run: Run) -> str:
+def describe_run(run: Run) -> str:
     """Return a line for each column with a run's value, and lines with its warnings and notes."""
     shown = [column for column in COLUMNS if column.title != "name" or run.name]
     lines = [f"{column.title}: {column.text(run)}" for column in shown]

@@ -257,7 +257,7 @@ class Session:
         if self.mesh is None:
             return 0.0
         lasts = (run.last for run in self.runs if run.last is not None)
-        return max((last.furthest(self.mesh) for last in lasts), default=0.0)
+        return max((last.largest_displacement(self.mesh) for last in lasts), default=0.0)
 
     def role(self, marker: str) -> Role:
         """Return the role of a boundary; boundaries without one are fixed."""

@@ -113,8 +113,8 @@ def open_temporary(path: Path, *, new: bool = False, buffering: int = -1) -> Bin
     except OSError as problem:
         if problem.errno != errno.ELOOP:
             raise
-        said = f"{path} is a symbolic link, whose target would be overwritten; remove the link"
-        raise OSError(errno.EINVAL, said, str(path)) from problem
+        message = f"{path} is a symbolic link, whose target would be overwritten; remove the link"
+        raise OSError(errno.EINVAL, message, str(path)) from problem
     if not stat.S_ISREG(os.fstat(opened).st_mode):
         os.close(opened)
         raise OSError(errno.EINVAL, f"{path} is a device or pipe; remove it", str(path))
@@ -122,7 +122,7 @@ def open_temporary(path: Path, *, new: bool = False, buffering: int = -1) -> Bin
 
 
 @contextmanager
-def ended(process: Process) -> Iterator[None]:
+def killed_at_end(process: Process) -> Iterator[None]:
     """Context at whose end the process is killed, if it still runs, and waited for."""
     _processes.add(process)
     try:

@@ -61,7 +61,7 @@ class _SealedFile(IndexDataCacheFile):  # type: ignore[misc]
         """Return the cache's entries by argument types; empty if missing, damaged or outdated."""
         try:
             sealed = Path(self._index_path).read_bytes()
-            version, stamp, overloads = pickle.loads(_opened(sealed))
+            version, stamp, overloads = pickle.loads(_without_checksum(sealed))
         except (OSError, ValueError):  # there is none yet, or it is damaged
             return {}
         return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
@@ -70,12 +70,12 @@ class _SealedFile(IndexDataCacheFile):  # type: ignore[misc]
         """Write the cache's entries by argument types."""
         content = self._dump((self._version, self._source_stamp, overloads))
         with self._open_for_write(self._index_path) as file:
-            file.write(_sealed(content))
+            file.write(_with_checksum(content))
 
     def _load_data(self, name: str) -> Any:
         """Return the machine code in the file ``name``; raise OSError if it is damaged."""
         try:
-            content = _opened(Path(self._data_path(name)).read_bytes())
+            content = _without_checksum(Path(self._data_path(name)).read_bytes())
             return _Reader(io.BytesIO(content)).load()
         except ValueError as problem:
             raise OSError(str(problem)) from problem  # Numba compiles it and writes it again
@@ -83,7 +83,7 @@ class _SealedFile(IndexDataCacheFile):  # type: ignore[misc]
     def _save_data(self, name: str, data: Any) -> None:
         """Write machine code to the file ``name``."""
         with self._open_for_write(self._data_path(name)) as file:
-            file.write(_sealed(self._dump(data)))
+            file.write(_with_checksum(self._dump(data)))
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
@@ -142,13 +142,13 @@ def compilation_watched(compiling: Callable[[], None]) -> Iterator[None]:
         yield
 
 
-def _sealed(content: bytes) -> bytes:
+def _with_checksum(content: bytes) -> bytes:
     """Return the content with its checksum before it."""
     return hashlib.sha256(content).digest() + content
 
 
-def _opened(sealed: bytes) -> bytes:
-    """Return the content that `_sealed` put a checksum before.
+def _without_checksum(sealed: bytes) -> bytes:
+    """Return the content that `_with_checksum` put a checksum before.
 
     Raises
     ------

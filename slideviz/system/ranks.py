@@ -237,7 +237,6 @@ class Ranks(SerialPool):
         return status.source, self.comm.recv(source=status.source)
 
     def _send_all(self, what: object) -> None:
-        """Send a message from rank 0 to all others."""
         for rank in range(1, self.size):
             self.comm.send(what, rank)
 

@@ -16,10 +16,17 @@ import pytest
 
 import slideviz as sv
 from slideviz.design.sweeps import sweep as sweeping
-from slideviz.design.sweeps.columns import columns_of, numbers_of, own_values
-from slideviz.design.sweeps.results import locked
+from slideviz.design.sweeps.columns import case_values, columns_of, numbers_of
+from slideviz.design.sweeps.results import lock_folder
 from slideviz.design.sweeps.table import DesignRow, read_designs
-from slideviz.design.sweeps.worker import Packed, Task, TaskResult, cache_mesh, packed, run_task
+from slideviz.design.sweeps.worker import (
+    Packed,
+    Task,
+    TaskResult,
+    cache_mesh,
+    pack_mesh,
+    run_task,
+)
 from slideviz.errors import CaseError, DeformError
 from slideviz.samples.table import sample
 from slideviz.session.design_table import read_results
@@ -119,7 +126,7 @@ def test_columns_have_several_names(passage):
         assert columns_of(case, [one])[one] == columns_of(case, [other])[other]
     assert "airfoil.translate.y" in numbers_of(case)
     named = columns_of(case, ["airfoil.translate.y", "STEPS"])
-    assert own_values(case, named) == {"airfoil.translate.y": 0.12, "STEPS": "5"}
+    assert case_values(case, named) == {"airfoil.translate.y": 0.12, "STEPS": "5"}
 
 
 def test_numbers_of_every_motion():
@@ -326,7 +333,7 @@ def test_asked_in_vain(passage):
 def test_the_mesh_is_sent_to_who_needs_it(passage):
     task = Task(1, passage.case, "no such mesh")
     assert run_task(task).row is None
-    mesh = packed(passage.mesh)
+    mesh = pack_mesh(passage.mesh)
     assert run_task(replace(task, mesh=mesh.name, packed=mesh)).row.problem == ""
     assert run_task(replace(task, mesh=mesh.name)).row.problem == ""
     other = run_task(replace(task, version="0.0.0")).row
@@ -385,12 +392,12 @@ def test_a_large_file_is_opened_in_the_other_process_too(passage, tmp_path, monk
     file = tmp_path / "passage.su2"
     sv.write(file, passage.mesh)
     mesh = sv.read(file)
-    sent = pickle.loads(packed(mesh).content)
+    sent = pickle.loads(pack_mesh(mesh).content)
     moved = mesh.points * 1.5
     sv.write(tmp_path / "one.su2", mesh.with_points(moved))
     sv.write(tmp_path / "other.su2", sent.with_points(moved))
     assert (tmp_path / "one.su2").read_bytes() == (tmp_path / "other.su2").read_bytes()
-    content = packed(mesh).content
+    content = pack_mesh(mesh).content
     file.write_bytes(file.read_bytes() + b"% more\n")
     with pytest.raises(sv.SlidevizError, match="was changed while it was in use"):
         pickle.loads(content)
@@ -412,7 +419,7 @@ def test_a_design_has_one_thread(passage, monkeypatch):
         return sv.deform(*values)
 
     monkeypatch.setattr(worker, "deform", watched)
-    mesh = packed(passage.mesh)
+    mesh = pack_mesh(passage.mesh)
     run_task(Task(1, passage.case, mesh.name, packed=mesh))  # libraries are loaded by the first
     before = threads()
     assert run_task(Task(1, passage.case, mesh.name, packed=mesh)).row.problem == ""
@@ -443,17 +450,17 @@ def test_of_two_sweeps_in_a_folder_the_second_is_refused(passage, here, tmp_path
 def test_a_lock_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / "sweep.lock").mkdir()
     with pytest.raises(CaseError, match=r"sweep\.lock: cannot be written: .*folder"):
-        locked(tmp_path)
+        lock_folder(tmp_path)
     (tmp_path / "sweep.lock").rmdir()
     (tmp_path / "precious").write_text("precious")
     (tmp_path / "sweep.lock").symlink_to(tmp_path / "precious")
     with pytest.raises(CaseError, match=r"sweep\.lock: .* it is a symbolic link, whose"):
-        locked(tmp_path)
+        lock_folder(tmp_path)
     assert (tmp_path / "precious").read_text() == "precious"
     (tmp_path / "sweep.lock").unlink()
     os.mkfifo(tmp_path / "sweep.lock")
     with pytest.raises(CaseError, match=r"sweep\.lock: this is a device or pipe"):
-        locked(tmp_path)
+        lock_folder(tmp_path)
 
 
 @pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
@@ -462,15 +469,15 @@ def test_without_locks_of_the_file_system_the_file_is_the_lock(tmp_path, monkeyp
         raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr(fcntl, "flock", flock)
-    lock = locked(tmp_path)
+    lock = lock_folder(tmp_path)
     with pytest.raises(CaseError, match=rf"another sweep .* \(process {os.getpid()}\); wait"):
-        locked(tmp_path)
+        lock_folder(tmp_path)
     lock.release()
     assert not (tmp_path / "sweep.lock").exists()
     dead = subprocess.Popen(["true"])
     dead.wait()
     (tmp_path / "sweep.lock").write_text(f"{dead.pid}\n{socket.gethostname()}\n")
-    locked(tmp_path).release()
+    lock_folder(tmp_path).release()
 
 
 def test_fields_of_endless_length_are_told(passage, here, tmp_path):

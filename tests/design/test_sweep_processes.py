@@ -20,7 +20,7 @@ import slideviz as sv
 from slideviz.design.sweeps import processes
 from slideviz.design.sweeps import sweep as sweeping
 from slideviz.design.sweeps.processes import Processes
-from slideviz.design.sweeps.worker import packed
+from slideviz.design.sweeps.worker import pack_mesh
 from slideviz.errors import DeformError
 from slideviz.samples.table import sample
 
@@ -77,7 +77,7 @@ def test_killed_workers_lose_one_design_each_and_none_is_left(passage, monkeypat
 
 
 def test_the_call_that_a_killed_worker_had_not_begun_is_done_by_another(passage):
-    with Processes(1, packed(passage.mesh)) as workers:
+    with Processes(1, pack_mesh(passage.mesh)) as workers:
         workers.submit(divmod, 1, 1).result()
         long = workers.submit(time.sleep, 60)
         others = [workers.submit(divmod, 7, k) for k in (1, 2, 3)]
@@ -161,7 +161,7 @@ def test_a_sweep_that_is_given_up_ends_at_once(passage):
 
 
 def test_what_a_process_cannot_do_is_an_error_of_the_call(passage):
-    with Processes(1, packed(passage.mesh)) as workers:
+    with Processes(1, pack_mesh(passage.mesh)) as workers:
         with pytest.raises(ZeroDivisionError):
             workers.submit(divmod, 1, 0).result()
         with pytest.raises(AttributeError, match="lambda"):

@@ -23,7 +23,7 @@ from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.session import changes, jobs
 from slideviz.session.inspect import worst_cells
 from slideviz.session.run_messages import end_message
-from slideviz.session.runs_table import described
+from slideviz.session.runs_table import describe_run
 
 
 @pytest.fixture
@@ -794,7 +794,7 @@ def test_what_is_harmless_is_counted_beside_the_button_and_not_over_the_view(rea
     ended_badly(ready, [note], inverted=0)
     assert not ready.window.banner.isVisible()
     assert [r.levelname for r in caplog.records if "no harm" in r.message] == ["INFO"]
-    assert "24 nodes are no control nodes" in described(ready.session.runs[-1])
+    assert "24 nodes are no control nodes" in describe_run(ready.session.runs[-1])
     text = ready.window.run_panel.text
     assert text.text() == "Done. <a href='notes'>1 note</a>"
     assert "24 nodes are no control nodes" in text.toolTip()

@@ -17,7 +17,7 @@ from slideviz.session import changes
 from slideviz.session.motions import pair_text
 from slideviz.session.opening import guess_by_name, open_mesh
 from slideviz.session.run_messages import run_requirements, with_field_labels
-from slideviz.session.runs_table import best
+from slideviz.session.runs_table import best_runs
 from slideviz.session.state import Run, StepFrame
 
 
@@ -121,8 +121,8 @@ def test_the_best_minimum_is_that_of_a_run_that_ended(session):
         return Run(number, session.case, (StepFrame(session.mesh, quality),), end)
 
     runs = [run(1, 0.5, "done"), run(2, 0.4, "done"), run(3, 0.9, ""), run(4, 0.8, "cancelled")]
-    assert best(runs) == {1}
-    assert best([*runs[:3], run(4, 0.8, "done")]) == {4}
+    assert best_runs(runs) == {1}
+    assert best_runs([*runs[:3], run(4, 0.8, "done")]) == {4}
 
 
 def test_letters_in_a_pdf_are_truetype(tmp_path):

@@ -13,7 +13,7 @@ from slideviz.mesh.quality import quality
 from slideviz.rbf.reduction import Reduction
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
-from slideviz.session.runs_table import COLUMNS, best, described, table_text, write_table
+from slideviz.session.runs_table import COLUMNS, best_runs, describe_run, table_text, write_table
 from slideviz.session.runs_words import (
     method_words,
     reduction_words,
@@ -83,11 +83,11 @@ def test_a_run_is_described_in_a_line_and_in_full(runs):
     assert summary(second).startswith(f"fixed vertices · 1 step · {nodes[1]} nodes · ")
     other = replace(second, case=second.case.change(kernel="gaussian", periodic="none"))
     assert summary(other).startswith("1 step · Gaussian · ")
-    assert "kernel: Gaussian (global)" in described(other)
-    text = described(second)
+    assert "kernel: Gaussian (global)" in describe_run(other)
+    text = describe_run(second)
     assert all(f"{column.title}: " in text for column in COLUMNS if column.title != "name")
     assert "name" not in text
-    assert "name: stiff" in described(replace(second, name="stiff"))
+    assert "name: stiff" in describe_run(replace(second, name="stiff"))
     assert "motion: airfoil: rotate by -8° about its centroid; airfoil: translate by" in text
     assert f"minimum quality: {second.last.quality.min:.4f}" in text
 
@@ -101,24 +101,24 @@ def test_a_run_that_is_not_done_says_how_far_it_came(runs):
     found = rows(table_text([bare]))[0]
     assert found["minimum quality"] == ""
     assert found["end"] == "running"
-    assert "minimum quality: –" in described(bare)
+    assert "minimum quality: –" in describe_run(bare)
 
 
 def test_the_best_run_has_the_highest_minimum(runs):
     wanted = max(runs, key=lambda run: run.last.quality.min).number
-    assert best(runs) == best(runs[::-1]) == {wanted}
-    assert best(runs[:1]) == set()
-    assert best([runs[0], Run(3, runs[0].case)]) == set(), "one of them has no result"
+    assert best_runs(runs) == best_runs(runs[::-1]) == {wanted}
+    assert best_runs(runs[:1]) == set()
+    assert best_runs([runs[0], Run(3, runs[0].case)]) == set(), "one of them has no result"
 
 
 def test_the_best_is_one_of_the_runs_with_the_same_motion(runs):
     turned = runs[0].case.change(motions=(Rotate("airfoil", 1.0),))
     bad, good = sorted(runs, key=lambda run: run.last.quality.min)
-    assert best([bad, replace(good, case=turned)]) == set(), "they cannot be compared"
+    assert best_runs([bad, replace(good, case=turned)]) == set(), "they cannot be compared"
     twice = [bad, good, replace(bad, number=3, case=turned), replace(good, number=4, case=turned)]
-    assert best(twice) == {good.number, 4}
-    assert best([good, replace(good, number=7)]) == set(), "neither is better"
-    assert best([bad, good, replace(good, number=7)]) == {good.number, 7}
+    assert best_runs(twice) == {good.number, 4}
+    assert best_runs([good, replace(good, number=7)]) == set(), "neither is better"
+    assert best_runs([bad, good, replace(good, number=7)]) == {good.number, 7}
 
 
 def test_words_of_methods_and_choices(runs):

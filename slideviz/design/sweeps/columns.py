@@ -102,7 +102,7 @@ def columns_of(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]
     known = _all_names(case)
     for name in names:
         try:
-            meant = _meant(case, name, known)
+            meant = _column_meaning(case, name, known)
             if first.setdefault(meant, name) != name or name in found:
                 raise CaseError(f"it means the same as column {first[meant]}; keep one of them")
             found[name] = meant
@@ -138,8 +138,8 @@ def applied(
             text = _text(values.get(keys[key], ""))
             case = set_key(case, key, text) if text else case
         except CaseError as problem:
-            said = str(problem).replace(f"--set {key}={text}: ", "")
-            problems.append(f"column {shown(keys[key])}: {said}")
+            message = str(problem).replace(f"--set {key}={text}: ", "")
+            problems.append(f"column {shown(keys[key])}: {message}")
     motions = list(case.motions)
     for name, place in columns.items():
         value = values.get(name, "")
@@ -160,7 +160,7 @@ def column_name(name: str) -> str:
     return plain.upper() if plain.upper() in KEYS else plain
 
 
-def own_values(case: Case, columns: Mapping[str, NumberPlace | str]) -> dict[str, Value]:
+def case_values(case: Case, columns: Mapping[str, NumberPlace | str]) -> dict[str, Value]:
     """Return the case's own value for each column: a number, or a text."""
     found: dict[str, Value] = {}
     for name, what in columns.items():
@@ -172,7 +172,7 @@ def own_values(case: Case, columns: Mapping[str, NumberPlace | str]) -> dict[str
     return found
 
 
-def _meant(case: Case, name: str, known: Mapping[str, NumberPlace]) -> NumberPlace | str:
+def _column_meaning(case: Case, name: str, known: Mapping[str, NumberPlace]) -> NumberPlace | str:
     """Return the place of a number, or the key, that a name means.
 
     ``known`` are the numbers by all their names: the shortest, and by the place of the motion.
@@ -183,7 +183,7 @@ def _meant(case: Case, name: str, known: Mapping[str, NumberPlace]) -> NumberPla
         if KEYS[key].group in (FILES, VIEW):
             raise CaseError("files and the view are those of the case for all designs")
         return key
-    wanted = _usual(name)
+    wanted = _normalized_name(name)
     if wanted in known:
         return known[wanted]
     # Markers may differ in capitals alone.
@@ -197,8 +197,10 @@ def _meant(case: Case, name: str, known: Mapping[str, NumberPlace]) -> NumberPla
         for part, _ in _parts(motion, at)
     )
     if several:
-        raise CaseError(f"several motions have it; say which, as {_listed(shortest)}")
-    there = f"the motions have {_listed(shortest)}" if shortest else "the motions have no numbers"
+        raise CaseError(f"several motions have it; say which, as {_names_text(shortest)}")
+    there = (
+        f"the motions have {_names_text(shortest)}" if shortest else "the motions have no numbers"
+    )
     close = nearest(name, [*shortest, *KEYS])
     raise CaseError(
         "there is no such number of a motion, and no such key"
@@ -215,7 +217,7 @@ def _all_names(case: Case) -> dict[str, NumberPlace]:
     }
 
 
-def _usual(name: str) -> str:
+def _normalized_name(name: str) -> str:
     """Return the name of a number with its last part in lower case, as here (`_ALSO`)."""
     head, dot, part = name.strip().rpartition(".")
     return f"{head}{dot}{_ALSO.get(part.lower(), part.lower())}"
@@ -252,11 +254,10 @@ def _parts(motion: Motion, at: int) -> Iterator[tuple[str, NumberPlace]]:
 
 
 def _is_number(value: object) -> bool:
-    """Return whether a value is a real number, and not a bool."""
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
-def _listed(known: Iterable[str]) -> str:
+def _names_text(known: Iterable[str]) -> str:
     """Return names in words, `_LISTED` at most."""
     names = list(known)
     return ", ".join(names[:_LISTED]) + (", ..." if len(names) > _LISTED else "")
@@ -272,7 +273,6 @@ def _number(value: Value) -> float:
 
 
 def _text(value: Any) -> str:
-    """Return a value as the text in a case file."""
     if isinstance(value, str):
         return value.strip()
     if isinstance(value, bool):

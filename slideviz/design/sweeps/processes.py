@@ -248,7 +248,6 @@ def _begin() -> None:
 
 
 def _wait_for_parent() -> None:
-    """Wait for the end of the parent process."""
     parent = parent_process()
     assert parent is not None
     parent.join()

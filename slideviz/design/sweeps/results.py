@@ -30,8 +30,8 @@ from slideviz.design.sweeps.table import (
     DesignRow,
     Designs,
     cells_of,
+    design_columns,
     head_of,
-    own_columns,
     result_of,
 )
 from slideviz.errors import CaseError
@@ -85,7 +85,7 @@ class SweepResults:
             raise CaseError(
                 f"{self._folder}: cannot be made a folder: {reason_of(problem)}"
             ) from problem
-        self._lock = locked(self._folder)
+        self._lock = lock_folder(self._folder)
         try:
             return self._started(resume, force, meshes)
         except BaseException:
@@ -103,24 +103,24 @@ class SweepResults:
     def _started(self, resume: bool, force: bool, meshes: bool) -> list[DesignRow]:
         """Do what `start` does, in the locked folder."""
         if resume and self.path.exists():
-            found = {row.design: row for row in self._go_on()}
-            return [row for row in found.values() if not row.problem and _has(row, meshes)]
+            found = {row.design: row for row in self._earlier_rows()}
+            return [row for row in found.values() if not row.problem and _has_mesh(row, meshes)]
         if self.path.exists() and not force:
             raise CaseError(
                 f"{self.path}: there are results already; continue with --resume (resume=True), "
                 f"start again with --force (force=True), or choose another folder"
             )
-        self._begin()
+        self._write_head()
         return []
 
-    def _begin(self) -> None:
+    def _write_head(self) -> None:
         """Write an empty table, and the sources."""
         text = json.dumps({"slideviz": __version__, **self._sources}, indent=2) + "\n"
         with atomic_write(self._folder / SOURCES, CaseError) as file:
             file.write(text.encode())
         write_csv(self.path, [self._head], CaseError)
 
-    def _go_on(self) -> list[DesignRow]:
+    def _earlier_rows(self) -> list[DesignRow]:
         """Return the rows of the table; CaseError where they are of another sweep.
 
         A last line that was cut off when the sweep was stopped is removed from the file.
@@ -138,7 +138,7 @@ class SweepResults:
         except ValueError as problem:
             raise CaseError(f"{self.path}: is no table of a sweep ({problem}); {_REMEDY}") from None
         if head != self._head:
-            names = ", ".join(head[own_columns(head)])
+            names = ", ".join(head[design_columns(head)])
             raise CaseError(
                 f"{self.path}: has other columns ({names}) than the table of designs "
                 f"({', '.join(self._designs.columns)}); {_REMEDY}"
@@ -189,7 +189,7 @@ class SweepResults:
             )
         for name, value in values.items():
             now = rows[row.design - 1].values[name]
-            if not _same(value, now):
+            if not _means_same(value, now):
                 raise CaseError(
                     f"{self.path}:{line}: design {row.design} was made with {name}= "
                     f"{value or '(that of the case)'}, and the table of designs has "
@@ -214,19 +214,19 @@ class SweepResults:
         changed = [key for key in {**before, **now} if before.get(key) != now.get(key)]
         if not changed:
             return
-        said = "; ".join(
+        message = "; ".join(
             f"{key}= {_short(before.get(key))} before, {_short(now.get(key))} now"
             if key in KEYS
             else f"the {key} changed"
             for key in changed
         )
-        raise CaseError(f"{self.path}: was made from other input: {said}; {_REMEDY}")
+        raise CaseError(f"{self.path}: was made from other input: {message}; {_REMEDY}")
 
 
 _REMEDY = "choose another folder, or start again with --force (force=True)"
 
 
-def locked(folder: Path) -> BaseFileLock:
+def lock_folder(folder: Path) -> BaseFileLock:
     """Return the lock of a folder, held: two sweeps would write over each other's results.
 
     The system frees it however the process ends; where a network's file system has no locks, the
@@ -296,20 +296,19 @@ def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
     return found
 
 
-def _has(row: DesignRow, meshes: bool) -> bool:
+def _has_mesh(row: DesignRow, meshes: bool) -> bool:
     """Return whether the mesh of a row exists, or is not wanted."""
     return not meshes or (row.mesh is not None and row.mesh.is_file())
 
 
 def _digest(*parts: Any) -> str:
-    """Return a digest of arrays or bytes."""
     digest = blake2b(digest_size=16)
     for part in parts:
         digest.update(part)
     return digest.hexdigest()
 
 
-def _same(text: str, value: Value) -> bool:
+def _means_same(text: str, value: Value) -> bool:
     """Return whether a cell's text means a value: the same text, or the same number."""
     if text == str(value):
         return True

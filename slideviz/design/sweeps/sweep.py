@@ -14,7 +14,7 @@ from slideviz.case.model import BoxMotion, Case, FromFile
 from slideviz.design.sweeps.processes import Processes, usable_cores
 from slideviz.design.sweeps.results import SweepResults, sources_of
 from slideviz.design.sweeps.table import Design, DesignRow, Table, read_designs
-from slideviz.design.sweeps.worker import Packed, Task, TaskResult, packed, run_task
+from slideviz.design.sweeps.worker import Packed, Task, TaskResult, pack_mesh, run_task
 from slideviz.errors import CaseError, DeformError
 from slideviz.formats.files import read
 from slideviz.formats.table import usual_ending
@@ -164,7 +164,7 @@ class _Tasks:
         boxes = any(isinstance(m, BoxMotion) for design in designs for m in design.case.motions)
         # The text of the file, which has boxes besides what writing keeps, is much of a mesh.
         lean = replace(mesh, origin=Origin())
-        self.packed: Packed = packed(mesh if boxes or folder is not None else lean)
+        self.packed: Packed = pack_mesh(mesh if boxes or folder is not None else lean)
         self._mesh, self._width = mesh, len(str(len(designs)))
 
     def of(self, design: Design, with_mesh: bool) -> Task:
@@ -201,8 +201,8 @@ class _Loop:
         going_on: Callable[[], object],
     ) -> None:
         self._executor, self._tasks, self._waiting = executor, tasks, waiting
-        self._going_on = going_on
-        self._flying: dict[Future[TaskResult], tuple[Design, bool]] = {}
+        self._check = going_on
+        self._pending: dict[Future[TaskResult], tuple[Design, bool]] = {}
         self._tries: dict[int, int] = {}
         self.holding: set[str] = set()
         """`holding`, `lacking`: workers that have the mesh, and workers that answered that they
@@ -213,16 +213,16 @@ class _Loop:
     def rows(self) -> Generator[DesignRow, None, None]:
         """Yield the rows as they come; when the generator is closed, cancel submitted calls."""
         try:
-            while self._waiting or self._flying:
+            while self._waiting or self._pending:
                 self._submit()
-                self._going_on()
-                done, _ = wait(self._flying, _EVERY, return_when=FIRST_COMPLETED)
+                self._check()
+                done, _ = wait(self._pending, _EVERY, return_when=FIRST_COMPLETED)
                 for future in done:
-                    row = self._row(future, self._flying.pop(future)[0])
+                    row = self._row(future, self._pending.pop(future)[0])
                     if row is not None:
                         yield row
         finally:
-            for future in self._flying:
+            for future in self._pending:
                 future.cancel()
             if isinstance(self._executor, Processes):
                 # Stopped also where all is done: to end by itself takes a process a second.
@@ -235,8 +235,8 @@ class _Loop:
         """
         unknown = max(_slots(self._executor) - len(self.holding) - len(self.lacking), 1)
         window = 3 * len(self.holding) + len(self.lacking) + unknown
-        sent = sum(with_mesh for _, with_mesh in self._flying.values())
-        while self._waiting and len(self._flying) < window:
+        sent = sum(with_mesh for _, with_mesh in self._pending.values())
+        while self._waiting and len(self._pending) < window:
             with_mesh = sent < len(self.lacking)
             if self._refused and not with_mesh:
                 return  # else an idle worker that lacks the mesh would be asked again and again
@@ -250,7 +250,7 @@ class _Loop:
                     "that are lost are replaced, and with resume=True finished designs are not "
                     "run again"
                 ) from problem
-            self._flying[future] = design, with_mesh
+            self._pending[future] = design, with_mesh
 
     def _row(self, future: Future[TaskResult], design: Design) -> DesignRow | None:
         """Return the row of a design; None where it is to be done again."""

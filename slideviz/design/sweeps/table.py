@@ -128,8 +128,8 @@ def _rows_of(table: Sequence[Mapping[str, Any]] | Mapping[str, Sequence[Any]]) -
         return list(table)
     lengths = {name: len(values) for name, values in table.items()}
     if len(set(lengths.values())) > 1:
-        said = ", ".join(f"{name} {count}" for name, count in lengths.items())
-        raise CaseError(f"the columns have different numbers of values ({said}); give as many")
+        message = ", ".join(f"{name} {count}" for name, count in lengths.items())
+        raise CaseError(f"the columns have different numbers of values ({message}); give as many")
     return [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
 
 
@@ -149,7 +149,7 @@ def _read_csv(case: Case, path: Path) -> Designs:
     In a table of results (``results.csv``) the columns of results are ignored.
     """
     text, _ = read_text(path, "table of designs")
-    lines = _filled(text)
+    lines = _filled_lines(text)
     if len(lines) < 2:
         raise CaseError(
             f"{path}: has no designs; expected a line with the names of the columns, as "
@@ -161,14 +161,14 @@ def _read_csv(case: Case, path: Path) -> Designs:
         words = _split(head, separator)
     except CaseError as problem:
         raise CaseError(f"{path}:{first}: {problem}") from None
-    own = own_columns(words)
+    own = design_columns(words)
     names = [column_name(name) for name in words[own]]
     problems: list[tuple[int, str]] = []
     try:
         columns = columns_of(case, names)
     except CaseError as problem:
-        problems += [(first, said) for said in str(problem).splitlines()]
-        columns = _known(case, names)
+        problems += [(first, message) for message in str(problem).splitlines()]
+        columns = _known_columns(case, names)
     designs: list[Design] = []
     for at, (line, content) in enumerate(rest, start=1):
         try:
@@ -181,7 +181,7 @@ def _read_csv(case: Case, path: Path) -> Designs:
             values: dict[str, Value] = {name: cell for name, cell in row if name in columns}
             designs.append(_design(case, columns, at, values))
         except CaseError as problem:
-            problems += [(line, said) for said in str(problem).splitlines()]
+            problems += [(line, message) for message in str(problem).splitlines()]
     if problems:
         raise CaseError(listed(path, problems))
     return Designs(columns, tuple(designs))
@@ -235,7 +235,7 @@ def result_of(head: Sequence[str], cells: Sequence[str], folder: Path = Path()) 
     )
 
 
-def own_columns(head: Sequence[str]) -> slice:
+def design_columns(head: Sequence[str]) -> slice:
     """Return the slice of the columns of designs; a table of results has others around them."""
     at = len(head) - 1
     while at > 0 and list(head[at : at + len(NUMBERS)]) != list(NUMBERS):
@@ -243,7 +243,7 @@ def own_columns(head: Sequence[str]) -> slice:
     return slice(1, at) if at > 1 and head[0] == "design" else slice(None)
 
 
-def _known(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]:
+def _known_columns(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]:
     """Return the columns with known names, so that mistakes in their values are found, too."""
     found: dict[str, NumberPlace | str] = {}
     for name in names:
@@ -264,7 +264,7 @@ def _design(
     return Design(number, plain, made)
 
 
-def _filled(text: str) -> list[tuple[int, str]]:
+def _filled_lines(text: str) -> list[tuple[int, str]]:
     """Return the lines that are neither empty nor comments, with their numbers from 1."""
     return [
         (at, line)

@@ -32,7 +32,7 @@ from slideviz.terms import FileFormat
 
 _KEPT = 2
 """Number of meshes that a process keeps: that of the sweep, and one of another sweep."""
-_held: dict[str, Mesh] = {}
+_meshes: dict[str, Mesh] = {}
 """The meshes of this process, by name."""
 _one_at_a_time = Lock()
 """Held during a task: Numba ends the process if loops of two threads run at once."""
@@ -73,7 +73,7 @@ class TaskResult:
     row: DesignRow | None = None
 
 
-def packed(mesh: Mesh) -> Packed:
+def pack_mesh(mesh: Mesh) -> Packed:
     """Return a mesh as bytes, named by their digest."""
     content = pickle.dumps(mesh, protocol=pickle.HIGHEST_PROTOCOL)
     return Packed(blake2b(content, digest_size=16).hexdigest(), content)
@@ -81,26 +81,26 @@ def packed(mesh: Mesh) -> Packed:
 
 def cache_mesh(mesh: Packed) -> str:
     """Keep a mesh in this process; return the name of the process."""
-    if mesh.name not in _held:
-        while len(_held) >= _KEPT:
-            _held.pop(next(iter(_held)))
-        _held[mesh.name] = pickle.loads(mesh.content)
-    return _myself()
+    if mesh.name not in _meshes:
+        while len(_meshes) >= _KEPT:
+            _meshes.pop(next(iter(_meshes)))
+        _meshes[mesh.name] = pickle.loads(mesh.content)
+    return _worker_name()
 
 
 def run_task(task: Task) -> TaskResult:
     """Deform the mesh by a design; return its row. An exception becomes a row with the reason."""
     if task.version != __version__:
-        reason = f"the worker {_myself()} has slideviz {__version__}, this is {task.version}"
+        reason = f"the worker {_worker_name()} has slideviz {__version__}, this is {task.version}"
         return TaskResult(
-            _myself(), DesignRow(task.design, problem=f"{reason}; install the same version")
+            _worker_name(), DesignRow(task.design, problem=f"{reason}; install the same version")
         )
     with _one_at_a_time:
         if task.packed is not None:
             cache_mesh(task.packed)
-        mesh = _held.get(task.mesh)
+        mesh = _meshes.get(task.mesh)
         if mesh is None:
-            return TaskResult(_myself())
+            return TaskResult(_worker_name())
         begin = time.perf_counter()
         try:
             with _one_thread():
@@ -113,7 +113,7 @@ def run_task(task: Task) -> TaskResult:
             row = DesignRow(
                 task.design, problem=f"internal error ({type(problem).__name__}: {problem})"
             )
-        return TaskResult(_myself(), row)
+        return TaskResult(_worker_name(), row)
 
 
 def _result(task: Task, mesh: Mesh, begin: float) -> DesignRow:
@@ -145,7 +145,7 @@ def _warnings(last: Step) -> tuple[str, ...]:
     return tuple(text for text in last.warnings if not isinstance(text, Note))
 
 
-def _myself() -> str:
+def _worker_name() -> str:
     """Return the name of this process: host and process id."""
     return f"{os.uname().nodename}, process {os.getpid()}"
 

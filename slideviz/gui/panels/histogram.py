@@ -209,7 +209,7 @@ class HistogramPanel(Panel):
         # The largest displacement of a node: values of cells are means over their nodes.
         far = what == "displacement"
         least = found.min if what == "size-skew" else plain.min()
-        ends = session.frame.furthest(session.mesh) if far else least
+        ends = session.frame.largest_displacement(session.mesh) if far else least
         form = ".4g" if what == "displacement" else ".4f"
         red = f" style='color:{alarm()}'" if bad else ""
         self.numbers.setText(

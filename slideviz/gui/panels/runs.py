@@ -20,7 +20,7 @@ from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import ask_and_write
 from slideviz.gui.widgets.services import Services, main_window
 from slideviz.session import changes
-from slideviz.session.runs_table import QUALITY, best, described, table_text, write_table
+from slideviz.session.runs_table import QUALITY, best_runs, describe_run, table_text, write_table
 from slideviz.session.runs_words import run_words, summary
 from slideviz.session.state import Run, Session
 from slideviz.session.store import Store
@@ -231,7 +231,7 @@ class RunsPanel(Panel):
                 item = QTreeWidgetItem()
                 item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable)
                 tree.addTopLevelItem(item)
-            champions = best(runs)
+            champions = best_runs(runs)
             for place, run in enumerate((None, *runs) if runs else ()):
                 row = tree.topLevelItem(place)
                 assert row is not None
@@ -252,7 +252,7 @@ class RunsPanel(Panel):
                 f"{quality.inverted:,}",
             )
         beside = number == session.view.beside
-        tip = "The mesh before it is deformed." if run is None else described(run)
+        tip = "The mesh before it is deformed." if run is None else describe_run(run)
         words = "step 0 of each run" if run is None else summary(run, session.runs)
         if champion:
             tip += "\n\nIts minimum quality is the highest of the runs with the same motion."
