@@ -339,7 +339,7 @@ def test_a_folder_that_cannot_be_written_is_logged_and_the_window_goes_on(
     window = make()
     open_in(window, case_file, qtbot)
     window.autosave.save()
-    qtbot.waitUntil(lambda: "could not be kept" in caplog.text)
+    qtbot.waitUntil(lambda: "could not be saved" in caplog.text)
     assert window.error_reporter.count == 0
 
 

@@ -97,6 +97,7 @@ class KeyForm(QFormLayout):
     def __init__(self, place: Form, own: Mapping[str, Field] | None = None) -> None:
         super().__init__()
         grow_fields(self)
+        self.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
         self.fields: dict[str, Field] = {}
         self._rows: list[tuple[Key, Field]] = []
         self._own = own or {}
