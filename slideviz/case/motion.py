@@ -16,11 +16,7 @@ import numpy as np
 
 from slideviz.case.boxes import ffd_displacements
 from slideviz.case.bumps import bump_displacements
-from slideviz.case.check import (
-    marker_problems,
-    motion_problems,
-    raise_all,
-)
+from slideviz.case.check import marker_problems, motion_problems, raise_all
 from slideviz.case.displacement import Displacements, read_displacements
 from slideviz.case.model import (
     BoxMotion,

@@ -83,11 +83,7 @@ def run_def(arguments: argparse.Namespace) -> int:
 
 def _run_def(arguments: argparse.Namespace) -> int:
     from slideviz import quality, write
-    from slideviz.cli.output_paths import (
-        OutputPath,
-        qualities_path,
-        require_output_paths,
-    )
+    from slideviz.cli.output_paths import OutputPath, qualities_path, require_output_paths
     from slideviz.cli.report import folded_cells, run_report
     from slideviz.cli.run_command import run_steps
     from slideviz.cli.run_outcome import CELLS, advice_for, report_outcome, write_qualities

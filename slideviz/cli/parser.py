@@ -4,27 +4,13 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import (
-    Iterable,
-    Sequence,
-)
-from importlib import (
-    import_module,
-)
-from pathlib import (
-    Path,
-)
-from typing import (
-    Any,
-    NoReturn,
-)
+from collections.abc import Iterable, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NoReturn
 
-from slideviz import (
-    __version__,
-)
-from slideviz.errors import (
-    nearest,
-)
+from slideviz import __version__
+from slideviz.errors import nearest
 
 
 def window(arguments: argparse.Namespace) -> int:

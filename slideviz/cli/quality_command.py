@@ -84,13 +84,7 @@ def _report(
 
     ``worst`` are numbers and VTK types of the worst cells, ``reference`` is the undeformed mesh.
     """
-    from slideviz.cli.report import (
-        histogram_lines,
-        quality_lines,
-        quality_report,
-        save_json,
-        table,
-    )
+    from slideviz.cli.report import histogram_lines, quality_lines, quality_report, save_json, table
     from slideviz.cli.terminal import DONE, INVERTED
 
     report = quality_report(name, found, worst)

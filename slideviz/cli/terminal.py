@@ -9,27 +9,12 @@ from __future__ import annotations
 import os
 import sys
 import unicodedata
-from collections.abc import (
-    Callable,
-    Iterator,
-)
-from contextlib import (
-    contextmanager,
-    redirect_stderr,
-    redirect_stdout,
-    suppress,
-)
-from contextvars import (
-    ContextVar,
-)
-from typing import (
-    Any,
-    TextIO,
-)
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from contextvars import ContextVar
+from typing import Any, TextIO
 
-from slideviz.errors import (
-    SlidevizError,
-)
+from slideviz.errors import SlidevizError
 
 DONE = 0
 WRONG_INPUT = 1

@@ -2,35 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import (
-    Callable,
-    Iterator,
-    Mapping,
-)
-from dataclasses import (
-    replace,
-)
-from pathlib import (
-    Path,
-)
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import (
-    ArrayLike,
-    NDArray,
-)
+from numpy.typing import ArrayLike, NDArray
 
-from slideviz.argument_types import (
-    check_types,
-)
-from slideviz.errors import (
-    MeshError,
-    path_error,
-    printable,
-)
-from slideviz.formats.losses import (
-    warning_of_losses,
-)
+from slideviz.argument_types import check_types
+from slideviz.errors import MeshError, path_error, printable
+from slideviz.formats.losses import warning_of_losses
 from slideviz.formats.table import (
     FILE_FORMATS,
     FORMATS,
@@ -40,26 +21,12 @@ from slideviz.formats.table import (
     holds_quality,
     usual_ending,
 )
-from slideviz.mesh.check import (
-    check_size,
-)
-from slideviz.mesh.model import (
-    Mesh,
-    Origin,
-)
-from slideviz.mesh.quality import (
-    Quality,
-    quality,
-)
-from slideviz.system.atomic import (
-    atomic_write,
-)
-from slideviz.system.threads import (
-    Tick,
-)
-from slideviz.terms import (
-    FileFormat,
-)
+from slideviz.mesh.check import check_size
+from slideviz.mesh.model import Mesh, Origin
+from slideviz.mesh.quality import Quality, quality
+from slideviz.system.atomic import atomic_write
+from slideviz.system.threads import Tick
+from slideviz.terms import FileFormat
 
 
 @check_types

@@ -7,32 +7,18 @@ and is vectorised. In compiled functions m is ``LANES``, of which ``count`` are 
 
 from __future__ import annotations
 
-from typing import (
-    TYPE_CHECKING,
-    Any,
-)
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import (
-    NDArray,
-)
+from numpy.typing import NDArray
 
-from slideviz.errors import (
-    MeshError,
-)
-from slideviz.mesh.elements import (
-    ELEMENTS,
-)
+from slideviz.errors import MeshError
+from slideviz.mesh.elements import ELEMENTS
 from slideviz.system.jit_cache import njit
-from slideviz.terms import (
-    CELL_STATES,
-)
+from slideviz.terms import CELL_STATES
 
 if TYPE_CHECKING:
-    from slideviz.mesh.model import (
-        FloatArray,
-        Mesh,
-    )
+    from slideviz.mesh.model import FloatArray, Mesh
 
 LEVELS = 6
 """How often a hexahedron is cut before it is called unproven."""

@@ -8,13 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.mesh.model import (
-    FloatArray,
-    IntArray,
-)
-from slideviz.system.threads import (
-    cores,
-)
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.system.threads import cores
 
 
 def sorted_in_rows(table: IntArray) -> IntArray:

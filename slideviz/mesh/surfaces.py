@@ -2,30 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import (
-    Sequence,
-)
-from dataclasses import (
-    dataclass,
-    replace,
-)
-from weakref import (
-    WeakKeyDictionary,
-)
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from slideviz.mesh.cached_boundary import (
-    boundary_of,
-)
-from slideviz.mesh.model import (
-    FloatArray,
-    IntArray,
-    Mesh,
-)
-from slideviz.mesh.nearest import (
-    row_groups,
-)
+from slideviz.mesh.cached_boundary import boundary_of
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.nearest import row_groups
 
 LEAST = 30_000
 """Facets of all boundaries together, below which there are no coarse surfaces."""

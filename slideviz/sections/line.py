@@ -11,14 +11,7 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray
 from slideviz.sections.handles import HandleParts, Part, rounded_place, within
-from slideviz.sections.shape import (
-    DIGITS,
-    InPlane,
-    Label,
-    axis_word,
-    direction_label,
-    triple_words,
-)
+from slideviz.sections.shape import DIGITS, InPlane, Label, axis_word, direction_label, triple_words
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section

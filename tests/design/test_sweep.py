@@ -19,14 +19,7 @@ from slideviz.design.sweeps import sweep as sweeping
 from slideviz.design.sweeps.columns import case_values, columns_of, numbers_of
 from slideviz.design.sweeps.results import lock_folder
 from slideviz.design.sweeps.table import DesignRow, read_designs
-from slideviz.design.sweeps.worker import (
-    Packed,
-    Task,
-    TaskResult,
-    cache_mesh,
-    pack_mesh,
-    run_task,
-)
+from slideviz.design.sweeps.worker import Packed, Task, TaskResult, cache_mesh, pack_mesh, run_task
 from slideviz.errors import CaseError, DeformError
 from slideviz.samples.table import sample
 from slideviz.session.design_table import read_results

@@ -13,13 +13,7 @@ from slideviz.export import offscreen_renderer as renderer_module
 from slideviz.export import vector
 from slideviz.export.film import FilmOptions, draw_images, film_steps
 from slideviz.export.offscreen_renderer import OffscreenRenderer
-from slideviz.export.picture_options import (
-    TITLE_ROOM,
-    PictureOptions,
-    panes,
-    size_words,
-    title_of,
-)
+from slideviz.export.picture_options import TITLE_ROOM, PictureOptions, panes, size_words, title_of
 from slideviz.export.titles import fitting, mark_words, pair_titles
 from slideviz.export.vector import draw_vector, require_vector, write_vector
 from slideviz.formats.losses import left_out

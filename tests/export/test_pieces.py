@@ -12,13 +12,7 @@ from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.session import changes, pieces
 from slideviz.session.opening import open_mesh
-from slideviz.session.pieces import (
-    InThread,
-    actor_groups,
-    render_in_groups,
-    run_inline,
-    run_to_end,
-)
+from slideviz.session.pieces import InThread, actor_groups, render_in_groups, run_inline, run_to_end
 from slideviz.session.state import StepFrame
 
 PLAIN = PictureOptions((300, 200))

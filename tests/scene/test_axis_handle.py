@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 
-from slideviz.scene.axis_handle import (
-    dragged_size,
-    frame_of,
-    patch_in,
-    pixel_and_slope,
-)
+from slideviz.scene.axis_handle import dragged_size, frame_of, patch_in, pixel_and_slope
 from slideviz.sections.around_axis import patch_of
 from slideviz.sections.model import Section
 from slideviz.session.section_cuts import Cuts

@@ -8,12 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from slideviz.formats.cgns.elements import (
-    CgnsElements,
-    grid_cells,
-    grid_nodes,
-    read_sections,
-)
+from slideviz.formats.cgns.elements import CgnsElements, grid_cells, grid_nodes, read_sections
 from slideviz.formats.cgns.tree import DATA, Node
 from slideviz.formats.meshio.markers import in_node_sets
 from slideviz.mesh.cached_boundary import outer_facets

@@ -10,56 +10,22 @@ import math
 import os
 import re
 import threading
-from collections.abc import (
-    Iterator,
-)
-from contextlib import (
-    contextmanager,
-    redirect_stderr,
-    redirect_stdout,
-)
-from dataclasses import (
-    replace,
-)
-from io import (
-    StringIO,
-)
-from pathlib import (
-    Path,
-)
-from typing import (
-    TYPE_CHECKING,
-)
-from xml.etree import (
-    ElementTree as ET,
-)
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from slideviz.errors import (
-    MeshError,
-    path_error,
-    printable,
-)
-from slideviz.formats.meshio.markers import (
-    MeshioBlock,
-    find_markers,
-)
-from slideviz.formats.table import (
-    endings,
-)
-from slideviz.mesh.check import (
-    check_mesh,
-    first_fault,
-)
-from slideviz.mesh.elements import (
-    ELEMENTS,
-)
-from slideviz.mesh.model import (
-    Cells,
-    FloatArray,
-    Mesh,
-)
+from slideviz.errors import MeshError, path_error, printable
+from slideviz.formats.meshio.markers import MeshioBlock, find_markers
+from slideviz.formats.table import endings
+from slideviz.mesh.check import check_mesh, first_fault
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import Cells, FloatArray, Mesh
 
 if TYPE_CHECKING:
     import h5py

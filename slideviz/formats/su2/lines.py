@@ -7,32 +7,16 @@ is on each.
 
 from __future__ import annotations
 
-from collections.abc import (
-    Iterator,
-)
-from dataclasses import (
-    dataclass,
-)
-from itertools import (
-    islice,
-)
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
-from slideviz.errors import (
-    MeshError,
-    printable,
-)
-from slideviz.formats.source import (
-    Source,
-)
-from slideviz.mesh.model import (
-    IntArray,
-)
-from slideviz.system.threads import (
-    Tick,
-    ordered_map,
-)
+from slideviz.errors import MeshError, printable
+from slideviz.formats.source import Source
+from slideviz.mesh.model import IntArray
+from slideviz.system.threads import Tick, ordered_map
 
 BLOCK_BYTES = 1 << 20
 """About how many bytes a block has: whole lines that are scanned together."""

@@ -3,75 +3,24 @@
 from __future__ import annotations
 
 import re
-from collections.abc import (
-    Iterator,
-    Sequence,
-)
-from dataclasses import (
-    dataclass,
-    replace,
-)
-from itertools import (
-    pairwise,
-    product,
-)
-from pathlib import (
-    Path,
-)
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise, product
+from pathlib import Path
 
 import numpy as np
 
-from slideviz.errors import (
-    printable,
-)
-from slideviz.formats.source import (
-    Source,
-    open_source,
-)
-from slideviz.formats.su2.keyword_blocks import (
-    boxes_elsewhere,
-    find_blocks,
-    find_bounds,
-)
-from slideviz.formats.su2.lines import (
-    Lines,
-    Rows,
-    number_of,
-    scan,
-)
-from slideviz.formats.su2.numbers import (
-    parse_cells,
-    parse_points,
-)
-from slideviz.formats.su2.text import (
-    boundaries_elsewhere,
-)
-from slideviz.formats.su2.zone import (
-    SendRows,
-    TextZone,
-    find_zone,
-)
-from slideviz.mesh.halo import (
-    FITS,
-    Halo,
-    RigidMotion,
-    fit_motion,
-    make_halo,
-)
-from slideviz.mesh.interfaces import (
-    find_interfaces,
-)
-from slideviz.mesh.model import (
-    Cells,
-    FloatArray,
-    IntArray,
-    Marker,
-    Mesh,
-    Origin,
-)
-from slideviz.system.threads import (
-    Tick,
-)
+from slideviz.errors import printable
+from slideviz.formats.source import Source, open_source
+from slideviz.formats.su2.keyword_blocks import boxes_elsewhere, find_blocks, find_bounds
+from slideviz.formats.su2.lines import Lines, Rows, number_of, scan
+from slideviz.formats.su2.numbers import parse_cells, parse_points
+from slideviz.formats.su2.text import boundaries_elsewhere
+from slideviz.formats.su2.zone import SendRows, TextZone, find_zone
+from slideviz.mesh.halo import FITS, Halo, RigidMotion, fit_motion, make_halo
+from slideviz.mesh.interfaces import find_interfaces
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin
+from slideviz.system.threads import Tick
 
 HaloAndRemarks = tuple[Halo | None, tuple[str, ...]]
 """The halo, None if there is none or it cannot be used; and remarks, a sentence each."""

@@ -13,58 +13,20 @@ import errno
 import json
 import os
 import zlib
-from collections.abc import (
-    Callable,
-    Iterable,
-    Iterator,
-    Sequence,
-)
-from concurrent.futures import (
-    ThreadPoolExecutor,
-    wait,
-)
-from contextlib import (
-    AbstractContextManager,
-    contextmanager,
-    suppress,
-)
-from dataclasses import (
-    dataclass,
-)
-from pathlib import (
-    Path,
-)
-from threading import (
-    Event,
-)
-from typing import (
-    BinaryIO,
-)
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event
+from typing import BinaryIO
 
-from slideviz.errors import (
-    MeshError,
-)
-from slideviz.system.atomic import (
-    mode_of,
-    reason_of,
-)
-from slideviz.system.cleanup import (
-    keep_partial,
-    open_temporary,
-    removed_at_stop,
-)
-from slideviz.system.file_checks import (
-    read_json,
-    require_no_input,
-)
-from slideviz.system.ranks import (
-    SERIAL,
-    SerialPool,
-    WorkerFactory,
-)
-from slideviz.system.threads import (
-    Tick,
-)
+from slideviz.errors import MeshError
+from slideviz.system.atomic import mode_of, reason_of
+from slideviz.system.cleanup import keep_partial, open_temporary, removed_at_stop
+from slideviz.system.file_checks import read_json, require_no_input
+from slideviz.system.ranks import SERIAL, SerialPool, WorkerFactory
+from slideviz.system.threads import Tick
 
 _PIECE = 1 << 26
 """Most bytes that are copied in one task."""

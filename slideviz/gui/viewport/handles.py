@@ -6,10 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pyvista as pv
-from vtkmodules.vtkInteractionWidgets import (
-    vtkImplicitPlaneRepresentation,
-    vtkImplicitPlaneWidget2,
-)
+from vtkmodules.vtkInteractionWidgets import vtkImplicitPlaneRepresentation, vtkImplicitPlaneWidget2
 
 from slideviz.color_scheme import SELECTED_COLOR, ColorScheme
 from slideviz.gui.responsiveness.timers import single_shot

@@ -28,14 +28,7 @@ from slideviz.scene.axis_handle import dragged_size, frame_of, patch_in, pixel_a
 from slideviz.scene.pick import on_plane, to_display
 from slideviz.scene.scene import Scene
 from slideviz.sections.around_axis import Patch, PlaceOnSection, axis_shape
-from slideviz.sections.handles import (
-    HandleParts,
-    Part,
-    dragged,
-    handle_parts,
-    part_at,
-    rounded,
-)
+from slideviz.sections.handles import HandleParts, Part, dragged, handle_parts, part_at, rounded
 from slideviz.sections.line import Box
 from slideviz.sections.model import Section
 

@@ -17,13 +17,7 @@ from qtpy.QtWidgets import QLabel, QSizePolicy, QStackedWidget, QWidget
 
 from slideviz.color_scheme import LIGHT, ColorScheme
 from slideviz.errors import SlidevizError
-from slideviz.gui.responsiveness.timers import (
-    LOOK_MS,
-    MOST_REST,
-    REST_MS,
-    REST_TIMES,
-    single_shot,
-)
+from slideviz.gui.responsiveness.timers import LOOK_MS, MOST_REST, REST_MS, REST_TIMES, single_shot
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import hint_label
 from slideviz.gui.widgets.plot_image import Draw, Picture, PlotFormat, draw_in_thread
