@@ -32,7 +32,7 @@ KINDS = {
     r"nodes (\d+) and (\d+) coincide": "images asked to move differently",
     r"the motion (?:puts|takes) (\S+) through (\S+) near": "motion through a boundary",
     r"which displace it differently": "two moving markers disagree",
-    r"would go \S+ far, more than": "an overshoot",
+    r"would move by \S+, more than": "an overshoot",
     r"misses its own control nodes": "a system that was not solved",
     r"equations of linear elasticity were not solved": "elasticity not solved",
 }
