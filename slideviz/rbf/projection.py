@@ -18,7 +18,6 @@ and is the derivative of the projection (`projection_matrices`).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +27,7 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import Boundary, corner_vectors, find_joints, unit
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
 from slideviz.rbf.closest import ClosestPoints
-from slideviz.system.threads import cores
+from slideviz.system.threads import ordered_map
 from slideviz.terms import ROLES
 
 CLOSE = 2e-6
@@ -240,8 +239,7 @@ def find_tracks(
             curved |= _bends(corners[:, 1] - corners[:, 0], either_way=True)
             beyond = edge_extension(ends, moving, place, reach)
             simplices.append(np.concatenate([corners, beyond]))
-    with ThreadPoolExecutor(cores()) as pool:
-        tracks = tuple(pool.map(lambda corners: ClosestPoints(corners, shift), simplices))
+    tracks = tuple(ordered_map(lambda corners: ClosestPoints(corners, shift), simplices))
     return Tracks(tracks, of_node, bool(curved))
 
 
