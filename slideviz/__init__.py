@@ -30,12 +30,15 @@ if TYPE_CHECKING:
     from slideviz.design.deformer import Deformer
     from slideviz.design.sweeps.sweep import sweep
     from slideviz.errors import ConditionWarning, SlidevizError, ToleranceWarning
+    from slideviz.export.verbs import film, picture, section
     from slideviz.formats.files import convert, read, write
     from slideviz.mesh.model import Cells, Marker, Mesh
     from slideviz.mesh.quality import Quality, quality
     from slideviz.mesh.quality_derivative import QualityDerivative
     from slideviz.rbf.reduction import Reduction
+    from slideviz.sections.model import Section
     from slideviz.solver.deform import Step, deform
+    from slideviz.study.combinations import compare
 
 _HOME = {
     "Bump": "case.model",
@@ -59,14 +62,19 @@ _HOME = {
     "Reduction": "rbf.reduction",
     "Rotate": "case.model",
     "Scale": "case.model",
+    "Section": "sections.model",
     "SlidevizError": "errors",
     "Step": "solver.deform",
     "ToleranceWarning": "errors",
     "Translate": "case.model",
+    "compare": "study.combinations",
     "convert": "formats.files",
     "deform": "solver.deform",
+    "film": "export.verbs",
+    "picture": "export.verbs",
     "quality": "mesh.quality",
     "read": "formats.files",
+    "section": "export.verbs",
     "sweep": "design.sweeps.sweep",
     "write": "formats.files",
 }
@@ -93,15 +101,20 @@ __all__ = [
     "Reduction",
     "Rotate",
     "Scale",
+    "Section",
     "SlidevizError",
     "Step",
     "ToleranceWarning",
     "Translate",
     "__version__",
+    "compare",
     "convert",
     "deform",
+    "film",
+    "picture",
     "quality",
     "read",
+    "section",
     "sweep",
     "write",
 ]

@@ -327,6 +327,10 @@ CellState = Literal["valid", "inverted", "unproven"]
 CELL_STATES: tuple[CellState, ...] = ("valid", "inverted", "unproven")
 """The states of cells: the place of each is its code in `slideviz.mesh.quality.Quality.status`."""
 
+NO_REFERENCE = "no reference: relative to itself"
+"""The remark, in pictures too, where there is no undeformed mesh to compare cells with: size is
+rated 1 then."""
+
 # View --------------------------------------------------------------------------------------
 
 Quantity = Literal["size-skew", "size", "skew", "displacement"]

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import Mesh
     from slideviz.study.combinations import Combination, CombinationRow
 
-STEPS = (1, 5, 20)
 TABLE, HISTORY = "compare.csv", "convergence.csv"
 KEPT_BYTES = 1_500_000_000
 """Most bytes of deformed meshes that are kept in memory, for the pictures."""
@@ -141,6 +140,8 @@ def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...
 
     methods = names("methods", tuple(COMPARED_METHODS), wanted_methods(case))
     modes = names("periodic", tuple(PERIODIC_MODES), wanted_modes(case))
+    from slideviz.study.combinations import STEPS
+
     steps = list(STEPS)
     if arguments.steps is not None:
         steps = []

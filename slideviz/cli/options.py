@@ -7,6 +7,8 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from slideviz.terms import NO_REFERENCE
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
@@ -14,9 +16,6 @@ if TYPE_CHECKING:
     from slideviz.scene.overview import Zoom
     from slideviz.terms import Role
 
-NONE = "no reference: relative to itself"
-"""The remark, in pictures too, where there is no undeformed mesh to compare cells with: size is
-rated 1 then."""
 REMEDY = "give --reference UNDEFORMED"
 """The advice after that remark."""
 
@@ -34,7 +33,7 @@ def add_reference(call: argparse.ArgumentParser, case_help: str) -> None:
 
 def reference_words(reference: Path | None) -> str:
     """Return the line on the undeformed mesh that the quality refers to, or that there is none."""
-    return f"{NONE}; {REMEDY}" if reference is None else f"reference: {reference}"
+    return f"{NO_REFERENCE}; {REMEDY}" if reference is None else f"reference: {reference}"
 
 
 SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {

@@ -117,7 +117,22 @@ def _run(arguments: argparse.Namespace) -> int:
         write_qualities(qualities, found)
         seconds["write"] += time.perf_counter()
     if arguments.picture:
-        _draw(arguments, case, done, output.name)
+        from slideviz.export.offscreen_renderer import PICTURE_SIZE
+        from slideviz.export.verbs import picture
+
+        named = replace(done.steps[-1].mesh, name=output.name)
+        pixels = arguments.picture_size or PICTURE_SIZE
+        picture(
+            arguments.picture,
+            named,
+            done.mesh,
+            case=case,
+            step=done.steps[-1],
+            rated=found,
+            before=before,
+            size=pixels,
+            zoom=arguments.zoom,
+        )
     seconds["total"] = time.perf_counter() - begin
     folded = done.folded
     report = run_report(
@@ -192,20 +207,6 @@ def _stream(
             later=QUALITY_BYTES if case.generate_quality else 0,
             ranks=arguments.ranks or SERIAL,
         )
-
-
-def _draw(arguments: argparse.Namespace, case: Case, done: RunResult, name: str) -> None:
-    """Write the picture of the quality after the last step."""
-    from slideviz.export.offscreen_renderer import PICTURE_SIZE, picture
-    from slideviz.session.opening import session_of_runs
-    from slideviz.session.state import Run, StepFrame
-
-    last = done.steps[-1]
-    named = StepFrame(replace(last.mesh, name=name), done.quality, last)
-    session = session_of_runs(
-        StepFrame(done.mesh, done.undeformed), [Run(1, case, (named,), "done")]
-    )
-    picture(session, arguments.picture, arguments.picture_size or PICTURE_SIZE, arguments.zoom)
 
 
 def require_streamable(

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from slideviz.case.section_shapes import SECTION_SHAPES, names
-from slideviz.cli.options import NONE, add_reference, add_shared, optional_case, reference_words
+from slideviz.cli.options import add_reference, add_shared, optional_case, reference_words
 from slideviz.cli.section_options import limits, neighbours, pixels, section_reader
 from slideviz.terms import COLOR_MAPS, METRICS, QUANTITIES
 
@@ -113,17 +113,8 @@ class _Scene:
 def section(arguments: argparse.Namespace) -> int:
     """Draw a section of a mesh to a file; return the exit code."""
     from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.errors import CaseError
-    from slideviz.plots.cells import surroundings
-    from slideviz.plots.section_paint import paint
-    from slideviz.plots.section_picture import (
-        SectionInRun,
-        SectionStyle,
-        require_picture_name,
-        section_picture,
-    )
-    from slideviz.sections.cut import Cutter
-    from slideviz.session.passages import show_passages
+    from slideviz.export.verbs import section as draw
+    from slideviz.plots.section_picture import SectionStyle, require_picture_name
 
     _check_usage(arguments)
     require_picture_name(arguments.output)
@@ -132,32 +123,28 @@ def section(arguments: argparse.Namespace) -> int:
         arguments, OutputPath(arguments.output, "-o"), OutputPath(arguments.json, "--json")
     )
     scene = _scene(arguments, case)
-    mesh, chosen = scene.mesh, scene.chosen
-    painted = paint(mesh, scene.quality, arguments.color, scene.base)
-    painted = replace(painted, color_map=arguments.map)
-    cutter = Cutter.of(mesh)
-    pieces = show_passages(cutter, mesh.points, chosen, scene.matrices)
-    note = "" if scene.base is not None or painted.label == "skew" else NONE
-    shown = SectionInRun(
-        pieces, painted, surroundings(cutter, mesh.points, scene.matrices), note=note
-    )
-    if not shown.drawn:
-        why = chosen.shape.miss(chosen, scene.outer)
-        raise CaseError(f"{mesh.name}: the {chosen.describe(mesh.dim)} {why}")
-    if arguments.range:
-        shown = replace(shown, paint=painted.within(*arguments.range))
-    elif painted.label == "displacement":
-        shown = replace(shown, paint=painted.up_to(shown.ids))
     style = SectionStyle(
         size=arguments.size or SectionStyle.size,
         trimmed=arguments.size is None,
         edges=arguments.edges,
         in_space=arguments.in_space,
-        name=Path(mesh.name).name,
+        name=Path(scene.mesh.name).name,
         title=arguments.title,
         axes=arguments.axes,
     )
-    section_picture([shown], chosen, arguments.output, style)
+    shown = draw(
+        arguments.output,
+        scene.mesh,
+        scene.chosen,
+        scene.base,
+        rated=scene.quality,
+        color=arguments.color,
+        color_range=arguments.range,
+        color_map=arguments.map,
+        passages=scene.matrices,
+        outer=scene.outer,
+        style=style,
+    )
     return _report(arguments, scene, shown)
 
 

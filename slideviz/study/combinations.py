@@ -45,6 +45,9 @@ MODES = terms.names(terms.PERIODIC_MODES)
 AUTO = 0
 """Number of steps that means STEPS= auto: the solver chooses it."""
 
+STEPS = (1, 5, 20)
+"""Numbers of steps that are compared by default."""
+
 
 @dataclass(frozen=True)
 class Combination:
@@ -148,10 +151,10 @@ def warm(methods: Iterable[str]) -> None:
 def compare(
     case: Case,
     mesh: Mesh,
-    wanted: Sequence[Combination],
+    wanted: Sequence[Combination] | None = None,
     tell: Callable[[Combination, Progress], None] | None = None,
 ) -> Iterator[CombinationRow]:
-    """Yield a row for each combination, in order.
+    """Deform a mesh by several methods; yield a row for each combination, in order.
 
     Parameters
     ----------
@@ -159,10 +162,29 @@ def compare(
         All settings but method, mode and number of steps, which are those of the combinations.
     mesh : Mesh
         The undeformed mesh.
-    wanted : sequence of Combination
+    wanted : sequence of Combination, optional
+        Methods, periodic modes and numbers of steps (`combinations`); by default the methods that
+        suit the case, in 1, 5 and 20 steps.
     tell : callable, optional
         Called often with the progress of a combination; raising `Cancelled` ends the comparison.
+
+    Raises
+    ------
+    Cancelled
+        ``tell`` ended the comparison. The problem of a combination that fails is in its row.
+
+    Examples
+    --------
+    >>> import slideviz as sv
+    >>> from slideviz.samples.table import write_sample
+    >>> files = write_sample("square", "try", 8)
+    >>> case, mesh = sv.Case.read("try/square.cfg"), sv.read("try/mesh.su2")
+    >>> rows = list(sv.compare(case, mesh))
+    >>> sorted({row.combination.method for row in rows})
+    ['ds', 'none', 'ps']
     """
+    if wanted is None:
+        wanted = combinations(wanted_methods(case), wanted_modes(case), STEPS)
     shared: _Shared | None = None
     for combination in wanted:
         try:

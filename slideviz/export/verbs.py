@@ -1,0 +1,246 @@
+"""Pictures, films and sections of meshes, each by one call: for the library and the commands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from slideviz.argument_types import check_types
+from slideviz.case.model import Case
+from slideviz.errors import CaseError
+from slideviz.export import film as films
+from slideviz.export import offscreen_renderer
+from slideviz.export.offscreen_renderer import PICTURE_SIZE
+from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.quality import Quality, quality
+from slideviz.plots.cells import surroundings
+from slideviz.plots.section_paint import paint
+from slideviz.plots.section_picture import (
+    SectionInRun,
+    SectionStyle,
+    require_picture_name,
+    section_picture,
+)
+from slideviz.scene.overview import Zoom
+from slideviz.sections.cut import Cutter
+from slideviz.sections.model import Section
+from slideviz.session.opening import session_of_runs
+from slideviz.session.passages import show_passages
+from slideviz.session.state import Run, StepFrame
+from slideviz.solver.deform import Step
+from slideviz.terms import NO_REFERENCE, ColorMap, Quantity
+
+
+@check_types
+def picture(
+    path: str | Path,
+    mesh: Mesh,
+    reference: Mesh | None = None,
+    *,
+    case: Case | None = None,
+    step: Step | None = None,
+    rated: Quality | None = None,
+    before: Quality | None = None,
+    size: tuple[int, int] = PICTURE_SIZE,
+    zoom: Zoom = "auto",
+) -> None:
+    """Write a PNG of a mesh in the colors of its quality, with name and quality as title.
+
+    A 2D mesh is shown whole. Of a 3D mesh, the whole cells behind a plane are shown, which goes
+    through the boundary that moved most, along its displacement.
+
+    Parameters
+    ----------
+    path : str or Path
+        The PNG file; one that exists is replaced.
+    mesh : Mesh
+        What to show.
+    reference : Mesh, optional
+        The undeformed mesh, with the same cells.
+    case : Case, optional
+        The case of the run, whose roles of boundaries are used.
+    step : Step, optional
+        The step of a run that ``mesh`` is of.
+    rated, before : Quality, optional
+        The quality of the cells, and of those of the reference, if they are known already.
+    size : (int, int)
+        Width and height in pixels.
+    zoom : Detail, "auto" or "all"
+        What part of the mesh is seen; "auto" is the whole, unless what moved is tiny in it.
+
+    Raises
+    ------
+    SlidevizError
+        The size cannot be drawn, there is no OpenGL, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import slideviz as sv
+    >>> square = sv.Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], sv.Cells.from_types([9], [0, 1, 2, 3]))
+    >>> sv.picture("square.png", square, size=(400, 300))
+    """
+    case = case or Case()
+    metric = case.quality_metric
+    found = quality(mesh, reference=reference, metric=metric) if rated is None else rated
+    if reference is None:
+        session = session_of_runs(StepFrame(mesh, found))
+    else:
+        before = quality(reference, metric=metric) if before is None else before
+        first = StepFrame(reference, before)
+        session = session_of_runs(first, [Run(1, case, (StepFrame(mesh, found, step),), "done")])
+    offscreen_renderer.picture(session, path, size, zoom)
+
+
+@check_types
+def film(
+    path: str | Path,
+    mesh: Mesh,
+    steps: Iterable[Step],
+    *,
+    case: Case | None = None,
+    color: Quantity = "size-skew",
+    size: tuple[int, int] | None = None,
+    fps: float | None = None,
+    hold: float = 1.5,
+    between: int = 0,
+    zoom: Zoom = "auto",
+    overwrite: bool = False,
+) -> None:
+    """Write the steps of a run as a film: MP4, GIF or numbered pictures.
+
+    Parameters
+    ----------
+    path : str or Path
+        A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
+    mesh : Mesh
+        The undeformed mesh.
+    steps : iterable of Step
+        The steps, as `slideviz.deform` yields them.
+    case : Case, optional
+        The case of the run, for its quality metric.
+    color : {"size-skew", "size", "skew", "displacement"}
+        What the colors say.
+    size : (int, int), optional
+        Width and height in pixels; by default those of the kind of file.
+    fps : float, optional
+        Images a second; when left out, ten, or fewer where there are few.
+    hold : float
+        Seconds that the last image is shown.
+    between : int
+        Images between two steps: nodes on straight lines, quality of that mesh.
+    zoom : Detail, "auto" or "all"
+        What part of the mesh is seen.
+    overwrite : bool
+        Allow files that exist.
+
+    Raises
+    ------
+    SlidevizError
+        There are no steps, the film cannot be made like that, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import slideviz as sv
+    >>> from slideviz.samples.table import write_sample
+    >>> files = write_sample("square", "try", 8)
+    >>> case, mesh = sv.Case.read("try/square.cfg"), sv.read("try/mesh.su2")
+    >>> sv.film("square.gif", mesh, sv.deform(case, mesh), case=case, size=(400, 300))
+    """
+    options = films.FilmOptions(size, fps, hold, between)
+    films.check_film(Path(path), options, overwrite=overwrite)  # before the work
+    case = case or Case()
+
+    def frame(moved: Mesh, step: Step | None = None) -> StepFrame:
+        return StepFrame(moved, quality(moved, reference=mesh, metric=case.quality_metric), step)
+
+    run = Run(1, case, tuple(frame(step.mesh, step) for step in steps), "done")
+    session = session_of_runs(frame(mesh), [run], color)
+    for _ in films.film(session, path, options, zoom=zoom, overwrite=overwrite):
+        pass
+
+
+@check_types
+def section(
+    path: str | Path,
+    mesh: Mesh,
+    at: Section,
+    reference: Mesh | None = None,
+    *,
+    rated: Quality | None = None,
+    color: Quantity = "size-skew",
+    color_range: tuple[float, float] | None = None,
+    color_map: ColorMap = "viridis",
+    passages: Mapping[int, FloatArray] | None = None,
+    outer: FloatArray | None = None,
+    style: SectionStyle | None = None,
+) -> SectionInRun:
+    """Write a picture of a section of a mesh; return what it shows.
+
+    Parameters
+    ----------
+    path : str or Path
+        The picture: .png, .svg or .pdf; one that exists is replaced.
+    mesh : Mesh
+        What to cut.
+    at : Section
+        Where: a plane, cylinder or cone.
+    reference : Mesh, optional
+        The undeformed mesh, with the same cells; needed for displacements.
+    rated : Quality, optional
+        The quality of the cells, if it is known already.
+    color : {"size-skew", "size", "skew", "displacement"}
+        What the colors say.
+    color_range : (float, float), optional
+        Ends of the color bar.
+    color_map : str
+        A color map of matplotlib.
+    passages : mapping of int to (4, 4), optional
+        The transformation of each passage to draw, by number; only the mesh itself (0) when left
+        out.
+    outer : (n, d), optional
+        Points with the extent of the mesh, for messages, where ``mesh`` is only a part of it.
+    style : SectionStyle, optional
+        Size and parts of the picture.
+
+    Returns
+    -------
+    SectionInRun
+        Its ``ids`` (k,) are the numbers of the cells that are cut, ``paint`` has their values.
+
+    Raises
+    ------
+    CaseError
+        The section misses the mesh, or the file has another ending.
+    SlidevizError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> import slideviz as sv
+    >>> square = sv.Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], sv.Cells.from_types([9], [0, 1, 2, 3]))
+    >>> line = sv.Section("plane", (0.5, 0.0, 0.0), (1.0, 0.0, 0.0))
+    >>> sv.section("middle.svg", square, line).ids
+    array([0])
+    """
+    require_picture_name(Path(path))
+    found = quality(mesh, reference=reference) if rated is None else rated
+    matrices = {0: np.eye(4)} if passages is None else passages
+    painted = replace(paint(mesh, found, color, reference), color_map=color_map)
+    cutter = Cutter.of(mesh)
+    pieces = show_passages(cutter, mesh.points, at, matrices)
+    note = "" if reference is not None or painted.label == "skew" else NO_REFERENCE
+    around = surroundings(cutter, mesh.points, matrices)
+    shown = SectionInRun(pieces, painted, around, note=note)
+    if not shown.drawn:
+        why = at.shape.miss(at, mesh.points[mesh.cells.nodes] if outer is None else outer)
+        raise CaseError(f"{mesh.name}: the {at.describe(mesh.dim)} {why}")
+    if color_range:
+        shown = replace(shown, paint=painted.within(*color_range))
+    elif painted.label == "displacement":
+        shown = replace(shown, paint=painted.up_to(shown.ids))
+    style = style or SectionStyle(trimmed=True, name=Path(mesh.name).name)
+    section_picture([shown], at, path, style)
+    return shown
