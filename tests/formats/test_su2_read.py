@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from su2_samples import MESSY, SAMPLES, SOLID, SQUARE, ZONES, assert_same, bits, save
 
-import slideviz.formats.su2.lines as su2_lines
+import slideviz.formats.su2.text as su2_text
 from slideviz.formats.files import read
 from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.check import unused_nodes
@@ -59,7 +59,7 @@ def test_byte_order_mark_is_skipped(tmp_path):
 def test_size_of_the_blocks_does_not_matter(tmp_path, monkeypatch, name, block):
     path = save(tmp_path, SAMPLES[name])
     whole = read(path)
-    monkeypatch.setattr("slideviz.formats.su2.lines.BLOCK_BYTES", block)
+    monkeypatch.setattr("slideviz.formats.su2.text.BLOCK_BYTES", block)
     small = read(path)
     assert_same(small, whole)
     assert len(small.origin.rows) > len(whole.origin.rows)
@@ -136,7 +136,7 @@ def test_unused_nodes_are_allowed_and_listed(tmp_path):
 
 
 def test_progress_rises_to_one(tmp_path, monkeypatch):
-    monkeypatch.setattr(su2_lines, "BLOCK_BYTES", 16)
+    monkeypatch.setattr(su2_text, "BLOCK_BYTES", 16)
     seen = []
     read(save(tmp_path, SOLID), progress=seen.append)
     assert len(seen) > 20

@@ -264,7 +264,7 @@ def test_lost_coordinate_in_space(tmp_path):
 
 @pytest.mark.parametrize("block", [1, 30, 1 << 20])
 def test_first_of_several_faults_is_named(tmp_path, monkeypatch, block):
-    monkeypatch.setattr("slideviz.formats.su2.lines.BLOCK_BYTES", block)
+    monkeypatch.setattr("slideviz.formats.su2.text.BLOCK_BYTES", block)
     text = edited(edited(SQUARE, "1.1 0.3 1", "1.1 a 1"), "1.1 1.7 4", "b1 1.7 4")
     text = text.replace("b1 1.7 4", "1.1 b 4")
     with pytest.raises(MeshError, match=":8: 'a' stands"):

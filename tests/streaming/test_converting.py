@@ -9,7 +9,8 @@ import pytest
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.formats import binary_copy
-from slideviz.formats.su2 import lines, write
+from slideviz.formats.su2 import text as su2_text
+from slideviz.formats.su2 import write
 from slideviz.streaming import converting, resources
 from tests.builders import grid
 from tests.formats.test_su2b import THREE_D, TWO_D, packed
@@ -22,7 +23,7 @@ HALO = "MARKER_TAG= SEND_RECEIVE\nMARKER_ELEMS= 1\nSEND_TO= 1\n1 0 0\n"
 def small(tmp_path, monkeypatch):
     """Pieces and blocks have few rows; the folder is the current one."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(lines, "BLOCK_BYTES", 700)
+    monkeypatch.setattr(su2_text, "BLOCK_BYTES", 700)
     monkeypatch.setattr(binary_copy, "PIECES", 3)
     monkeypatch.setattr(write, "_BLOCK_ROWS", 17)
     monkeypatch.setattr(converting, "NEAR", 5)

@@ -39,8 +39,8 @@ rank = int(os.environ.get("OMPI_COMM_WORLD_RANK", 0))
 from slideviz.streaming import output
 from slideviz.streaming import skin
 from slideviz.formats import binary_copy
-from slideviz.formats.su2 import lines
-output.CHUNK, skin.BLOCK, lines.BLOCK_BYTES, binary_copy.PIECES = 37, 50, 700, 2
+from slideviz.formats.su2 import text as su2_text
+output.CHUNK, skin.BLOCK, su2_text.BLOCK_BYTES, binary_copy.PIECES = 37, 50, 700, 2
 move = output.write_points
 def late(*given):
     time.sleep({pause})

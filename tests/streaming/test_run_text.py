@@ -18,7 +18,8 @@ from slideviz.cli import run
 from slideviz.cli.options import changed
 from slideviz.errors import MeshError
 from slideviz.formats import binary_copy
-from slideviz.formats.su2 import lines, write
+from slideviz.formats.su2 import text as su2_text
+from slideviz.formats.su2 import write
 from slideviz.formats.su2b.layout import MAGIC
 from slideviz.formats.su2b.partial import names_of
 from slideviz.samples.table import write_sample
@@ -45,7 +46,7 @@ def in_memory(case, path):
 @pytest.fixture
 def small(monkeypatch):
     """Pieces, parts and blocks have few rows."""
-    monkeypatch.setattr(lines, "BLOCK_BYTES", 700)
+    monkeypatch.setattr(su2_text, "BLOCK_BYTES", 700)
     monkeypatch.setattr(binary_copy, "PIECES", 3)
     monkeypatch.setattr(output, "CHUNK", 60)
 
@@ -71,7 +72,7 @@ def test_bytes_are_those_of_a_run_in_memory(tmp_path, monkeypatch, ending, name,
     expected = in_memory(case, tmp_path / f"memory.{ending}")
     for chunk, block in ((37, 700), (1 << 20, 1 << 20)):
         monkeypatch.setattr(output, "CHUNK", chunk)
-        monkeypatch.setattr(lines, "BLOCK_BYTES", block)
+        monkeypatch.setattr(su2_text, "BLOCK_BYTES", block)
         stream(case, tmp_path / f"out.{ending}")
         assert (tmp_path / f"out.{ending}").read_bytes() == expected
     assert not list(tmp_path.glob(".*"))
@@ -337,13 +338,13 @@ from pathlib import Path
 import slideviz as sv
 from slideviz.streaming import converting, output, run
 from slideviz.formats import binary_copy
-from slideviz.formats.su2 import lines
+from slideviz.formats.su2 import text as su2_text
 def late(what):
     def slow(*a):
         time.sleep(0.05)
         return what(*a)
     return slow
-output.CHUNK, lines.BLOCK_BYTES, binary_copy.PIECES = 60, 2000, 3
+output.CHUNK, su2_text.BLOCK_BYTES, binary_copy.PIECES = 60, 2000, 3
 output.write_points = late(output.write_points)
 binary_copy._write_cells = late(binary_copy._write_cells)
 from slideviz.streaming import stream_input

@@ -64,7 +64,7 @@ def test_all_threads_work_at_once(threads):
 
 @pytest.mark.parametrize("calls", [1, 2, 7])
 def test_writing_that_is_stopped_leaves_neither_threads_nor_files(tmp_path, monkeypatch, calls):
-    for name in ("su2.lines", "su2.write"):
+    for name in ("su2.text", "su2.write"):
         monkeypatch.setattr(f"slideviz.formats.{name}.BLOCK_BYTES", 16)
     mesh = read(save(tmp_path, SOLID))
     seen = []
@@ -81,7 +81,7 @@ def test_writing_that_is_stopped_leaves_neither_threads_nor_files(tmp_path, monk
 
 
 def test_the_number_of_threads_changes_nothing(tmp_path, monkeypatch):
-    for name in ("su2.lines", "su2.write"):
+    for name in ("su2.text", "su2.write"):
         monkeypatch.setattr(f"slideviz.formats.{name}.BLOCK_BYTES", 16)
     mesh = read(save(tmp_path, SOLID))
     write(tmp_path / "out.su2", mesh.with_points(mesh.points * 1.0))

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError
 from slideviz.formats.source import Source
 from slideviz.formats.su2.keyword_blocks import is_ffd
-from slideviz.formats.su2.lines import BLOCK_BYTES, Piece, Rows
+from slideviz.formats.su2.lines import Piece, Rows
 from slideviz.formats.su2.read import Document
+from slideviz.formats.su2.text import BLOCK_BYTES
 from slideviz.formats.su2.zone import SEND_RECEIVE
 from slideviz.formats.table import WriteOptions, write_blocks
 from slideviz.mesh.check import check_mesh, check_points
