@@ -277,7 +277,9 @@ def take(x: Array, rows: IntArray) -> Array:
     """Return the rows ``rows`` (m,) of x (..., n, c), (..., m, c); rows may occur repeatedly."""
     v = value(x)
     n = v.shape[-2]
-    return recorded(v[..., rows, :], (x, lambda t: t[..., rows, :], lambda g: sums(g, rows, n)))
+    return recorded(
+        v.take(rows, axis=-2), (x, lambda t: t.take(rows, axis=-2), lambda g: sums(g, rows, n))
+    )
 
 
 def gather(x: Array, rows: IntArray, count: int) -> Array:
