@@ -328,7 +328,6 @@ def _is_stale(path: Path) -> bool:
 
 
 def _designs_file(path: Path) -> Path:
-    """Return the file with the designs of a session."""
     return path.with_suffix(".csv")
 
 

@@ -454,7 +454,6 @@ def _is_in_front(dock: QDockWidget) -> bool:
 
 
 def _clear_focus(dock: QDockWidget) -> None:
-    """Take the keyboard focus away from a field in a dock."""
     field = QApplication.focusWidget()
     if field is not None and dock.isAncestorOf(field):
         field.clearFocus()

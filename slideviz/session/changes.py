@@ -55,14 +55,12 @@ def undo_words(change: Callable[..., Any], named: Mapping[str, Any]) -> str | No
 
 
 def _replaced(rows: tuple[Row, ...], index: int, row: Row) -> tuple[Row, ...]:
-    """Return the rows with another one at the place ``index``."""
     changed = list(rows)
     changed[index] = row
     return tuple(changed)
 
 
 def _without(rows: tuple[Row, ...], index: int) -> tuple[Row, ...]:
-    """Return the rows without the one at the place ``index``."""
     return rows[:index] + rows[index + 1 :]
 
 

@@ -79,7 +79,6 @@ class Unsaved:
         return f"{text}\n{more}" if more else text
 
     def _without(self, gone: str) -> Unsaved:
-        """Return the unsaved work without that of the kind ``gone``."""
         return replace(self, lost={name: self.lost[name] for name in self.lost if name != gone})
 
     def _repeats(self) -> str:

@@ -168,7 +168,6 @@ class CurvesPanel(Panel):
         self.sync(self.store.session)
 
     def _picked(self, value: float) -> None:
-        """Go to the step that was clicked."""
         if self.kind.currentData() == "steps" and not self.area.empty:
             self.store.change(changes.show_frame, round(value))
 
@@ -178,7 +177,6 @@ class CurvesPanel(Panel):
 
 
 def _shown(session: Session) -> object:
-    """Return what the curves show of a session."""
     return session.frame, session.runs, session.shown, session.case.axis, session.case.origin
 
 

@@ -283,7 +283,6 @@ class DisplayPanel(Panel):
 
 
 def _shown(session: Session) -> object:
-    """Return what the panel shows of a session."""
     case, view = session.case, session.view
     periodic = case.markers_with("periodic"), case.periodic_type, case.axis, case.origin
     runs = session.runs if view.color_by == "displacement" else ()

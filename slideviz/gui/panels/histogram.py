@@ -275,7 +275,6 @@ class HistogramPanel(Panel):
 
 
 def _shown(session: Session) -> object:
-    """Return what the histogram shows of a session."""
     view = session.view
     values = session.frame, session.runs, session.color_range
     return *values, view.color_by, view.color_map, view.threshold, view.beside

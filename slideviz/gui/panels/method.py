@@ -140,7 +140,6 @@ class KeyForm(QFormLayout):
 
 
 def _set_tip(field: Field, text: str) -> None:
-    """Set the tooltip of a field and of its parts."""
     if hasattr(field, "set_tip"):
         field.set_tip(text)
     # The tooltip of a number may show why its text is invalid.
@@ -262,7 +261,6 @@ class MethodPanel(Panel):
         )
 
     def _show_more(self) -> None:
-        """Scroll to “More settings” after they were opened."""
         self.area.widget().adjustSize()
         bar = self.area.verticalScrollBar()
         bar.setValue(min(self.more.y(), bar.maximum()))
@@ -331,7 +329,6 @@ class MethodPanel(Panel):
         return replace(given, tolerance=float(f"{absolute:.6g}"))
 
     def _sync_hints(self, session: Session) -> None:
-        """Show the hints: the tolerance and the motion, idle settings, the period found."""
         case, extent = session.case, self._extent
         tolerance = self.form.fields["tolerance"]
         assert isinstance(tolerance, NumberField)

@@ -218,7 +218,6 @@ class MotionEditor(MotionForm):
         return f"{ABOUT[what]} ({direction_words(axis)})"
 
     def _is_machine(self, motion: Rotate | Scale | Radial) -> bool:
-        """Return whether a motion is about the machine's axis."""
         if self._machine is None or isinstance(motion, Scale):
             return False
         axis, origin = self._machine

@@ -254,7 +254,6 @@ class SectionsPanel(Panel):
 
 
 def _shown(session: Session) -> object:
-    """Return what the panel shows of a session."""
     view = session.view
     return session.mesh, view.sections, view.section_index, view.handle
 

@@ -128,7 +128,6 @@ class WorstPanel(Panel):
         )
 
     def _fill(self, session: Session) -> None:
-        """Make the list of the step that is shown."""
         if session.frame is None or self._key(session) == self._listed_key:
             return
         self._listed_key, self._last = self._key(session), time.monotonic()

@@ -118,7 +118,6 @@ def _undo_in_field(field: QLineEdit, event: QEvent) -> bool | None:
 
 
 def _clear_undo(field: QLineEdit) -> None:
-    """Leave nothing that the field itself could undo or redo."""
     if field.isUndoAvailable() or field.isRedoAvailable():
         field.setText(field.text())
 

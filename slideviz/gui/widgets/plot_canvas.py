@@ -119,7 +119,6 @@ class PlotCanvas(QWidget):
         self._look_after.start()
 
     def _show_image(self) -> None:
-        """Show the image being drawn, if it is done."""
         if self._coming is None or not self._coming.done():
             return
         coming, self._coming = self._coming, None
