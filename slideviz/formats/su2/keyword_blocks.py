@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 from slideviz.errors import MeshError
-from slideviz.formats.su2.lines import KEYWORD, Lines, show
+from slideviz.formats.su2 import KEYWORD
+from slideviz.formats.su2.lines import Lines, show
 
 _KEY = re.compile(rb"[A-Za-z_]\w*")
 _COUNT = re.compile(rb"\+?\d{1,18}")

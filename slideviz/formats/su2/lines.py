@@ -17,8 +17,6 @@ from slideviz.errors import MeshError, printable
 from slideviz.formats.source import Source
 from slideviz.mesh.model import IntArray
 
-ROWS, TEXT, KEYWORD = 0, 1, 2
-"""Kinds of runs (see `Lines`) by their first line: a row or a blank line, text, text with ``=``."""
 _BOM = b"\xef\xbb\xbf"
 """The byte order mark of UTF-8."""
 _NUMERIC = tuple(b"%c" % code for code in b"+-.0123456789")

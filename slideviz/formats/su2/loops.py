@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from slideviz.formats.su2 import KEYWORD, ROWS, TEXT
 from slideviz.formats.su2.decimal import OPTIONS, U10, U48, decimal
-from slideviz.formats.su2.lines import KEYWORD, ROWS, TEXT
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.system.jit_cache import njit
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.formats.su2 import ROWS
 from slideviz.formats.su2.keyword_blocks import (
     ALIASES,
     KNOWN,
@@ -19,7 +20,7 @@ from slideviz.formats.su2.keyword_blocks import (
     is_ffd,
     misspelt,
 )
-from slideviz.formats.su2.lines import ROWS, Lines, Rows, number_of, show
+from slideviz.formats.su2.lines import Lines, Rows, number_of, show
 
 SEND_RECEIVE = "SEND_RECEIVE"
 """Name of the markers of a halo (in `su2b.layout`, too)."""
