@@ -139,7 +139,7 @@ def test_worst_cells_are_listed_and_marked(stator, folder):
     shown = [int(panel.model.index(row, 0).data()) for row in range(3)]
     assert shown == worst.tolist()
     for row in range(3):
-        panel._go(row)
+        panel._fly_to_row(row)
         assert stator.session.view.marked_cell == panel.model.cell(row)
         assert f"Cell {worst[row]}" in panel.info.text()
         assert any(name.startswith("mark") for name in window.scene.plotter.renderer.actors)

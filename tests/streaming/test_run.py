@@ -1,4 +1,4 @@
-"""Streamed runs: the bits of a run in memory, whatever the chunks; stopped, and gone on with."""
+"""Streamed runs: the bits of a run in memory, whatever the chunks; stopped, and resumed."""
 
 import json
 import os

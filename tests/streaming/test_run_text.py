@@ -1,4 +1,4 @@
-"""Streamed runs of SU2 text meshes: the bytes of a run in memory; stopped, and gone on with."""
+"""Streamed runs of SU2 text meshes: the bytes of a run in memory; stopped, and resumed."""
 
 import json
 import os
@@ -278,7 +278,7 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, smal
             told: list[str] = []
             stream(case, out, note=told.append, resume=True)
         assert (f"continues after {stop} of {parts} parts" in told[0]) == (stop > 0)
-        assert ("goes on with the text as it was read" in told[0]) == (stop == 0)
+        assert ("continues with the text that was read" in told[0]) == (stop == 0)
         assert bool(made_again) == (stop == -1)
         assert len(moved) == parts - max(stop, 0)
         assert out.read_bytes() == whole
