@@ -160,3 +160,38 @@ def test_contributing_cites_names_that_are_in_their_files():
         path = ROOT / file if (ROOT / file).exists() else PACKAGE / file
         words = set(re.findall(r"\w+", path.read_text(encoding="utf-8")))
         assert set(re.findall(r"\w+", names.replace(" and ", " "))) <= words, file
+
+
+BEHAVIOURS = {
+    "gui": {
+        "cgns", "elided", "end_to_end", "export", "inputs", "invalid", "key_form", "keyboard",
+        "large_mesh", "leaks", "names", "open_su2b", "piece_runner", "quick", "radial", "refit",
+        "responsive", "room", "steps_in_one_file", "tips", "warm_up",
+    },
+    "golden": {"alike", "golden"},
+    "plots": {"by_hand"},
+    "scene": {"kept_shapes"},
+    "session": {"seen_values"},
+}  # fmt: skip
+"""Tests of what several modules of a room do together; all others are named by their module."""
+
+
+def test_tests_are_named_by_the_modules_that_they_test():
+    """Either test_<module>.py, or test_<module>_<more>.py; the room's word may stand before it."""
+    lost = []
+    for path in sorted((ROOT / "tests").rglob("*/test_*.py")):
+        room, subject = path.parent.name, path.stem.removeprefix("test_")
+        folder = ROOT / "slideviz" / room
+        names = {part.stem for part in folder.rglob("*") if part.is_dir() or part.suffix == ".py"}
+        words = subject.split("_")
+        starts = [words, words[1:]] if words[0] in room else [words]
+        named = any("_".join(s[:k]) in names for s in starts for k in range(1, len(s) + 1))
+        if named == (subject in BEHAVIOURS.get(room, set())):
+            lost.append(str(path))
+    assert not lost
+
+
+def test_no_two_files_of_tests_have_one_name():
+    """pytest would take the second for the first."""
+    names = [path.name for path in (ROOT / "tests").rglob("test_*.py")]
+    assert sorted(names) == sorted(set(names))

@@ -24,7 +24,7 @@ from slideviz.session.passages import keeps, passages
 from slideviz.session.section_cuts import first_section, position_range, with_direction
 from slideviz.session.state import StepFrame
 from tests.builders import cube, grid, ring, square
-from tests.sections.test_section import KINDS, areas, shaken
+from tests.sections.test_model_section import KINDS, areas, shaken
 
 SHAPE = (4, 6, 5)
 APEX, ANGLE = (0.0, 0.0, -1.0), 30.0

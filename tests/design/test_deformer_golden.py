@@ -2,7 +2,7 @@
 
 `tests/design/gradients.csv` has, for each case, the points of a run, the points of a design, `jvp`
 and `vjp`: their length, and their products with two random arrays. Record them again, where they
-are to change, with ``PYTHONPATH=tests python -m tests.design.test_golden_gradients``.
+are to change, with ``PYTHONPATH=tests python -m tests.design.test_deformer_golden``.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from slideviz.case.model import Case
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.reduction import Reduction
 from tests import builders
-from tests.design.test_derivatives import REDUCED, SHAPES, alike, motions, wave
+from tests.design.test_deformer_derivatives import REDUCED, SHAPES, alike, motions, wave
 from tests.test_laws import METHODS, box, box_case, sector, sector_case
 
 RECORD = Path(__file__).with_name("gradients.csv")

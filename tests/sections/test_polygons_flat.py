@@ -7,7 +7,7 @@ from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.plane import plane_axes
 from tests.builders import cube, grid, passage, ring
-from tests.sections.test_section import areas
+from tests.sections.test_model_section import areas
 
 
 def flatten(polygons, section, near=None):
