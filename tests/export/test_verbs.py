@@ -20,7 +20,7 @@ def square(tmp_path, monkeypatch):
 
 def test_a_section_is_that_of_the_command(square):
     _, mesh = square
-    line = sv.Section("plane", (0.0, 0.4, 0.0), (0.0, 1.0, 0.0), whole=True)
+    line = sv.Section("plane", (0.0, 0.4, 0.0), (0.0, 1.0, 0.0), whole_cells=True)
     shown = sv.section("ours.svg", mesh, line)
     assert len(shown.ids) == 6  # two of the eight are in the block
     with pytest.raises(CaseError, match="misses the mesh"):
