@@ -27,7 +27,8 @@ def section_of(row):
     high = min(row.size.high, 1e3) if row.size is not None else 1e3
     size = st.floats(1e-3, high, exclude_max=True)
     made = st.builds(Section.of, st.just(row.value), triple, direction, size)
-    flags = st.fixed_dictionaries({name: st.booleans() for name in ("whole_cells", "flat", "shown")})
+    names = ("whole_cells", "flat", "shown")
+    flags = st.fixed_dictionaries({name: st.booleans() for name in names})
     return st.builds(lambda section, how: replace(section, **how), made, flags)
 
 
