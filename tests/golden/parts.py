@@ -291,6 +291,48 @@ def comparison(desk: Desk) -> None:
     desk.close("compare")
 
 
+SU2 = """\
+MESH_FILENAME= mesh.su2
+MESH_OUT_FILENAME= out.su2
+SOLUTION_ADJ_FILENAME= adj.dat
+OBJECTIVE_FUNCTION= DRAG
+DV_MARKER= ( BLOCK )
+DV_KIND= TRANSLATION, ROTATION
+DV_PARAM= (1, 0.5, 0); (0.5, 0.5, 0, 0.5, 0.5, 1)
+DV_VALUE= 0.01, 3.0
+"""
+"""A configuration of SU2 for the sample square."""
+
+
+def designs(desk: Desk) -> None:
+    """Keep a sweep, and what ``def`` and ``dot`` make of a configuration of SU2."""
+    case = made(desk, "square")
+    Path("mesh.su2").write_text(Path("square/mesh.su2").read_text())
+    Path("table.csv").write_text("SLIDING_MODE,STEPS\nps,1\nds,2\n")
+    desk.run("sweep", case, "--columns")
+    desk.run("sweep", case, "table.csv", "-o", "swept", "--workers", "1", "-q")
+    desk.file("swept/results.csv")
+    Path("su2.cfg").write_text(SU2)
+    desk.run("def", "su2.cfg", "--json", "-")
+    desk.file("out.su2")
+    rows = mesh_points(Path("out.su2").read_text())
+    head = '"PointID", "x", "y", "Adj_Density", "Sensitivity_x", "Sensitivity_y"'
+    values = [f"{k}, {x!r}, {y!r}, 1.0, {y!r}, {x!r}" for k, (x, y) in enumerate(rows)]
+    Path("adj_cd.csv").write_text("\n".join([head, *values]) + "\n")
+    desk.run("dot", "su2.cfg", "--json", "-")
+    desk.file("of_grad.dat")
+    desk.close("designs")
+
+
+def mesh_points(text: str) -> list[tuple[float, float]]:
+    """Return the points of a 2D mesh."""
+    lines = text.splitlines()
+    begin = next(k for k, line in enumerate(lines) if line.startswith("NPOIN="))
+    count = int(lines[begin].split()[1])
+    rows = (line.split() for line in lines[begin + 1 : begin + 1 + count])
+    return [(float(x), float(y)) for x, y, *_ in rows]
+
+
 def pictures(desk: Desk) -> None:
     """Keep the pictures of ``run``."""
     for name in ("passage", "square", "polar", "cylindrical", "stator"):
@@ -382,7 +424,7 @@ PARTS: dict[str, Callable[[Desk], None]] = {
     part.__name__: part
     for part in (
         *(texts, samples, methods_2d, methods_3d, reports, formats, mistakes),
-        *(comparison, pictures, sections, films, window),
+        *(designs, comparison, pictures, sections, films, window),
     )
 }
 """By name, which is that of the folder in ``kept/``."""
