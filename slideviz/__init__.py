@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from slideviz.design.deformer import Deformer
     from slideviz.design.sweeps.sweep import sweep
     from slideviz.errors import ConditionWarning, SlidevizError, ToleranceWarning
-    from slideviz.export.verbs import film, picture, section
+    from slideviz.export.flat_section import section
+    from slideviz.export.verbs import film, picture
     from slideviz.formats.files import convert, read, write
     from slideviz.mesh.model import Cells, Marker, Mesh
     from slideviz.mesh.quality import Quality, quality
@@ -74,7 +75,7 @@ _HOME = {
     "picture": "export.verbs",
     "quality": "mesh.quality",
     "read": "formats.files",
-    "section": "export.verbs",
+    "section": "export.flat_section",
     "sweep": "design.sweeps.sweep",
     "write": "formats.files",
 }

@@ -113,7 +113,7 @@ class _Scene:
 def section(arguments: argparse.Namespace) -> int:
     """Draw a section of a mesh to a file; return the exit code."""
     from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.export.verbs import section as draw
+    from slideviz.export.flat_section import section as draw
     from slideviz.plots.section_picture import SectionStyle, require_picture_name
 
     _check_usage(arguments)
