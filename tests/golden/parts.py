@@ -317,7 +317,7 @@ def designs(desk: Desk) -> None:
     desk.file("out.su2")
     rows = mesh_points(Path("out.su2").read_text())
     head = '"PointID", "x", "y", "Adj_Density", "Sensitivity_x", "Sensitivity_y"'
-    values = [f"{k}, {x!r}, {y!r}, 1.0, {y!r}, {x!r}" for k, (x, y) in enumerate(rows)]
+    values = [f"{k}, {x!r}, {y!r}, 1.0, {y * y!r}, {x!r}" for k, (x, y) in enumerate(rows)]
     Path("adj_cd.csv").write_text("\n".join([head, *values]) + "\n")
     desk.run("dot", "su2.cfg", "--json", "-")
     desk.file("of_grad.dat")
