@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import grid, halo_text, passage, sector
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.errors import CaseError
 from slideviz.mesh.periodic import match
 from slideviz.rbf.reduction import Reduction
+from tests.builders import grid, halo_text, passage, sector
 from tests.formats.su2_samples import save
 from tests.slow import one_of_each_fast
 

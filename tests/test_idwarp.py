@@ -3,13 +3,13 @@
 import h5py
 import numpy as np
 import pytest
-from builders import grid
-from cgns_files import passage_grid, save_passage
 
 import slideviz as sv
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
 from slideviz.idwarp import USMesh
+from tests.builders import grid
+from tests.cgns_files import passage_grid, save_passage
 
 HOLE = ((2, 4), (2, 4), (2, 4))
 

@@ -5,11 +5,11 @@ import sys
 
 import numpy as np
 import pytest
-from builders import grid
 
 import slideviz as sv
 from slideviz.case.model import Case
 from slideviz.errors import MeshError
+from tests.builders import grid
 
 om = pytest.importorskip("openmdao.api")
 pytest.importorskip("mphys")

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import square
 from scipy.optimize import minimize
 
 import slideviz as sv
 from slideviz.case.model import Case
 from slideviz.ffd.box import plane_corners, regular_box
+from tests.builders import square
 
 EXAMPLE = Path(__file__).parents[1] / "docs" / "examples" / "plot_8_optimise.py"
 LEAST = 0.5

@@ -4,7 +4,6 @@ import re
 
 import numpy as np
 import pytest
-from builders import annulus, far_field, grid, layered, square
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
@@ -13,6 +12,7 @@ from slideviz.rbf import methods
 from slideviz.rbf.reduction import Reduction
 from slideviz.streaming import output
 from slideviz.streaming.run import stream
+from tests.builders import annulus, far_field, grid, layered, square
 
 # A wall moves along itself; beside it, 1e-6 away, nodes of the sliding sides stay.
 SHEARED = Case(

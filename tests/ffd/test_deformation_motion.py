@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from ffd_samples import square, unpacked
 
 import slideviz as sv
 from slideviz.case.check import check_case
@@ -10,6 +9,7 @@ from slideviz.case.motion import displacements
 from slideviz.errors import CaseError
 from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import boxes_of, with_boxes
+from tests.ffd.ffd_samples import square, unpacked
 
 CORNERS = np.array([[-0.1, -0.2], [1.1, -0.2], [1.1, 0.3], [-0.1, 0.3]])
 NUMBERS = tuple(np.column_stack([CORNERS, np.zeros(4)]).ravel()) + (0.0,) * 12

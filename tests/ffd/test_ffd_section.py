@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
-from ffd_samples import DESIGN, REAL, square, unpacked
 
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.errors import MeshError
 from slideviz.ffd.box import CORNERS, plane_corners, regular_box
 from slideviz.ffd.section import boxes_of, with_boxes
+from tests.ffd.ffd_samples import DESIGN, REAL, square, unpacked
 
 NAMES = ["naca0012_two_ffd_boxes.su2", "burner_hx.su2"]
 WITH_BOXES = [

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ffd_samples import square
 
 import slideviz as sv
 from slideviz.case.check import check_case
@@ -17,6 +16,7 @@ from slideviz.errors import CaseError
 from slideviz.ffd.box import CoordinateSystem, plane_corners, regular_box
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.session.run_messages import moves_nothing
+from tests.ffd.ffd_samples import square
 from tests.oracles.freeform import blended, rotated
 
 CORNERS = np.array([[-0.1, -0.2], [1.1, -0.2], [1.1, 0.3], [-0.1, 0.3]])

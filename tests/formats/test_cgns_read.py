@@ -5,8 +5,15 @@ from itertools import pairwise
 import h5py
 import numpy as np
 import pytest
-from builders import box_rules, make_mesh
-from cgns_files import (
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkIOCGNSReader import vtkCGNSReader
+
+from slideviz.errors import MeshError
+from slideviz.formats.cgns.read import read_cgns
+from slideviz.formats.files import read
+from slideviz.mesh.periodic import match
+from tests.builders import box_rules, make_mesh
+from tests.cgns_files import (
     PITCH,
     add_period,
     base,
@@ -22,14 +29,7 @@ from cgns_files import (
     wavy,
     zone,
 )
-from su2_samples import SOLID, SQUARE, bits, save
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkIOCGNSReader import vtkCGNSReader
-
-from slideviz.errors import MeshError
-from slideviz.formats.cgns.read import read_cgns
-from slideviz.formats.files import read
-from slideviz.mesh.periodic import match
+from tests.formats.su2_samples import SOLID, SQUARE, bits, save
 
 
 def as_sets(mesh):

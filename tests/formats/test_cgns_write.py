@@ -6,10 +6,6 @@ import resource
 import h5py
 import numpy as np
 import pytest
-from builders import cube
-from cgns_files import passage_grid, save_passage
-from su2_samples import bits
-from test_cgns_read import judged, points_of
 
 from slideviz import quality
 from slideviz.cli import run
@@ -18,6 +14,10 @@ from slideviz.formats.cgns.read import read_cgns
 from slideviz.formats.files import read, write
 from slideviz.formats.losses import left_out
 from slideviz.formats.table import formats_for
+from tests.builders import cube
+from tests.cgns_files import passage_grid, save_passage
+from tests.formats.su2_samples import bits
+from tests.formats.test_cgns_read import judged, points_of
 
 CASE = """\
 MESH_FILENAME= {mesh}

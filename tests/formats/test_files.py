@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from su2_samples import SOLID, SQUARE, assert_same, bits, meshes, save
 
 import slideviz
 from slideviz.cli import run
@@ -21,6 +20,7 @@ from slideviz.mesh.cached_boundary import outer_facets
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, Marker, Mesh, Origin
 from tests.builders import square
+from tests.formats.su2_samples import SOLID, SQUARE, assert_same, bits, meshes, save
 
 GMSH_22 = """\
 $MeshFormat

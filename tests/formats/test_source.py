@@ -6,12 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from su2_samples import MESSY, SQUARE, assert_same, save
 
 from slideviz.errors import MeshError
 from slideviz.formats.files import read, write
 from slideviz.formats.source import Source, open_source
 from slideviz.formats.su2.read import read_su2
+from tests.formats.su2_samples import MESSY, SQUARE, assert_same, save
 
 
 @pytest.fixture(params=["in memory", "open"])

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from su2_samples import bits, save
 
 from slideviz.errors import MeshError
 from slideviz.formats.files import write
@@ -15,6 +14,7 @@ from slideviz.formats.source import open_source
 from slideviz.formats.su2.loops import point_block
 from slideviz.formats.su2.read import read_su2
 from slideviz.mesh.model import Cells, Mesh
+from tests.formats.su2_samples import bits, save
 
 MANY = 100_000
 

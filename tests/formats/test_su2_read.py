@@ -4,13 +4,13 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from su2_samples import MESSY, SAMPLES, SOLID, SQUARE, ZONES, assert_same, bits, save
 
 import slideviz.formats.su2.text as su2_text
 from slideviz.formats.files import read
 from slideviz.formats.su2.write import su2_blocks
 from slideviz.mesh.check import unused_nodes
 from slideviz.streaming.stream_input import open_read_only
+from tests.formats.su2_samples import MESSY, SAMPLES, SOLID, SQUARE, ZONES, assert_same, bits, save
 
 
 def test_square(tmp_path):

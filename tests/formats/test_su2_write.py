@@ -8,7 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from su2_samples import (
+
+from slideviz.errors import MeshError
+from slideviz.formats.files import read, write
+from slideviz.mesh.check import LARGEST
+from slideviz.mesh.model import Cells, Marker, Mesh, Origin
+from tests.formats.su2_samples import (
     MESSY,
     SAMPLES,
     SOLID,
@@ -20,11 +25,6 @@ from su2_samples import (
     save,
     shared_meshes,
 )
-
-from slideviz.errors import MeshError
-from slideviz.formats.files import read, write
-from slideviz.mesh.check import LARGEST
-from slideviz.mesh.model import Cells, Marker, Mesh, Origin
 
 
 @pytest.fixture(scope="module")

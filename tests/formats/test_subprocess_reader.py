@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from su2_samples import SOLID, assert_same, save
 
 from slideviz.errors import MeshError
 from slideviz.formats import subprocess_reader
 from slideviz.formats.files import read, write
 from slideviz.formats.meshio.bridge import read_with_meshio
+from tests.formats.su2_samples import SOLID, assert_same, save
 
 NETGEN = """\
 mesh3d

@@ -8,8 +8,6 @@ from itertools import pairwise
 import h5py
 import numpy as np
 import pytest
-from builders import cube, grid, square
-from su2_samples import SOLID, SQUARE, bits, save
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkVersion
 from vtkmodules.vtkIOHDF import vtkHDFReader
@@ -22,6 +20,8 @@ from slideviz.formats.files import read, write
 from slideviz.formats.vtkhdf import vtkhdf_series
 from slideviz.mesh.model import Marker
 from slideviz.samples.table import write_sample
+from tests.builders import cube, grid, square
+from tests.formats.su2_samples import SOLID, SQUARE, bits, save
 
 VTK_VERSION = (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion())
 

@@ -1,10 +1,10 @@
 """A CGNS mesh is opened in the window, and saved as another CGNS file."""
 
 import numpy as np
-from cgns_files import passage_grid, save_passage
 
 from slideviz.formats.cgns.read import read_cgns
 from slideviz.gui.widgets import questions
+from tests.cgns_files import passage_grid, save_passage
 
 
 def test_a_cgns_file_is_opened_and_saved_again(driver, answers, tmp_path):

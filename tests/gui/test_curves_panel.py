@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import pytest
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
-from test_worst import session_with_runs
 
 from slideviz.color_scheme import DARK
 from slideviz.gui.panels.curves import CurvesPanel
 from slideviz.session import changes
 from slideviz.session.state import Session
+from tests.gui.test_worst import session_with_runs
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
-from test_worst import session_with_runs
 
 from slideviz.color_scheme import DARK
 from slideviz.errors import SlidevizError
@@ -15,6 +14,7 @@ from slideviz.sections.polygons import ONLY_INVERTED
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
+from tests.gui.test_worst import session_with_runs
 
 
 @pytest.fixture

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from su2_samples import MESSY, SAMPLES, SOLID, SQUARE, ZONES, meshes, save
 
 from slideviz.errors import MeshError
 from slideviz.formats.files import read, write
@@ -21,6 +20,7 @@ from slideviz.mesh.check import check_mesh, first_fault
 from slideviz.mesh.model import Cells, Marker, Mesh, Origin
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
+from tests.formats.su2_samples import MESSY, SAMPLES, SOLID, SQUARE, ZONES, meshes, save
 
 
 def line_of(text: str, part: str) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from builders import grid, halo_text
 
 from slideviz.errors import CaseError, MeshError
 from slideviz.formats.files import read
@@ -14,6 +13,7 @@ from slideviz.mesh.metrics import EXPONENTS, METRICS
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.system import threads
+from tests.builders import grid, halo_text
 from tests.oracles import quality as oracle
 
 TYPES = (5, 9, 10, 12, 13, 14)

@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 import pyvista as pv
-from ffd_samples import square
 
 import slideviz as sv
 from slideviz.cli import run
@@ -19,6 +18,7 @@ from slideviz.scene.scene import Scene
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame, ViewState
+from tests.ffd.ffd_samples import square
 
 CORNERS = plane_corners(np.array([[-0.1, -0.2], [1.1, -0.2], [1.1, 0.3], [-0.1, 0.3]]))
 FLAT, SPLINES = regular_box("BOX", CORNERS, (3, 1, 1), None), (4, 2, 2)

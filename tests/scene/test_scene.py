@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import pyvista as pv
-from builders import grid, halo_text
 
 import slideviz as sv
 from slideviz.color_scheme import COLOR_MAP, DARK, INVERTED_COLOR, LIGHT
@@ -16,6 +15,7 @@ from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.terms import ROLES
+from tests.builders import grid, halo_text
 
 
 def image(scene):
