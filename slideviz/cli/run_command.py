@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
     from slideviz.solver.deform import Step
-    from slideviz.streaming.run import RunResult
+    from slideviz.solver.steps import RunResult
     from slideviz.terms import FileFormat, Metric
 
 KEPT_BYTES = 1_000_000_000
@@ -160,7 +160,7 @@ def _deform(
     from slideviz.formats.files import quality_data
     from slideviz.formats.losses import warning_of_losses
     from slideviz.scene.overview import require_detail
-    from slideviz.streaming.run import RunResult
+    from slideviz.solver.steps import RunResult
 
     assert case.mesh_file is not None
     seconds = {"read": -time.perf_counter()}

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from math import factorial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba import prange
-from scipy.sparse import csr_array
 
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.frames import Frame
 from slideviz.system.jit_cache import njit
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
 

@@ -1,6 +1,6 @@
 """The results of a run: its progress, its steps, and the numbers of steps that STEPS= auto tried.
 
-Steps are made in `slideviz.solver.stepping`, their number is chosen in `.solver`.
+Steps are made in `slideviz.solver.stepping`, their number is chosen in `slideviz.solver.deform`.
 """
 
 from __future__ import annotations
@@ -8,12 +8,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from dataclasses import field as made_by
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.rbf.field import Field
 from slideviz.rbf.problem import Cycle
+
+if TYPE_CHECKING:
+    from slideviz.mesh.quality import Quality
 
 
 @dataclass(frozen=True)
@@ -93,3 +97,23 @@ class Step:
     field: Field | None = None
     """The function that displaced the nodes off the boundary in this step; kept in streamed
     runs."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunResult:
+    """The outcome of a run, in memory or from file to file."""
+
+    mesh: Mesh
+    """The undeformed mesh; of one in a file the points of its skin, without cells and elements of
+    markers."""
+    steps: tuple[Step, ...]
+    """Their meshes are the deformed ``mesh``, their ``node_counts`` those of the whole mesh."""
+    quality: Quality
+    undeformed: Quality
+    """`quality`, `undeformed`: quality of all cells after and before the run; of a mesh in a file
+    without ``size`` and ``skew``."""
+    folded: dict[int, tuple[int, int]]
+    """dict of int to (int, int): VTK type of inverted cells, and the step after which they are
+    first inverted, by cell number; at most ``listed``, those with the lowest numbers."""
+    seconds: dict[str, float]
+    """Spent by phase, besides those of the steps."""

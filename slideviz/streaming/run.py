@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 
@@ -25,10 +25,11 @@ from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.rbf.problem import PhaseTimer
 from slideviz.rbf.projection import Tracks
-from slideviz.solver.deform import Progress, Step, all_steps, require_memory
+from slideviz.solver.deform import all_steps, require_memory
 from slideviz.solver.growth import Farthest, stray_warning
 from slideviz.solver.setup import make_setup
 from slideviz.solver.stepping import Stepping
+from slideviz.solver.steps import Progress, RunResult, Step
 from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.output import Output
 from slideviz.streaming.quality import folded_steps
@@ -102,26 +103,6 @@ class RemainingTime:
 
 
 ReportProgress = Callable[[Progress], None]
-
-
-@dataclass(frozen=True, eq=False)
-class RunResult:
-    """The outcome of a run, in memory or from file to file."""
-
-    mesh: Mesh
-    """The undeformed mesh; of one in a file the points of its skin, without cells and elements of
-    markers."""
-    steps: tuple[Step, ...]
-    """Their meshes are the deformed ``mesh``, their ``node_counts`` those of the whole mesh."""
-    quality: Quality
-    undeformed: Quality
-    """`quality`, `undeformed`: quality of all cells after and before the run; of a mesh in a file
-    without ``size`` and ``skew``."""
-    folded: dict[int, tuple[int, int]]
-    """dict of int to (int, int): VTK type of inverted cells, and the step after which they are
-    first inverted, by cell number; at most ``listed``, those with the lowest numbers."""
-    seconds: dict[str, float]
-    """Spent by phase, besides those of the steps."""
 
 
 def stream(
