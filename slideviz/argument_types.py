@@ -196,7 +196,7 @@ def _is_series(value: object) -> bool:
 
 
 def _is_numeric(value: object, *, whole: bool) -> bool:
-    """Return whether NumPy makes numbers of a value, and, where asked for, whole ones."""
+    """Return whether NumPy converts a value to numbers; ``whole`` requires integers."""
     try:
         array = np.asarray(value)
         array = np.asarray(array, np.float64) if array.dtype == object else array

@@ -17,7 +17,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 # Many tests start the program, which would compile each of its modules anew.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-# Plotters, scenes and small meshes that the tests of several rooms draw.
+# Plotters, scenes and small meshes that the tests of several packages draw.
 pytest_plugins = ["tests.scenes"]
 
 

@@ -1,4 +1,4 @@
-"""Plotters, scenes and small meshes that the tests of several rooms draw."""
+"""Plotters, scenes and small meshes that the tests of several packages draw."""
 
 import numpy as np
 import pytest

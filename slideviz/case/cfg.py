@@ -218,7 +218,7 @@ def _with_paths(case: Case, change: Callable[[Path], Path]) -> Case:
 
 
 def _from_folder(file: Path, folder: Path) -> Path:
-    """Return the path of what a case file in ``folder`` names ``file``, shortened if possible."""
+    """Resolve the relative path ``file`` of a case file in ``folder``; drop ``..`` if possible."""
     path = folder / file
     short = Path(os.path.normpath(path))
     # `link/..` is the parent of the link's target, so shorten only if it is the same file then.

@@ -97,7 +97,7 @@ def without_definition(case: Case) -> str:
 
 
 def without_axis(case: Case) -> str:
-    """Return why FFD_AXIS has no effect in a case; "" if it has."""
+    """Return why FFD_AXIS has no effect in a case; "" if it has one."""
     return "FFD_COORD_SYSTEM= CARTESIAN has no axis" if case.ffd_system == "CARTESIAN" else ""
 
 

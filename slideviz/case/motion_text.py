@@ -298,7 +298,7 @@ def require_peak(peak: float) -> None:
 
 
 def term_of(k: float, n: float) -> tuple[int, int]:
-    """Return term k of n of an airfoil's shape as whole numbers; raises CaseError if none is."""
+    """Return term k of n of an airfoil's shape as integers; raises CaseError if there is none."""
     if k != int(k) or n != int(n) or not 1 <= k <= n <= MOST_TERMS:
         raise CaseError(
             f"there is no term {k:g} of {n:g}; expected whole numbers, 1 to n of n, and n up to "

@@ -92,11 +92,11 @@ def deformation(case: Case) -> tuple[object, ...]:
 
 
 def motion_labels(cases: Sequence[Case]) -> list[str]:
-    """Return a label for each case: its motions in few words; all "" where all have the same.
+    """Return a short label of the motions of each case; all are "" if all motions are the same.
 
-    Of equal numbers of motions, labels have those that differ.
-    Labels name boundaries only where motions of different ones occur, and points, axes and folders
-    only where different motions would have the same label without.
+    If the cases have equally many motions, labels contain only those that differ. Labels name
+    boundaries only if several boundaries move. They contain points, axes and folders only if
+    different motions would have the same label otherwise.
     """
     if len({case.motions for case in cases}) < 2:
         return [""] * len(cases)
@@ -194,7 +194,7 @@ def mesh_words(mesh: Mesh) -> tuple[str, str]:
 
 
 def box_words(mesh: Mesh) -> tuple[str, str]:
-    """Return the size of a mesh along each axis, and lines with lowest and highest coordinates.
+    """Return two texts: the mesh's size along each axis, and its lowest and highest coordinates.
 
     Both are "" for a mesh without points.
     """

@@ -62,7 +62,7 @@ class Kind:
         return ""
 
     def called(self, text: str) -> str:
-        """Return the window's word for the value of a text; the text itself where it has none."""
+        """Return the window's word for a value written as text; the text itself if it has none."""
         try:
             return self.words.get(self.read(text), text)
         except CaseError:

@@ -46,7 +46,7 @@ class OpenMesh:
 
 @contextmanager
 def progress_of(arguments: argparse.Namespace, phase: str) -> Iterator[Callable[[float], None]]:
-    """Context with a function that shows the fraction done of a phase, with ``--stream``."""
+    """Context with a function that shows the progress of a phase, if ``--stream`` is set."""
     from slideviz.cli.progress import Bar
     from slideviz.solver.steps import Progress
 

@@ -217,7 +217,7 @@ def zoom(text: str) -> Zoom:
 
 
 def count(text: str) -> int:
-    """Return the whole number that a text like ``20000`` or ``1e8`` is."""
+    """Parse a whole number, written like ``20000`` or ``1e8``."""
     try:
         number = float(text)
     except ValueError:

@@ -384,7 +384,7 @@ def _showing(session: Session, frame: StepFrame) -> Session:
 
 
 def _titles(session: Session, options: PictureOptions) -> Titles:
-    """Return the function of the titles of one run: run, step and quality."""
+    """Return a function that writes the title of each frame: run, step and quality."""
     letters = options.size[0] / (LETTER_WIDTH * options.scale)
     longest = LONGEST.format(len(session.frames) - 1)
 

@@ -43,7 +43,7 @@ class CoordinateSystem:
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def q_of(self, points: FloatArray) -> FloatArray:
-        """Return the coordinates q (..., 3) of points (..., 3)."""
+        """Return the coordinates q (..., 3) of Cartesian points (..., 3)."""
         if self.kind == "CARTESIAN":
             return points
         x, y, z = np.moveaxis(points - np.array(self.origin), -1, 0)
@@ -56,7 +56,7 @@ class CoordinateSystem:
         return np.stack([radius, theta, np.arccos(np.clip(cosine, -1.0, 1.0))], axis=-1)
 
     def points_of(self, q: FloatArray) -> FloatArray:
-        """Return the points (..., 3) of coordinates q (..., 3)."""
+        """Return the Cartesian points (..., 3) of coordinates q (..., 3)."""
         if self.kind == "CARTESIAN":
             return q
         first, theta, last = np.moveaxis(q, -1, 0)
@@ -223,7 +223,7 @@ class Box:
 
     @property
     def degrees(self) -> Index:
-        """Return the degree of each direction: the number of control points less one."""
+        """Return the polynomial degree along each direction: number of control points less one."""
         i, j, k = (count - 1 for count in self.points.shape[:3])
         return i, j, k
 

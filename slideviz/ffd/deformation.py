@@ -34,7 +34,7 @@ class Limits:
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """A move of a box by one of the values of a design."""
+    """A link between a design variable and a move of a box."""
 
     box: str
     move: Move

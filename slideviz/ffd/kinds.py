@@ -22,7 +22,7 @@ NORMAL = np.array([NEARLY, 1.0 + NEARLY, NEARLY])
 
 
 class Move(Protocol):
-    """What happens to control points by an amount."""
+    """A way to move the control points of a box, scaled by an amount."""
 
     @property
     def chosen(self) -> np.ndarray:
@@ -234,7 +234,10 @@ def _is_held(index: tuple[int, ...], held: Planes) -> bool:
 
 
 def _shift(box: Box, chosen: list[tuple[object, object, object]], vector: FloatArray) -> Shift:
-    """Return the shift of control points by a vector (3,), those of each entry of ``chosen``."""
+    """Return the shift by a vector (3,) of the control points at the indices ``chosen``.
+
+    A control point at several of them moves several times as far.
+    """
     unit = np.zeros(box.points.shape)
     for each in chosen:
         unit[each] += vector  # type: ignore[index]

@@ -75,7 +75,7 @@ def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:
 
 
 def listed(lost: Sequence[str]) -> str:
-    """Return words (at least one) as a list in a sentence: ``a, b and c``."""
+    """Join words (at least one) for a sentence: ``a, b and c``."""
     *first, last = lost
     return f"{', '.join(first)} and {last}" if first else last
 

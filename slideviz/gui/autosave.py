@@ -278,7 +278,7 @@ class OrphanedSession:
         return datetime.fromtimestamp(self.path.stat().st_mtime)
 
     def designs(self) -> tuple[DesignTable, bool]:
-        """Return the table of designs, and whether its results are of the case.
+        """Return the table of designs, and whether its results belong to the present case.
 
         Raises
         ------

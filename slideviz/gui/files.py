@@ -194,7 +194,7 @@ class Files(QObject):
     # Save ------------------------------------------------------------------------------
 
     def stem(self) -> str:
-        """Return the stem of the file names that dialogs offer: that of the case or mesh."""
+        """Return the stem of file names that dialogs suggest: that of the case or the mesh."""
         session = self.window.store.session
         path = session.case.source or session.path
         return path.stem if path is not None else "mesh"

@@ -39,7 +39,7 @@ def first_fault(cells: Cells, n_points: int) -> tuple[int, str] | None:
 
 
 def no_node(node: str, n_points: int) -> str:
-    """Return the sentence of an error for an element with a ``node`` that does not exist."""
+    """Return the error message for an element whose ``node`` does not exist."""
     return (
         f"node {node} does not exist: the {n_points} points are numbered "
         f"from 0 to {n_points - 1}; correct the element or the points"

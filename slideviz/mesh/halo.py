@@ -52,7 +52,7 @@ class Halo:
     """(h,): distance of each copy from where the motion of the halo puts its donor, undeformed."""
 
     def follow(self, before: FloatArray, after: FloatArray, rows: IntArray) -> FloatArray:
-        """Return ``after`` (n, d), with receivers moved as their donors, turned by their rotations.
+        """Return ``after`` (n, d) with receivers displaced like their donors, and rotated.
 
         Parameters
         ----------

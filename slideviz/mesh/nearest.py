@@ -106,9 +106,9 @@ def _margin(seen: FloatArray, apart: float) -> float:
 
 
 def _alone(points: FloatArray, at: FloatArray, reach: float) -> tuple[FloatArray, IntArray] | None:
-    """Return what `nearest` does with ``bound=reach``, or None where that needs a tree.
+    """Return the result of `nearest` with ``bound=reach``, or None if it needs a search tree.
 
-    That is where a place has two points within reach, or there are too many candidates.
+    It needs one if a query has two points within reach, or if there are too many candidates.
     """
     seen, from_here = (x @ OBLIQUE[: x.shape[1]] for x in (points, at))
     margin = max(_margin(seen, reach), _margin(from_here, reach))

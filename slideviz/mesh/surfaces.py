@@ -43,8 +43,9 @@ def coarse_surfaces(
     border = np.zeros(len(nodes), bool)
     for one in surfaces:
         border[np.searchsorted(nodes, one.nodes[np.unique(one.rim)])] = True
-    stands = nodes[_representatives(points[nodes], border, cubes or CUBES)]
-    return tuple(_coarse(one, stands[np.searchsorted(nodes, one.nodes)]) for one in surfaces)
+    representatives = nodes[_representatives(points[nodes], border, cubes or CUBES)]
+    at = (np.searchsorted(nodes, one.nodes) for one in surfaces)
+    return tuple(map(_merge_nodes, surfaces, (representatives[each] for each in at)))
 
 
 def _representatives(points: FloatArray, first: np.ndarray, cubes: int) -> IntArray:
@@ -64,12 +65,12 @@ def _representatives(points: FloatArray, first: np.ndarray, cubes: int) -> IntAr
     return np.asarray(chosen[cube])
 
 
-def _coarse(surface: Surface, stands: IntArray) -> Surface:
-    """Return a surface with mesh nodes ``stands`` (u,) in place of its nodes (u,), without a rim.
+def _merge_nodes(surface: Surface, representatives: IntArray) -> Surface:
+    """Return a surface whose nodes (u,) are merged into ``representatives`` (u,), without a rim.
 
-    Facets that collapse, and all but one of those that become equal, are left out.
+    Collapsed facets are left out. Of facets that become equal, only the first is kept.
     """
-    facets = stands[surface.facets]
+    facets = representatives[surface.facets]
     # A side whose nodes became one is removed: a triangle is left, with its last node twice.
     for side in range(3):
         gone = facets[:, side] == facets[:, side + 1]

@@ -152,7 +152,8 @@ class CurveRows:
     def of(self, shown: Sequence[tuple[Session, Cuts]], section: Section) -> tuple[CurveRow, ...]:
         """Return the curve of the undeformed mesh, then one per session, the first session's last.
 
-        A mesh that the section misses has no curve; nor has the undeformed one for displacements.
+        Meshes that the section does not cut are left out, and so is the undeformed mesh if
+        displacements are drawn.
 
         Parameters
         ----------

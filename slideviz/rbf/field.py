@@ -29,7 +29,7 @@ class Field(Protocol):
     def at(self, features: FloatArray, points: FloatArray, /, tick: Tick = no_tick) -> FloatArray:
         """Return the displacement (m, d) at Cartesian ``points`` (m, d) with ``features`` (k, m).
 
-        Both as they are before this step.
+        Points and features are those before the step.
         """
 
 

@@ -65,10 +65,10 @@ class Frozen(Protocol):
     """The discrete choices of a step, kept for any displacement (`slideviz.design.frozen`)."""
 
     out: FloatArray | None
-    """(..., n, d): where the displacement of all nodes may be written."""
+    """(..., n, d): an array for the displacement of all nodes, to be reused."""
 
     def choose(self, name: str, make: Callable[[], Any]) -> Any:
-        """Return the choice of this name; ``make`` makes it the first time."""
+        """Return the cached choice ``name``; the first call makes it with ``make``."""
 
     def fit(self, problem: Problem) -> Any:
         """Return a fit (`slideviz.rbf.methods.Fit`) whose rows were chosen before."""
@@ -76,13 +76,13 @@ class Frozen(Protocol):
     def correct(
         self, problem: Problem, displacement: Array, nodes: IntArray, errors: Array, *, needed: bool
     ) -> Array:
-        """Return the displacement (..., n, d) with errors (..., b, d) at nodes (b,) spread."""
+        """Return the displacement (..., n, d) corrected by the errors (..., b, d) of nodes (b,)."""
 
     def fixed(self, name: str, make: Callable[[], Any]) -> Any:
-        """Return what depends on positions only; ``make`` makes it at new positions."""
+        """Return the cached value ``name``, which ``make`` makes again when positions change."""
 
     def project(self, nodes: IntArray, free: Array) -> Array:
-        """Return displacements (..., m, d) of sliding nodes (m,), projected as chosen before."""
+        """Project displacements (..., m, d) of sliding nodes (m,) onto the facets chosen before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,8 +170,8 @@ class Problem:
     def beginning(self) -> IntArray:
         """Return the control nodes (c,) with which the selection of this step begins.
 
-        Those of the step before, in a selection with one level. None if they are as many as
-        ``max_nodes`` allows, for then no node could be added where the error changes.
+        They are those of the previous step. The array is empty if the selection has several levels,
+        or if the previous step has ``max_nodes`` control nodes, so that none could be added.
         """
         settings, before = self.reduction, self.before
         if settings is None or before is None or settings.multilevel:

@@ -89,9 +89,9 @@ class System:
     _cache: dict[str, Any] = made_by(default_factory=dict)
 
     def rough_data(self) -> FloatArray:
-        """Return test data: a sine wave along each axis, over the extent of the nodes.
+        """Return test data (n, 3): a sine wave along each axis, over the extent of the nodes.
 
-        (n, 3), or (n, 1) with directions: the waves along these.
+        If the rows have directions, the data are (n, 1): the components of the waves along them.
         """
         features, normals = self.place
         count = 3 if normals is None else normals.shape[1]

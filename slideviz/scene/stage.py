@@ -149,9 +149,9 @@ class Stage:
         return min(STRIP * self.pixel_scale, 0.4 * self.plotter.window_size[0])
 
     def values(self, session: Session) -> FloatArray:
-        """Return the value (m,) of every cell of the shown frame by which it is colored, cached.
+        """Return the values (m,) that color the cells of the shown frame, cached.
 
-        It is NaN for inverted cells.
+        They are NaN for inverted cells.
         """
         frame, what = session.frame, session.view.color_by
         assert frame is not None

@@ -73,9 +73,10 @@ class Cone(AboutAxis):
         return np.asarray(np.clip(angle, *_ENDS))
 
     def first(self, section: Section, points: FloatArray) -> Section:
-        """Return a cone through the middle of points, of the usual half angle or a smaller one.
+        """Return a cone through the middle of points.
 
-        Smaller where it would not stay between inner and outer radius over the whole length.
+        Its half angle is the usual one, or smaller if the cone would otherwise leave the range from
+        inner to outer radius within the length of the mesh.
         """
         local = section.frame(points)
         radius, height = np.hypot(local[:, 0], local[:, 1]), local[:, 2]

@@ -309,7 +309,7 @@ def _loops(row: ElementType, pattern: int) -> list[list[int]]:
 def _joints(
     side: tuple[int, ...], pattern: int, edge_of: dict[frozenset[int], int]
 ) -> list[tuple[int, int]]:
-    """Return the edges before and after each run of negative nodes round a side, by number."""
+    """Return the pairs of cut edges of a side: before and after each run of negative nodes."""
     negative = [bool(pattern >> node & 1) for node in side]
     size = len(side)
     joints = []

@@ -127,10 +127,10 @@ class Shape(Protocol):
         """Return the positions (n,) at which the section would go through points (n, 3)."""
 
     def first(self, section: Section, points: FloatArray) -> Section:
-        """Return the section that a new one starts as, about through the middle of points (n, 3).
+        """Return the initial position of a new section, near the middle of points (n, 3).
 
-        ``section`` has the point and direction to begin with: the middle of the points, or the
-        axis of the machine.
+        ``section`` has an initial point and direction: the middle of the points, or the axis of the
+        machine.
         """
 
     def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
@@ -215,7 +215,7 @@ class InPlane(Protocol):
         """Return the point (2,) of the handle by which the mouse moves the section."""
 
     def handle_parts(self, section: Section, parts: list[FloatArray], box: Box) -> HandleParts:
-        """Return the handle inside a box; ``parts`` are the section's polylines there (`trace`)."""
+        """Return the drawn parts of the handle; ``parts`` are the section's polylines there."""
 
     def dragged(
         self, section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box

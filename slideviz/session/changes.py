@@ -177,10 +177,10 @@ def show_handle(session: Session, shown: bool) -> Session:
 def selection_after(
     index: int | None, old: Sequence[Section], new: Sequence[Section]
 ) -> int | None:
-    """Return the place of the selected section after one was added, removed or changed.
+    """Return the index of the selected section after one was added, removed or changed.
 
-    ``index`` is its place among ``old``. A section that was added is selected; where the selected
-    one was removed, its neighbour is.
+    ``index`` is its index in ``old``. An added section becomes selected. If the selected one was
+    removed, its neighbour becomes selected.
     """
     if not new:
         return None

@@ -93,7 +93,7 @@ class DesignTable:
         return DesignTable(self.columns if kept else (), kept, MappingProxyType(results))
 
     def with_results(self, rows: Iterable[DesignRow]) -> DesignTable:
-        """Return the table with further results, by the number of their design."""
+        """Return the table with added results; ``rows`` have the numbers of their designs."""
         more = {row.design: row for row in rows}
         return replace(self, results=MappingProxyType({**self.results, **more}))
 

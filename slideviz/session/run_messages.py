@@ -38,9 +38,9 @@ RATE = 2e10
 
 
 def exact_cost(case: Case, mesh: Mesh) -> str:
-    """Return a sentence on memory and time of a large run without data reduction; else "".
+    """Return a warning of the memory and time of a large run without data reduction, or "".
 
-    All boundary nodes are control nodes then: memory grows with the square of their number, and
+    All boundary nodes are control nodes: memory grows with the square of their number, and
     time with the cube.
     """
     from slideviz.solver.deform import free_memory

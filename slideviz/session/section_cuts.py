@@ -78,7 +78,7 @@ def cut_key(section: Section) -> Section:
 
 
 def slab_of(mesh: Mesh, section: Section) -> StepFrame | None:
-    """Return the slab of cells of a large mesh that a section cuts; None until it was read."""
+    """Return the cached cells that a section cuts in a large mesh; None until they are read."""
     return _SLABS.get(mesh, {}).get(cut_key(section))
 
 

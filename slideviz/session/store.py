@@ -44,7 +44,7 @@ def notify(
 
 @dataclass(frozen=True)
 class UndoState:
-    """The state that undo brings back: case, guesses, style of the view, removed runs."""
+    """The state that undo restores: case, guesses, style of the view, removed runs."""
 
     case: Case
     guesses: Mapping[str, Guess]

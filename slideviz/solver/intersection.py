@@ -338,7 +338,7 @@ def _plane(arms: FloatArray) -> float:
 def _space(points: FloatArray, facets: IntArray, p: FloatArray) -> float:
     """Return the winding number of facets (f, 4) around a point ``p`` (3,).
 
-    The same to the bit for any number of threads: the sums of their parts are added in order.
+    Its bits do not depend on the number of threads: the sums of the parts are added in order.
     """
     sums = np.zeros(-(-len(facets) // PART))
 

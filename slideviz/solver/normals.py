@@ -160,8 +160,8 @@ def _directions(setup: Setup, normals: Array) -> Array:
 def _leading(rows: Array) -> Array:
     """Return the two leading right singular vectors of rows (k, 3) of rank 2.
 
-    The derivative leaves out their rotation within the plane that they span, on which no result
-    depends.
+    The derivative does not contain their rotation within the plane that they span: no result
+    depends on it.
     """
     a = value(rows)
     vectors, sizes = np.linalg.svd(a)[2], np.zeros(3)

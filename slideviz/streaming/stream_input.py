@@ -246,7 +246,7 @@ def text_blocks(
     after : Path
         A file with the new points where the binary copy has the old ones.
     ffd : bytes or None
-        Boxes for free-form deformation, in place of those in the text; None keeps these.
+        Boxes for free-form deformation that replace those in the text; None keeps the latter.
     """
     text = mesh_input.text
     assert text is not None

@@ -207,7 +207,7 @@ def compare(
 
 
 def _share(combination: Combination, case: Case, mesh: Mesh) -> _Shared:
-    """Return the setup of a combination, timed."""
+    """Return the setup of a combination, and the time it took."""
     clock = _Clock()
     with clock:
         setup = make_setup(combination.applied(case), mesh)

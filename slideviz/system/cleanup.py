@@ -178,7 +178,7 @@ def is_alive(pid: str) -> bool:
 
 
 def _owned(pid: int | str) -> str:
-    """Return the beginning of the names of the drafts of process ``pid`` on this machine."""
+    """Return the prefix of the names of unfinished files of process ``pid`` on this machine."""
     return f"{PREFIX}{_machine()}-{pid}-"
 
 

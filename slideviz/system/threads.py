@@ -36,7 +36,7 @@ def cores() -> int:
 
 @contextmanager
 def at_most(threads: int) -> Iterator[None]:
-    """Context in which `cores` is at most ``threads``, as other processes use the other cores."""
+    """Context that limits `cores` to ``threads``, to leave the other cores to other processes."""
     _most.append(threads)
     try:
         yield

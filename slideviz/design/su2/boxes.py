@@ -30,7 +30,10 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 
 def held_planes(config: Su2Config, mesh: Mesh, box: Box, continuity: str) -> Planes:
-    """Return the planes of a box that are held; ``continuity`` is a value of FFD_CONTINUITY."""
+    """Return the planes of control points that stay fixed, by axis.
+
+    ``continuity`` is a value of FFD_CONTINUITY.
+    """
     depth = CONTINUITIES[continuity]
     if not depth:
         given = [list_of(config.words[f"FFD_FIX_{letter}"]) for letter in "IJK"]

@@ -188,7 +188,7 @@ def _read_csv(case: Case, path: Path) -> Designs:
 
 
 def head_of(columns: Iterable[str], words: Sequence[str] = WORDS) -> list[str]:
-    """Return the head of a table of results: the design's number and columns, and its results."""
+    """Return the column titles of a table of results: number, design variables, results."""
     return ["design", *columns, *NUMBERS, *words]
 
 
@@ -199,9 +199,9 @@ def cells_of(
     words: Sequence[str] = WORDS,
     folder: Path = Path(),
 ) -> list[object]:
-    """Return the cells of a design, as `head_of` names them; those of results empty without any.
+    """Return the cells of a design's row, in the order of `head_of`.
 
-    Its mesh is relative to ``folder``.
+    Cells of results are empty if ``row`` is None. The path of the mesh is relative to ``folder``.
     """
     result = row or DesignRow(number)
     texts = {

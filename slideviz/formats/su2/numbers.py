@@ -30,7 +30,7 @@ _EXTRA_POINT_WORDS = 2
 
 
 def parse_cells(lines: Lines, rows: Rows, dim: int, n_points: int, progress: Tick) -> Cells:
-    """Return the elements on rows, each with type, nodes, and perhaps an index that is ignored.
+    """Parse elements, one per row: type, nodes, and an optional index, which is ignored.
 
     Parameters
     ----------

@@ -119,7 +119,7 @@ class WarmupThread(QObject):
 def import_numerics() -> None:
     """Import the numerics before any thread is started, and lower their threads' priority.
 
-    NumPy's BLAS gets `NUMPY_THREADS` if SciPy has a BLAS of its own.
+    If NumPy and SciPy have separate BLAS libraries, NumPy's is limited to `NUMPY_THREADS`.
     """
     # Once, here: if two threads (the warm-up and a run) import Numba at the same time, one finds
     # it partly initialized.

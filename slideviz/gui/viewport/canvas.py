@@ -199,7 +199,7 @@ class View3D(QtInteractor):
         return np.asarray(self.screenshot(return_img=True))
 
     def spare_software(self) -> None:
-        """Switch off costly effects if the CPU draws: a software OpenGL, no graphics card.
+        """Switch off costly effects if OpenGL draws in software, without a graphics card.
 
         They are antialiasing, order-independent transparency, and four of five lights.
         """
