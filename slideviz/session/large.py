@@ -71,9 +71,9 @@ def first_frame(skin: Mesh, metric: Metric, tick: Callable[[float], object]) -> 
     Raises
     ------
     MeshError
-        The file has a mistake.
+        The file has a mistake, or there is no disk space for 9 bytes for each cell.
     OSError
-        It cannot be read, or there is no disk space for 9 bytes for each cell.
+        It cannot be read.
     """
     assert skin.source is not None
     folder = Path(tempfile.gettempdir())

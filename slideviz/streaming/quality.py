@@ -118,7 +118,8 @@ class CellCounts:
     def add(self, block: CellBlock) -> None:
         """Count the cells of a block."""
         self._used[block.nodes[block.mesh.cells.nodes]] = True
-        self._types += np.bincount(block.mesh.cells.types, minlength=256)
+        for vtk, (ids, _) in block.mesh.cells.by_type.items():
+            self._types[vtk] += len(ids)
 
     @property
     def points(self) -> int:
@@ -156,7 +157,7 @@ def measure_mesh(
     stack : ExitStack
         Removes the scratch files when it closes.
     folder : Path
-        Where they are made: 9 bytes for each cell.
+        Where they are made, that for temporary files: 9 bytes for each cell.
     worst : int
         As for `quality_totals`.
     counts : CellCounts, optional
@@ -167,14 +168,18 @@ def measure_mesh(
     Raises
     ------
     MeshError
-        As by `quality_blocks`.
+        As by `quality_blocks`; or there is no disk space for the scratch files.
     """
     collector: QualityCollector | None = None
     for block in quality_blocks(source, metric, tick, may_fold=may_fold):
         found = block.quality
         assert found is not None
         if isinstance(source, FileSource):
-            collector = collector or QualityCollector(stack, folder, source.n_cells, metric)
+            if collector is None:
+                try:
+                    collector = QualityCollector(stack, folder, source.n_cells, metric)
+                except MeshError as problem:
+                    raise MeshError(f"{problem} (TMPDIR names another folder)") from problem
             collector.add(index_of(block.ids), found.values, found.status, found.signs[:1])
         if counts is not None:
             counts.add(block)

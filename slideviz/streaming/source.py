@@ -25,6 +25,7 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part, frozen_
 from slideviz.mesh.quality import Quality
 from slideviz.sections.cut import crossed_cells
 from slideviz.sections.model import Section
+from slideviz.system.atomic import reason_of
 from slideviz.system.cleanup import draft, open_temporary
 from slideviz.system.threads import Tick
 
@@ -365,16 +366,28 @@ def has_cells_of(mesh: Zone, other: Zone) -> bool:
 
 
 class Scratch:
-    """An array (count,) in a temporary file, which is removed when ``stack`` closes."""
+    """An array (count,) in a temporary file, which is removed when ``stack`` closes.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be made in ``folder``: the disk may be full.
+    """
 
     def __init__(self, stack: ExitStack, folder: Path, count: int, kind: type) -> None:
         path = stack.enter_context(draft(folder))
-        with open_temporary(path, new=True) as file:
-            size = max(count * np.dtype(kind).itemsize, 1)
-            file.truncate(size)
-            if hasattr(os, "posix_fallocate"):  # else a full disk would end the process
-                os.posix_fallocate(file.fileno(), 0, size)
-            self._map = mmap.mmap(file.fileno(), 0)
+        size = max(count * np.dtype(kind).itemsize, 1)
+        try:
+            with open_temporary(path, new=True) as file:
+                file.truncate(size)
+                if hasattr(os, "posix_fallocate"):  # else a full disk would end the process
+                    os.posix_fallocate(file.fileno(), 0, size)
+                self._map = mmap.mmap(file.fileno(), 0)
+        except OSError as problem:
+            raise MeshError(
+                f"{folder}: a temporary file of {size / 1e6:,.0f} MB cannot be written there: "
+                f"{reason_of(problem)}"
+            ) from problem
         self.array: NDArray = np.frombuffer(self._map, kind, count)
 
     def release(self) -> None:

@@ -1,5 +1,7 @@
 """Commands that look at a mesh, with --stream: the words and numbers of one in memory."""
 
+import errno
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import slideviz as sv
 from slideviz.cli import run
 from slideviz.errors import MeshError
 from slideviz.samples.table import write_sample
+from slideviz.session.large import first_frame
 from slideviz.streaming import quality, skin, source
 from slideviz.system.cleanup import PREFIX
 from tests.builders import grid
@@ -192,3 +195,19 @@ def test_numbers_of_cells_are_in_files_that_end(small):
         assert len(list(Path("scratch").glob(f"{PREFIX}*"))) == 2
         assert counts.types == {9: 16}
     assert not list(Path("scratch").iterdir())
+
+
+def test_no_place_for_the_numbers_of_cells_is_told(small, capsys, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    sv.write(small / "mesh.su2b", grid((3, 3, 3)))
+    monkeypatch.setattr(os, "posix_fallocate", full, raising=False)
+    assert run(["info", "mesh.su2b", "--stream"]) == 1
+    why = "the disk is full; free some space or choose another disk (TMPDIR names another folder)"
+    message = f"{small / 'scratch'}: a temporary file of 0 MB cannot be written there: {why}"
+    assert capsys.readouterr().err == f"slideviz: {message}\n"
+    assert not list((small / "scratch").iterdir())
+    with pytest.raises(MeshError, match="the disk is full"):
+        first_frame(skin.read_skin(small / "mesh.su2b", None), "knupp", lambda _: None)
+    assert not list((small / "scratch").iterdir())
