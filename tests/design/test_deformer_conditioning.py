@@ -242,6 +242,18 @@ def test_a_derivative_that_cannot_be_trusted_is_told(reduction):
         deformer.jvp(deformer.displacement, alone)
 
 
+def test_designs_with_data_reduction_get_no_warning_of_rounding():
+    """Their system is nearly singular, but a tolerance is larger than its rounding."""
+    made = sample("square", 20, "motion")
+    reduction = Reduction(relative=1e-9)
+    settings = {"sliding": "none", "periodic": "none", "steps": 1, "reduction": reduction}
+    case = made.case.change(kernel="wendland-c2", influence_factor=2000.0, **settings)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ConditionWarning)
+        warnings.simplefilter("ignore", ToleranceWarning)
+        sv.Deformer(made.mesh, case).deform()
+
+
 def test_a_singular_system_of_a_design_is_refused():
     with pytest.raises(DeformError, match=r"system of the 2 control rows is singular at this des"):
         full_factor(np.ones((2, 2)))
