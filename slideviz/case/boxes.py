@@ -10,7 +10,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from slideviz.case.displacement import Displacements
-from slideviz.case.model import BoxMotion, Case, Ffd, FfdThickness, FfdTwist, moves, named
+from slideviz.case.model import BoxMotion, Case, Ffd, FfdThickness, FfdTwist, applies_to, named
 from slideviz.errors import CaseError, Note, SlidevizError, nearest
 from slideviz.ffd.box import (
     CARTESIAN,
@@ -241,7 +241,7 @@ def ffd_displacements(
 ) -> dict[object, Displacements]:
     """Return the displacements of the nodes ``on`` moving markers, by motion of a box.
 
-    Several equal motions share one, their mean.
+    Equal motions have one entry, with the mean of their displacements.
 
     Raises
     ------
@@ -256,7 +256,7 @@ def ffd_displacements(
     for name, changes in box_changes(case, mesh, boxes).items():
         for place, q, change in changes:
             motion = case.motions[place]
-            mine = {name: nodes for name, nodes in on.items() if moves(motion, name)}
+            mine = {name: nodes for name, nodes in on.items() if applies_to(motion, name)}
             moved = _moved(boxes[name], mesh, q, change, mine)
             if moved is not None and not alone and _is_in(name, mesh, system_of(case)):
                 moved = replace(moved, warnings=(*moved.warnings, _stays(name)))

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from slideviz.case.displacement import Displacements
-from slideviz.case.model import Case, Cst, HicksHenne, OnAirfoil, moves, named
+from slideviz.case.model import Case, Cst, HicksHenne, OnAirfoil, applies_to, named
 from slideviz.case.motion_text import term_of
 from slideviz.errors import CaseError
 from slideviz.mesh.cached_boundary import boundary_of
@@ -86,7 +86,9 @@ def bump_displacements(
     found: dict[object, Displacements] = {}
     problems = []
     for place, motion in enumerate(case.motions, start=1):
-        markers = [name for name in on if isinstance(motion, OnAirfoil) and moves(motion, name)]
+        markers = [
+            name for name in on if isinstance(motion, OnAirfoil) and applies_to(motion, name)
+        ]
         if not markers or not isinstance(motion, OnAirfoil):
             continue
         nodes = np.unique(np.concatenate([on[name] for name in markers]))

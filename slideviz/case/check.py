@@ -21,7 +21,7 @@ from slideviz.case.model import (
     Radial,
     Rotate,
     Translate,
-    moves,
+    applies_to,
     named,
 )
 from slideviz.case.motion_text import read_motions, write_motions
@@ -132,7 +132,7 @@ def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
         f"moving marker {marker!r} has no motion; add MOTION= ({marker}, translate, ...) or "
         f"DEFORMATION_FILENAME, or name it in MARKER_FIXED instead if it stays{of_all}"
         for marker in case.markers_with("moving")
-        if not any(moves(motion, marker) for motion in case.motions)
+        if not any(applies_to(motion, marker) for motion in case.motions)
     ]
     for place, motion in enumerate(case.motions, start=1):
         problems = [*_motion_problems(motion, mesh.dim)]
@@ -175,7 +175,7 @@ def _prescribed_problems(case: Case, mesh: Mesh, motion: Prescribed) -> Iterator
     if motion.vectors.shape[1] != mesh.dim:
         has = motion.vectors.shape[1]
         yield f"its vectors have {has} components, and the mesh {mesh.dim} dimensions"
-    names = (name for name in case.markers_with("moving") if moves(motion, name))
+    names = (name for name in case.markers_with("moving") if applies_to(motion, name))
     on = [mesh.marker(name).nodes for name in names if name in mesh.marker_names]
     stray = np.setdiff1d(motion.nodes, np.concatenate([*on, np.empty(0, np.int64)]))
     if len(stray):

@@ -67,7 +67,7 @@ class Key:
         return f"{self.label} ({self.unit})" if self.unit else self.label
 
     def idle(self, case: Case) -> str:
-        """Return why the key has no effect in a case; "" where it has one."""
+        """Return why the key has no effect in a case; "" if it has one."""
         return other_method(case, self.method) or self.idle_reason(case)
 
 
@@ -97,7 +97,7 @@ def setting(name: str, group: str, kind: Kind, field: str, meaning: str, **windo
 
 
 def role(name: str, kind: Kind, wanted: Role, meaning: str) -> Key:
-    """Return the row of a key whose value is the list of the markers with the role ``wanted``."""
+    """Return the row of a key that lists the markers with the role ``wanted``."""
 
     def put(case: Case, names: tuple[str, ...]) -> Case:
         return case.change(roles={**case.roles, **dict.fromkeys(names, wanted)})

@@ -240,7 +240,7 @@ def named(target: Target) -> tuple[str, ...]:
     return (target,) * bool(target) if isinstance(target, str) else target
 
 
-def moves(motion: Motion, marker: str) -> bool:
+def applies_to(motion: Motion, marker: str) -> bool:
     """Return whether a motion moves the moving marker ``marker``."""
     return not motion.marker or marker in named(motion.marker)
 

@@ -30,7 +30,7 @@ from slideviz.case.model import (
     Rotate,
     Scale,
     Translate,
-    moves,
+    applies_to,
     named,
 )
 from slideviz.errors import CaseError
@@ -78,7 +78,7 @@ def reference_displacements(
     except CaseError as problem:
         problems.append(str(problem))
     for motion in case.motions:
-        moved = [nodes for name, nodes in on.items() if moves(motion, name)]
+        moved = [nodes for name, nodes in on.items() if applies_to(motion, name)]
         if isinstance(motion, FromFile) and (moved or not motion.marker):
             nodes = np.unique(np.concatenate([*moved, np.empty(0, np.int64)]))
             names = " or ".join(repr(name) for name in named(motion.marker))
@@ -185,7 +185,7 @@ def moved_together(
     """
     total = {name: np.zeros_like(points[nodes]) for name, nodes in on.items()}
     for motion in motions:
-        here = {name: points[on[name]] + total[name] for name in on if moves(motion, name)}
+        here = {name: points[on[name]] + total[name] for name in on if applies_to(motion, name)}
         one = motion if len(here) < 2 else _as_one(motion, here, on)
         for name, at in here.items():
             total[name] += _change(one, at, on[name], files)

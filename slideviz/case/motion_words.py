@@ -183,7 +183,7 @@ def mesh_words(mesh: Mesh) -> tuple[str, str]:
     """
     halo = "" if mesh.halo is None else f"  (halo: {int(mesh.halo.cells.sum()):,})"
     about = "" if mesh.halo is None else f"With {mesh.halo.describe()}.\n"
-    size, ends = box_words(mesh)
+    size, ends = bounds_words(mesh)
     part = mesh.part
     cells, points = (part.n_cells, part.n_points) if part else (len(mesh.cells), len(mesh.points))
     count = f"{cells:,} cells{halo}   {points:,} points"
@@ -193,7 +193,7 @@ def mesh_words(mesh: Mesh) -> tuple[str, str]:
     return f"{mesh.dim}D   {count}   {size}", about + ends
 
 
-def box_words(mesh: Mesh) -> tuple[str, str]:
+def bounds_words(mesh: Mesh) -> tuple[str, str]:
     """Return two texts: the mesh's size along each axis, and its lowest and highest coordinates.
 
     Both are "" for a mesh without points.

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from slideviz.cli.processes import launched, run_shared
-from slideviz.cli.terminal import CANCELLED, DONE, WRONG_INPUT, terminal
+from slideviz.cli.terminal import CANCELLED, DONE, WRONG_INPUT, terminal_streams
 from slideviz.errors import Cancelled, SlidevizError
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def run(argv: Sequence[str]) -> int:
     """Run one command and return its exit code; an error is printed as a message."""
-    with terminal():
+    with terminal_streams():
         variable = launched()
         code = _shared(argv, variable) if variable else _run(argv, None)
         try:

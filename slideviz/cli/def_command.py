@@ -153,7 +153,7 @@ def _run_def(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def _relaxation_told(config: Su2Config) -> Iterator[None]:
-    """Context in which an error has a line about OPT_RELAX_FACTOR, unless that is 1."""
+    """Context that adds a line about OPT_RELAX_FACTOR to errors, unless it is 1."""
     from slideviz.errors import SlidevizError
 
     try:

@@ -216,7 +216,7 @@ def zoom(text: str) -> Zoom:
     return Detail(tuple(centre), width)
 
 
-def count(text: str) -> int:
+def integer(text: str) -> int:
     """Parse a whole number, written like ``20000`` or ``1e8``."""
     try:
         number = float(text)

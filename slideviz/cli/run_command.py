@@ -240,7 +240,7 @@ def require_streamable(
 def is_to_be_streamed(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> bool:
-    """Return whether to stream a run: if asked for, or possible and memory is too small for it."""
+    """Return whether to stream a run: on request, or if it is possible and memory is too small."""
     from slideviz.streaming.resources import missing_memory
 
     if arguments.stream:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from slideviz.cli.options import count
+from slideviz.cli.options import integer
 from slideviz.formats.table import FILE_FORMATS
 
 
@@ -14,7 +14,9 @@ def add_sample(calls: argparse._SubParsersAction) -> None:
     call = calls.add_parser("sample", help="write a sample case")
     call.add_argument("name", nargs="?", help="name of the sample; without it, list all")
     call.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder (default: NAME)")
-    call.add_argument("--size", type=count, metavar="N", help="size; the list says what it counts")
+    call.add_argument(
+        "--size", type=integer, metavar="N", help="size; the list says what it counts"
+    )
     call.add_argument(
         "--format",
         type=str.lower,

@@ -41,7 +41,10 @@ def glued(argv: Sequence[str]) -> list[str]:
 
 @dataclass(frozen=True)
 class SectionArgument:
-    """The section of an option; ``axis`` is whether the option has its axis or normal."""
+    """The section that an option describes.
+
+    ``axis``: whether the option contains the axis or normal of the section.
+    """
 
     section: Section
     axis: bool = True

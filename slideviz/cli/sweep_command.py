@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz.cli.options import add_shared, count, read_case, require_mesh_file
+from slideviz.cli.options import add_shared, integer, read_case, require_mesh_file
 from slideviz.cli.progress import Bar
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def add_sweep(calls: argparse._SubParsersAction) -> None:
     call.add_argument("--columns", action="store_true", help="list the possible columns")
     call.add_argument("--meshes", action="store_true", help="write the mesh of each design")
     call.add_argument(
-        "--workers", type=count, metavar="N", help="processes (default: one for each core)"
+        "--workers", type=integer, metavar="N", help="processes (default: one for each core)"
     )
     call.add_argument(
         "--scheduler", metavar="ADDRESS", help="work on a Dask cluster, as tcp://node1:8786"

@@ -106,7 +106,7 @@ def _encodable(text: str, encoding: str) -> str:
 
 
 @contextmanager
-def terminal() -> Iterator[None]:
+def terminal_streams() -> Iterator[None]:
     """Context in which stdout and stderr are each a `Terminal`."""
     out, err = Terminal(sys.stdout, needed=True), Terminal(sys.stderr, needed=False)
     with redirect_stdout(out), redirect_stderr(err):
@@ -134,10 +134,10 @@ def say(what: str, text: str) -> None:
 
 @contextmanager
 def holding() -> Iterator[Callable[..., None]]:
-    """Context in which `say` prints nothing until the function it yields is called, or it ends.
+    """Context that delays the texts of `say` until its end, or until its function is called.
 
-    The function leaves out texts that begin with its argument, if any. An error that ends it before
-    is printed alone: nothing was done that the rest could concern.
+    The yielded function leaves out texts that begin with its argument, if any. If an error ends the
+    context before, only the error is printed.
     """
     held: list[tuple[str, str]] = []
     token = _HELD.set(held)

@@ -191,14 +191,14 @@ class Deformer:
         ConditionWarning
             Between the boundary nodes, the points of a design cannot be trusted.
         """
-        given = self.displacement if displacement is None else displacement
-        given = self._checked(given, "displacement")
-        points, errors, error_estimate = self._deformed(given)
+        design = self.displacement if displacement is None else displacement
+        design = self._checked(design, "displacement")
+        points, errors, error_estimate = self._deformed(design)
         warn_of_error_estimate(self._steps, error_estimate)
         reduced = self._setup.reduction is not None
-        same = given[..., None, :, :] == self._references
+        same = design[..., None, :, :] == self._references
         reference = same.all(axis=(-1, -2)).any(axis=-1)
-        allowed = self._checks.tolerance(given)
+        allowed = self._checks.tolerance(design)
         warn_of_errors(errors, allowed, reference, reduced=reduced)
         return points
 
@@ -210,8 +210,8 @@ class Deformer:
         are set exactly; or the distance of a sliding node from its boundary, because it left the
         plane of the facet that it was on at the reference. The larger of both.
         """
-        found = self._deformed(self._checked(displacement, "displacement"))[1]
-        return float(found) if found.ndim == 0 else found
+        error = self._deformed(self._checked(displacement, "displacement"))[1]
+        return float(error) if error.ndim == 0 else error
 
     @check_types
     def jvp(self, displacement: FloatArray, direction: FloatArray) -> FloatArray:
@@ -301,11 +301,11 @@ class Deformer:
             for k, each in enumerate(displacement):
                 points[k], errors[k], error_estimate[k] = self._deformed(each)
             return points, errors, error_estimate
-        found = [
+        estimates = [
             self._together(displacement[first : first + TOGETHER], points[first : first + TOGETHER])
             for first in range(0, len(points), TOGETHER)
         ]
-        errors, error_estimate = np.concatenate([np.empty((2, 0)), *found], axis=1)
+        errors, error_estimate = np.concatenate([np.empty((2, 0)), *estimates], axis=1)
         return points, errors, error_estimate
 
     def _together(self, displacement: FloatArray, out: FloatArray) -> FloatArray:
@@ -328,12 +328,12 @@ class Deformer:
 
     def _taped(self, displacement: FloatArray) -> tuple[list[StepState], Variable, Variable]:
         """Return the states of a design (m, d), and its input and points as variables of a tape."""
-        given = self._shaped(displacement, self.displacement.shape, "displacement")
-        if given.ndim == 3:
+        design = self._shaped(displacement, self.displacement.shape, "displacement")
+        if design.ndim == 3:
             raise CaseError(
                 "derivatives are taken at one displacement; call it for each of several"
             )
-        start = Tape().variable(given)
+        start = Tape().variable(design)
         states = self._run(self._input.target(start))
         end = states[-1].points
         assert isinstance(end, Variable)

@@ -90,7 +90,7 @@ def save_section(
     style = SectionStyle(paper.size, True, "edges" in session.view.drawn, name=name, dpi=paper.dpi)
     style = replace(style, title=paper.title, axes=paper.axes)
     if len(shown) == 1:
-        shown = [replace(shown[0], name=state_words(session), place="")]
+        shown = [replace(shown[0], name=frame_words(session), place="")]
     section_picture(shown, section, path, style)
     return path
 
@@ -127,7 +127,7 @@ def _choice(session: Session, section: Section) -> CellsInRange | None:
     return CellsInRange.of(frame.shown_values(session.view.color_by, session.mesh), threshold)
 
 
-def state_words(session: Session) -> str:
+def frame_words(session: Session) -> str:
     """Return run, step and method of a session in words."""
     run = session.run_shown
     if run is None or session.view.frame == 0:

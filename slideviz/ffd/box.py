@@ -288,7 +288,7 @@ class Box:
         return out
 
     def problem(self, index: Index) -> str:
-        """Return why the box has no control point of this index; empty where it has."""
+        """Return why the box has no control point of this index; "" if it has one."""
         for name, at, most in zip("ijk", index, self.degrees, strict=True):
             if not -1 <= at <= most:
                 return (

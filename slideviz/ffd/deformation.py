@@ -33,7 +33,7 @@ class Limits:
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class DrivenMove:
     """A link between a design variable and a move of a box."""
 
     box: str
@@ -64,7 +64,7 @@ class BoxDeformation:
     """Undeformed, in the order of the file."""
     inside: dict[str, Embedding]
     """Nodes in each box, by their place in 0..m-1."""
-    drives: Sequence[Drive]
+    drives: Sequence[DrivenMove]
     values: FloatArray
     """(v,): the design."""
     relax: float
@@ -86,7 +86,7 @@ class BoxDeformation:
         self._by_name = {box.name: box for box in self.boxes}
         self._carried = {box.name: self._in_parent(box) for box in self.boxes if box.parent}
         self._tape: list[Callable[[_Rates], None]] = []
-        self._done: dict[str, list[tuple[Drive, float]]] = {}
+        self._done: dict[str, list[tuple[DrivenMove, float]]] = {}
         self._factor, self._relax = 1.0, self.relax
         self._embedded = dict(self.inside)
         self.nodes = np.zeros((self.count, 3))
@@ -193,7 +193,7 @@ class BoxDeformation:
 
     def _moved(
         self,
-        drive: Drive,
+        drive: DrivenMove,
         points: FloatArray,
         amount: float,
         relax: float,

@@ -25,7 +25,7 @@ def left_out(path: Path, mesh: Mesh) -> str:
     row = format_for(path)
     has_quality = row.solver or row.quality
     lost = [*([] if has_quality else ["the quality of the cells"]), *lost_in(row, mesh)]
-    return f"{path.name} does not hold {listed(lost)}." if lost else ""
+    return f"{path.name} does not hold {join_words(lost)}." if lost else ""
 
 
 def lost_in(row: MeshFormat, mesh: Mesh) -> list[str]:
@@ -74,7 +74,7 @@ def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:
     return tuple(words for words, is_lost in lost.items() if is_lost)
 
 
-def listed(lost: Sequence[str]) -> str:
+def join_words(lost: Sequence[str]) -> str:
     """Join words (at least one) for a sentence: ``a, b and c``."""
     *first, last = lost
     return f"{', '.join(first)} and {last}" if first else last
@@ -98,7 +98,7 @@ def sentence_of_lost(
     if alone:
         is_enough = format_for(output).zones and list(lost) == [OTHER_ZONES]
         remedy = "leave out --zone" if is_enough else f"leave out --zone and {remedy}"
-    return f"{output} will not have {listed(lost)} of {name}; {remedy} to keep them"
+    return f"{output} will not have {join_words(lost)} of {name}; {remedy} to keep them"
 
 
 def warning_of_losses(

@@ -80,11 +80,11 @@ class SessionRecovery(QObject):
         if not self.waiting:
             self.banner.hide()
             return
-        found = self.waiting[0]
+        session = self.waiting[0]
         more = len(self.waiting) - 1
-        path = found.case.mesh_file if found.source is None else found.source
+        path = session.case.mesh_file if session.source is None else session.source
         text = (
-            f"slideviz did not end properly. Restore the session of {_time_text(found.when)} "
+            f"slideviz did not end properly. Restore the session of {_time_text(session.when)} "
             f"with {path.name} in {path.parent}?" + (f" ({more} more)" if more else "")
         )
         answers = {"Restore": partial(self.answer, True), "Discard": partial(self.answer, False)}
@@ -92,15 +92,15 @@ class SessionRecovery(QObject):
 
     def answer(self, restore: bool) -> None:
         """Start restoring the offered session, or remove its file; then offer the next."""
-        found = self.waiting[0]
+        session = self.waiting[0]
         if not restore:
             self.waiting.pop(0).remove()
         elif self.window.files.ask_about_unsaved(partial(self.answer, True)):
             self._later.append(self.waiting.pop(0))
-            done = partial(self._opened, found)
-            name = found.case.mesh_file.name
+            done = partial(self._opened, session)
+            name = session.case.mesh_file.name
             self.window.running.start_job(
-                f"Restoring {name}", done, jobs.open_file, found.path, None
+                f"Restoring {name}", done, jobs.open_file, session.path, None
             )
         self._offer()
 
@@ -368,12 +368,12 @@ def _path_text(path: Path) -> str:
 
 def _rename_broken(path: Path, why: str) -> str:
     """Rename an unusable file to ``….broken``; return a sentence about it for the user."""
-    kept = path.with_name(f"{path.name.lstrip('.')}.broken")
+    target = path.with_name(f"{path.name.lstrip('.')}.broken")
     number = count(2)
-    while kept.exists():
-        kept = path.with_name(f"{path.name.lstrip('.')}.{next(number)}.broken")
+    while target.exists():
+        target = path.with_name(f"{path.name.lstrip('.')}.{next(number)}.broken")
     try:
-        path.rename(kept)
+        path.rename(target)
     except OSError as problem:
         return f"{path}: a saved session cannot be read ({why}), nor renamed ({problem})."
-    return f"A saved session cannot be read ({why}); it is still there, as {kept}."
+    return f"A saved session cannot be read ({why}); it is still there, as {target}."

@@ -179,9 +179,8 @@ def available_area(window: QWidget) -> QRect:
 class DockRow:
     """A row of the table of docks: name, title, area, and the function that makes its panel.
 
-    ``tabbed_with`` names the dock that it is tabbed with, ``tabbed_with_if_low`` that in a low
-    window. ``untitled``: it has no title bar, as its content says what it is. ``shown``: it is
-    visible at first.
+    ``tabbed_with`` names the dock that it is tabbed with; ``tabbed_with_if_low`` is used instead in
+    a window of small height. ``untitled``: it has no title bar. ``shown``: it is visible at first.
     """
 
     name: str

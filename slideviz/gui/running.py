@@ -168,9 +168,9 @@ class Running(QObject):
 
     def _cancelled(self) -> None:
         steps = len(self.store.session.frames) - 1
-        kept = f"; {steps} step{'s' if steps != 1 else ''} kept" if steps > 0 else ""
-        self.status_changed.emit(f"Cancelled{kept}")
-        log.info("cancelled%s", kept)
+        steps_kept = f"; {steps} step{'s' if steps != 1 else ''} kept" if steps > 0 else ""
+        self.status_changed.emit(f"Cancelled{steps_kept}")
+        log.info("cancelled%s", steps_kept)
         if self._deforms:
             self._log_remarks(self.store.session.runs[-1])
         self._end("cancelled")

@@ -48,7 +48,7 @@ def no_node(node: str, n_points: int) -> str:
 
 def _first_repeated(cells: Cells) -> tuple[int, int] | None:
     """Return the index of the first element that has a node twice, and that node, or None."""
-    found: list[tuple[int, int]] = []
+    repeated: list[tuple[int, int]] = []
     for ids, nodes in cells.by_type.values():
 
         def look(part: slice, ids: IntArray, nodes: IntArray) -> None:
@@ -56,16 +56,16 @@ def _first_repeated(cells: Cells) -> tuple[int, int] | None:
             same: NDArray[np.bool_] = ordered[:, 1:] == ordered[:, :-1]
             if same.any():
                 k = int(np.argmax(same.any(axis=1)))
-                found.append((int(ids[part][k]), int(ordered[k, int(np.argmax(same[k]))])))
+                repeated.append((int(ids[part][k]), int(ordered[k, int(np.argmax(same[k]))])))
 
         in_parts(partial(look, ids=ids, nodes=nodes), len(ids))
-    return min(found, default=None)
+    return min(repeated, default=None)
 
 
 def unused_nodes(mesh: Mesh) -> IntArray:
     """Return ascending indices (u,) of the points that no cell uses.
 
-    slideviz has no trouble with them, but SU2 makes control volumes of size zero around them.
+    They do no harm in slideviz, but SU2 makes control volumes of size zero around them.
     """
     used = np.zeros(len(mesh.points), bool)
     used[mesh.cells.connectivity] = True

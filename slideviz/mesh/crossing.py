@@ -157,8 +157,8 @@ def pierced(points: FloatArray, a: FacetSimplices, b: FacetSimplices, margin: fl
         row, column = np.nonzero(touch)
         touches.append(np.column_stack((ends[row, column], j[row])))
         pairs = list(combinations(range(ends.shape[1]), 2))
-        found = [_strike(planes, at[:, pair], height[:, pair], i, j) for pair in pairs]
-        hits = [hit for hit in found if hit is not None]
+        crossings = [_strike(planes, at[:, pair], height[:, pair], i, j) for pair in pairs]
+        hits = [hit for hit in crossings if hit is not None]
         if hits:
             point, first = min(hits, key=lambda hit: hit[1])
             return point, int(a.facet[part[i[first]]]), int(b.facet[j[first]])

@@ -120,8 +120,8 @@ def fan_normals(
     share = np.array([[1 / width] * width, [1 / 3, 1 / 3, 1 / 6, 1 / 6][:width]])
     total = np.zeros((len(fans.fan_node), coords.shape[1]))
     # Sealed, whatever they came from: the loop is compiled once.
-    given = (sealed(each) for each in (fans.facet, fans.node, fans.fan))
-    _add_normals(sealed(coords), sealed(boundary.facets), x, share, normal, *given, total)
+    incidence = (sealed(each) for each in (fans.facet, fans.node, fans.fan))
+    _add_normals(sealed(coords), sealed(boundary.facets), x, share, normal, *incidence, total)
     return unit(total)
 
 

@@ -162,14 +162,14 @@ def _sides(mesh: Mesh, receivers: IntArray, donors: IntArray) -> tuple[tuple[str
     for marker in mesh.markers:
         for _, nodes in marker.cells.by_type.values():
             marker_of |= {tuple(row): marker.name for row in np.sort(nodes, axis=1).tolist()}
-    found = []
+    pairs = []
     for marker in mesh.markers:
         if not copied[marker.nodes].all():
             continue
         for _, nodes in marker.cells.by_type.values():
             origins = np.sort(donor[nodes], axis=1).tolist()
-            found += [(marker.name, marker_of.get(tuple(row), marker.name)) for row in origins]
-    return tuple(dict.fromkeys(pair for pair in found if pair[0] != pair[1]))
+            pairs += [(marker.name, marker_of.get(tuple(row), marker.name)) for row in origins]
+    return tuple(dict.fromkeys(pair for pair in pairs if pair[0] != pair[1]))
 
 
 def _touching(cells: Cells, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -50,13 +50,13 @@ def find_interfaces(
 
 def torn_interfaces(mesh: Mesh, points: FloatArray) -> tuple[str, ...]:
     """Return a sentence for each interface whose nodes are elsewhere in ``points`` (n, d)."""
-    found = []
+    sentences = []
     for each in mesh.interfaces:
         gap = np.linalg.norm(points[each.nodes] - mesh.points[each.nodes], axis=1)
         if gap.max(initial=0.0) > ROUNDING * mesh.extent:
-            found.append(
+            sentences.append(
                 f"zone {each.zone} no longer fits: {each.marker}, which is an interface with its "
                 f"{each.other}, has moved by up to {gap.max():.3g}; keep it fixed, or deform zone "
                 f"{each.zone} alike"
             )
-    return tuple(found)
+    return tuple(sentences)

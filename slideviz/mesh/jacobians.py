@@ -59,9 +59,9 @@ def decide_unproven(vtk: int, at: FloatArray, signs: NDArray[np.int8]) -> Status
 def subdivide(coefficients: FloatArray, levels: int = LEVELS) -> Status:
     """Return the status (m,) of triquadratic polynomials with Bézier coefficients (3, 3, 3, m).
 
-    ``VALID`` means positive in the whole unit cube. It is cut into eight parts, ``levels`` times; a
-    part with only positive coefficients is positive, and its corner coefficients are values of the
-    polynomial, of which one that is not positive decides for ``INVERTED``.
+    ``VALID`` means positive in the whole unit cube. The cube is cut into eight parts, ``levels``
+    times. A polynomial is positive in a part if all its coefficients there are positive. Corner
+    coefficients are values of the polynomial: if one is not positive, the status is ``INVERTED``.
     """
     inverted = np.zeros(coefficients.shape[-1], bool)
     owner = np.arange(coefficients.shape[-1])
@@ -276,7 +276,7 @@ def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ig
         `slideviz.mesh.jacobians.decide_unproven` is still to decide; else ``VALID``.
     """
     at = np.empty((points.shape[1], nodes.shape[1], LANES))
-    found = np.empty((3, 3, 3, LANES))
+    coefficients = np.empty((3, 3, 3, LANES))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
         here = slice(first, first + count)
@@ -286,11 +286,11 @@ def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ig
         sides, states = turn[here], status[here]
         states[:] = VALID
         if vtk == 12:
-            _write_hexahedron(at, count, found)
-            _mark(found.reshape(27, LANES), sides, states, UNPROVEN)
+            _write_hexahedron(at, count, coefficients)
+            _mark(coefficients.reshape(27, LANES), sides, states, UNPROVEN)
         elif vtk == 13:
-            _write_prism(at, count, found[0])
-            _mark(found[0, 1], sides, states, UNPROVEN)
+            _write_prism(at, count, coefficients[0])
+            _mark(coefficients[0, 1], sides, states, UNPROVEN)
         for k in range(len(table)):
             for c in range(count):
                 alpha[k, first + c] *= sides[c]

@@ -24,7 +24,7 @@ Skew = Callable[[FloatArray, FloatArray], FloatArray]
 """A function of spread and Jacobians (k, m) that returns the skew (m,)."""
 
 
-def total(a: FloatArray) -> FloatArray:
+def ordered_sum(a: FloatArray) -> FloatArray:
     """Return the sum over the first axis, terms added up in order.
 
     ``a.sum(axis=0)`` adds pairwise where there is a single cell, so that the last bit of a result
@@ -45,22 +45,22 @@ def _tetrahedron(spread: FloatArray, alpha: FloatArray) -> FloatArray:
 
 def _quadrilateral(spread: FloatArray, alpha: FloatArray) -> FloatArray:
     """Knupp's: the harmonic mean of ``alpha / spread``, the sines of the corners."""
-    return 4 / total(spread / alpha)
+    return 4 / ordered_sum(spread / alpha)
 
 
 def _hexahedron(spread: FloatArray, alpha: FloatArray) -> FloatArray:
     """Knupp's: the harmonic mean of ``(alpha / spread)^(2/3)`` over the corners."""
-    return 8 / total(np.cbrt((spread / alpha) ** 2))
+    return 8 / ordered_sum(np.cbrt((spread / alpha) ** 2))
 
 
 def _hexahedron_rbf_slide(spread: FloatArray, alpha: FloatArray) -> FloatArray:
     """As `_hexahedron`, but without the exponent 2/3 of Knupp and of thesis Eq. 2.48."""
-    return 8 / total(spread / alpha)
+    return 8 / ordered_sum(spread / alpha)
 
 
 def _prism(spread: FloatArray, alpha: FloatArray) -> FloatArray:
     """Our own: as the hexahedron, scaled to 1 for a right prism on an equilateral triangle."""
-    return 6 / total(np.cbrt(0.75 * (spread / alpha) ** 2))
+    return 6 / ordered_sum(np.cbrt(0.75 * (spread / alpha) ** 2))
 
 
 def _pyramid(spread: FloatArray, alpha: FloatArray) -> FloatArray:
@@ -71,7 +71,7 @@ def _pyramid(spread: FloatArray, alpha: FloatArray) -> FloatArray:
     √2 (e₃ - (e₁ + e₂) / 2), and the spread is ``‖T‖²``. Unlike the skew of prisms and hexahedra
     it depends on the height too: it is below 1 for a tall or a flat pyramid.
     """
-    return 4 / total(spread / (3 * np.cbrt(2 * alpha**2)))
+    return 4 / ordered_sum(spread / (3 * np.cbrt(2 * alpha**2)))
 
 
 KNUPP: dict[int, Skew] = {  # by VTK identifier

@@ -114,7 +114,7 @@ class Cells:
     @cached_property
     def by_type(self) -> dict[int, tuple[IntArray, IntArray]]:
         """Indices (m_t,) and nodes (m_t, n_t) of the elements of each type, by VTK identifier."""
-        found = {}
+        blocks = {}
         alike = len(self) > 0 and self.types.min() == self.types.max()
         present = self.types[:1] if alike else np.flatnonzero(np.bincount(self.types))
         for vtk in present.tolist():
@@ -125,8 +125,8 @@ class Cells:
                 nodes = block.reshape(-1, width)
             else:
                 nodes = self.connectivity[self.offsets[ids][:, None] + np.arange(width)]
-            found[vtk] = sealed(ids), sealed(nodes)
-        return found
+            blocks[vtk] = sealed(ids), sealed(nodes)
+        return blocks
 
     @cached_property
     def nodes(self) -> IntArray:
@@ -134,10 +134,10 @@ class Cells:
         return sealed(sorted_nodes(self.connectivity))
 
     def __repr__(self) -> str:
-        found = ", ".join(
+        counts = ", ".join(
             f"{len(ids)} {ELEMENTS[vtk].name}" for vtk, (ids, _) in self.by_type.items()
         )
-        return f"Cells({found})"
+        return f"Cells({counts})"
 
     def take(self, which: IntArray | NDArray[np.bool_]) -> Cells:
         """Return elements by indices ``which`` (k,), in that order, or by a mask (m,)."""
@@ -188,7 +188,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class ZoneInterface:
-    """A boundary whose ``nodes`` (k,) are in the places of nodes of ``other`` in another zone."""
+    """A boundary whose ``nodes`` (k,) coincide with nodes of ``other`` in another zone."""
 
     marker: str
     zone: int

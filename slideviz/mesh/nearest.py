@@ -77,9 +77,9 @@ def nearest(
         A distance within which each place probably has exactly one point: then no tree is built.
         The result does not depend on it.
     """
-    found = _alone(points, at, min(bound, likely))
-    if found is not None and (bound <= likely or np.isfinite(found[0]).all()):
-        return found
+    match = _alone(points, at, min(bound, likely))
+    if match is not None and (bound <= likely or np.isfinite(match[0]).all()):
+        return match
     from scipy.spatial import cKDTree  # takes long to load
 
     distance, number = cKDTree(points).query(at, distance_upper_bound=bound, workers=cores())

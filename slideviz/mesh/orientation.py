@@ -14,7 +14,7 @@ import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobians import CORNERS, write_corners
-from slideviz.mesh.metrics import total
+from slideviz.mesh.metrics import ordered_sum
 from slideviz.mesh.model import Mesh, sealed
 from slideviz.system.threads import in_parts
 
@@ -35,13 +35,13 @@ def reference_of(mesh: Mesh) -> tuple[FloatArray, NDArray[np.int8]]:
     The signs are those of `orientation`; the sums are multiplied by them, so that they are positive
     but for folded cells. Both are cached as long as the mesh lives.
     """
-    found = _REFERENCES.get(mesh)
-    if found is None:
+    reference = _REFERENCES.get(mesh)
+    if reference is None:
         sums = corner_sums(mesh)
         signs = orientation(mesh.cells, sums)
         sums *= signs
-        found = _REFERENCES[mesh] = sealed(sums), sealed(signs)
-    return found
+        reference = _REFERENCES[mesh] = sealed(sums), sealed(signs)
+    return reference
 
 
 def corner_sums(mesh: Mesh) -> FloatArray:
@@ -59,7 +59,7 @@ def _sums_of(points: FloatArray, vtk: int, nodes: IntArray) -> FloatArray:
     def add(part: slice) -> None:
         alpha = np.empty((len(table), part.stop - part.start))
         write_corners(points, nodes[part], table, alpha)
-        sums[part] = total(alpha)
+        sums[part] = ordered_sum(alpha)
 
     in_parts(add, len(nodes))
     return sums

@@ -204,11 +204,11 @@ def pair_up(
         return None
 
     reasons: list[MeshError] = []
-    found = pairs_of(list(names), None)
-    if found is None:
+    pairs = pairs_of(list(names), None)
+    if pairs is None:
         period = next((reason for reason in reasons if "one period" in str(reason)), None)
         raise period or _left_over(mesh, names, reasons[0], kind=kind, axis=axis, origin=origin)
-    return found
+    return pairs
 
 
 def _left_over(

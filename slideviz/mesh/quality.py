@@ -27,7 +27,7 @@ from slideviz.mesh.jacobians import (
     measure,
     write_corners,
 )
-from slideviz.mesh.metrics import METRICS, total
+from slideviz.mesh.metrics import METRICS, ordered_sum
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality_derivative import QualityDerivative, derivative_of
@@ -112,7 +112,7 @@ def pairwise_sum(
 ) -> float:
     """Return the sum of ``values[first:last]``, piece by piece, with the bits of ``numpy.sum``.
 
-    NumPy sums up halves of halves, the first of each a multiple of 8 long, and so does this.
+    Like NumPy, it halves the range recursively; the length of each first half is a multiple of 8.
     ``visit`` is called with the slice of each piece after it was read.
     """
     last = len(values) if last is None else last
@@ -122,9 +122,9 @@ def pairwise_sum(
         return pairwise_sum(values, visit, first, middle) + pairwise_sum(
             values, visit, middle, last
         )
-    found = float(values[first:last].sum())
+    partial_sum = float(values[first:last].sum())
     visit(slice(first, last))
-    return found
+    return partial_sum
 
 
 def lowest(
@@ -137,18 +137,18 @@ def lowest(
 
     ``only`` (m,) is a mask of those that count; ``release`` as for `quality_totals`.
     """
-    found = np.empty(0, np.int64)
+    ids = np.empty(0, np.int64)
     for first in range(0, len(values) if count > 0 else 0, PIECE):
         part = values[first : first + PIECE]
         if only is not None:
             part = np.where(only[first : first + PIECE], part, np.inf)
         limit = np.partition(part, count - 1)[count - 1] if len(part) > count else np.inf
-        found = np.concatenate([found, first + np.flatnonzero(part <= limit)])
+        ids = np.concatenate([ids, first + np.flatnonzero(part <= limit)])
         if only is not None:
-            found = found[only[found]]
-        found = found[np.argsort(values[found], kind="stable")[:count]]
+            ids = ids[only[ids]]
+        ids = ids[np.argsort(values[ids], kind="stable")[:count]]
         release()
-    return found
+    return ids
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,8 +248,8 @@ class Quality:
     @check_types
     def inverted_cells(self, n: int | None = None) -> IntArray:
         """Return the ids, ascending, of the (first ``n``) inverted cells, without the halo's."""
-        found = self.status == INVERTED
-        return np.flatnonzero(found if self.halo is None else found & ~self.halo)[:n]
+        mask = self.status == INVERTED
+        return np.flatnonzero(mask if self.halo is None else mask & ~self.halo)[:n]
 
     @check_types
     def histogram(self, bins: int = 20) -> tuple[IntArray, FloatArray]:
@@ -342,12 +342,12 @@ def quality(
 
         def of_part(part: slice, vtk: int, ids: IntArray, nodes: IntArray) -> None:
             here = ids[part]
-            found = _of_cells(mesh.points, vtk, nodes[part], signs[here], sums[here], metric)
-            size[here], skew[here], status[here] = found
-            values[here] = np.sqrt(found[0]) * found[1]
+            result = _of_cells(mesh.points, vtk, nodes[part], signs[here], sums[here], metric)
+            size[here], skew[here], status[here] = result
+            values[here] = np.sqrt(result[0]) * result[1]
 
         in_parts(partial(of_part, vtk=vtk, ids=ids, nodes=nodes), len(ids), lambda _: going_on())
-    found = Quality(
+    result = Quality(
         values=sealed(values),
         size=sealed(size),
         skew=sealed(skew),
@@ -357,9 +357,9 @@ def quality(
         halo=None if mesh.halo is None else mesh.halo.cells,
     )
     if not derivative:
-        return found
+        return result
     before = None if reference is None else sums
-    return replace(found, derivative=derivative_of(mesh, found, before, p, going_on))
+    return replace(result, derivative=derivative_of(mesh, result, before, p, going_on))
 
 
 def _of_cells(
@@ -382,7 +382,7 @@ def _of_cells(
         status[open_] = decide_unproven(vtk, points[nodes[open_]].T, signs[open_])
     good = status != INVERTED
     with np.errstate(all="ignore"):
-        size = np.where(good, _ratio(total(alpha), sums), 0.0)
+        size = np.where(good, _ratio(ordered_sum(alpha), sums), 0.0)
         # 1 is the bound of every formula; a value above it by rounding would be in no bin.
         skew = np.where(good, np.minimum(METRICS[metric][vtk](spread, alpha), 1.0), 0.0)
     return size, skew, status

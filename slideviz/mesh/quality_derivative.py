@@ -271,11 +271,11 @@ def _depths(vtk: int, at: FloatArray, scale: FloatArray) -> FloatArray:
     Coefficients that are no corner Jacobians count only where all of these are positive: they may
     be negative in a valid cell, and there would be a jump where the first corner folds.
     """
-    found = -scale * _coefficients(vtk, at)
-    found[~(found >= 0)] = -1.0
+    coefficients = -scale * _coefficients(vtk, at)
+    coefficients[~(coefficients >= 0)] = -1.0
     outer = len(CORNERS[vtk])
-    found[outer:, (found[:outer] >= 0).any(axis=0)] = -1.0
-    return found
+    coefficients[outer:, (coefficients[:outer] >= 0).any(axis=0)] = -1.0
+    return coefficients
 
 
 def _pull(vtk: int, at: FloatArray, weights: FloatArray) -> FloatArray:

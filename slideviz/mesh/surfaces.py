@@ -123,10 +123,10 @@ _FOUND: WeakKeyDictionary[Mesh, dict[tuple[str, ...], Enclosing]] = WeakKeyDicti
 def enclosing_of(mesh: Mesh, surfaces: Sequence[Surface]) -> Enclosing:
     """Return what boundaries of a mesh enclose; cached by their names as long as the mesh lives."""
     names = tuple(one.name for one in surfaces)
-    kept = _FOUND.setdefault(mesh, {})
-    if names not in kept:
-        kept[names] = Enclosing(is_closed(surfaces), enclosed(surfaces, mesh.points))
-    return kept[names]
+    cache = _FOUND.setdefault(mesh, {})
+    if names not in cache:
+        cache[names] = Enclosing(is_closed(surfaces), enclosed(surfaces, mesh.points))
+    return cache[names]
 
 
 def enclosed(surfaces: Sequence[Surface], points: FloatArray) -> frozenset[str]:
@@ -226,13 +226,13 @@ def find_surfaces(mesh: Mesh) -> tuple[Surface, ...]:
     if not mesh.markers:
         return ()
     boundary = boundary_of(mesh)
-    found = []
+    surfaces = []
     for index, name in enumerate(boundary.names):
         mine = boundary.marker == index
         nodes, local = np.unique(boundary.facets[mine], return_inverse=True)
         facets = local.reshape(-1, boundary.facets.shape[1])
-        found.append(Surface(name, nodes, facets, boundary.owner[mine], _rim(facets)))
-    return tuple(found)
+        surfaces.append(Surface(name, nodes, facets, boundary.owner[mine], _rim(facets)))
+    return tuple(surfaces)
 
 
 def _rim(facets: IntArray) -> IntArray:

@@ -143,9 +143,9 @@ def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
 
 def _touch(nodes: IntArray, chosen: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
     """Return a mask (m,) of cells (m, n) with at least ``least`` nodes in the mask ``chosen``."""
-    found = np.empty(len(nodes), bool)
-    in_parts(lambda part: _mark(nodes[part], chosen, least, found[part]), len(nodes))
-    return found
+    mask = np.empty(len(nodes), bool)
+    in_parts(lambda part: _mark(nodes[part], chosen, least, mask[part]), len(nodes))
+    return mask
 
 
 @njit(nogil=True, cache=True)

@@ -96,15 +96,17 @@ class Profiles:
         SlidevizError
             The mesh has no extent along the coordinate.
         """
-        found = []
+        profiles = []
         shown, run_shown = session.frame, session.run_shown
         if shown is not None and run_shown is not None and shown is not session.first:
-            found.append(self._one(session, shown, coordinate, run_shown))
+            profiles.append(self._one(session, shown, coordinate, run_shown))
         others = [run for run in session.runs if run is not run_shown]
-        found += [self._one(session, r.last, coordinate, r) for r in others if r.last is not None]
+        profiles += [
+            self._one(session, r.last, coordinate, r) for r in others if r.last is not None
+        ]
         if session.first is not None:
-            found.append(self._one(session, session.first, coordinate, None))
-        return found
+            profiles.append(self._one(session, session.first, coordinate, None))
+        return profiles
 
     def _one(
         self, session: Session, frame: StepFrame, coordinate: Coordinate, run: Run | None
@@ -113,16 +115,16 @@ class Profiles:
         assert mesh is not None
         label = "undeformed" if run is None else run.label
         key = coordinate, case.axis, case.origin, label
-        kept = self._made.setdefault(frame, {})
-        if key not in kept:
+        cache = self._made.setdefault(frame, {})
+        if key not in cache:
             # In layers of the undeformed mesh, so that layers of cells stay together.
             values = frame.quality.values
             if coordinate == "r":
                 made = along_radius(mesh, values, case.axis, case.origin, label=label)
             else:
                 made = along(mesh, values, coordinate, label=label)
-            kept[key] = replace(made, series=UNDEFORMED if run is None else series_of(run))
-        return kept[key]
+            cache[key] = replace(made, series=UNDEFORMED if run is None else series_of(run))
+        return cache[key]
 
 
 def coordinates(session: Session) -> dict[Coordinate, str]:
@@ -166,8 +168,8 @@ class CurveRows:
         first = shown[0][0]
         if first.first is not None and quantity_drawn(first) != "displacement":
             states.insert(0, (show_frame(first, 0), self._first))
-        found = (self._row(session, cuts, line) for session, cuts in states)
-        return tuple(row for row in found if row is not None)
+        curves = (self._row(session, cuts, line) for session, cuts in states)
+        return tuple(row for row in curves if row is not None)
 
     def _row(self, session: Session, cuts: Cuts, line: Section) -> CurveRow | None:
         frame, run = session.frame, session.run_shown
@@ -199,7 +201,7 @@ def colors_of(session: Session) -> Colors:
 
 
 def facts_of(session: Session, cuts: Cuts, section: Section) -> str:
-    """Return a sentence with the number of cut cells, their min, mean and inverted ones."""
+    """Return a sentence on the cut cells: number, minimum and mean quality, inverted cells."""
     frame = session.frame
     assert frame is not None
     lines = cuts.of(frame.mesh, _line(section))
@@ -242,9 +244,9 @@ class FrameCounts:
         what = shown_measure(session)
         shown = [*session.frames, *(run.last for run in session.runs if run.last is not None)]
         for frame in shown:
-            kept = self._spreads.setdefault(frame, {})
-            if what not in kept:
-                kept[what] = spread(frame, what, session.mesh)
+            cache = self._spreads.setdefault(frame, {})
+            if what not in cache:
+                cache[what] = spread(frame, what, session.mesh)
         spreads = [ends for frame in shown if (ends := self._spreads[frame][what]) is not None]
         low, high = (
             min((e[0] for e in spreads), default=0.0),
@@ -258,10 +260,10 @@ class FrameCounts:
     def of(self, session: Session, frame: StepFrame, limits: Range) -> Distribution:
         """Return the distribution of a frame's values between limits."""
         what = shown_measure(session)
-        kept = self._kept.setdefault(frame, {})
-        if (what, limits) not in kept:
-            kept[what, limits] = distribution(frame, what, limits, session.mesh)
-        return kept[what, limits]
+        cache = self._kept.setdefault(frame, {})
+        if (what, limits) not in cache:
+            cache[what, limits] = distribution(frame, what, limits, session.mesh)
+        return cache[what, limits]
 
 
 def draw_histogram(

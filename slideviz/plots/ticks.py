@@ -67,8 +67,8 @@ def bar_ticks(
         gap = _BETWEEN * width * max(part(form % end) for end in (low, high))
         if step >= gap:
             inner = ticks(low, high, count)
-            kept = inner[(inner >= low + gap) & (inner <= high - gap)]
-            return np.concatenate([ends[:1], kept, ends[1:]]), form
+            inside = inner[(inner >= low + gap) & (inner <= high - gap)]
+            return np.concatenate([ends[:1], inside, ends[1:]]), form
     return ends, form
 
 

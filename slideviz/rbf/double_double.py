@@ -215,8 +215,9 @@ def _less_product(u, ul, k, j, first, last):  # type: ignore[no-untyped-def]
 def _factorise(u, ul, top):  # type: ignore[no-untyped-def]
     """Overwrite `ROWS` rows of u + ul (n, n) from ``top`` on by those of U with U^T U = u + ul.
 
-    U is upper triangular; what is below its diagonal means nothing. Rows above are done. In strips
-    of columns that fit into a fast memory. Returns False if there is no such U.
+    U is upper triangular; entries below its diagonal are undefined. Rows above ``top`` must be
+    those of U already. Columns are processed in strips that fit into the cache. Returns False if
+    there is no such U.
     """
     n, end = len(u), min(len(u), top + ROWS)
     for part in prange((n - top + STRIP - 1) // STRIP):

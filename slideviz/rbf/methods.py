@@ -154,7 +154,7 @@ SLIDING_METHODS: dict[str, Callable[[Problem, PhaseTimer], Solution]] = {
 
 
 def _fit(problem: Problem, timer: PhaseTimer, first: Fit | None = None) -> Fit:
-    """Return a fit without rows, greedy with data reduction; ``first``: the fit before, if any."""
+    """Return an empty fit, greedy with data reduction; ``first`` is the previous fit, if any."""
     if problem.frozen is not None:
         frozen: Fit = problem.frozen.fit(problem)
         return frozen

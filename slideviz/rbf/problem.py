@@ -61,7 +61,7 @@ class Cycle:
     """Since the selection began."""
 
 
-class Frozen(Protocol):
+class FrozenChoices(Protocol):
     """The discrete choices of a step, kept for any displacement (`slideviz.design.frozen`)."""
 
     out: FloatArray | None
@@ -131,7 +131,7 @@ class Problem:
     lasting: bool = False
     """Whether the factor will be used for other data too (as for gradients). Then its accuracy is
     tested with other data, too."""
-    frozen: Frozen | None = None
+    frozen: FrozenChoices | None = None
     """The choices of a step whose derivatives are wanted; None in a run, which makes its own."""
 
     def choose(self, name: str, make: Callable[[], Any]) -> Any:

@@ -25,7 +25,7 @@ Rect = tuple[float, float, float, float]
 """Left, bottom, right and top, in pixels from the lower left corner of the view."""
 
 
-class Plate:
+class LegendPlate:
     """A half-transparent rectangle in the background's colors, between legend and mesh.
 
     Parameters

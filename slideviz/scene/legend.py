@@ -8,7 +8,7 @@ import pyvista as pv
 
 from slideviz.scene.color_legend import (
     OPACITY,
-    Plate,
+    LegendPlate,
     add_color_bar,
     add_point_legend,
     add_role_legend,
@@ -40,7 +40,7 @@ class LegendLayer(KeyedLayer):
         clear_legend(self.stage.plotter)
         self._key = ()
         self._bar: tuple[str, float] | None = None
-        self._plate: Plate | None = None
+        self._plate: LegendPlate | None = None
 
     def update(self, old: Session | None, new: Session) -> None:
         """Draw another state of the session; make the legend anew if its content has changed."""
@@ -56,7 +56,7 @@ class LegendLayer(KeyedLayer):
             return
         self._placed = ()
         # First, as later actors are drawn over it.
-        self._plate = Plate(stage.plotter, PLATE, stage.scheme) if stage.has_plate else None
+        self._plate = LegendPlate(stage.plotter, PLATE, stage.scheme) if stage.has_plate else None
         if what == "role":
             used = {session.role(name) for name in mesh.marker_names}
             roles = [role for role in ROLES if role in used]

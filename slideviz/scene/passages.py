@@ -45,10 +45,10 @@ class Period:
         key = (mesh, session.pairs, names, case.periodic_type, case.axis, case.origin)
         if self._found is None or self._found[0] != key:
             try:
-                found = find_period(mesh, case, session.pairs)
+                period = find_period(mesh, case, session.pairs)
             except SlidevizError:
-                found = None  # periodic boundaries that do not match: said beside the Run button
-            self._found = key, found
+                period = None  # periodic boundaries that do not match: said beside the Run button
+            self._found = key, period
         return self._found[1]
 
 

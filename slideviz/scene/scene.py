@@ -248,8 +248,8 @@ class Scene:
         if pick.meets(self.plotter, x, y, solid):
             return None
         within = [one for one in drawn if one.surface.name not in self._boundaries.glass]
-        found = pick.front_surface(self.plotter, x, y, within) if within else None
-        return pick.front_surface(self.plotter, x, y, drawn) if found is None else found
+        surface = pick.front_surface(self.plotter, x, y, within) if within else None
+        return pick.front_surface(self.plotter, x, y, drawn) if surface is None else surface
 
     def pick_cell(self, x: float, y: float) -> int | None:
         """Return the index of the cell at a pixel from the lower left, or None.

@@ -136,8 +136,8 @@ class SectionLayer(Layer):
 
     def _find_box(self, mesh: Mesh, neighbours: dict[int, FloatArray]) -> Box:
         """Return the corners of the box around a 2D mesh and its neighbouring passages."""
-        own = mesh.points[self.cuts.cutter(mesh).used]
-        every = [own, *(transformed(own, matrix) for matrix in neighbours.values())]
+        nodes = mesh.points[self.cuts.cutter(mesh).used]
+        every = [nodes, *(transformed(nodes, matrix) for matrix in neighbours.values())]
         boxes = [box_around(points) for points in every]
         low = np.min([box[0] for box in boxes], axis=0)
         return low, np.max([box[1] for box in boxes], axis=0)

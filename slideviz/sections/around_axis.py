@@ -30,7 +30,7 @@ _MOST = 400
 """About how many places of a cut are kept for its handle: enough for one to be in any close-up."""
 
 
-class Unrolled(NamedTuple):
+class UnrolledPolygons(NamedTuple):
     """Polygons around an axis, cut open at the seam: a point on it is there once for each side."""
 
     local: FloatArray
@@ -44,7 +44,7 @@ class Unrolled(NamedTuple):
     """The middle of the range of angles, in radians."""
 
 
-def unrolled(section: Section, polygons: Polygons, near: float | None) -> Unrolled:
+def unrolled(section: Section, polygons: Polygons, near: float | None) -> UnrolledPolygons:
     """Return polygons around the axis of a section, at least one, cut open at the seam.
 
     The seam lies in the middle of the largest range of angles without points. Whole turns are
@@ -67,7 +67,7 @@ def unrolled(section: Section, polygons: Polygons, near: float | None) -> Unroll
     keys, corners = np.unique(polygons.connectivity * span + turn - turn.min(), return_inverse=True)
     node, extra = np.divmod(keys, span)
     opened = angle[node] + TURN * (extra + turn.min())
-    return Unrolled(local[node], opened, corners, float(centre + shift))
+    return UnrolledPolygons(local[node], opened, corners, float(centre + shift))
 
 
 def _wrapped(angle: FloatArray) -> FloatArray:
@@ -120,7 +120,7 @@ class AboutAxis(Shape):
         """Return w (3,) and c: in the section's frame the surface is w · (x², y², z²) = c."""
 
     @abstractmethod
-    def laid(self, section: Section, opened: Unrolled, ahead: float | None) -> FloatArray:
+    def laid(self, section: Section, opened: UnrolledPolygons, ahead: float | None) -> FloatArray:
         """Return unrolled points (p, 3) laid flat (see `slideviz.sections.shape.Shape.flatten`)."""
 
     @abstractmethod
@@ -164,15 +164,17 @@ class AboutAxis(Shape):
         rows, weight = section.basis[used], weights[used]
         p, d = (edges[0] - np.asarray(section.origin)) @ rows.T, edges[1] @ rows.T
         square, slope = np.sum(weight * d * d, axis=1), np.sum(weight * p * d, axis=1)
-        rest = np.sum(weight * p * p, axis=1) - total
-        root = np.sqrt(np.maximum(slope**2 - square * rest, 0.0))
+        constant = np.sum(weight * p * p, axis=1) - total
+        root = np.sqrt(np.maximum(slope**2 - square * constant, 0.0))
         before, after = level
         sign = np.where(after > before, 1.0, -1.0)
         # Of the two formulas of a root, the one without cancellation.
         stable = sign * slope > 0
         with np.errstate(divide="ignore", invalid="ignore"):
-            found = np.where(stable, -rest / (slope + sign * root), (sign * root - slope) / square)
-        return np.asarray(np.clip(np.nan_to_num(found), 0.0, 1.0))
+            roots = np.where(
+                stable, -constant / (slope + sign * root), (sign * root - slope) / square
+            )
+        return np.asarray(np.clip(np.nan_to_num(roots), 0.0, 1.0))
 
     def position(self, section: Section) -> float:
         """Return the size: a radius, or a half angle in degrees."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import FloatArray
-from slideviz.sections.around_axis import AboutAxis, Unrolled, patch_of
+from slideviz.sections.around_axis import AboutAxis, UnrolledPolygons, patch_of
 from slideviz.sections.shape import (
     DIGITS,
     FEW,
@@ -118,7 +118,7 @@ class Cone(AboutAxis):
             "degrees from its axis"
         )
 
-    def laid(self, section: Section, opened: Unrolled, ahead: float | None) -> FloatArray:
+    def laid(self, section: Section, opened: UnrolledPolygons, ahead: float | None) -> FloatArray:
         """Return the developed cone with the apex at 0, and as z the distance from it, outwards.
 
         Lengths s from the apex are kept. An angle theta around the axis becomes theta sin(half

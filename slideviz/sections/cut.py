@@ -85,8 +85,8 @@ class Cutter:
         keys, corners = np.unique(low[keep] * len(points) + high[keep], return_inverse=True)
         a, b = np.divmod(keys, len(points))
         at = _crossings(points, a, b, level, section)
-        found = Polygons(at, offsets_of(keep.sum(axis=1)), corners, owners)
-        return found.take(np.argsort(owners, kind="stable"))
+        polygons = Polygons(at, offsets_of(keep.sum(axis=1)), corners, owners)
+        return polygons.take(np.argsort(owners, kind="stable"))
 
     def which_cells(self, points: FloatArray, section: Section) -> IntArray:
         """Return the sorted numbers of the cells that the section cuts (see `cut`).
@@ -205,9 +205,9 @@ def _patterns(nodes: IntArray, negative: np.ndarray) -> np.ndarray:
 
     ``negative`` is a mask (n,) of nodes.
     """
-    found = np.empty(len(nodes), np.uint8)
-    in_parts(lambda part: _write_patterns(nodes[part], negative, found[part]), len(nodes))
-    return found
+    patterns = np.empty(len(nodes), np.uint8)
+    in_parts(lambda part: _write_patterns(nodes[part], negative, patterns[part]), len(nodes))
+    return patterns
 
 
 @njit(nogil=True, cache=True)
@@ -276,11 +276,11 @@ def cut_cases(vtk: int) -> IntArray:
     element type, -1 where there are no more. A 2D element has lines instead, of two corners.
     """
     row = ELEMENTS[vtk]
-    found = [_loops(row, pattern) for pattern in range(2**row.n_nodes)]
-    loops = max(len(one) for one in found)
-    corners = max((len(loop) for one in found for loop in one), default=0)
-    table = np.full((len(found), loops, corners), -1, np.int64)
-    for pattern, one in enumerate(found):
+    loops_of = [_loops(row, pattern) for pattern in range(2**row.n_nodes)]
+    loops = max(len(one) for one in loops_of)
+    corners = max((len(loop) for one in loops_of for loop in one), default=0)
+    table = np.full((len(loops_of), loops, corners), -1, np.int64)
+    for pattern, one in enumerate(loops_of):
         for index, loop in enumerate(one):
             table[pattern, index, : len(loop)] = loop
     table.flags.writeable = False

@@ -16,7 +16,7 @@ import numpy as np
 
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import FloatArray
-from slideviz.sections.around_axis import AboutAxis, Unrolled
+from slideviz.sections.around_axis import AboutAxis, UnrolledPolygons
 from slideviz.sections.handles import HandleParts, Part, rounded, rounded_place, within
 from slideviz.sections.shape import (
     DIGITS,
@@ -115,7 +115,7 @@ class Cylinder(AboutAxis):
         return np.asarray(np.hypot(section.along(points, 0), section.along(points, 1)))
 
     def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
-        """Return how far the axis moves sideways."""
+        """Return how far the axis moves perpendicular to itself; see `Shape.keeps`."""
         return float(np.linalg.norm(np.cross(step, section.basis[2])))
 
     def describe(self, section: Section) -> str:
@@ -139,7 +139,7 @@ class Cylinder(AboutAxis):
             "axis"
         )
 
-    def laid(self, section: Section, opened: Unrolled, ahead: float | None) -> FloatArray:
+    def laid(self, section: Section, opened: UnrolledPolygons, ahead: float | None) -> FloatArray:
         """Return position along the axis, radius times angle, and distance outwards."""
         local = opened.local
         along = local[:, 2] + np.asarray(section.origin) @ section.basis[2]

@@ -140,9 +140,9 @@ class Line(InPlane):
 
         That is `middle` or, where it is not in the box, the middle of the line in the box.
         """
-        own = within(self.middle(section)[None], box)
-        if len(own):
-            return np.asarray(own[0])
+        middle = within(self.middle(section)[None], box)
+        if len(middle):
+            return np.asarray(middle[0])
         ends = line_ends(section, box)
         return self.middle(section) if ends is None else np.asarray(ends.mean(axis=0))
 

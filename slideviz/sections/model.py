@@ -81,8 +81,8 @@ class Section:
     @classmethod
     def of(cls, kind: str, origin: Triple, direction: Triple, size: float) -> Section:
         """Return the section of the shape ``kind`` with these numbers; a plane ignores ``size``."""
-        own = SHAPES[kind].terms.size
-        sizes: dict[str, Any] = {} if own is None else {own.field: size}
+        row = SHAPES[kind].terms.size
+        sizes: dict[str, Any] = {} if row is None else {row.field: size}
         return cls(kind, origin, direction, **sizes)
 
     @property
@@ -132,9 +132,11 @@ class Section:
 
     def along(self, points: FloatArray, row: int) -> FloatArray:
         """Return the coordinates (n,) of points (n, 2 or 3) along a row of ``basis``: 0, 1 or 2."""
-        found = np.empty(len(points))
-        _project(points, self.basis[row], float(np.asarray(self.origin) @ self.basis[row]), found)
-        return found
+        coordinates = np.empty(len(points))
+        _project(
+            points, self.basis[row], float(np.asarray(self.origin) @ self.basis[row]), coordinates
+        )
+        return coordinates
 
     def distance(self, points: FloatArray) -> FloatArray:
         """Return signed distances (n,) of points (n, 2 or 3), along the normal or outwards.

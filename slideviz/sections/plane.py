@@ -151,7 +151,7 @@ class Plane(Shape):
         return None
 
     def ahead(self, section: Section, points: FloatArray) -> float | None:
-        """Return None: only a cone needs an angle to be drawn level at."""
+        """Return None: only the flat view of a cone depends on an angle."""
         return None
 
     def flat_labels(self, section: Section) -> tuple[Label, Label]:

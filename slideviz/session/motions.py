@@ -13,7 +13,7 @@ import numpy as np
 from slideviz.case.boxes import box_definition, boxes_for
 from slideviz.case.displacement import Displacements, parse_displacements, read_displacements
 from slideviz.case.lines import read_text
-from slideviz.case.model import Case, FromFile, Target, moves, named
+from slideviz.case.model import Case, FromFile, Target, applies_to, named
 from slideviz.case.motion import displacements, key_of, moved_together, placed_displacements
 from slideviz.case.motion_words import direction_words
 from slideviz.errors import CaseError, SlidevizError
@@ -161,7 +161,7 @@ def new_target(session: Session) -> Target:
     """Return the moving boundaries of a new motion: selected, else without motion, else all."""
     case = session.case
     moving = case.markers_with("moving")
-    without = [n for n in moving if not any(moves(motion, n) for motion in case.motions)]
+    without = [n for n in moving if not any(applies_to(motion, n) for motion in case.motions)]
     names = tuple(name for name in moving if name in session.view.selected) or tuple(without)
     if len(names) == 1:
         return names[0]
@@ -204,7 +204,7 @@ def boxes_hint(session: Session) -> str:
 
 
 def largest_prescribed(case: Case, mesh: Mesh) -> float:
-    """Return the largest displacement that the motions prescribe; 0 where they have mistakes."""
+    """Return the largest displacement that the motions prescribe; 0 if they are invalid."""
     try:
         vectors = displacements(case, mesh).vectors
     except (OSError, SlidevizError):
@@ -283,7 +283,7 @@ class Ghosts:
         on = {
             name: self._nodes[name]
             for name in case.markers_with("moving")
-            if name in self._nodes and any(moves(motion, name) for motion in case.motions)
+            if name in self._nodes and any(applies_to(motion, name) for motion in case.motions)
         }
         files: dict[object, Displacements] = {}
         for motion in case.motions:
@@ -297,7 +297,7 @@ class Ghosts:
 
     def _read(self, motion: FromFile, on: Mapping[str, IntArray]) -> Displacements | None:
         # A file for several boundaries may list the nodes of each of them.
-        names = tuple(name for name in on if moves(motion, name))
+        names = tuple(name for name in on if applies_to(motion, name))
         if not names:
             return None
         try:

@@ -22,7 +22,7 @@ from slideviz.case.model import (
     Rotate,
     Scale,
     Translate,
-    moves,
+    applies_to,
 )
 from slideviz.errors import Note
 from slideviz.mesh.model import Mesh
@@ -153,7 +153,7 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
     found += [
         Requirement(f"“{name}” has no motion: add one.", "motion", name)
         for name in moving
-        if not any(moves(motion, name) for motion in case.motions)
+        if not any(applies_to(motion, name) for motion in case.motions)
     ]
     if case.motions and all(moves_nothing(motion) for motion in case.motions):
         found.append(Requirement("Nothing moves yet: enter the values of the motion.", "motion"))

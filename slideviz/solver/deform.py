@@ -177,7 +177,7 @@ def folded_at(steps: Sequence[Step], mesh: Mesh, cells: IntArray) -> IntArray:
 def require_memory(setup: Setup, case: Case, *, lasting: bool = False) -> None:
     """Raise DeformError when the system of a step would not fit into free memory.
 
-    ``lasting``: as of a ``Problem``.
+    ``lasting`` has the meaning of `slideviz.rbf.problem.Problem.lasting`.
     """
     if case.method == "elastic":
         _require_free(

@@ -234,7 +234,7 @@ def _is_lost(case: Case, mesh: Mesh, after: FloatArray, facets: IntArray) -> boo
     before, there = (_beside(points, some) for points in (mesh.points, after))
     shell = boundary_of(mesh).facets
     # The markers have holes, so that they have no inside: take all sides of one cell alone.
-    if abs(winding(mesh.points, shell, before[:1])[0] - 1.0) > OPEN:
+    if abs(winding_number(mesh.points, shell, before[:1])[0] - 1.0) > OPEN:
         shell = shell_of(mesh)
     # Beside twisted facets, which are taken for triangles, a point may be on the wrong side.
     there = there[[not _is_out(shell, mesh.points, point[None]) for point in before]]
@@ -256,7 +256,7 @@ def _beside(points: FloatArray, facets: IntArray) -> FloatArray:
 
 def _is_out(facets: IntArray, points: FloatArray, at: FloatArray) -> bool:
     """Return whether all points ``at`` (m, d) are outside of a closed surface of facets (f, k)."""
-    return all(winding(points, facets, point[None])[0] < HALF for point in at)
+    return all(winding_number(points, facets, point[None])[0] < HALF for point in at)
 
 
 def _images(case: Case, mesh: Mesh, at: FloatArray, around: FloatArray) -> Iterator[FloatArray]:
@@ -304,7 +304,7 @@ def _place(hit: Crossing) -> str:
     return f"({', '.join(f'{value:.4g}' for value in hit.point)})"
 
 
-def winding(points: FloatArray, facets: IntArray, at: FloatArray) -> FloatArray:
+def winding_number(points: FloatArray, facets: IntArray, at: FloatArray) -> FloatArray:
     """Return the winding number (m,) of a surface around each point: 1 inside it, 0 outside.
 
     An integer, but for rounding, for any closed surface; close to one where it has small gaps.
@@ -325,17 +325,17 @@ def winding(points: FloatArray, facets: IntArray, at: FloatArray) -> FloatArray:
     Trans. Biomed. Eng. 30, 1983).
     """
     if facets.shape[1] == 2:
-        return np.array([_plane(points[facets] - p) for p in at])
-    return np.array([_space(points, facets, p) for p in at])
+        return np.array([_winding_2d(points[facets] - p) for p in at])
+    return np.array([_winding_3d(points, facets, p) for p in at])
 
 
-def _plane(arms: FloatArray) -> float:
+def _winding_2d(arms: FloatArray) -> float:
     """Return the winding number of line segments around the origin, from their ends (f, 2, 2)."""
     (a, b), (c, d) = arms[:, 0].T, arms[:, 1].T
     return float(np.arctan2(a * d - b * c, a * c + b * d).sum() / (2.0 * np.pi))
 
 
-def _space(points: FloatArray, facets: IntArray, p: FloatArray) -> float:
+def _winding_3d(points: FloatArray, facets: IntArray, p: FloatArray) -> float:
     """Return the winding number of facets (f, 4) around a point ``p`` (3,).
 
     Its bits do not depend on the number of threads: the sums of the parts are added in order.

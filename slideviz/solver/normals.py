@@ -38,7 +38,7 @@ TURN = {2: np.array([[0.0, 1.0], [-1.0, 0.0]])}
 
 
 def sliding_normals(setup: Setup, coords: Array) -> tuple[IntArray, Array]:
-    """Return what ``Setup.constraints`` does, on a tape: nodes (q,) and unit normals (q, d)."""
+    """Return nodes (q,) and unit normals (q, d) like ``Setup.constraints``, on a tape."""
     nodes, at = setup.constraints(value(coords))
     if not (setup.tracks.curved and isinstance(coords, Variable)) or not len(nodes):
         return nodes, at

@@ -138,7 +138,7 @@ that slide past the end of their surface have something to slide on."""
 
 @dataclass(frozen=True, eq=False)
 class Setup(Domain):
-    """A domain with what is prescribed on it and what a step needs: the same in all steps."""
+    """A domain, its prescribed displacements, and the data that are the same in all steps."""
 
     known: IntArray
     """(a,): moving and fixed nodes."""

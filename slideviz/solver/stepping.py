@@ -22,7 +22,7 @@ from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import largest_misfit, misfits
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.operations import features
-from slideviz.rbf.problem import Frozen, PhaseTimer, Problem, Solution
+from slideviz.rbf.problem import FrozenChoices, PhaseTimer, Problem, Solution
 from slideviz.rbf.refine import NOTED, TRUSTED
 from slideviz.rbf.tape import Array, put, take, value
 from slideviz.solver.growth import farthest_node, stray_warning, unsoundness
@@ -207,7 +207,7 @@ def one_step(
     goal: Array,
     timer: PhaseTimer,
     before: Solution | None,
-    frozen: Frozen | None = None,
+    frozen: FrozenChoices | None = None,
 ) -> Solution:
     """Return the solution of one step from ``coords`` (n, d), with the displacement of all nodes.
 
@@ -236,7 +236,7 @@ def problem_at(
     coords: Array,
     goal: Array,
     before: Solution | None = None,
-    frozen: Frozen | None = None,
+    frozen: FrozenChoices | None = None,
 ) -> Problem:
     """Return the problem of the step from ``coords`` (n, d) with known nodes at ``goal`` (a, d)."""
     once = np.flatnonzero(setup.once(setup.known))

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from slideviz.errors import MeshError, SlidevizError
-from slideviz.system.threads import Result, Task, at_most, cores, submit_ahead
+from slideviz.system.threads import Result, Task, core_limit, cores, submit_ahead
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Comm, Intracomm
@@ -55,7 +55,7 @@ class SerialPool:
             Arguments of ``make``; they, tasks and results are pickled if there are several ranks.
         """
         threads = cores()
-        with make(*arguments) as work, at_most(1), ThreadPoolExecutor(threads) as pool:
+        with make(*arguments) as work, core_limit(1), ThreadPoolExecutor(threads) as pool:
             try:
                 yield lambda tasks: submit_ahead(pool, threads, work, tasks)
             finally:
@@ -249,7 +249,7 @@ class Ranks(SerialPool):
         return whole
 
     def _portable(self, problem: Exception) -> Exception:
-        """Return an error that can be pickled; for a missing file, one that names the rank."""
+        """Return an error that can be pickled; if a file is missing, it names the rank."""
         if isinstance(problem, FileNotFoundError):
             return MeshError(
                 f"{problem.filename}: not there for rank {self.rank} on {os.uname().nodename}; "
@@ -284,5 +284,5 @@ def thread_limit(threads: int) -> Iterator[Callable[[], None]]:
     from numba import config, set_num_threads
     from threadpoolctl import threadpool_limits
 
-    with threadpool_limits(threads, user_api="blas"), at_most(threads):
+    with threadpool_limits(threads, user_api="blas"), core_limit(threads):
         yield lambda: set_num_threads(min(threads, config.NUMBA_NUM_THREADS))

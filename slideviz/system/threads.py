@@ -24,18 +24,18 @@ Tick = Callable[[float], object]
 PART = 16384
 """Rows of a part."""
 _most = [sys.maxsize]
-"""Limits of `at_most` contexts that are open, the innermost last."""
+"""Limits of `core_limit` contexts that are open, the innermost last."""
 
 
 def cores() -> int:
-    """Return the number of threads to work with: Numba's, or the limit of `at_most` if lower."""
+    """Return the number of threads to work with: Numba's, or the limit of `core_limit` if lower."""
     from numba import get_num_threads
 
     return min(int(get_num_threads()), _most[-1])
 
 
 @contextmanager
-def at_most(threads: int) -> Iterator[None]:
+def core_limit(threads: int) -> Iterator[None]:
     """Context that limits `cores` to ``threads``, to leave the other cores to other processes."""
     _most.append(threads)
     try:

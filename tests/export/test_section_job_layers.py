@@ -12,7 +12,7 @@ from slideviz.color_scheme import INVERTED_COLOR, LIGHT
 from slideviz.errors import Cancelled, CaseError
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
-from slideviz.export.section_job import PageFormat, save_section, state_words
+from slideviz.export.section_job import PageFormat, frame_words, save_section
 from slideviz.export.vector import draw_vector
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality
@@ -603,7 +603,7 @@ def test_the_picture_of_a_section_has_the_colors_of_the_view_and_says_which_run_
 ):
     session = open_mesh(StepFrame(cube, quality(cube)), None)
     section = Section("plane", (0.5, 0.5, 0.52))
-    assert state_words(session) == "undeformed"
+    assert frame_words(session) == "undeformed"
     moved = cube.with_points(cube.points * (1.0, 1.0, 1.2))
     session = changes.set_case(session, sliding="ds")
     for _ in range(2):

@@ -7,7 +7,7 @@ import pytest
 
 from slideviz.errors import CaseError
 from slideviz.ffd.box import CoordinateSystem, regular_box
-from slideviz.ffd.deformation import BoxDeformation, Drive, Limits
+from slideviz.ffd.deformation import BoxDeformation, DrivenMove, Limits
 from slideviz.ffd.inverse import parametric
 from slideviz.ffd.kinds import Request, moves_of
 from tests.oracles.freeform import blended, moved
@@ -48,7 +48,7 @@ def deformed(boxes, variables, scale=1.0, points=POINTS, relax=1.0, **limits):
     for name, kind, index, numbers, value in variables:
         request = Request(kind, index, numbers, 1.3)
         for move in moves_of(by_name[name], request):
-            drives.append(Drive(name, move, len(values), not request.direct))
+            drives.append(DrivenMove(name, move, len(values), not request.direct))
             values.append(scale * value)
     return BoxDeformation(
         boxes, inside, drives, np.array(values), relax, len(points), Limits(**limits)

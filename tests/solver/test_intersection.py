@@ -155,8 +155,10 @@ def test_a_turn_beside_a_curved_wall_is_not_refused():
 def test_a_motion_by_very_many_periods_is_looked_at_at_once(monkeypatch):
     found = sample("passage", size=12)
     mesh, looked = found.mesh, []
-    inside = intersection.winding
-    monkeypatch.setattr(intersection, "winding", lambda *a: looked.append(None) or inside(*a))
+    inside = intersection.winding_number
+    monkeypatch.setattr(
+        intersection, "winding_number", lambda *a: looked.append(None) or inside(*a)
+    )
     for far in (1.0, 1e9):
         looked.clear()
         message(*moved(found.case, mesh, Translate("airfoil", (0.0, far))))

@@ -188,7 +188,7 @@ class FrozenStep:
 
 
 class _Run:
-    """One run of a step: `slideviz.rbf.problem.Frozen` at some positions."""
+    """One run of a step: `slideviz.rbf.problem.FrozenChoices` at some positions."""
 
     def __init__(self, step: FrozenStep, coords: Array, out: FloatArray | None) -> None:
         self._step, self._setup, self._coords = step, step.setup, coords

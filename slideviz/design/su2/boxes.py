@@ -23,7 +23,7 @@ from slideviz.design.su2.markers import problems_of_markers
 from slideviz.design.su2.variables import DesignVariable, angle_notes
 from slideviz.errors import CaseError
 from slideviz.ffd.box import Box, Embedding
-from slideviz.ffd.deformation import BoxDeformation, Drive, Limits
+from slideviz.ffd.deformation import BoxDeformation, DrivenMove, Limits
 from slideviz.ffd.kinds import DIRECTIONS, NONE, Move, Planes, Request, moves_of, variable_problem
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -36,8 +36,8 @@ def held_planes(config: Su2Config, mesh: Mesh, box: Box, continuity: str) -> Pla
     """
     depth = CONTINUITIES[continuity]
     if not depth:
-        given = [list_of(config.words[f"FFD_FIX_{letter}"]) for letter in "IJK"]
-        i, j, k = (frozenset(int(word.text) for word in words) for words in given)
+        indices = [list_of(config.words[f"FFD_FIX_{letter}"]) for letter in "IJK"]
+        i, j, k = (frozenset(int(word.text) for word in words) for words in indices)
         return i & _planes(box, 0), j & _planes(box, 1), k & _planes(box, 2)
     ends = _edges(mesh, config.markers, box)
     symmetric = config.words["FFD_SYMMETRY_PLANE"].upper() == "YES" and mesh.dim == 3
@@ -239,7 +239,7 @@ class MovedBoxes:
             variable = self.config.variables[place]
             one = len(variable.values) == 1
             mine = self._moves(place)[part : part + 1]
-            drives += [Drive(variable.box, move, value, one) for move in mine]
+            drives += [DrivenMove(variable.box, move, value, one) for move in mine]
         return BoxDeformation(
             self.boxes,
             self.embedded,
@@ -317,13 +317,13 @@ def move_boxes(config: Su2Config, mesh: Mesh, nodes: IntArray) -> MovedBoxes:
         if name in names:
             warnings += [text for each in config.markers for text in off_points(box, mesh, each)]
     held, stuck = held_by_continuity(config, mesh, {box.name: box for box in boxes})
-    found = MovedBoxes(config, mesh, nodes, tuple(boxes), inside, held, ())
+    moved = MovedBoxes(config, mesh, nodes, tuple(boxes), inside, held, ())
     try:
-        notes = found.at_design.notes
+        notes = moved.at_design.notes
     except CaseError as problem:
         raise CaseError(f"{config.source}: {problem}") from problem
-    notes = [*notes, *_without_effect(found), *angle_notes(config.variables, config.relaxation)]
-    return replace(found, warnings=(*warnings, *stuck, *notes))
+    notes = [*notes, *_without_effect(moved), *angle_notes(config.variables, config.relaxation)]
+    return replace(moved, warnings=(*warnings, *stuck, *notes))
 
 
 def _without_effect(found: MovedBoxes) -> list[str]:

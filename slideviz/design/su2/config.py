@@ -65,11 +65,11 @@ def radial_settings(
     if kind == "ELASTIC" and "METHOD" not in rows:
         why = "DEFORM_KIND= ELASTIC: radial functions move the mesh nevertheless; write METHOD="
         warnings.append(Note(f"{why} elastic for elasticity"))
-    given: dict[str, Any] = {}
+    fields: dict[str, Any] = {}
     for name, form in {**READ_ALWAYS, **(READ_WITH_RBF if kind == "RBF" else {})}.items():
         if name in rows:
             try:
-                given[name] = form.read(rows[name].value)
+                fields[name] = form.read(rows[name].value)
             except CaseError as problem:
                 note(rows[name], str(problem))
     if kind == "RBF":
@@ -78,16 +78,16 @@ def radial_settings(
             note(rows[FUNCTION], not_one_of(word, KERNELS))
         kernel, factor = KERNELS.get(word, KERNELS["WENDLAND_C2"])
         case = case if "RBF_KERNEL" in rows else case.change(kernel=kernel)
-        radius = given.get("RADIAL_BASIS_FUNCTION_PARAMETER")
+        radius = fields.get("RADIAL_BASIS_FUNCTION_PARAMETER")
         if radius and not {"SUPPORT_RADIUS", "INFLUENCE_FACTOR"} & {*rows}:
             case = case.change(support_radius=factor * radius)
-        if "DEFORM_NONLINEAR_ITER" in given and "STEPS" not in rows:
-            case = case.change(steps=given["DEFORM_NONLINEAR_ITER"])
-    return _reduced(case, rows, given)
+        if "DEFORM_NONLINEAR_ITER" in fields and "STEPS" not in rows:
+            case = case.change(steps=fields["DEFORM_NONLINEAR_ITER"])
+    return _reduced(case, rows, fields)
 
 
 def _reduced(case: Case, rows: Mapping[str, Entry], given: Mapping[str, Any]) -> Case:
-    """Return the case with SU2's greedy selection: one node at a time, the one farthest off."""
+    """Return the case with SU2's greedy selection: one node at a time, by the largest error."""
     names = {"RBF_GREEDY_TOLERANCE": "tolerance", "RBF_GREEDY_CORRECTION_FACTOR": "gamma"}
     values = {names[key]: value for key, value in given.items() if key in names}
     wanted = given.get("RBF_DATA_REDUCTION", True if values else None)
@@ -268,8 +268,8 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
         mesh_out=_with_ending(files["MESH_OUT_FILENAME"], case),
         warnings=(*warnings, *notes, *_perhaps_ours(path, ignored, rows)),
     )
-    given = frozenset(rows)
-    return Su2Config(case, markers, variables, files, words, ignored, reader.named, given)
+    keys = frozenset(rows)
+    return Su2Config(case, markers, variables, files, words, ignored, reader.named, keys)
 
 
 def _perhaps_ours(path: Path, ignored: tuple[str, ...], rows: dict[str, Entry]) -> list[str]:
@@ -378,7 +378,7 @@ class _Reader:
 
     def formats(self) -> dict[str, str | None]:
         """Return the fields ``mesh_format`` and ``mesh_out_format`` of the case."""
-        found: dict[str, str | None] = {}
+        formats: dict[str, str | None] = {}
         for key, field in (("MESH_FORMAT", "mesh_format"), ("MESH_OUT_FORMAT", "mesh_out_format")):
             entry = self.rows.get(key)
             value = "SU2" if entry is None else entry.value.upper()
@@ -387,8 +387,8 @@ class _Reader:
                 self.note(entry, not_one_of(value, ("SU2", "SU2B", "CGNS")))
             # Without the key the ending tells, as it does for CGNS.
             known = entry is not None and value.lower() in FILE_FORMATS
-            found[field] = value.lower() if known else None
-        return found
+            formats[field] = value.lower() if known else None
+        return formats
 
     def check(self, words: dict[str, str]) -> None:
         """Note unsupported values, a missing DV_KIND, and keys that belong in a case file."""

@@ -74,9 +74,11 @@ def design_gradients(
         return surface, last.mesh
 
     part, (surface, _), messages = convex_part(config, mesh, attempt, lambda each: each[1])
-    found = find_gradients(surface, progress)
-    variables = part * found.variables if found.at_design else found.variables
-    return surface, replace(found, variables=variables, warnings=(*found.warnings, *messages))
+    gradients = find_gradients(surface, progress)
+    variables = part * gradients.variables if gradients.at_design else gradients.variables
+    return surface, replace(
+        gradients, variables=variables, warnings=(*gradients.warnings, *messages)
+    )
 
 
 def find_gradients(

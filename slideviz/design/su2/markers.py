@@ -53,12 +53,12 @@ def problems_of_markers(config: Su2Config, mesh: Mesh, needed: bool = True) -> l
 
 def _warnings(config: Su2Config, mesh: Mesh, passed: dict[str, str]) -> list[str]:
     """Return a warning for each key with ignored markers; ``passed`` maps these to keys."""
-    found = []
+    messages = []
     for key in dict.fromkeys(passed.values()):
         names = [name for name in passed if passed[name] == key]
         close = nearest(names[0], mesh.marker_names) if len(names) == 1 else ""
-        found.append(
+        messages.append(
             f"{config.source}: {key}: {mesh.name} has no marker {' or '.join(map(repr, names))}: "
             f"ignored, as in SU2{close}"
         )
-    return found
+    return messages

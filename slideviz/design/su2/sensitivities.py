@@ -216,16 +216,16 @@ def sensitivity_file(config: Su2Config) -> Path:
     """
     if _is_unordered(config):
         return config.files["DV_UNORDERED_SENS_FILENAME"]
-    given = config.files["SOLUTION_ADJ_FILENAME"]
+    adjoint_file = config.files["SOLUTION_ADJ_FILENAME"]
     objective = config.words["OBJECTIVE_FUNCTION"].strip("() ").upper()
-    stem = given.with_suffix("") if given.suffix in (".csv", ".dat") else given
+    stem = adjoint_file.with_suffix("") if adjoint_file.suffix in (".csv", ".dat") else adjoint_file
     suffix = "combo" if "," in objective else SUFFIXES.get(objective, "")
     stems = [stem.with_name(f"{stem.name}_{suffix}")] if suffix else []
     endings = [".csv", ".dat"]
     if config.words["READ_BINARY_RESTART"].upper() == "YES":
         endings.reverse()
     tried = [one.with_name(one.name + end) for one in (*stems, stem) for end in endings]
-    for path in (*tried, given):
+    for path in (*tried, adjoint_file):
         if path.is_file():
             return path
     raise CaseError(

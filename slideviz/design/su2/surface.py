@@ -71,11 +71,11 @@ def convex_part(
 
     def tried(config: Su2Config) -> tuple[Attempt | None, int]:
         try:
-            found = attempt(config)
+            surface = attempt(config)
         except (CaseError, DeformError) as problem:  # a boundary goes through another one
             impossible.append(problem)
             return None, 1
-        return found, max(0, quality(deformed(found), reference=mesh).inverted - least)
+        return surface, max(0, quality(deformed(surface), reference=mesh).inverted - least)
 
     full, first = tried(config)
     if full is not None and not first:

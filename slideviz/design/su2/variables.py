@@ -158,21 +158,21 @@ def read_variables(
         problems += [(row.line, f"DV_KIND: {sentence}") for sentence in strange]
         return ()
     groups = _groups(rows, kinds, problems, warnings)
-    found = []
+    variables = []
     for place, (kind, group) in enumerate(zip(kinds, groups, strict=False), start=1):
         try:
-            found.append(_variable(kind, group))
+            variables.append(_variable(kind, group))
         except CaseError as problem:
             problems.append((rows["DV_PARAM"].line, f"DV_PARAM: variable {place}: {problem}"))
             continue
-        if (side := found[-1].parameter("side")) not in (0.0, 1.0):
+        if (side := variables[-1].parameter("side")) not in (0.0, 1.0):
             said = f"side {side:g} is neither 0 (lower) nor 1 (upper): as in SU2, the upper side"
             warnings.append(f"DV_PARAM: variable {place} ({kind}): {said}")
-    if len(found) < len(groups):
+    if len(variables) < len(groups):
         return ()
-    found = _with_values(rows, found, problems, warnings)
-    problems += [(row.line, f"DV_KIND: {sentence}") for sentence in _contradictions(found)]
-    return _dispatched(found, warnings)
+    variables = _with_values(rows, variables, problems, warnings)
+    problems += [(row.line, f"DV_KIND: {sentence}") for sentence in _contradictions(variables)]
+    return _dispatched(variables, warnings)
 
 
 def misspelt(key: str, rows: Mapping[str, Entry]) -> str:
@@ -185,14 +185,14 @@ def _strange(kinds: list[str]) -> list[str]:
     """Return a sentence for each kind that is unknown or not supported, or that there is none."""
     if not kinds:
         return [f"names no design variable; supported: {', '.join(supported())}"]
-    found = []
+    messages = []
     for kind in dict.fromkeys(kinds):
         if kind not in KINDS:
             hint = nearest(kind, KINDS) or f"; supported: {', '.join(supported())}"
-            found.append(f"SU2 has no kind {kind}{hint}")
+            messages.append(f"SU2 has no kind {kind}{hint}")
         elif KINDS[kind].refused:
-            found.append(f"{kind} {KINDS[kind].refused}; supported: {', '.join(supported())}")
-    return found
+            messages.append(f"{kind} {KINDS[kind].refused}; supported: {', '.join(supported())}")
+    return messages
 
 
 def _groups(
@@ -241,14 +241,14 @@ def _variable(name: str, group: list[Word]) -> DesignVariable:
         raise CaseError(f"{len(group)} {what} are given; {needed}")
     boxed = names[0] == "BOX"
     numbers = tuple(number(word.text) for word in group[boxed:])
-    found = DesignVariable(name, (0.0,), numbers, group[0].text if boxed else "")
-    at = [found.parameter(letter, -1.0) for letter in "ijk"]
+    variable = DesignVariable(name, (0.0,), numbers, group[0].text if boxed else "")
+    at = [variable.parameter(letter, -1.0) for letter in "ijk"]
     if boxed and any(place != int(place) or place < -1 for place in at):
         raise CaseError(f"an index is no whole number from -1; {needed}")
     several = kind.several.split(", ") if kind.several else []
-    if several and not any(found.parameter(each) for each in several):
-        found = replace(found, values=(0.0,) * len(several))
-    return found
+    if several and not any(variable.parameter(each) for each in several):
+        variable = replace(variable, values=(0.0,) * len(several))
+    return variable
 
 
 def _with_values(
@@ -306,17 +306,17 @@ def _contradictions(variables: list[DesignVariable]) -> list[str]:
 def _dispatched(variables: list[DesignVariable], warnings: list[str]) -> tuple[DesignVariable, ...]:
     """Return the variables, those marked that do nothing in SU2 beside the first one."""
     reasons: dict[str, list[str]] = {}
-    found = []
+    marked = []
     for place, each in enumerate(variables, start=1):
         reason = _why_ignored(each, variables[0]) if place > 1 else ""
-        found.append(replace(each, ignored=bool(reason)))
+        marked.append(replace(each, ignored=bool(reason)))
         if reason:
             reasons.setdefault(reason, []).append(f"{place} ({each.kind})")
     for reason, places in reasons.items():
         more = f" and {len(places) - 6} more" if len(places) > 6 else ""
         sentence = f"variable{'s' * (len(places) > 1)} {', '.join(places[:6])}{more} of DV_KIND"
         warnings.append(f"{sentence} will have no effect, as in SU2: {reason}; make two runs")
-    return tuple(found)
+    return tuple(marked)
 
 
 def _why_ignored(variable: DesignVariable, first: DesignVariable) -> str:

@@ -74,7 +74,7 @@ class Processes(Executor):
 
     @property
     def why_none_starts(self) -> str:
-        """Return why no process starts, after `_STARTS` failures in a row; else an empty text."""
+        """Return why no process starts, after `_STARTS` failures in a row; "" before."""
         if self._failed_starts < _STARTS:
             return ""
         if any(code < 0 for code in self.exit_codes):

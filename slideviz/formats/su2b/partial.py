@@ -62,7 +62,7 @@ def checksums(path: Path, tick: Tick, ranks: SerialPool = SERIAL) -> list[int]:
     """Return the CRC-32 of each piece of a file."""
     found: list[int] = []
     tasks = _pieces(0, path.stat().st_size)
-    with ranks.sharing(_summing, path) as do:
+    with ranks.sharing(_checksums, path) as do:
         for checksum in do(tasks):
             found.append(checksum)
             tick(len(found) / len(tasks))
@@ -173,7 +173,7 @@ def _mending(source: Path, ours: Path) -> Iterator[Callable[[Piece], None]]:
 
 
 @contextmanager
-def _summing(path: Path) -> Iterator[Callable[[Piece], int]]:
+def _checksums(path: Path) -> Iterator[Callable[[Piece], int]]:
     """Context with a function that returns the CRC-32 of a piece of a file."""
     with path.open("rb") as file:
 

@@ -51,14 +51,14 @@ class Exports(QObject):
             return
         view, settings = self.window.viewing, self.window.settings
         with self._renderer() as renderer:
-            kept = str(settings.value("picture", ""))
-            dialog = PictureDialog(self.window, renderer, (view.width(), view.height()), kept)
+            choices = str(settings.value("picture", ""))
+            dialog = PictureDialog(self.window, renderer, (view.width(), view.height()), choices)
             accepted = dialog.exec() == PictureDialog.DialogCode.Accepted
-            options, kept = dialog.picture_options, dialog.choices
+            options, choices = dialog.picture_options, dialog.choices
             dialog.deleteLater()
             if not accepted:
                 return
-            settings.setValue("picture", kept)
+            settings.setValue("picture", choices)
             default = self.window.files.folder() / f"{self.window.files.stem()}.png"
             filters = picture_filters(self._session)
             path = questions.ask_save(self.window, "Export picture", default, filters)

@@ -159,14 +159,14 @@ class ShortcutsDialog(QDialog):
         wanted, total = wanted.strip().lower(), 0
         for index in range(self.tree.topLevelItemCount()):
             top = self.tree.topLevelItem(index)
-            found = 0
+            matches = 0
             for k in range(top.childCount()):
                 row = top.child(k)
                 words = " ".join(row.text(column) for column in range(3)).lower()
                 row.setHidden(wanted not in words)
-                found += not row.isHidden()
-            top.setHidden(not found)
-            total += found
+                matches += not row.isHidden()
+            top.setHidden(not matches)
+            total += matches
         self.nothing.setVisible(not total)
 
 
@@ -194,8 +194,8 @@ class TextDialog(QDialog):
 
     def _typed(self, wanted: str) -> None:
         self.text.moveCursor(QTextCursor.MoveOperation.Start)
-        found = self.text.toPlainText().lower().count(wanted.lower()) if wanted else 0
-        self.count.setText(f"{found} found" if wanted else "")
+        matches = self.text.toPlainText().lower().count(wanted.lower()) if wanted else 0
+        self.count.setText(f"{matches} found" if wanted else "")
         self.next()
 
     def next(self) -> None:
@@ -284,5 +284,5 @@ def details(window: Services) -> str:
 def _graphics(window: Services) -> str:
     """Return OpenGL's vendor, renderer and version, as lines."""
     said = window.viewing.view.render_window.ReportCapabilities().splitlines()
-    kept = [" ".join(line.split()) for line in said if line.startswith("OpenGL")]
-    return "\n".join(kept[:3]) or "OpenGL: not known yet"
+    versions = [" ".join(line.split()) for line in said if line.startswith("OpenGL")]
+    return "\n".join(versions[:3]) or "OpenGL: not known yet"

@@ -77,8 +77,8 @@ def page_text(path: Path) -> str:
 
 def page_title(path: Path) -> str:
     """Return the title of a page: its first heading."""
-    found = re.search(r"^# (.+)$", page_text(path), re.MULTILINE)
-    return found[1].replace("`", "") if found else path.stem
+    heading = re.search(r"^# (.+)$", page_text(path), re.MULTILINE)
+    return heading[1].replace("`", "") if heading else path.stem
 
 
 PATH = Qt.ItemDataRole.UserRole
@@ -198,11 +198,11 @@ class ManualDialog(QDialog):
         for section in self._items():
             pages = (section, *self._items(section))
             paths = [Path(one.data(0, PATH)) for one in pages]
-            found = [words in page_text(path).lower() for path in paths]
-            for one, there in zip(pages, found, strict=True):
+            matches = [words in page_text(path).lower() for path in paths]
+            for one, there in zip(pages, matches, strict=True):
                 one.setHidden(not there)
-            section.setHidden(not any(found))
-            self._found += [path for path, there in zip(paths, found, strict=True) if there]
+            section.setHidden(not any(matches))
+            self._found += [path for path, there in zip(paths, matches, strict=True) if there]
         pages_found = "1 page" if len(self._found) == 1 else f"{len(self._found)} pages"
         self.count.setText((pages_found if self._found else "Nothing found") if words else "")
 

@@ -113,8 +113,8 @@ def ask_table(parent: QWidget, rows: TableRows, path: Path, default: Path) -> Pa
     dialog = TableDialog(parent, rows, table_text(path))
     there = path.is_file()
     while dialog.exec() == QDialog.DialogCode.Accepted:
-        found = questions.ask_save(parent, "Save the table", path if there else default, FILTERS)
-        if found is not None:
-            write_table(found, dialog.text, path)
-            return found
+        target = questions.ask_save(parent, "Save the table", path if there else default, FILTERS)
+        if target is not None:
+            write_table(target, dialog.text, path)
+            return target
     return None

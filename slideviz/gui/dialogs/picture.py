@@ -191,16 +191,16 @@ class PictureDialog(QDialog):
     @property
     def choices(self) -> str:
         """Return the chosen options as JSON, to be the initial ones of the next dialog."""
-        kept = asdict(self.picture_options)
+        choices = asdict(self.picture_options)
         numbers = (self.width_cm.value(), self.height_cm.value(), self.dpi.value())
-        kept.update(
+        choices.update(
             preset=self.size_choice.currentData(), text=self.text.currentData(), paper=numbers
         )
         # These depend on the present view.
-        del kept["fill"], kept["both"]
+        del choices["fill"], choices["both"]
         if not self.renderer.session.marked_here:
-            del kept["marked"]
-        return json.dumps(kept)
+            del choices["marked"]
+        return json.dumps(choices)
 
     def _restore_choices(self, kept: str) -> None:
         """Fill the fields from the `choices` of the last time; from defaults if there are none."""

@@ -225,7 +225,7 @@ def draw_span(
     """
     axes = figure.add_subplot()
     try:
-        found = find()
+        profiles = find()
     except SlidevizError as error:
         axes.set_axis_off()
         figure.text(
@@ -233,8 +233,8 @@ def draw_span(
             fontsize=style.size, color=style.scheme.text,
         )  # fmt: skip
         return
-    spanwise(axes, found, what, style=style)
+    spanwise(axes, profiles, what, style=style)
     axes.yaxis.label.set_text(f"{coordinate} before deformation [mesh units]")
     if not whole:
-        axes.set_xlim(close_limits(getattr(profile, what) for profile in found))
+        axes.set_xlim(close_limits(getattr(profile, what) for profile in profiles))
     add_legend(axes, style, loc="best")

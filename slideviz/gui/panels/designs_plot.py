@@ -103,9 +103,9 @@ class DesignPlot(QWidget):
             design_curves(self._table, column, what),
             failed_designs(self._table, column),
         )
-        found = nearest_design(self.canvas.figure.axes[0], curves, x, y, failed)
-        if found is not None:
-            self.picked(found)
+        nearest = nearest_design(self.canvas.figure.axes[0], curves, x, y, failed)
+        if nearest is not None:
+            self.picked(nearest)
 
     def _save(self) -> None:
         ask_and_write_plot(self, "Save plot", "designs", self.drawing())

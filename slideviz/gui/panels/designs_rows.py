@@ -185,8 +185,8 @@ class DesignRows(QWidget):
 
         The first one is the default, not a choice, until values are typed for it.
         """
-        kept = self.column.currentIndex() > 0 or bool(self.values.text())
-        chosen = self.column.currentData() if kept and mesh is self._mesh else None
+        edited = self.column.currentIndex() > 0 or bool(self.values.text())
+        chosen = self.column.currentData() if edited and mesh is self._mesh else None
         if mesh is not self._mesh:
             self.values.clear()
         self._mesh = mesh

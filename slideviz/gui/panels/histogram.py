@@ -201,14 +201,14 @@ class HistogramPanel(Panel):
         self._described_frame = session.frame
         what = shown_measure(session)
         counted = session.frame.quality.counted
-        found = session.frame.quality
+        quality = session.frame.quality
         plain = session.frame.values(what, session.mesh)[counted]
-        bad = found.inverted
+        bad = quality.inverted
         low = "highest" if what == "displacement" else "min"
-        mean = found.mean if what == "size-skew" else plain.mean()
+        mean = quality.mean if what == "size-skew" else plain.mean()
         # The largest displacement of a node: values of cells are means over their nodes.
         far = what == "displacement"
-        least = found.min if what == "size-skew" else plain.min()
+        least = quality.min if what == "size-skew" else plain.min()
         ends = session.frame.largest_displacement(session.mesh) if far else least
         form = ".4g" if what == "displacement" else ".4f"
         red = f" style='color:{alarm()}'" if bad else ""

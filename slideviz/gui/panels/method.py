@@ -201,10 +201,10 @@ class MoreSettings(QWidget):
 
     def sync(self, case: Case, spare: Case) -> None:
         """Fill the form from ``case``, or from ``spare`` where ``case`` has no data reduction."""
-        given = case.reduction or spare.reduction
-        self._criterion = given.criterion
-        self.levels.show_value(given.criterion if given.multilevel else "none")
-        self.level_end.show_value(self._level.get(case.change(reduction=given)))
+        reduction = case.reduction or spare.reduction
+        self._criterion = reduction.criterion
+        self.levels.show_value(reduction.criterion if reduction.multilevel else "none")
+        self.level_end.show_value(self._level.get(case.change(reduction=reduction)))
         self.form.sync(case, spare, {})
 
 
@@ -274,12 +274,12 @@ class MethodPanel(Panel):
 
     def _set(self, key: Key, value: object) -> None:
         """Change the case by the new value of a key; data reduction is handled by this panel."""
-        own: dict[str, Callable[[Case, Any], Case]] = {
+        special: dict[str, Callable[[Case, Any], Case]] = {
             "DATA_REDUCTION": self._reduce,
             "DATA_RED_TOLERANCE": self._put_tolerance,
         }
         case = self.store.session.case
-        new = own.get(key.name, key.put)(case, value)
+        new = special.get(key.name, key.put)(case, value)
         values = {field.name: getattr(new, field.name) for field in fields(Case)}
         changed = {name: now for name, now in values.items() if now != getattr(case, name)}
         if changed:
@@ -294,18 +294,20 @@ class MethodPanel(Panel):
         return put_reduction(case.change(reduction=first), wanted)
 
     def _put_tolerance(self, case: Case, value: float) -> Case:
-        given = case.reduction or Reduction()
-        return case.change(reduction=replace(given, tolerance=value, relative=None))
+        reduction = case.reduction or Reduction()
+        return case.change(reduction=replace(reduction, tolerance=value, relative=None))
 
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
         """Fill the panel from the session's case."""
         self._reduction = session.case.reduction or self._reduction
-        given = replace(self._with_absolute_tolerance(self._reduction or Reduction()), auto=False)
-        case, spare = session.case, Case(reduction=given)
+        reduction = replace(
+            self._with_absolute_tolerance(self._reduction or Reduction()), auto=False
+        )
+        case, spare = session.case, Case(reduction=reduction)
         if case.reduction is not None:
-            case = case.change(reduction=replace(given, auto=case.reduction.auto))
+            case = case.change(reduction=replace(reduction, auto=case.reduction.auto))
         fields = self.form.fields
         fields["origin"].set_scale(self._extent)
         rotational = case.periodic_type != "translational" and "rotational" in _pair_kinds(session)
@@ -357,8 +359,8 @@ class MethodPanel(Panel):
         if key != self._support[0]:
             self._support = key, support_of(case, mesh)[0]
         radius = self._support[1]
-        given = "" if case.support_radius is None else ", a length of the case file"
-        return f"a radius of {radius:.4g}{given}" if radius else ""
+        origin = "" if case.support_radius is None else ", a length of the case file"
+        return f"a radius of {radius:.4g}{origin}" if radius else ""
 
     def _largest_of(self, session: Session) -> float:
         """Return the largest prescribed displacement, computed once for each set of motions."""

@@ -124,8 +124,8 @@ class WorstModel(QAbstractTableModel):
         """Return the row of a cell of the mesh; -1 if it is not in the table."""
         if self.worst is None or cell is None:
             return -1
-        found = np.flatnonzero(self.worst.cells[self.order] == cell)
-        return int(found[0]) if len(found) else -1
+        rows = np.flatnonzero(self.worst.cells[self.order] == cell)
+        return int(rows[0]) if len(rows) else -1
 
     def rowCount(self, parent: ModelIndex | None = None) -> int:
         return len(self.order) if parent is None or not parent.isValid() else 0

@@ -258,8 +258,8 @@ class InPlaneHandle(PointHandle[tuple[Section, Box]]):
         if seen is None:
             return []
         lines: list[tuple[Part, FloatArray]] = [("line", line) for line in seen.lines]
-        found: list[tuple[Part, FloatArray]] = [("end", seen.ends), ("middle", seen.middle)]
-        return [(part, self._pixels(points)) for part, points in found + lines if len(points)]
+        points_of: list[tuple[Part, FloatArray]] = [("end", seen.ends), ("middle", seen.middle)]
+        return [(part, self._pixels(points)) for part, points in points_of + lines if len(points)]
 
     def _pixels(self, points: FloatArray) -> FloatArray:
         return to_display(self.view, np.column_stack([points, np.zeros(len(points))]))

@@ -222,7 +222,7 @@ def old_crashes(folder: Path) -> list[Path]:
 
     Empty files, of processes that were killed, are removed.
     """
-    found = []
+    files = []
     for path in sorted(folder.glob("crash-*.log"), key=lambda path: path.stat().st_mtime):
         if is_alive(path.stem.partition("-")[2]):
             continue
@@ -231,5 +231,5 @@ def old_crashes(folder: Path) -> list[Path]:
                 path.unlink()
                 continue
             when = datetime.fromtimestamp(path.stat().st_mtime)
-            found.append(path.replace(folder / f"crash-{when:%Y%m%d-%H%M%S}-{path.stem[6:]}.txt"))
-    return found
+            files.append(path.replace(folder / f"crash-{when:%Y%m%d-%H%M%S}-{path.stem[6:]}.txt"))
+    return files

@@ -107,14 +107,14 @@ def _undo_in_field(field: QLineEdit, event: QEvent) -> bool | None:
     redoes = event.matches(QKeySequence.StandardKey.Redo)
     if not (undoes or redoes or (event.key(), event.modifiers()) == ctrl_y):
         return None
-    own = field.isUndoAvailable() if undoes else field.isRedoAvailable()
-    event.setAccepted(own)
-    if not own:
+    available = field.isUndoAvailable() if undoes else field.isRedoAvailable()
+    event.setAccepted(available)
+    if not available:
         _clear_undo(field)  # what was typed here before is older than what the window does now
     elif event.type() == QEvent.Type.KeyPress:
         with _as_undo(field):
             (field.undo if undoes else field.redo)()
-    return own
+    return available
 
 
 def _clear_undo(field: QLineEdit) -> None:
@@ -137,8 +137,8 @@ class TextField(QLineEdit):
     """A field for a text, in which Ctrl+Z and Ctrl+Y act first on what is typed."""
 
     def event(self, event: QEvent) -> bool:
-        own = _undo_in_field(self, event)
-        return super().event(event) if own is None else own
+        handled = _undo_in_field(self, event)
+        return super().event(event) if handled is None else handled
 
 
 class NumberField(TextField):
@@ -396,8 +396,8 @@ class NumberBox(QSpinBox):
             self._validate()
 
     def event(self, event: QEvent) -> bool:
-        own = _undo_in_field(self.lineEdit(), event)
-        return super().event(event) if own is None else own
+        handled = _undo_in_field(self.lineEdit(), event)
+        return super().event(event) if handled is None else handled
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if self.fault and event.key() == Qt.Key.Key_Escape:

@@ -124,12 +124,12 @@ def redraw_icons(window: QWidget) -> None:
 @lru_cache(maxsize=256)
 def _drawn(name: str, color: str) -> QIcon:
     svg = _SVG.format(c=color, w=1.8, body=STROKES[name].format(c=color))
-    found = QIcon()
+    icon = QIcon()
     for size in (20, 40):
         pixmap = _pixmap(svg, size)
-        found.addPixmap(pixmap)
-        found.addPixmap(_faded(pixmap), QIcon.Mode.Disabled)
-    return found
+        icon.addPixmap(pixmap)
+        icon.addPixmap(_faded(pixmap), QIcon.Mode.Disabled)
+    return icon
 
 
 @lru_cache(maxsize=16)
@@ -149,7 +149,7 @@ def role_icon(role: Role) -> QIcon:
 def logo() -> QIcon:
     """Return the icon of the program, the one that is installed with its desktop file."""
     svg = (files("slideviz.gui") / "desktop" / "slideviz.svg").read_text(encoding="utf-8")
-    found = QIcon()
+    icon = QIcon()
     for size in (16, 32, 64, 128):
-        found.addPixmap(_pixmap(svg, size))
-    return found
+        icon.addPixmap(_pixmap(svg, size))
+    return icon

@@ -61,13 +61,13 @@ def _title(field: QWidget, panel: QWidget) -> str:
 
     The own name is left out if the row's numbers are only invalid together.
     """
-    own = field.accessibleName() if getattr(field, "problem", "") else ""
+    name = field.accessibleName() if getattr(field, "problem", "") else ""
     part: QWidget | None = field
     while part is not None and part is not panel:
         for form in panel.findChildren(QFormLayout):
             label = form.labelForField(part)
             if isinstance(label, QLabel):
-                return f"{label.text()} {own}".rstrip()
+                return f"{label.text()} {name}".rstrip()
         part = part.parentWidget()
     return field.accessibleName() or field.objectName()
 

@@ -42,16 +42,16 @@ class Ruler(QWidget):
         length = self.height() if self.upright else self.width()
         room, least = (34, 15) if self.upright else (70, 50)
         most = max(length // room, 2)
-        found = nice_ticks(self.low, self.high, most)
+        ticks = nice_ticks(self.low, self.high, most)
         for more in range(most + 1, most + 6):
             # One tick does not show the scale: try closer ones, if their numbers do not touch.
-            if len(found) > 1:
+            if len(ticks) > 1:
                 break
             closer = nice_ticks(self.low, self.high, more)
             apart = closer[1] - closer[0] if len(closer) > 1 else 0.0
             if apart * length >= least * (self.high - self.low):
-                found = closer
-        return found
+                ticks = closer
+        return ticks
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
