@@ -1,4 +1,4 @@
-"""The mesh that info, quality and section look at: in memory, or with ``--stream`` in its file."""
+"""The mesh of info, quality and section: in memory, or with ``--stream`` in its file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class OpenMesh:
-    """A mesh that a command looks at, and the undeformed one if there is a reference."""
+    """A mesh that a command reads, and the undeformed one if there is a reference."""
 
     source: MeshSource
     reference: Path | None
@@ -33,7 +33,7 @@ class OpenMesh:
     """Closes files, and removes temporary ones."""
 
     def quality(self, arguments: argparse.Namespace, counts: CellCounts | None = None) -> Quality:
-        """Return the quality of all cells, and add these to ``counts``."""
+        """Return the quality of all cells; ``counts`` counts them, too."""
         from slideviz.streaming.quality import measure_mesh
 
         folder = Path(tempfile.gettempdir())
@@ -76,32 +76,33 @@ def open_mesh(arguments: argparse.Namespace, case: Case | None = None) -> Iterat
     with ExitStack() as stack:
         with progress_of(arguments, "read") as tick:
 
-            def opened(
+            def open_one(
                 path: Path, zone: int | None, kind: FileFormat | None = None
             ) -> Mesh | StreamInput:
                 if not arguments.stream:
                     return read(path, zone=zone, file_format=kind)
                 return stack.enter_context(open_read_only(path, zone, tick, folder, kind))
 
-            mesh = opened(arguments.mesh, arguments.zone)
-            skin = _in_memory(mesh, tick)
+            mesh = open_one(arguments.mesh, arguments.zone)
+            skin = _mesh_of(mesh, tick)
             base = None
             if reference is not None:
-                base = opened(reference, arguments.zone)
+                base = open_one(reference, arguments.zone)
                 if arguments.stream and not _same_cells(mesh, base):
                     raise MeshError(
                         f"{reference} cannot be the reference of {skin.name}: it must have the "
                         "same cells; give the undeformed mesh"
                     )
             elif case is not None and case.mesh_file is not None and case.mesh_file.is_file():
-                base = opened(case.mesh_file, arguments.zone or case.zone, case.mesh_format)
+                base = open_one(case.mesh_file, arguments.zone or case.zone, case.mesh_format)
                 base = base if _same_cells(mesh, base) else None
                 reference = None if base is None else case.mesh_file
         source = _source(stack, mesh, base, skin)
-        yield OpenMesh(source, reference, lambda: None if base is None else _in_memory(base), stack)
+        yield OpenMesh(source, reference, lambda: None if base is None else _mesh_of(base), stack)
 
 
-def _in_memory(mesh: Mesh | StreamInput, tick: Callable[[float], object] = lambda _: None) -> Mesh:
+def _mesh_of(mesh: Mesh | StreamInput, tick: Callable[[float], object] = lambda _: None) -> Mesh:
+    """Return a mesh in memory or, of one in its file, its boundary and the cells at it."""
     from slideviz.mesh.model import Mesh
 
     return mesh if isinstance(mesh, Mesh) else mesh.skin(tick)

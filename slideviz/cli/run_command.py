@@ -102,8 +102,8 @@ def _run(arguments: argparse.Namespace) -> int:
     _require_output_paths(arguments, case, output, qualities)
     streamed = is_to_be_streamed(arguments, case, output, kind)
     about = _about(case) if streamed else ""
-    made = [path for path in (output, qualities) if path]
-    if arguments.resume and (known := finished(about, made)):
+    results = [path for path in (output, qualities) if path]
+    if arguments.resume and (known := finished(about, results)):
         arguments.begun(REPLACED)
         if not arguments.quiet:
             why = "the run of this case, mesh and version is finished; there is nothing to do"
@@ -140,7 +140,7 @@ def _run(arguments: argparse.Namespace) -> int:
     )
     advice = advice_for(case, done.steps[-1].layers, None if streamed else done.mesh, found)
     if streamed:
-        note_finished(about, made, report, folded, advice)
+        note_finished(about, results, report, folded, advice)
     files = {"mesh": output, CELLS: qualities}
     return report_outcome(arguments, report, files, found, before, folded, advice=advice)
 

@@ -199,10 +199,10 @@ def _print_run(
 
 
 def _trial_words(trial: Mapping[str, Any]) -> str:
-    """Return what a number of steps gave, as ``2 (minimum 0.51)``."""
-    made = f", halved to {trial['steps']}" if trial["steps"] != trial["planned"] else ""
-    gave = f"{trial['inverted']} inverted" if trial["inverted"] else f"minimum {trial['min']:.3g}"
-    return f"{trial['planned']} ({gave}{made})"
+    """Return the outcome of a number of steps, as ``2 (minimum 0.51)``."""
+    halved = f", halved to {trial['steps']}" if trial["steps"] != trial["planned"] else ""
+    result = f"{trial['inverted']} inverted" if trial["inverted"] else f"minimum {trial['min']:.3g}"
+    return f"{trial['planned']} ({result}{halved})"
 
 
 def advice_for(

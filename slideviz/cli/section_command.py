@@ -165,12 +165,12 @@ def _scene(arguments: argparse.Namespace, case: Case | None) -> _Scene:
                 f"{mesh.name} is 2D, where all cells are shown around the cut; leave out --stream"
             )
         chosen, matrices = _section_and_passages(arguments, mesh, opened.read_base, case)
-        ways = [matrix for matrix in matrices.values() if not keeps(chosen, matrix)]
-        if len(ways) < len(matrices):
-            ways.append(np.eye(4))
+        moves = [matrix for matrix in matrices.values() if not keeps(chosen, matrix)]
+        if len(moves) < len(matrices):
+            moves.append(np.eye(4))
         with progress_of(arguments, "quality") as tick:
             blocks = quality_blocks(opened.source, arguments.metric, tick)
-            near = join_blocks(blocks) if mesh.dim == 2 else cut_cells(blocks, chosen, ways)
+            near = join_blocks(blocks) if mesh.dim == 2 else cut_cells(blocks, chosen, moves)
     near = near.part_of(mesh)
     assert near.quality is not None
     outer = mesh.points if mesh.part is not None else mesh.points[mesh.cells.nodes]
@@ -252,12 +252,12 @@ def _section_and_passages(
 
 def _as_json(chosen: Section) -> dict[str, Any]:
     size = chosen.shape.terms.size
-    own = {} if size is None else {size.field: chosen.size}
+    sizes = {} if size is None else {size.field: chosen.size}
     return {
         "kind": chosen.kind,
         "origin": list(chosen.origin),
         "direction": list(chosen.direction),
         "radius": None,
-        **own,
+        **sizes,
         "whole": chosen.whole_cells,
     }

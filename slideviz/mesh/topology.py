@@ -163,8 +163,8 @@ def _canonical_triangles(table: IntArray) -> IntArray:
     out = table.copy()
     for column in (0, 1):
         twice = out[:, column] == out[:, column + 1]
-        rest = np.delete(out[twice], column, axis=1)
-        out[twice] = np.hstack([rest, rest[:, -1:]])
+        others = np.delete(out[twice], column, axis=1)
+        out[twice] = np.hstack([others, others[:, -1:]])
     return out
 
 

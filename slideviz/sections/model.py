@@ -42,7 +42,7 @@ class Section:
     kind: str
     """Its shape: a key of `SHAPES`."""
     origin: Triple = (0.0, 0.0, 0.0)
-    """(3,) tuple of float: A point of the plane or of the cylinder's axis, or the apex of the cone,
+    """(3,) tuple of float: a point of the plane or of the cylinder's axis, or the apex of the cone,
     in the mesh's length unit."""
     direction: Triple = (0.0, 0.0, 1.0)
     """(3,) tuple of float: the plane's normal, or the direction of the axis; any length but
@@ -81,8 +81,8 @@ class Section:
     @classmethod
     def of(cls, kind: str, origin: Triple, direction: Triple, size: float) -> Section:
         """Return the section of the shape ``kind`` with these numbers; a plane ignores ``size``."""
-        row = SHAPES[kind].terms.size
-        sizes: dict[str, Any] = {} if row is None else {row.field: size}
+        size_term = SHAPES[kind].terms.size
+        sizes: dict[str, Any] = {} if size_term is None else {size_term.field: size}
         return cls(kind, origin, direction, **sizes)
 
     @property

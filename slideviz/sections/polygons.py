@@ -64,7 +64,7 @@ class Polygons:
     """Polygons, or lines where the mesh is 2D, each with the cell it belongs to."""
 
     points: FloatArray
-    """(p, 3)."""
+    """(p, 3): the corners of all polygons."""
     offsets: IntArray
     """(q + 1,): polygon ``i`` has the corners ``connectivity[offsets[i]:offsets[i + 1]]``."""
     connectivity: IntArray

@@ -53,7 +53,7 @@ class WorstCells:
     values: FloatArray
     """(k,): their measure; 0 for an inverted cell."""
     inverted: np.ndarray
-    """(k,)."""
+    """(k,): whether each is inverted."""
     positions: FloatArray
     """(k, d): the means of their nodes, in the mesh's length unit."""
     steps: IntArray
@@ -112,13 +112,13 @@ def _listed(frame: StepFrame, extra: StepFrame, at: int, count: int) -> WorstCel
     assert extra.base is not None
     assert frame.mesh.part is not None
     cells = np.arange(min(count, len(extra.mesh.cells)))
-    numbers, own = extra.mesh.part.cells[cells], frame.mesh.part.cells
-    at_own = np.minimum(np.searchsorted(own, numbers), len(own) - 1)
-    drawn = own[at_own] == numbers  # those at the boundary are drawn as parts of it
+    numbers, in_memory = extra.mesh.part.cells[cells], frame.mesh.part.cells
+    place = np.minimum(np.searchsorted(in_memory, numbers), len(in_memory) - 1)
+    drawn = in_memory[place] == numbers  # those at the boundary are drawn as parts of it
     before = quality(extra.base, metric=extra.quality.metric).values[cells]
     values = extra.quality.values[cells]
     return WorstCells(
-        np.where(drawn, at_own, len(frame.mesh.cells) + cells),
+        np.where(drawn, place, len(frame.mesh.cells) + cells),
         values,
         extra.quality.status[cells] == INVERTED,
         cell_centers(extra.mesh, cells),

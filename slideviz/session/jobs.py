@@ -167,8 +167,8 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
         folded = None if found else folding_message(*asked)
     except SlidevizError as error:
         return _first_line(error, files), ""
-    said = with_field_labels(found[0].upper() + found[1:] + ".") if found else ""
-    return said, (f"{folded}." if folded else "")
+    message = with_field_labels(found[0].upper() + found[1:] + ".") if found else ""
+    return message, (f"{folded}." if folded else "")
 
 
 def _first_line(error: SlidevizError, files: list[Path]) -> str:
@@ -449,8 +449,8 @@ def open_sample(
     report(JobProgress(f"Making the sample {name}"))
     with suppress(OSError):  # writing says why
         private_folder(folder)
-    own = folder / (name if size is None else f"{name}-{size}")
-    written = write_sample(name, own, size or SIZES.get(name), overwrite=True)
+    place = folder / (name if size is None else f"{name}-{size}")
+    written = write_sample(name, place, size or SIZES.get(name), overwrite=True)
     raise_if_cancelled(stopped)
     case = next(path for path in written if path.suffix == ".cfg")
     return open_file(case, None, report, stopped)

@@ -71,9 +71,9 @@ class Output:
         about = f"{about} {is_text} {parts(n_points)[0]}"
         if is_text:
             require_no_input(output, MeshError, replaces)
-            made = partial_file(output, mesh_input.path.stat().st_size, about, resume=resume)
+            partial = partial_file(output, mesh_input.path.stat().st_size, about, resume=resume)
         else:
-            made = partial_copy(
+            partial = partial_copy(
                 output,
                 mesh_input.path,
                 about,
@@ -82,7 +82,7 @@ class Output:
                 replaces=replaces,
                 ranks=ranks,
             )
-        self._partial = stack.enter_context(made)
+        self._partial = stack.enter_context(partial)
         self._is_ready = self._is_oriented = False
         self._collector: RunCollector | None = None
 
@@ -110,7 +110,7 @@ class Output:
                 tick((k + 1) / len(done))
 
     def resume_message(self) -> str:
-        """Return a sentence on how much a stopped run has left to go on with."""
+        """Return a sentence on how much of a stopped run can be used."""
         done, total = self._opened().done, len(parts(self.source.n_points))
         if done:
             return f"{self._path.name}: continues after {done} of {total} parts"

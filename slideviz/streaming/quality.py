@@ -84,7 +84,7 @@ def quality_blocks(
 ) -> Iterator[CellBlock]:
     """Yield all cells of a mesh with their quality, in the order of the file.
 
-    With ``may_fold``, cells numbered in both directions are not looked at.
+    With ``may_fold``, it is not checked whether cells numbered in both directions are folded.
 
     Raises
     ------
@@ -93,19 +93,19 @@ def quality_blocks(
     """
     signs = np.zeros(0, np.int8)
     for block in source.blocks(tick):
-        found = quality(block.mesh, block.base, metric)
+        measured = quality(block.mesh, block.base, metric)
         if isinstance(source, FileSource) and not may_fold:
-            known, signs = len(signs), orientations_of(np.concatenate([signs, found.signs]))
-            if known < 2 == len(signs):
-                also = "compare a deformed mesh with --reference UNDEFORMED, " * (
+            before, signs = len(signs), orientations_of(np.concatenate([signs, measured.signs]))
+            if before < 2 == len(signs):
+                remedy = "compare a deformed mesh with --reference UNDEFORMED, " * (
                     source.base is None
                 )
                 parts = [
                     (k, min(k + CELLS, source.n_cells)) for k in range(0, source.n_cells, CELLS)
                 ]
                 with SERIAL.sharing(facet_sums, *source.zone) as do:
-                    require_consistent_orientation(do(parts), source.file.name, also)
-        yield replace(block, quality=found)
+                    require_consistent_orientation(do(parts), source.file.name, remedy)
+        yield replace(block, quality=measured)
 
 
 class CellCounts:
@@ -194,7 +194,7 @@ class MeasuredBlock:
     """The quality of a block of cells, undeformed and deformed, without its meshes."""
 
     ids: Index
-    """(k,) int64 or slice: the numbers of the cells."""
+    """(k,) int64 or slice: the numbers of the cells in the whole mesh."""
     values: FloatArray
     before: FloatArray
     """`values`, `before` (k,): quality of the deformed and of the undeformed cells."""
@@ -208,7 +208,7 @@ class MeasuredBlock:
     """dict of int to (int, (n,) int64): VTK type and nodes of inverted cells, by their number:
     those with the lowest numbers."""
     farthest: Farthest
-    """The node that went farthest."""
+    """The node with the largest displacement."""
 
     @classmethod
     def of(cls, block: CellBlock, metric: Metric, listed: int) -> MeasuredBlock:
@@ -243,7 +243,7 @@ class RunCollector:
         self.inverted: dict[int, tuple[int, IntArray]] = {}
         """VTK type and nodes of inverted cells, by their number: those with the lowest numbers."""
         self.farthest = Farthest(-1.0, 0, np.empty(0))
-        """The node that went farthest."""
+        """The node with the largest displacement."""
 
     def add(self, found: MeasuredBlock, listed: int) -> None:
         """Add a block; the ``listed`` inverted cells with the lowest numbers so far are kept."""
@@ -281,28 +281,28 @@ def facet_sums(path: Path, zone: int | None) -> Iterator[Callable[[tuple[int, in
         yield add
 
 
-def require_consistent_orientation(found: Iterable[int], name: str, also: str = "") -> None:
+def require_consistent_orientation(sums: Iterable[int], name: str, remedy: str = "") -> None:
     """Raise where the sums of the hashes of all parts of the cells do not add up to 0.
 
     Parameters
     ----------
-    found : iterable of int
+    sums : iterable of int
         The sum of each part, of `facet_sums`.
     name : str
         The mesh, for the message.
-    also : str
+    remedy : str
         One more remedy for the message.
 
     Raises
     ------
     MeshError
-        They do not: some cell is folded, or a part of the boundary is in no marker.
+        The sum is not 0: some cell is folded, or a part of the boundary is in no marker.
     """
-    if sum(found) % 2**64:
+    if sum(sums) % 2**64:
         raise MeshError(
             f"{name}: some cells are numbered the other way round than others, and others are "
             "folded, or a part of the boundary is in no marker, which only the whole mesh can "
-            f"tell; {also}run it without --stream, or mesh again"
+            f"tell; {remedy}run it without --stream, or mesh again"
         )
 
 

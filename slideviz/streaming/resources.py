@@ -39,8 +39,8 @@ def missing_memory(case: Case) -> str:
     kind = format_of(path, case.mesh_format).value
     if kind is None:
         return ""
-    said = missing_memory_of(path, kind)
-    return "" if said and kind == "su2" and find_text(path, case.zone).zone.sends else said
+    message = missing_memory_of(path, kind)
+    return "" if message and kind == "su2" and find_text(path, case.zone).zone.sends else message
 
 
 def missing_memory_of(path: Path, kind: FileFormat) -> str:

@@ -52,8 +52,8 @@ its own pace. Before stages worth so many seconds of `SECONDS` are done, nothing
 class RemainingTime:
     """The stages of a streamed run: passes each `Progress` on, with the seconds that are left.
 
-    All stages but ``solve`` go through all points or cells. So the time that those took which are
-    done, over their `SECONDS`, is the pace of the others. ``solve`` depends on the boundary alone.
+    All stages but ``solve`` pass over all points or cells. Their pace is the time that the finished
+    ones took over their `SECONDS`. ``solve`` depends on the boundary alone.
 
     Parameters
     ----------
@@ -96,10 +96,10 @@ class RemainingTime:
         if usual < SURE:
             return None
         pace = spent / usual
-        own = max(pace * SECONDS[stage] - now, 0.0)
+        this_stage = max(pace * SECONDS[stage] - now, 0.0)
         if self._part >= SURE:
-            own = now * (1.0 - self._part) / self._part
-        return own + pace * sum(SECONDS[later] for later in self._left_stages[1:])
+            this_stage = now * (1.0 - self._part) / self._part
+        return this_stage + pace * sum(SECONDS[later] for later in self._left_stages[1:])
 
 
 ReportProgress = Callable[[Progress], None]

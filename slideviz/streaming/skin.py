@@ -51,8 +51,8 @@ def skin_of_text(text: Text, path: Path, tick: Tick, ranks: SerialPool = SERIAL)
     skin = replace(
         skin,
         markers=tuple(
-            replace(marker, name=given.name)
-            for marker, given in zip(skin.markers, zone.markers, strict=True)
+            replace(marker, name=original.name)
+            for marker, original in zip(skin.markers, zone.markers, strict=True)
         ),
     )
     others = text_boundaries_elsewhere(text.lines, text.sections, zone, tick)
@@ -78,10 +78,10 @@ def naming_text(text: Text, path: Path) -> Iterator[None]:
     try:
         yield
     except MeshError as problem:
-        said = str(problem).replace(printable(path), text.lines.name)
-        if said == str(problem):
+        message = str(problem).replace(printable(path), text.lines.name)
+        if message == str(problem):
             raise
-        raise MeshError(said) from problem
+        raise MeshError(message) from problem
 
 
 Index = slice | IntArray

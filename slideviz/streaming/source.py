@@ -1,7 +1,7 @@
 """The cells of a mesh with their points, block by block: of a mesh in memory, or of one in a file.
 
-A mesh in memory is one block. What is told of all cells (their quality, those that a section cuts)
-is found by the blocks, whichever source they come from.
+A mesh in memory is one block. The quality of the cells and the cells that a section cuts are found
+block by block, by the same functions for both sources.
 """
 
 from __future__ import annotations
@@ -132,9 +132,9 @@ def cut_cells(
     CellBlock
         The cells with nodes on both sides of the section, or on it; perhaps none.
     """
-    ways = list(matrices)
+    transformations = list(matrices)
     return join_blocks(
-        block.take(np.flatnonzero(crossed_cells(block.mesh, section, ways, near)))
+        block.take(np.flatnonzero(crossed_cells(block.mesh, section, transformations, near)))
         for block in blocks
     )
 
@@ -144,7 +144,7 @@ class MeshSource(Protocol):
 
     @property
     def mesh(self) -> Mesh:
-        """Return what of the mesh is in memory: all of it, or its boundary and the cells at it."""
+        """Return the part of the mesh in memory: all of it, or its boundary and the cells at it."""
 
     @property
     def n_cells(self) -> int:
@@ -324,13 +324,13 @@ class FileSource:
         found = [self.elements_at(int(cell), 1) for cell in ids]
         if any(int(one.ids[0]) != cell for one, cell in zip(found, ids, strict=True)):
             # Cells are not in order in the file: read all of it.
-            kept: dict[int, ElementBlock] = {}
+            by_id: dict[int, ElementBlock] = {}
             for block in element_blocks(self.file, place, place.cells, place.dim):
                 ends = np.concatenate([[0], np.cumsum(SIZES[block.types])])
                 for k in np.flatnonzero(np.isin(block.ids, ids)).tolist():
                     nodes = block.nodes[ends[k] : ends[k + 1]].copy()
-                    kept[int(block.ids[k])] = ElementBlock(0, block.types[k : k + 1], nodes, ids)
-            found = [kept[int(cell)] for cell in ids]
+                    by_id[int(block.ids[k])] = ElementBlock(0, block.types[k : k + 1], nodes, ids)
+            found = [by_id[int(cell)] for cell in ids]
         types = np.concatenate([one.types for one in found])
         return ElementBlock(0, types, np.concatenate([one.nodes for one in found]), ids)
 

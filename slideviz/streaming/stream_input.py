@@ -123,7 +123,7 @@ def open_read_only(
     folder: Path,
     file_format: FileFormat | None = None,
 ) -> Iterator[StreamInput]:
-    """Context with a mesh that is only looked at; the binary copy of a text is in ``folder``.
+    """Context with a mesh that is only read; the binary copy of a text is in ``folder``.
 
     The copy is removed at the end.
 
@@ -136,21 +136,21 @@ def open_read_only(
         yield StreamInput(path, zone)
         return
     layout = binary_layout(_streamable(path, zone, tick), is_result=False)
-    with draft(folder) as ours:
+    with draft(folder) as copy:
         try:
-            open_temporary(ours, new=True).close()
-            require_disk_space(ours, path, layout.size)
-            os.truncate(ours, layout.size)
-            head = write_layout(layout, ours, progress_share(tick, SCANNED, COPIED))
-            with open_temporary(ours) as file:
+            open_temporary(copy, new=True).close()
+            require_disk_space(copy, path, layout.size)
+            os.truncate(copy, layout.size)
+            head = write_layout(layout, copy, progress_share(tick, SCANNED, COPIED))
+            with open_temporary(copy) as file:
                 file.write(head)
         except OSError as problem:
             raise MeshError(
                 f"{path}: its binary copy cannot be written in {folder}: {reason_of(problem)} "
                 "(TMPDIR names another folder)"
             ) from problem
-        with naming_text(layout.text, ours):
-            yield StreamInput(ours, None, layout.text)
+        with naming_text(layout.text, copy):
+            yield StreamInput(copy, None, layout.text)
 
 
 @contextmanager

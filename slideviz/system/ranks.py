@@ -188,7 +188,7 @@ class Ranks(SerialPool):
         Raises the error of a task in its place.
         """
         idle = list(range(1, self.size))
-        own: Future[None] | None = None
+        local: Future[None] | None = None
         found: dict[int, tuple[Any, BaseException | None]] = {}
         begun = done = 0
 
@@ -199,17 +199,17 @@ class Ranks(SerialPool):
                 found[index] = None, problem
 
         while done < len(tasks):
-            while begun < min(len(tasks), done + AHEAD * self.size) and (idle or own is None):
-                if own is None:
-                    own = pool.submit(do, begun)
+            while begun < min(len(tasks), done + AHEAD * self.size) and (idle or local is None):
+                if local is None:
+                    local = pool.submit(do, begun)
                 else:
                     rank = idle.pop()
                     self._owing.add(rank)
                     self.comm.send((begun, tasks[begun]), rank)
                 begun += 1
-            rank, answer = self._received(0.001, own)
-            if own is not None and own.done():
-                own = None
+            rank, answer = self._received(0.001, local)
+            if local is not None and local.done():
+                local = None
             if answer is not None:
                 idle.append(rank)
                 found[answer[0]] = answer[1:]
@@ -243,10 +243,10 @@ class Ranks(SerialPool):
     def _broadcast(self, content: bytes) -> bytearray:
         """Return on all ranks the ``content`` of rank 0; the others call it with empty content."""
         size = self.comm.bcast(len(content))
-        whole = bytearray(content) if content else bytearray(size)
+        message = bytearray(content) if content else bytearray(size)
         for at in range(0, size, PIECE):
-            self.comm.Bcast(memoryview(whole)[at : at + PIECE])
-        return whole
+            self.comm.Bcast(memoryview(message)[at : at + PIECE])
+        return message
 
     def _portable(self, problem: Exception) -> Exception:
         """Return an error that can be pickled; if a file is missing, it names the rank."""

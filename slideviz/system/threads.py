@@ -59,10 +59,10 @@ def in_parts(
     """
     parts = iter([slice(first, min(first + PART, count)) for first in range(0, count, PART)])
 
-    def run_remaining(tell: Callable[[float], object]) -> None:
+    def run_remaining(report: Callable[[float], object]) -> None:
         try:
             for part in parts:
-                tell(part.start / count)
+                report(part.start / count)
                 work(part)
         except BaseException:
             for _ in parts:  # no thread finds another
@@ -98,7 +98,7 @@ def submit_ahead(
 ) -> Iterator[Result]:
     """Yield the results of tasks in order, at most two tasks for each of the pool's threads ahead.
 
-    So results that nobody took yet do not fill the memory.
+    Thus results that are not yet used do not fill the memory.
     """
     waiting: deque[Future[Result]] = deque()
     try:
