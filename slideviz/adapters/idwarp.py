@@ -374,7 +374,7 @@ class USMesh:
     # Between the orders of numbers ---------------------------------------------------------
 
     def _followed(self, coordinates: FloatArray) -> FloatArray:
-        """Return coordinates (N, d) with nodes that are not moving ones where the grid has them."""
+        """Return coordinates (N, d), with those of nodes that are no moving nodes from the grid."""
         return np.where(self._surface.held, self._points[self._surface.nodes], coordinates)
 
     def _shaped(self, values: ArrayLike) -> FloatArray:

@@ -61,7 +61,7 @@ class Kind:
             return str(problem)
         return ""
 
-    def called(self, text: str) -> str:
+    def value_label(self, text: str) -> str:
         """Return the window's word for a value written as text; the text itself if it has none."""
         try:
             return self.words.get(self.read(text), text)

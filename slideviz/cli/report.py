@@ -182,9 +182,9 @@ def print_remarks(remarks: Iterable[str], *, quiet: bool) -> None:
 
 
 def save_json(path: Path | None, report: Mapping[str, Any]) -> bool:
-    """Write a report to a file, or print it where ``path`` is ``-``; return if it was printed.
+    """Write a report to a file, or print it if ``path`` is ``-``; return whether it was printed.
 
-    Neither where ``path`` is None.
+    If ``path`` is None, do nothing.
     """
     if path is None:
         return False

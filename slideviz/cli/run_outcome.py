@@ -116,7 +116,7 @@ def report_outcome(
 
 
 def save_report(arguments: argparse.Namespace, report: dict) -> bool:
-    """Write report and convergence where asked for; return whether the report was printed."""
+    """Write the report and the convergence on request; return whether the report was printed."""
     from slideviz.cli.report import save_history, save_json
 
     if arguments.history:
@@ -227,7 +227,7 @@ def advice_for(
 
 
 def _inverted_sentence(report: dict, folded: Folded, advice: str) -> str:
-    """Return a sentence on how many and which cells are inverted, and what may help."""
+    """Return a sentence with the number of inverted cells, the first of them, and remedies."""
     from slideviz.mesh.elements import ELEMENTS
 
     inverted, cells = report["quality"]["inverted"], report["quality"]["cells"]

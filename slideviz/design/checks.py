@@ -29,7 +29,7 @@ BADLY_CONDITIONED = 1e14
 
 
 def largest_condition(steps: Sequence[FrozenStep]) -> float:
-    """Return the largest condition number of the steps' systems at the reference; or 1.0."""
+    """Return the largest condition number of the steps' systems at the reference; 1.0 if none."""
     return max((step.condition for step in steps), default=1.0)
 
 

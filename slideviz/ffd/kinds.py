@@ -35,7 +35,7 @@ class Move(Protocol):
         """Return the derivative (I, J, K, 3) of the moved points with respect to the amount."""
 
     def pushed(self, points: FloatArray, amount: float, rates: FloatArray, /) -> FloatArray:
-        """Return the rates (I, J, K, 3) of the moved points for rates of the points."""
+        """Return the derivative (I, J, K, 3) of the moved points along ``rates`` of the points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ class Turn:
         return turned * self.length / (self.length**2 + amount**2)
 
     def pushed(self, _points: FloatArray, amount: float, rates: FloatArray) -> FloatArray:
-        """Return the rates (I, J, K, 3) of the moved points for rates of the points."""
+        """Return the derivative (I, J, K, 3) of the moved points along ``rates`` of the points."""
         return rates + self.turned(rates, amount)
 
     def turned(self, arm: FloatArray, amount: float) -> FloatArray:
@@ -147,7 +147,7 @@ class Twist:
         return turn.slope(points, amount) if turn else np.zeros_like(points)
 
     def pushed(self, points: FloatArray, amount: float, rates: FloatArray) -> FloatArray:
-        """Return the rates (I, J, K, 3) of the moved points for rates of the points."""
+        """Return the derivative (I, J, K, 3) of the moved points along ``rates`` of the points."""
         turn = self.turn(points)
         if turn is None:
             return rates

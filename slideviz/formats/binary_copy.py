@@ -95,7 +95,7 @@ class BinaryLayout:
 
     @property
     def markers(self) -> int:
-        """Return the first byte of the markers."""
+        """Return the offset of the first byte of the markers."""
         return self.points + self.text.n_points * self.point.itemsize
 
     @property

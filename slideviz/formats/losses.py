@@ -21,7 +21,7 @@ OTHER_ZONES = "its other zones"
 
 
 def left_out(path: Path, mesh: Mesh) -> str:
-    """Return a sentence on the parts of a mesh that a file of that name leaves out; "" if none."""
+    """Return a sentence on the parts of a mesh that the format of a file cannot hold, or ""."""
     row = format_for(path)
     has_quality = row.solver or row.quality
     lost = [*([] if has_quality else ["the quality of the cells"]), *lost_in(row, mesh)]

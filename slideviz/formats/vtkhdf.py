@@ -240,7 +240,7 @@ def _clean(name: str) -> str:
 
 
 def _free(name: str, taken: set[str]) -> str:
-    """Return the name, with a number added if it is taken or has a meaning in VTKHDF."""
+    """Return a unique name: with a number added if it is taken or reserved in VTKHDF."""
     number, free = 1, name
     while free in taken or free == "Assembly":
         number += 1

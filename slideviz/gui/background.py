@@ -51,7 +51,7 @@ class BackgroundJob(QObject):
 
 
 class IntersectionCheck(BackgroundJob):
-    """Keeps ``Session.intersection`` up to date by a job; a result stays until the next one."""
+    """Keeps ``Session.intersection`` up to date by a background job."""
 
     def __init__(self, store: Store, parent: QObject | None = None) -> None:
         super().__init__(store, parent, INTERSECTION_MS)

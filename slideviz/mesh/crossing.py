@@ -166,7 +166,7 @@ def pierced(points: FloatArray, a: FacetSimplices, b: FacetSimplices, margin: fl
 
 
 def self_crossing(points: FloatArray, cells: Cells) -> Hit | None:
-    """Return where an edge of a boundary goes through that boundary (point, both facets), or None.
+    """Return where a boundary intersects itself (point, both facets), or None.
 
     Facets that share a node are not compared.
 

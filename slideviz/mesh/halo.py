@@ -51,7 +51,7 @@ class Halo:
     mismatch: FloatArray
     """(h,): distance of each copy from where the motion of the halo puts its donor, undeformed."""
 
-    def follow(self, before: FloatArray, after: FloatArray, rows: IntArray) -> FloatArray:
+    def move_receivers(self, before: FloatArray, after: FloatArray, rows: IntArray) -> FloatArray:
         """Return ``after`` (n, d) with receivers displaced like their donors, and rotated.
 
         Parameters

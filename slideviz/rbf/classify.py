@@ -159,7 +159,7 @@ def _cosines(normals):  # type: ignore[no-untyped-def]
 def _continuations(alike, roles, nodes, smooth):  # type: ignore[no-untyped-def]
     """Return a mask (c, c): whether the surface of fan i continues in fan j of an image.
 
-    At each image at most in one fan: of the same role, and at the smallest angle.
+    At each image a surface continues in at most one fan, of the same role, at the smallest angle.
     """
     count = len(roles)
     goes_on = np.zeros((count, count), np.bool_)

@@ -320,7 +320,7 @@ class Residuals:
 
 @dataclass(frozen=True, eq=False)
 class DoubleFactor:
-    """The factor U of a system G = U^T U (n, n): its rounding ``upper``, and the rest ``low``."""
+    """The double-double factor U = ``upper`` + ``low`` (n, n) of a system G = U^T U."""
 
     upper: FloatArray
     low: FloatArray

@@ -86,7 +86,7 @@ class GreedyFit:
         rows = ConstraintRows(none, None, np.empty((0, d)))
         self._among = Candidates(rows, none, none, none, np.empty(0))
         self._level = GreedyLevel(problem, self._among, self.interpolant)
-        self._known = problem.beginning()
+        self._known = problem.initial_control_nodes()
         self._given, self._used = problem.stages[done:], list[int]()
         self._one_level = not self._settings.multilevel
 

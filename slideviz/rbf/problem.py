@@ -37,7 +37,7 @@ class PhaseTimer:
 
     @contextmanager
     def phase(self, name: str) -> Iterator[Tick]:
-        """Context that adds its seconds to phase ``name``; gives the callback for its progress."""
+        """Context that times the phase ``name``; it yields the callback for its progress."""
         start = perf_counter()
         self.report(name, 0.0)
         try:
@@ -167,7 +167,7 @@ class Problem:
             return np.zeros((len(nodes), self.dim))
         return self.before.carried.at(nodes)
 
-    def beginning(self) -> IntArray:
+    def initial_control_nodes(self) -> IntArray:
         """Return the control nodes (c,) with which the selection of this step begins.
 
         They are those of the previous step. The array is empty if the selection has several levels,
@@ -182,7 +182,7 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class CarriedError:
-    """The errors that the interpolants of all steps so far left at boundary nodes."""
+    """The errors that the interpolants of all previous steps left at boundary nodes."""
 
     nodes: IntArray
     """(b,): sorted, each once."""

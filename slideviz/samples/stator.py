@@ -50,7 +50,7 @@ HEIGHT, WIDTH = 6e-4, (3e-3, 9e-3)
 
 
 def reshaped(points: FloatArray, radii: tuple[float, float], stack_z: float) -> FloatArray:
-    """Return the displacement (k, 3) of blade nodes, which keeps their distance from the axis.
+    """Return displacements (k, 3) of blade nodes that keep their distance from the axis.
 
     Parameters
     ----------

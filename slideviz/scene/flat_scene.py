@@ -120,9 +120,9 @@ class FlatScene:
         self._shown.show(flat)
 
     def _ahead(self, section: Section, session: Session) -> float | None:
-        """Return the angle, in radians, that is put in the middle when unrolled (None for a plane).
+        """Return the angle in radians at the middle of the unrolled section; None for a plane.
 
-        It is that of the undeformed mesh, so that all views agree, and is cached.
+        It is that of the undeformed mesh, so that all views agree. It is cached.
         """
         key = (session.mesh, section.kind, section.origin, section.direction)
         if key != self._level[0]:

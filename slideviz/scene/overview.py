@@ -105,9 +105,10 @@ def lengths(mesh: Mesh, base: Mesh) -> FloatArray:
 
 
 def _inner_bodies(base: Mesh, length: FloatArray) -> list[IntArray]:
-    """Return the nodes of each boundary that is inside the mesh's box and moved.
+    """Return the nodes of each moved boundary inside the mesh's bounding box.
 
-    ``length`` (n,) is the displacement of each node; the least that counts is 5 % of the largest.
+    ``length`` (n,) is the displacement of each node. A boundary counts as moved from 5 % of the
+    largest displacement on.
     """
     least = 0.05 * float(length.max())
     bodies = [marker.nodes for marker in base.markers if len(marker.nodes)]

@@ -288,7 +288,7 @@ def cut_cases(vtk: int) -> IntArray:
 
 
 def _loops(row: ElementType, pattern: int) -> list[list[int]]:
-    """Return the polygons of one pattern, each a list of edges by number."""
+    """Return the polygons of one sign pattern, each a list of edge numbers."""
     edge_of = {frozenset(edge): index for index, edge in enumerate(row.edges)}
     sides = row.facets if row.dim == 3 else (tuple(range(row.n_nodes)),)
     joints = [joint for side in sides for joint in _joints(side, pattern, edge_of)]

@@ -23,7 +23,7 @@ _DIGITS = 4
 
 @dataclass(frozen=True, eq=False)
 class HandleParts:
-    """The handle of a section in a 2D mesh: what of it can be seen and dragged."""
+    """The visible parts of the handle of a section in a 2D mesh, which can be dragged."""
 
     middle: FloatArray
     """(m, 2): one point; none where it is out of view."""

@@ -105,7 +105,7 @@ class Line(InPlane):
         return np.asarray(origin[:2] + origin[2] * normal[2] / flat * normal[:2])
 
     def handle_parts(self, section: Section, parts: list[FloatArray], box: Box) -> HandleParts:
-        """Return the handle of a line: its ends, the point it turns about, and itself."""
+        """Return the handle of a line: its ends, the point about which it turns, and the line."""
         return HandleParts(self._pivot(section, box)[None], parts[0], parts)
 
     def dragged(

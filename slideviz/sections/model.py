@@ -119,7 +119,7 @@ class Section:
     def basis(self) -> FloatArray:
         """Return unit vectors as rows (3, 3), right-handed, the third along the normal or axis.
 
-        Where the shape's direction has no sign (a cylinder), its largest component is positive.
+        If the shape's direction has no sign (a cylinder), its largest component is positive.
         """
         base = axis_basis(self.direction)
         if not self.shape.directed and base[2, np.argmax(np.abs(base[2]))] < 0:

@@ -25,7 +25,7 @@ _NEAR = 0.03
 def round_middle(values: FloatArray) -> float:
     """Return a round number near the middle of the nodes' ``values`` (n,), between their layers.
 
-    A section in a layer of nodes would cut the cells of one side or the other, by rounding.
+    If a section were in a layer of nodes, rounding would decide which cells it cuts.
     """
     low, high = float(values.min()), float(values.max())
     middle, span = (low + high) / 2.0, high - low
@@ -149,7 +149,7 @@ class Shape(Protocol):
         """Return the section in few words."""
 
     def miss(self, section: Section, points: FloatArray) -> str:
-        """Return a sentence that the section misses points (n, d), and where it would cut them."""
+        """Return the message that a section does not cut points (n, d), with positions that do."""
 
     # Laid flat, and looked at ----------------------------------------------------------
 

@@ -457,7 +457,7 @@ def rename_run(session: Session, number: int, name: str) -> Session:
 
 @undoable("settings of a run")
 def adopt_settings(session: Session, number: int) -> Session:
-    """Return the session with the case of a run as its own, and no guesses."""
+    """Return the session with the settings of a run, and without guessed roles."""
     run = session.run(number)
     if run is None:
         return session

@@ -32,7 +32,7 @@ class TypedNodes:
         return tuple(kind for place, kind in enumerate(NODE_TYPES) if place in there)
 
     def only(self, nodes: IntArray) -> TypedNodes:
-        """Return those of the typed nodes that are among ``nodes``."""
+        """Return the typed nodes that are also in ``nodes``."""
         keep = np.isin(self.nodes, nodes)
         return TypedNodes(self.nodes[keep], self.kinds[keep])
 

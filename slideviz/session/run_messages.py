@@ -254,7 +254,7 @@ def idle_text(case: Case) -> tuple[str, ...]:
 def with_field_labels(text: str) -> str:
     """Return a message with keys of the case file replaced by their labels in the window."""
     kernel = KEYS["RBF_KERNEL"].kind
-    return _KERNEL.sub(lambda found: kernel.called(found[0]), _KEY.sub(_words, text))
+    return _KERNEL.sub(lambda found: kernel.value_label(found[0]), _KEY.sub(_words, text))
 
 
 def _words(found: re.Match[str]) -> str:
@@ -262,6 +262,6 @@ def _words(found: re.Match[str]) -> str:
     label = key.label.removesuffix(" ×")  # which a message would have beside the × that closes it
     if first is None:
         return label
-    other = "" if second is None else key.kind.called(second)
+    other = "" if second is None else key.kind.value_label(second)
     more = "" if not link else f"{link}{second}" if other == second else f"{link}“{other}”"
-    return f"{label} “{key.kind.called(first)}”{more}"
+    return f"{label} “{key.kind.value_label(first)}”{more}"

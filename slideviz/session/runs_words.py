@@ -89,7 +89,7 @@ def _setting_words(key: Key, case: Case) -> str:
         return ""
     if key.field == "reduction":
         return reduction_words(case)
-    text = key.kind.called(key.kind.write(value)).partition(" (")[0]  # "Gaussian (global)"
+    text = key.kind.value_label(key.kind.write(value)).partition(" (")[0]  # "Gaussian (global)"
     if key.kind.entry in ("axis", "point"):
         text = f"({', '.join(map(_number_words, value))})"
     elif key.kind.entry == "real":
@@ -99,7 +99,7 @@ def _setting_words(key: Key, case: Case) -> str:
 
 
 def _roles_words(case: Case, others: Sequence[Case]) -> str:
-    """Return a case's roles in words, of the boundaries whose role differs among ``others``."""
+    """Return in words the roles of the boundaries whose role differs in ``others``."""
     names = dict.fromkeys(name for other in others for name in other.roles)
     differ = [n for n in names if len({one.roles.get(n, "fixed") for one in others}) > 1]
     return ", ".join(f"{name} {case.roles.get(name, 'fixed')}" for name in differ)

@@ -235,7 +235,7 @@ class Store:
         return self._step(self._undo, self._redo)
 
     def redo(self) -> bool:
-        """Make the last change that was undone again, if none was made since; return as `undo`."""
+        """Repeat the last undone change, unless another one was made since; return as `undo`."""
         return self._step(self._redo, self._undo)
 
     def _step(self, source: list[UndoEntry], target: list[UndoEntry]) -> bool:

@@ -199,9 +199,10 @@ def require_memory(setup: Setup, case: Case, *, lasting: bool = False) -> None:
 def _systems(setup: Setup, case: Case, *, lasting: bool) -> list[int]:
     """Return the number of unknowns of each dense system whose factors are in memory together.
 
-    At most: parts of the boundary that supports do not connect have systems of their own.
+    These are upper bounds: parts of the boundary that supports do not connect have separate
+    systems.
 
-    Direct sliding has one system for each axis where normals lie along axes. Where boundaries are
+    Direct sliding has one system for each axis if normals are along axes. Where boundaries are
     curved, it solves a further one, for all boundary nodes.
     """
     goal = setup.coords[setup.known] + setup.target

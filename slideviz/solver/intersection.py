@@ -131,9 +131,9 @@ def jump_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -
 
 
 def _arcs(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> list[FloatArray]:
-    """Return the points (n, d) at ``ARCS`` places on the way; none where it is straight.
+    """Return the points (n, d) at ``ARCS`` places of their path; none if it is straight.
 
-    It is an arc in a cylindrical frame, about its axis, and where motions of the case turn.
+    The path is an arc in a cylindrical frame, about its axis, and for motions that rotate.
     """
     frame, at = find_period(case, mesh, boundary_of(mesh))[1], mesh.points[nodes]
     parts = np.arange(1, ARCS + 1) / ARCS

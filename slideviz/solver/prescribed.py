@@ -78,8 +78,8 @@ def displaced(moved: Displacements, mesh: Mesh) -> Displacements:
 def image_tolerance(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> float:
     """Return the allowed difference of the displacements of images, over the largest displacement.
 
-    Formulas displace images alike, but for the mismatch of their places; displacements from files
-    or given as arrays may be rounded to few digits.
+    Formulas displace images alike, except for the mismatch of their positions. Displacements from
+    files or arrays may be rounded to few digits.
     """
     if any(isinstance(motion, FromFile | Prescribed) for motion in case.motions):
         return TOLERANCE

@@ -275,7 +275,7 @@ def problem_at(
 def displaced_coords(
     setup: Setup, coords: FloatArray, displacement: FloatArray, goal: FloatArray
 ) -> FloatArray:
-    """Return the coordinates (n, d) after a displacement, which they overwrite.
+    """Return the displaced coordinates (n, d), written over the displacement.
 
     Known nodes are exactly at their ``goal`` (a, d).
     """
@@ -327,7 +327,7 @@ def with_halo_copies(
 ) -> tuple[FloatArray, FloatArray]:
     """Return Cartesian ``points`` and coordinates ``moved`` (n, d), with halo copies moved, too."""
     rows = setup.copies
-    points, out = halo.follow(mesh.points, points, rows), moved.copy()
+    points, out = halo.move_receivers(mesh.points, points, rows), moved.copy()
     out[halo.receivers[rows]] = setup.frame.coords(points[halo.receivers[rows]])
     return points, out
 

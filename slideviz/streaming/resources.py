@@ -97,7 +97,7 @@ def bytes_of_text(layout: BinaryLayout, is_text: bool, later: int) -> int:
 
 
 def bytes_of_binary(path: Path, zone: int | None, *, is_text: bool, later: int) -> int:
-    """Return the most bytes on the disk at a time in the run of a binary mesh (`bytes_of_text`)."""
+    """Return the peak disk space in bytes of a run of a binary mesh; see `bytes_of_text`."""
     with open_zone(path, zone) as (source, place):
         result = text_size(place) if is_text else source.size
         points = place.n_points * source.point(place.dim).itemsize if is_text else 0

@@ -27,8 +27,8 @@ from numba.core.runtime import rtsys
 def _environment(module: str, constants: list, name: str) -> Environment:
     """Return the environment (globals and constants) of a compiled function, for unpickling it.
 
-    Numba's own `_rebuild_env`, which this replaces, imports the module of the function. For
-    Numba's modules, which take long, that is not done: loaded machine code does not use them.
+    It replaces Numba's `_rebuild_env`, which imports the module of the function. Modules of Numba
+    are not imported here: that takes long, and loaded machine code does not use them.
     """
     if module.partition(".")[0] != "numba" or module in sys.modules:
         return environment._rebuild_env(module, constants, name)

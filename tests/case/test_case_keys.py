@@ -340,7 +340,7 @@ def test_a_kind_says_why_a_text_is_no_value_and_what_the_window_calls_one():
         ("STEPS", "3", "3"),
         ("METHOD", "magic", "magic"),
     ):
-        assert KEYS[name].kind.called(text) == called
+        assert KEYS[name].kind.value_label(text) == called
 
 
 @pytest.mark.parametrize(

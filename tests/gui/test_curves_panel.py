@@ -39,7 +39,7 @@ def lines(panel):
 @pytest.mark.parametrize("kind", ["steps", "greedy", "span"])
 def test_without_a_mesh_it_says_what_to_do(panel, kind):
     choose(panel, kind)
-    assert panel.area.empty
+    assert panel.area.shows_text
     assert "Open a mesh first" in panel.area.words.text()
     assert not panel.save.isEnabled()
 
@@ -96,7 +96,7 @@ def test_convergence_of_the_shown_step_or_why_there_is_none(full, qtbot):
     frames = (run.frames[0], replace(run.frames[1], step=step))
     with qtbot.waitSignal(full.canvas.drawn):
         full.store.put(replace(session, runs=(session.runs[0], replace(run, frames=frames))))
-    assert not full.area.empty
+    assert not full.area.shows_text
     assert list(lines(full)["run 2, step 2"].get_xdata()) == [4, 8, 12, 16, 20]
     full.store.change(changes.show_frame, 0)
     assert "The undeformed mesh is shown" in full.area.words.text()
@@ -136,7 +136,7 @@ def test_a_coordinate_that_the_mesh_does_not_have_is_told_in_the_plot(full, qtbo
 
 def test_another_mesh_is_begun_with(full):
     full.store.put(Session())
-    assert full.area.empty
+    assert full.area.shows_text
     assert full.coordinate.count() > 0
 
 

@@ -49,13 +49,13 @@ def drag(panel, low, high, release=True):
 
 
 def test_without_a_mesh_it_says_what_to_do(panel):
-    assert panel.area.empty
+    assert panel.area.shows_text
     assert "Open a mesh first" in panel.area.words.text()
     assert not panel.save.isVisible()
 
 
 def test_it_shows_the_step_the_undeformed_mesh_and_other_runs(full, qtbot):
-    assert not full.area.empty
+    assert not full.area.shows_text
     assert sorted(labels(full)) == ["run 1", "run 2", "undeformed"]
     quality = full.store.session.frame.quality
     assert f"{quality.min:.4f}" in full.numbers.text()

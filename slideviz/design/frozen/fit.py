@@ -228,7 +228,7 @@ class FrozenFit:
             return factor if self._refined or not len(factor.dropped) else full_factor(system)
 
     def _extended(self, place: FloatArray, index: IntArray, level: int) -> Factor:
-        """Return the factor of rows without directions, extended from that of the stage before."""
+        """Extend the factor of the previous stage by the new rows, which have no directions."""
         before, factor = self._factors.get(level, (index[:0], NOTHING))
         if not np.array_equal(index[: len(before)], before):
             before, factor = index[:0], NOTHING

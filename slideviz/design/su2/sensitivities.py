@@ -289,7 +289,7 @@ def match(
 
 
 def _nearest(found: Sensitivities, points: FloatArray) -> tuple[float, np.ndarray]:
-    """Return the largest distance of the file's points from points, and the point of each row."""
+    """Return the largest distance to a nearest point, and that point for each row of the file."""
     assert found.points is not None
     if found.ordered:
         gap = np.abs(found.points - points)

@@ -49,7 +49,7 @@ def convex_part(
     attempt: Callable[[Su2Config], Attempt],
     deformed: Callable[[Attempt], Mesh],
 ) -> tuple[float, Attempt, Sequence[str]]:
-    """Return the part of the design that CONVEXITY_CHECK leaves, its deformation, and warnings.
+    """Reduce the design by CONVEXITY_CHECK; return its factor, the deformation, and warnings.
 
     Parameters
     ----------
@@ -296,7 +296,7 @@ class MovingSurface:
 
     @property
     def moves_whole_mesh(self) -> bool:
-        """Return whether all nodes of the mesh move as the variables say (``*_GRID``)."""
+        """Return whether the variables displace all nodes of the mesh directly (``*_GRID``)."""
         return self.config.variables[0].group == "grid"
 
     def moved(self) -> Mesh:

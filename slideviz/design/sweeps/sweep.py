@@ -41,10 +41,10 @@ def sweep(
     force: bool = False,
     going_on: Callable[[], object] = lambda: None,
 ) -> Iterator[DesignRow]:
-    """Return an iterator over the results of designs, each as it comes.
+    """Return an iterator over the results of designs, in the order in which they finish.
 
-    Each design is deformed as by ``slideviz run`` with its values: with the same bits where that
-    has one thread, else but for the rounding of a large system that several threads solve.
+    Each design is deformed as by ``slideviz run`` with its values. The bits are the same if that
+    run has one thread; several threads round a large system differently.
 
     Parameters
     ----------

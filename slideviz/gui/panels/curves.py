@@ -168,7 +168,7 @@ class CurvesPanel(Panel):
         self.sync(self.store.session)
 
     def _picked(self, value: float) -> None:
-        if self.kind.currentData() == "steps" and not self.area.empty:
+        if self.kind.currentData() == "steps" and not self.area.shows_text:
             self.store.change(changes.show_frame, round(value))
 
     def _save(self) -> None:

@@ -104,7 +104,7 @@ class _FirstLine(QStyledItemDelegate):
 
 
 def text_color(option: QStyleOptionViewItem, plain: QPalette.ColorRole) -> QColor:
-    """Return the text color of a row: ``plain`` of the palette, or that of a selected row."""
+    """Return the text color of a row: ``plain``, or the palette's color of selected rows."""
     chosen = bool(option.state & QStyle.StateFlag.State_Selected)
     active = bool(option.state & QStyle.StateFlag.State_Active)
     group = QPalette.ColorGroup.Active if active else QPalette.ColorGroup.Inactive

@@ -58,7 +58,7 @@ def distinguishing_digits(values: FloatArray) -> int:
 def place_digits(names: Sequence[str], places: FloatArray) -> list[int]:
     """Return the number of decimals of each column of places (n, d), by their ``names``.
 
-    All lengths have as many: those that the smallest needs, but not many more than the largest.
+    All lengths have equally many: enough for the smallest, but not many more than for the largest.
     """
     angles = ["°" in name for name in names]
     each = [decimals(column) for column in places.T]

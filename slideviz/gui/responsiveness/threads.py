@@ -53,7 +53,7 @@ def prepare_drawing(view: Any, stage: Stage) -> None:
         stage.remove("warm-up")
         QTimer.singleShot(0, draw)
 
-    view.spare_software()
+    view.reduce_effects()
     draw()
 
 

@@ -198,7 +198,7 @@ class View3D(QtInteractor):
         self._render()  # type: ignore[call-arg]  # pyvistaqt's decorator hides it
         return np.asarray(self.screenshot(return_img=True))
 
-    def spare_software(self) -> None:
+    def reduce_effects(self) -> None:
         """Switch off costly effects if OpenGL draws in software, without a graphics card.
 
         They are antialiasing, order-independent transparency, and four of five lights.

@@ -116,7 +116,7 @@ class FlatViews(QWidget):
         view.closed.connect(self.closed)
         self._row.addWidget(view, 1)
         view.show()
-        view.view.spare_software()
+        view.view.reduce_effects()
         return view
 
     def _drop_second(self) -> None:
@@ -244,7 +244,7 @@ class CurveView(QWidget):
         self.rows = ()
 
     def _picked(self, position: float) -> None:
-        if self.rows and not self.area.empty:
+        if self.rows and not self.area.shows_text:
             self.store.change(changes.mark_cell, self.rows[-1].curve.cell_at(position))
 
     def _save(self) -> None:

@@ -98,7 +98,7 @@ class Viewing(QWidget):
         self.second_scene = Scene(self.second, self.scene.scheme)
         self.second_scene.sections.cuts = self.second_cuts
         self._connect(self.second, self.second_scene)
-        self.second.spare_software()
+        self.second.reduce_effects()
         self.second.set_flat(session.mesh.dim == 2)
         self.second_scene.set_coarse_boundaries(self.coarse)
         self.second_scene.open(changes.second_view(session), self.surfaces)
@@ -192,7 +192,7 @@ class Viewing(QWidget):
         self._before = None
         self.surfaces = opened.surfaces
         self._ghosts = opened.ghosts
-        self.view.spare_software()
+        self.view.reduce_effects()
         self.view.set_flat(session.mesh.dim == 2)
         self.coarse = opened.coarse
         self.scene.set_coarse_boundaries(opened.coarse)

@@ -53,9 +53,9 @@ def in_column(
     on: QWidget | None = None,
     margins: tuple[int, int, int, int] = (0, 0, 0, 0),
 ) -> QVBoxLayout:
-    """Return a vertical layout of parts, of which those in ``wide`` share the spare height.
+    """Return a vertical layout of parts; those in ``wide`` share the spare height.
 
-    It becomes the layout of the widget ``on``, if given, with ``margins`` in pixels.
+    If ``on`` is given, the layout is set on this widget, with ``margins`` in pixels.
     """
     layout = QVBoxLayout()
     if on is not None:

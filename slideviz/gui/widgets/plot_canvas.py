@@ -198,7 +198,7 @@ class PlotArea(QStackedWidget):
         self.setMinimumHeight(100)
 
     @property
-    def empty(self) -> bool:
+    def shows_text(self) -> bool:
         """Return whether a text is shown instead of the plot."""
         return self.currentWidget() is self.words
 
@@ -208,7 +208,7 @@ class PlotArea(QStackedWidget):
         self.setCurrentWidget(self.words)
 
     def plot(self) -> None:
-        """Show the plot, and draw it anew."""
+        """Show the plot and redraw it."""
         self.setCurrentWidget(self.canvas)
         self.canvas.request_draw()
 

@@ -62,7 +62,7 @@ class VectorField(QWidget):
         self._mark()
 
     def restore(self) -> None:
-        """Replace what is invalid by the last valid numbers; nothing is emitted."""
+        """Replace invalid texts by the last valid numbers, without emitting a signal."""
         for field in self.fields:
             field.restore()
         self._write(self._good)
