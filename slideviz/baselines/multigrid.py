@@ -265,9 +265,13 @@ def sweep(indptr, indices, data, inverse, right, x, backward):  # type: ignore[n
             x[row, i] = total
 
 
-@njit(parallel=True, **_OPTIONS)
+@njit(parallel=True, nogil=True, cache=True)
 def product(indptr, indices, data, x, out):  # type: ignore[no-untyped-def]
-    """Write the product of a matrix in blocks with x (m, b) to out (m, b)."""
+    """Write the product of a matrix in blocks with x (m, b) to out (m, b).
+
+    Sums keep their order (no ``fastmath``): Numba optimises this loop differently where it is
+    compiled and where it comes from the cache, so that the first run gave other bits than the next.
+    """
     m, b = x.shape
     for row in prange(m):
         for i in range(b):
