@@ -92,7 +92,7 @@ def _gathered(source: FileSource, where: IntArray) -> Cells:
 
 Warn = Callable[[str], object]
 """Called with a sentence on what of the mesh the new file will lack; with "" if nothing."""
-PLACE = 8
+PLACE_BYTES = 8
 """Bytes of disk for each cell: its place in the binary file, should cells not be in order there."""
 
 
@@ -184,7 +184,7 @@ def _to_text(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tic
             name = printable(source.name)
             warn(sentence_of_lost(target, name, [OTHER_ZONES], alone=True))
         sizes = [text_size(place) for place in places]
-        more = PLACE * max(place.cells.count for place in places)
+        more = PLACE_BYTES * max(place.cells.count for place in places)
         require_disk_space(target, target, sum(sizes) + more)
         for place in places:  # finds every mistake in the file, as reading it whole would
             read_skin(source, place.number, progress_share(tick, 0.0, 0.3))

@@ -44,9 +44,9 @@ SECONDS = {"text": 4.3, "read": 1.0, "solve": 5.0, "evaluate": 3.2, "quality": 2
 Only their ratios matter. ``text`` is reading a text mesh, ``read`` a binary one, ``solve`` all that
 is done with the boundary alone.
 """
-SURE = 0.1
-"""Least evidence for an estimate. From this part of a stage on, the rest of it is estimated from
-its own pace. Before stages worth so many seconds of `SECONDS` are done, nothing is estimated."""
+LEAST_PART = 0.1
+"""Part of a stage that must be done before its remaining time is estimated from its own pace.
+Nothing is estimated before stages worth so many seconds of `SECONDS` are done."""
 
 
 class RemainingTime:
@@ -93,11 +93,11 @@ class RemainingTime:
         spent, usual = self._spent, self._usual
         if stage != "solve":
             spent, usual = spent + now, usual + SECONDS[stage] * self._part
-        if usual < SURE:
+        if usual < LEAST_PART:
             return None
         pace = spent / usual
         this_stage = max(pace * SECONDS[stage] - now, 0.0)
-        if self._part >= SURE:
+        if self._part >= LEAST_PART:
             this_stage = now * (1.0 - self._part) / self._part
         return this_stage + pace * sum(SECONDS[later] for later in self._left_stages[1:])
 

@@ -149,17 +149,17 @@ def read_skin(
 def _counting_progress(tick: Tick, begin: float, end: float, count: int) -> Callable[[Any], Any]:
     """Return a function that returns its argument, and with each of ``count`` calls ticks.
 
-    The fraction told to ``tick`` rises from ``begin`` to ``end``.
+    The argument of ``tick`` rises from ``begin`` to ``end``.
     """
     done = 0
 
-    def passed(thing: Any) -> Any:
+    def count_and_return(result: Any) -> Any:
         nonlocal done
         done += 1
         tick(begin + (end - begin) * done / count)
-        return thing
+        return result
 
-    return passed
+    return count_and_return
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +173,7 @@ class _BoundaryCells:
     ids: IntArray
     """`types`, `nodes`, `ids` (k,), flat, (k,): of the cells that may have a side on the boundary:
     VTK identifiers, nodes, numbers."""
-    every: Index
+    all_ids: Index
     """slice or (b,): the numbers of all cells of the block."""
 
 
@@ -187,14 +187,14 @@ def _boundary_cell_reader(
     first cell.
     """
     with open_zone(path, zone) as (source, place):
-        on = np.zeros(place.n_points, bool)
-        on[boundary] = True
+        on_boundary = np.zeros(place.n_points, bool)
+        on_boundary[boundary] = True
 
         def read(first: int) -> _BoundaryCells:
             block = element_block(source, place, place.cells, place.dim, first, BLOCK)
             cells = Cells.from_types(block.types, block.nodes)
             _check_block(source, place, block, cells)
-            near = np.add.reduceat(on[block.nodes], cells.offsets[:-1], dtype=np.int64)
+            near = np.add.reduceat(on_boundary[block.nodes], cells.offsets[:-1], dtype=np.int64)
             chosen = np.flatnonzero(near >= place.dim)
             kept = cells.take(chosen)
             return _BoundaryCells(
@@ -219,24 +219,24 @@ def _join_boundary_cells(
 
     Raises MeshError if two blocks have a cell of the same number.
     """
-    kept: list[_BoundaryCells] = []
+    blocks: list[_BoundaryCells] = []
     seen = np.zeros(place.cells.count, bool)
     for near in found:
-        if seen[near.every].any():
-            k = int(np.argmax(seen[near.every]))
-            every = near.every
-            index = every.start + k if isinstance(every, slice) else int(every[k])
+        if seen[near.all_ids].any():
+            k = int(np.argmax(seen[near.all_ids]))
+            ids = near.all_ids
+            index = ids.start + k if isinstance(ids, slice) else int(ids[k])
             raise _repeated_index_error(source, place, near.first + k, index)
-        seen[near.every] = True
-        kept.append(near)
-    if not kept:
+        seen[near.all_ids] = True
+        blocks.append(near)
+    if not blocks:
         require_used(source, place.cells, 0)
         return Cells.from_blocks([]), np.empty(0, np.int64)
-    types = np.concatenate([near.types for near in kept])
-    nodes = np.concatenate([near.nodes for near in kept])
-    ids = np.concatenate([near.ids for near in kept])
-    order = np.argsort(ids, kind="stable")
-    return Cells.from_types(types, nodes).take(order), ids[order]
+    types = np.concatenate([near.types for near in blocks])
+    nodes = np.concatenate([near.nodes for near in blocks])
+    numbers = np.concatenate([near.ids for near in blocks])
+    order = np.argsort(numbers, kind="stable")
+    return Cells.from_types(types, nodes).take(order), numbers[order]
 
 
 def _check_block(source: BinaryFile, place: ZonePlace, block: ElementBlock, cells: Cells) -> None:
