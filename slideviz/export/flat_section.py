@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.argument_types import check_types
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, not_one_of
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import Quality, quality
 from slideviz.plots.cells import surroundings
@@ -23,7 +23,7 @@ from slideviz.plots.section_picture import (
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session.passages import show_passages
-from slideviz.terms import NO_REFERENCE, ColorMap, Quantity
+from slideviz.terms import COLOR_MAPS, NO_REFERENCE, ColorMap, Quantity
 
 
 @check_types
@@ -59,8 +59,8 @@ def section(
         What the colors say.
     color_range : (float, float), optional
         Ends of the color bar.
-    color_map : str
-        A color map of matplotlib.
+    color_map : {"viridis", "cividis", "plasma", "inferno", "gray"}
+        The color map, which color-blind people can read.
     passages : mapping of int to (4, 4), optional
         The transformation of each passage to draw, by number; only the mesh itself (0) when left
         out.
@@ -77,7 +77,8 @@ def section(
     Raises
     ------
     CaseError
-        The section misses the mesh, or the file has another ending.
+        The section misses the mesh, the file has another ending, or a quantity or color map is
+        unknown.
     SlidevizError
         The file cannot be written.
 
@@ -90,6 +91,8 @@ def section(
     array([0])
     """
     require_picture_name(Path(path))
+    if color_map not in COLOR_MAPS:
+        raise CaseError(f"color_map: {not_one_of(color_map, COLOR_MAPS)}")
     found = quality(mesh, reference=reference) if rated is None else rated
     matrices = {0: np.eye(4)} if passages is None else passages
     painted = replace(paint(mesh, found, color, reference), color_map=color_map)

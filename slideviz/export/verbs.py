@@ -7,6 +7,7 @@ from pathlib import Path
 
 from slideviz.argument_types import check_types
 from slideviz.case.model import Case
+from slideviz.errors import CaseError, not_one_of
 from slideviz.export import film as films
 from slideviz.export import offscreen_renderer
 from slideviz.export.offscreen_renderer import PICTURE_SIZE
@@ -16,7 +17,7 @@ from slideviz.scene.overview import Zoom
 from slideviz.session.opening import session_of_runs
 from slideviz.session.state import Run, StepFrame
 from slideviz.solver.deform import Step
-from slideviz.terms import Quantity
+from slideviz.terms import QUANTITIES, Quantity
 
 
 @check_types
@@ -111,7 +112,7 @@ def film(
     size : (int, int), optional
         Width and height in pixels; by default those of the kind of file.
     fps : float, optional
-        Images a second; when left out, ten, or fewer where there are few.
+        Images per second; when left out, ten, or fewer where there are few.
     hold : float
         Seconds that the last image is shown.
     between : int
@@ -124,7 +125,8 @@ def film(
     Raises
     ------
     SlidevizError
-        There are no steps, the film cannot be made like that, or the file cannot be written.
+        There are no steps, the quantity is unknown, the film cannot be made like that, or the file
+        cannot be written.
 
     Examples
     --------
@@ -134,6 +136,8 @@ def film(
     >>> case, mesh = sv.Case.read("try/square.cfg"), sv.read("try/mesh.su2")
     >>> sv.film("square.gif", mesh, sv.deform(case, mesh), case=case, size=(400, 300))
     """
+    if color not in QUANTITIES:
+        raise CaseError(f"color: {not_one_of(color, QUANTITIES)}")
     options = films.FilmOptions(size, fps, hold, between)
     films.check_film(Path(path), options, overwrite=overwrite)  # before the work
     case = case or Case()

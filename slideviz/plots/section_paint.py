@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slideviz.color_scheme import COLOR_MAP
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, not_one_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
-from slideviz.terms import Quantity
+from slideviz.terms import QUANTITIES, Quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +95,11 @@ def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = N
     Raises
     ------
     CaseError
-        The displacement is wanted without the mesh that it is measured from, or with another.
+        The quantity is unknown, or the displacement is wanted without the mesh that it is measured
+        from, or with another.
     """
+    if by not in QUANTITIES:
+        raise CaseError(f"color: {not_one_of(by, QUANTITIES)}")
     inverted = quality.status == INVERTED
     if by != "displacement":
         values = {"size-skew": quality.values, "size": quality.size, "skew": quality.skew}[by]

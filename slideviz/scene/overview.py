@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
-from slideviz.errors import SlidevizError
+from slideviz.errors import SlidevizError, not_one_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 TINY = 0.05
@@ -34,8 +34,13 @@ Zoom = Detail | Literal["auto", "all"]
 
 
 def require_detail(zoom: Zoom, mesh: Mesh) -> None:
-    """Raise SlidevizError if a given detail is not in the mesh or has the wrong dimension."""
+    """Raise SlidevizError if a detail is not in the mesh or has the wrong dimension.
+
+    A word other than "auto" and "all" raises it, too.
+    """
     if not isinstance(zoom, Detail):
+        if zoom not in (words := get_args(get_args(Zoom)[1])):
+            raise SlidevizError(f"zoom: {not_one_of(zoom, words)}")
         return
     place = ", ".join(f"{x:g}" for x in zoom.centre)
     if len(zoom.centre) != mesh.dim:

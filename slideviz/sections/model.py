@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from slideviz.argument_types import check_fields
 from slideviz.errors import CaseError
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray
@@ -36,10 +37,11 @@ class Section:
     Raises
     ------
     CaseError
-        A number is not finite, the direction has length zero, or the shape cannot have the size.
+        The shape is unknown, a number is not finite, the direction has length zero, or the shape
+        cannot have the size.
     """
 
-    kind: str
+    kind: str = field(metadata=SHAPES)
     """Its shape: a key of `SHAPES`."""
     origin: Triple = (0.0, 0.0, 0.0)
     """(3,) tuple of float: a point of the plane or of the cylinder's axis, or the apex of the cone,
@@ -62,6 +64,7 @@ class Section:
     """The half angle of the cone; 0 for others."""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         numbers, terms = (*self.origin, *self.direction, self.size), self.shape.terms
         if not np.isfinite(numbers).all():
             raise CaseError(f"{self.kind} section: {numbers} has a number that is not finite")

@@ -49,3 +49,17 @@ def test_a_film_has_the_steps(square):
         assert image.n_frames == 3
     with pytest.raises(sv.SlidevizError, match=r"a\.gif"):
         sv.film("a.gif", mesh, (), case=case, size=(300, 200))
+
+
+def test_unknown_words_are_refused_with_those_there_are(square):
+    case, mesh = square
+    line = sv.Section("plane", (0.0, 0.4, 0.0), (0.0, 1.0, 0.0))
+    with pytest.raises(CaseError, match=r"color: 'skw' is not one of size-skew .*mean skew\?"):
+        sv.section("a.svg", mesh, line, color="skw")
+    with pytest.raises(CaseError, match="color_map: 'jet' is not one of viridis"):
+        sv.section("a.svg", mesh, line, color_map="jet")
+    with pytest.raises(CaseError, match="color: 'role' is not one of size-skew"):
+        sv.film("a.gif", mesh, sv.deform(case, mesh), case=case, color="role")
+    with pytest.raises(sv.SlidevizError, match=r"zoom: 'al' is not one of auto \| all"):
+        sv.picture("a.png", mesh, zoom="al")
+    assert not list(Path.cwd().glob("a.*"))

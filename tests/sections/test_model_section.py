@@ -8,7 +8,7 @@ import pyvista as pv
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slideviz.errors import CaseError
+from slideviz.errors import ArgumentError, CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.sections.cut import Cutter, cut_cases
@@ -351,3 +351,13 @@ def test_wrong_sections_are_refused():
         Section("cylinder", direction=(0, 0, 0), radius=1)
     with pytest.raises(CaseError, match="not finite"):
         Section("plane", origin=(0, float("nan"), 0))
+
+
+def test_an_unknown_shape_is_refused_and_lists_become_tuples():
+    with pytest.raises(CaseError, match=r"kind: 'plan' is not one of plane .*did you mean plane"):
+        Section("plan")
+    with pytest.raises(ArgumentError, match=r"Section: origin is 3; expected 3 numbers"):
+        Section("plane", 3)
+    made = Section("plane", [0.5, 0.0, 0.0], np.array([1.0, 0.0, 0.0]))
+    assert made == Section("plane", (0.5, 0.0, 0.0), (1.0, 0.0, 0.0))
+    assert hash(made)
