@@ -180,7 +180,9 @@ class MemorySource:
 
     def blocks(self, tick: Tick = lambda _: None) -> Iterator[CellBlock]:
         """Yield the mesh as one block."""
-        yield CellBlock(np.arange(self.n_cells), np.arange(self.n_points), self.mesh, self.base)
+        numbers = np.arange(max(self.n_cells, self.n_points))
+        ids, nodes = numbers[: self.n_cells], numbers[: self.n_points]
+        yield CellBlock(ids, nodes, self.mesh, self.base)
         tick(1.0)
 
     def types(self, ids: IntArray) -> NDArray[np.uint8]:
