@@ -69,7 +69,7 @@ def warn_of_condition(steps: Sequence[FrozenStep]) -> None:
 
 
 def warn_of_error_estimate(steps: Sequence[FrozenStep], error_estimate: FloatArray) -> bool:
-    """Warn if the doubt (...,) of a design is above `TRUSTED`; return whether it is."""
+    """Warn if the error estimate (...,) of a design is above `TRUSTED`; return whether it is."""
     worst = float(error_estimate.max(initial=0.0))
     if worst <= TRUSTED:
         return False

@@ -285,10 +285,11 @@ class Deformer:
         return states[1:]
 
     def _deformed(self, displacement: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return points (..., n, d), largest errors and doubts (...,) of designs (..., m, d).
+        """Return points (..., n, d), errors and error estimates (...,) of designs (..., m, d).
 
-        A doubt is that of a ``Solution``: the estimated error between boundary nodes. Raises
-        DeformError where a result cannot be right or images are displaced differently.
+        The largest error at the boundary, and the estimate between boundary nodes as of a
+        ``Solution``. Raises DeformError where a result cannot be right or images are displaced
+        differently.
         """
         if displacement.ndim == 2:
             target = value(self._input.target(displacement))
@@ -311,7 +312,7 @@ class Deformer:
     def _together(self, displacement: FloatArray, out: FloatArray) -> FloatArray:
         """Write the points of k designs (k, m, d) to ``out`` (k, n, d), deformed in one step.
 
-        Returns their errors and doubts, (2, k). Raises as `_deformed`.
+        Returns their errors and error estimates, (2, k). Raises as `_deformed`.
         """
         setup, (step,) = self._setup, self._steps
         targets = value(self._input.target(displacement))

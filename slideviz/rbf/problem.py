@@ -262,7 +262,10 @@ class Interpolant:
         tick: Tick = no_tick,
         out: FloatArray | None = None,
     ) -> Array:
-        """Return the displacements (..., m, d) of nodes in the frame, in ``out`` if given."""
+        """Return the displacements (..., m, d) of nodes in the frame, in ``out`` if given.
+
+        ``nodes`` are numbers (m,), or ``slice(None)`` for all nodes.
+        """
         x = problem.features
         here = x if isinstance(nodes, slice) else columns(x, nodes)
         if not len(self.nodes):
