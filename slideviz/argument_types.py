@@ -132,13 +132,13 @@ def _require(called: str, owner: object, given: Iterable[tuple[str, object]]) ->
 @cache
 def _annotations(owner: Any) -> dict[str, Any]:
     """Return the annotations of a function or class, without those that only mypy can know."""
-    found = {}
+    hints = {}
     for each in reversed(getattr(owner, "__mro__", (owner,))):
         scope = vars(sys.modules[each.__module__])
         for name, text in get_annotations(each).items():
             with suppress(NameError):
-                found[name] = eval(text, scope)
-    return found
+                hints[name] = eval(text, scope)
+    return hints
 
 
 def _members(hint: Any) -> tuple[Any, ...]:
@@ -157,10 +157,10 @@ def _misfit(value: object, hint: Any, place: str) -> _Misfit | None:
         return wrong and (wrong._replace(needed=hint) if wrong.place == place else wrong)
     members = _members(hint)
     if len(members) > 1:
-        found = [_misfit(value, member, place) for member in members]
-        if None in found:
+        misfits = [_misfit(value, member, place) for member in members]
+        if None in misfits:
             return None
-        within = [wrong for wrong in found if wrong is not None and wrong.place != place]
+        within = [wrong for wrong in misfits if wrong is not None and wrong.place != place]
         return within[0] if len(within) == 1 else _Misfit(place, value, hint)
     if not _fits(value, hint, origin_of(hint) or hint, inner):
         return _Misfit(place, value, hint)

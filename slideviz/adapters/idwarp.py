@@ -281,10 +281,10 @@ class USMesh:
             The number of nodes is wrong, copies of a node disagree, or a node was moved that the
             case does not move.
         """
-        given = self._shaped(coordinates)
+        shaped = self._shaped(coordinates)
         now = self._points[self._surface.nodes]
-        self._displacement = self._surface.displacement(given, now)
-        self._coordinates = given.copy()
+        self._displacement = self._surface.displacement(shaped, now)
+        self._coordinates = shaped.copy()
 
     def warpMesh(self) -> None:
         """Move the grid to the surface that was set."""

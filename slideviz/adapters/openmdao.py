@@ -88,8 +88,8 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
             points = deformer.deform(displacement)
             outputs[VOLUME] = points.ravel()
             if self.options["quality"]:
-                found = self._measure(displacement, points)
-                outputs[MINIMUM], outputs[MEAN] = found.minimum, found.mean
+                measured = self._measure(displacement, points)
+                outputs[MINIMUM], outputs[MEAN] = measured.minimum, measured.mean
         except SlidevizError as problem:
             raise om.AnalysisError(str(problem)) from problem
 
@@ -100,8 +100,8 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
         deformer, displacement = self._at(inputs)
         slopes = {}
         if MINIMUM in d_outputs or MEAN in d_outputs:
-            found = self._measure(displacement)
-            slopes = {MINIMUM: found.of_minimum, MEAN: found.of_mean}
+            measured = self._measure(displacement)
+            slopes = {MINIMUM: measured.of_minimum, MEAN: measured.of_mean}
         if mode == "fwd":
             moved = deformer.jvp(displacement, d_inputs[SURFACE].reshape(displacement.shape))
             if VOLUME in d_outputs:
@@ -134,15 +134,15 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
         deformer, kept = self.options["deformer"], self._measured
         if kept is None or kept[0] is not deformer or not np.array_equal(kept[1], displacement):
             mesh = deformer.mesh
-            found = quality(
+            measured = quality(
                 mesh.with_points(deformer.deform(displacement) if points is None else points),
                 mesh,
                 deformer.case.quality_metric,
                 derivative=True,
                 p=self.options["p"],
             ).derivative
-            assert found is not None
-            kept = self._measured = deformer, displacement.copy(), found
+            assert measured is not None
+            kept = self._measured = deformer, displacement.copy(), measured
         return kept[2]
 
 

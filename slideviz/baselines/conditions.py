@@ -42,10 +42,10 @@ def conditions(problem: Problem, body: Body, nodes: IntArray, values: FloatArray
     """
     same = problem.same_as
     first, data = merge(problem, nodes, values)
-    given = np.zeros(value(problem.coords).shape)
-    given[first] = value(data)
+    prescribed = np.zeros(value(problem.coords).shape)
+    prescribed[first] = value(data)
     place, turn = unknowns(problem, body, first)
-    known = np.where(np.isin(same, first)[:, None], given[same], 0.0)
+    known = np.where(np.isin(same, first)[:, None], prescribed[same], 0.0)
     free = _projections(problem, body, place, int(place.max(initial=-1)) + 1)
     return held(place, turn, free, _cartesian(problem, body.frame, known))
 

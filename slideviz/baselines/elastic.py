@@ -109,11 +109,11 @@ class Equilibrium:
         known = self._known(data)
         right = -value(self._collected(self._force(known)))
         inverse_times = partial(each_of, self._solved)
-        found: Array = inverse_times(right)
+        solved: Array = inverse_times(right)
         if any(isinstance(x, Variable) for x in (self._coords, data)):
-            left = self._collected(self._force(self._moved(value(found)) + known))
-            found = solution(left, value(found), inverse_times)
-        return difference_from(self._body.frame, self._at, self._moved(found) + known)
+            left = self._collected(self._force(self._moved(value(solved)) + known))
+            solved = solution(left, value(solved), inverse_times)
+        return difference_from(self._body.frame, self._at, self._moved(solved) + known)
 
     def _make(self) -> list[Level]:
         """Return the multigrid levels of the stiffness matrix."""
@@ -132,14 +132,14 @@ class Equilibrium:
             return np.zeros_like(right)
         start = np.zeros(right.size)
         with enough_threads(0.0):
-            found = conjugate_gradients(self._levels, right.ravel(), start, tolerance=EXACT)
-        if not found.residual_ratio <= ENOUGH:
+            solved = conjugate_gradients(self._levels, right.ravel(), start, tolerance=EXACT)
+        if not solved.residual_ratio <= ENOUGH:
             raise DeformError(
-                f"the equations of linear elasticity were solved to {found.residual_ratio:.1g} "
-                f"only, in {found.iterations} iterations, so that derivatives would not be exact; "
+                f"the equations of linear elasticity were solved to {solved.residual_ratio:.1g} "
+                f"only, in {solved.iterations} iterations, so that derivatives would not be exact; "
                 "use more STEPS, or METHOD= rbf"
             )
-        return found.x.reshape(right.shape)
+        return solved.x.reshape(right.shape)
 
     def _known(self, data: Array) -> Array:
         """Return the Cartesian displacement (..., n, d) of known nodes; zero for other nodes."""
@@ -174,8 +174,8 @@ class Equilibrium:
         """Return the forces (..., k, d) on the unknowns, of nodal forces (..., n, d)."""
         inside = take(forces, self._inside)
         back = np.swapaxes(self._turn[self._inside], 1, 2)
-        found = gather(transform(back, inside), self._place[self._inside], self._count)
-        return _without(found, self._held)
+        displacement = gather(transform(back, inside), self._place[self._inside], self._count)
+        return _without(displacement, self._held)
 
     def _directions(self, problem: Problem) -> list[tuple[IntArray, Array]]:
         """Return pairs of blocks of unknowns (h,) and unit directions (h, d) that hold them.
@@ -325,25 +325,25 @@ def _equilibrium(
     coords = value(problem.coords)
     with timer.phase("solve") as tick:
         at = body.frame.points(coords)
-        given = conditions(problem, body, nodes, value(values))
-        matrix, right = assemble(at, body.parts, given, lambda f: tick(ASSEMBLING * f))
-        guess = np.zeros((len(given.free), at.shape[1]))
-        inside = np.flatnonzero(given.place >= 0)
+        prescribed = conditions(problem, body, nodes, value(values))
+        matrix, right = assemble(at, body.parts, prescribed, lambda f: tick(ASSEMBLING * f))
+        guess = np.zeros((len(prescribed.free), at.shape[1]))
+        inside = np.flatnonzero(prescribed.place >= 0)
         if start is not None:
             moved = body.frame.points(coords + value(start)) - at
-            turned = np.einsum("mji,mj->mi", given.turn[inside], moved[inside])
-            guess[given.place[inside]] = turned
-        found = solve(
+            turned = np.einsum("mji,mj->mi", prescribed.turn[inside], moved[inside])
+            guess[prescribed.place[inside]] = turned
+        solved = solve(
             matrix,
             right,
-            rigid_motions(at, given),
+            rigid_motions(at, prescribed),
             guess.ravel(),
             lambda f: tick(ASSEMBLING + (1.0 - ASSEMBLING) * f),
         )
-        warnings = _warnings(found)
-        shift = given.known.copy()
-        unknown = found.x.reshape(guess.shape)[given.place[inside]]
-        shift[inside] = np.einsum("mij,mj->mi", given.turn[inside], unknown)
+        warnings = _warnings(solved)
+        shift = prescribed.known.copy()
+        unknown = solved.x.reshape(guess.shape)[prescribed.place[inside]]
+        shift[inside] = np.einsum("mij,mj->mi", prescribed.turn[inside], unknown)
         displacement = body.frame.difference(at, shift)
     return displacement, warnings
 

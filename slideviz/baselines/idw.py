@@ -206,10 +206,10 @@ def _means(
     """
     nodes, data = merge(problem, known, values)
     sources, power = columns(problem.features, nodes), weights.power
-    own = problem.choose(f"weights of {len(known)}", lambda: weights.of(value(data)))
+    node_weights = problem.choose(f"weights of {len(known)}", lambda: weights.of(value(data)))
     with timer.phase("evaluate") as tick:
-        means = weighted_mean(problem.basis, targets, sources, data, own, power, tick)
-    return means, WeightedField(problem.basis, value(sources), value(data), own, power)
+        means = weighted_mean(problem.basis, targets, sources, data, node_weights, power, tick)
+    return means, WeightedField(problem.basis, value(sources), value(data), node_weights, power)
 
 
 @dataclass(frozen=True, eq=False)

@@ -105,21 +105,21 @@ def _while_ticking(work: Callable[[], list[Level]], tick: Tick) -> list[Level]:
     pyamg's set-up of a large mesh takes seconds and has no callback. When ``tick`` raises, the
     thread runs to its end, but nobody waits for it.
     """
-    found: Future[list[Level]] = Future()
+    future: Future[list[Level]] = Future()
 
     def run() -> None:
         try:
-            found.set_result(work())
+            future.set_result(work())
         except BaseException as problem:  # handed to the thread that waits
-            found.set_exception(problem)
+            future.set_exception(problem)
 
     Thread(target=run, daemon=True, name="multigrid").start()
     done = 0.0
     while True:
         try:
-            return found.result(timeout=WAIT_SECONDS)
+            return future.result(timeout=WAIT_SECONDS)
         except TimeoutError:
-            if found.done():
+            if future.done():
                 raise
             done += (1.0 - done) / 50
             tick(MAKING * done)
@@ -142,17 +142,17 @@ def hierarchy(matrix: bsr_array, modes: FloatArray) -> list[Level]:
             postsmoother=None,
             max_coarse=COARSE,
         ).levels
-    found = []
+    levels = []
     for level in made[:-1]:
         inverse = np.linalg.pinv(_diagonal(level.A), hermitian=True)
-        found.append(Level(level.A, np.ascontiguousarray(inverse), level.P, level.R))
+        levels.append(Level(level.A, np.ascontiguousarray(inverse), level.P, level.R))
     dense = made[-1].A.toarray()
     diagonal = np.diag(dense).copy()
     # Rows of nothing: motions that the nodes of an aggregate do not have.
     dense[np.diag_indices_from(dense)] += np.where(diagonal > 0, RIDGE * diagonal, 1.0)
     factor = cho_factor(dense, lower=True, check_finite=False)
-    found.append(Level(made[-1].A, np.empty((0, 1, 1)), factor=factor))
-    return found
+    levels.append(Level(made[-1].A, np.empty((0, 1, 1)), factor=factor))
+    return levels
 
 
 def _diagonal(matrix: Any) -> FloatArray:

@@ -108,17 +108,17 @@ class ShapeBlock:
 
 def blocks(cells: Cells) -> list[ShapeBlock]:
     """Return all cells as elements, a block for each type; pyramids as parts of tetrahedra."""
-    found = []
+    shapes = []
     for vtk, (ids, nodes) in cells.by_type.items():
         if vtk == PYRAMID:
             # Read-only like the mesh's own, for which the loops are compiled.
             parts = frozen_array(np.concatenate([nodes[:, p] for p in PYRAMID_PARTS]), np.int64)
-            found.append(
+            shapes.append(
                 ShapeBlock(shape(TETRAHEDRON), parts, np.tile(ids, len(PYRAMID_PARTS)), 0.5)
             )
         else:
-            found.append(ShapeBlock(shape(vtk), nodes, ids, 1.0))
-    return found
+            shapes.append(ShapeBlock(shape(vtk), nodes, ids, 1.0))
+    return shapes
 
 
 CHUNK = 20_000

@@ -72,13 +72,13 @@ def defined_boxes(case: Case, mesh: Mesh) -> dict[str, Box]:
         The corners, degrees or orders of a box make none.
     """
     key = box_definition(case)
-    kept = _DEFINED.setdefault(mesh, {})
-    if key not in kept:
-        kept[key] = {
+    cache = _DEFINED.setdefault(mesh, {})
+    if key not in cache:
+        cache[key] = {
             name: _defined(case, mesh.dim, name, corners, degrees)
             for (name, corners), degrees in zip(case.ffd_boxes, case.ffd_degrees, strict=False)
         }
-    return kept[key]
+    return cache[key]
 
 
 def _defined(
@@ -115,20 +115,20 @@ def ffd_problems(case: Case, mesh: Mesh, motion: BoxMotion) -> tuple[str, ...]:
         return (missing_box(mesh, motion.box, boxes, none),)
     box = boxes[motion.box]
     unknown = box.problem(_lattice_index(motion, mesh.dim))
-    found = [unknown] if unknown else []
+    problems = [unknown] if unknown else []
     name, across = ("dz", 2) if box.system.kind == "CARTESIAN" else ("dθ", 1)
     if isinstance(motion, Ffd) and mesh.dim == 2 and (shift := motion.vector[across]):
-        found.append(f"{name} is {shift:g}, which leaves the plane; in 2D write 0")
+        problems.append(f"{name} is {shift:g}, which leaves the plane; in 2D write 0")
     if isinstance(motion, FfdTwist) and mesh.dim == 2:
-        found.append("a box in 2D has no span to twist along; write rotate")
+        problems.append("a box in 2D has no span to twist along; write rotate")
     if isinstance(motion, FfdTwist) and case.ffd_system != "CARTESIAN":
-        found.append(
+        problems.append(
             f"ffd-twist turns control points in x, y and z, and FFD_COORD_SYSTEM is "
             f"{case.ffd_system}; move them along θ with ffd"
         )
     if not isinstance(motion, Ffd | FfdTwist) and mesh.dim == 2 and case.ffd_system != "CARTESIAN":
-        found.append(f"in 2D it needs FFD_COORD_SYSTEM= CARTESIAN, which is {case.ffd_system}")
-    return tuple(found)
+        problems.append(f"in 2D it needs FFD_COORD_SYSTEM= CARTESIAN, which is {case.ffd_system}")
+    return tuple(problems)
 
 
 def _lattice_index(motion: BoxMotion, dim: int) -> Index:
@@ -167,17 +167,17 @@ def box_changes(
     Place of the motion, the control points (I, J, K, 3) before it, in the box's coordinates, and
     their change by it. Motions that do not fit their box change nothing.
     """
-    found: dict[str, list[tuple[int, FloatArray, FloatArray]]] = {}
+    changes: dict[str, list[tuple[int, FloatArray, FloatArray]]] = {}
     for place, motion in enumerate(case.motions):
         if not isinstance(motion, BoxMotion) or motion.box not in boxes:
             continue
         box = boxes[motion.box]
         if box.problem(_lattice_index(motion, mesh.dim)):
             continue
-        mine = found.setdefault(motion.box, [])
+        mine = changes.setdefault(motion.box, [])
         q = mine[-1][1] + mine[-1][2] if mine else box.q
         mine.append((place, q, _change_of(motion, box, q, mesh.dim)))
-    return found
+    return changes
 
 
 def missing_box(mesh: Mesh, name: str, boxes: Iterable[str], none: str) -> str:
@@ -208,8 +208,8 @@ def embedding(box: Box, mesh: Mesh, marker: str) -> tuple[Embedding, float]:
     else they are computed. How far off: the distance of a node from the point of its parametric
     coordinates, over the size of the box. Both are found once for each mesh.
     """
-    kept = _EMBEDDED.setdefault(mesh, {})
-    if (box, marker) not in kept:
+    cache = _EMBEDDED.setdefault(mesh, {})
+    if (box, marker) not in cache:
         on = mesh.marker(marker).nodes
         if marker in box.embedded:
             nodes, uvw = box.embedded[marker]
@@ -217,12 +217,12 @@ def embedding(box: Box, mesh: Mesh, marker: str) -> tuple[Embedding, float]:
         else:
             nodes = on
             uvw, inside = parametric(box, mesh.points[on])
-        found = box.embed(nodes[inside], uvw[inside])
+        embedded = box.embed(nodes[inside], uvw[inside])
         size = np.ptp(box.points.reshape(-1, 3), axis=0)[: mesh.dim]
-        there = box.system.points_of(found.sums(box.q))[:, : mesh.dim]
-        gap = np.abs(there - mesh.points[found.nodes]) / size
-        kept[box, marker] = found, float(gap.max(initial=0.0))
-    return kept[box, marker]
+        there = box.system.points_of(embedded.sums(box.q))[:, : mesh.dim]
+        gap = np.abs(there - mesh.points[embedded.nodes]) / size
+        cache[box, marker] = embedded, float(gap.max(initial=0.0))
+    return cache[box, marker]
 
 
 def off_points(box: Box, mesh: Mesh, marker: str) -> list[str]:
@@ -250,7 +250,7 @@ def ffd_displacements(
     """
     motions = box_motions(case)
     boxes = boxes_for(case, mesh) if motions else {}
-    found: dict[object, list[Displacements]] = {}
+    displacements: dict[object, list[Displacements]] = {}
     problems = {}
     alone = len(motions) == len(case.motions) and not any(box.level for box in boxes.values())
     for name, changes in box_changes(case, mesh, boxes).items():
@@ -261,7 +261,7 @@ def ffd_displacements(
             if moved is not None and not alone and _is_in(name, mesh, system_of(case)):
                 moved = replace(moved, warnings=(*moved.warnings, _stays(name)))
             if moved is not None:
-                found.setdefault(motion, []).append(moved)
+                displacements.setdefault(motion, []).append(moved)
             elif mine:
                 of = " or ".join(repr(one) for one in named(motion.marker)) or "a moving marker"
                 problems[place] = (
@@ -270,7 +270,7 @@ def ffd_displacements(
                 )
     if problems:
         raise CaseError("\n".join(problems[place] for place in sorted(problems)))
-    return {motion: _mean(several) for motion, several in found.items()}
+    return {motion: _mean(several) for motion, several in displacements.items()}
 
 
 def _stays(name: str) -> Note:

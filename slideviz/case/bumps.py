@@ -83,7 +83,7 @@ def bump_displacements(
     CaseError
         A motion with a height moves no node: none is on its side, along its chord.
     """
-    found: dict[object, Displacements] = {}
+    displacements: dict[object, Displacements] = {}
     problems = []
     for place, motion in enumerate(case.motions, start=1):
         markers = [
@@ -95,7 +95,7 @@ def bump_displacements(
         shape = _shape(motion, mesh, markers, nodes)
         vectors = np.zeros((len(nodes), mesh.dim))
         vectors[:, 1] = motion.height * shape
-        found[motion] = Displacements(nodes, vectors)
+        displacements[motion] = Displacements(nodes, vectors)
         if not shape.any():
             of = " or ".join(repr(name) for name in named(motion.marker)) or "a moving marker"
             side = "" if not hasattr(motion, "side") else f" on its {motion.side} side"
@@ -106,7 +106,7 @@ def bump_displacements(
             )
     if problems:
         raise CaseError("\n".join(problems))
-    return found
+    return displacements
 
 
 def _shape(motion: OnAirfoil, mesh: Mesh, markers: list[str], nodes: IntArray) -> FloatArray:

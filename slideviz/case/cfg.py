@@ -201,8 +201,8 @@ def _unknown(key: str) -> str:
 
 
 def _without_role(case: Case, role: str, names: tuple[str, ...]) -> Case:
-    kept = {name: r for name, r in case.roles.items() if r != role and name not in names}
-    return case.change(roles=kept)
+    roles = {name: r for name, r in case.roles.items() if r != role and name not in names}
+    return case.change(roles=roles)
 
 
 def _with_paths(case: Case, change: Callable[[Path], Path]) -> Case:

@@ -75,7 +75,7 @@ def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
     What else a run needs is found by `check_case`: a case without it can be read from a file, and
     put right with ``--set``.
     """
-    found: list[tuple[tuple[str, ...], str]] = []
+    problems: list[tuple[tuple[str, ...], str]] = []
     moving = case.markers_with("moving")
     seen: set[str] = set()
     for place, motion in enumerate(case.motions, start=1):
@@ -91,15 +91,15 @@ def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
                 f"motion {place} names {name!r}, which does not move: MARKER_MOVING= "
                 f"({', '.join(moving)}) does not have it; {remedy}"
             )
-            found.append((("MOTION", "MARKER_MOVING"), sentence))
+            problems.append((("MOTION", "MARKER_MOVING"), sentence))
     if case.periodic_type == "rotational" and case.direction in (0, 2):
         name = "r" if case.direction == 0 else "z"
         sentence = (
             f"rotational periodicity repeats in theta, not in {name} (PERIODIC_DIRECTION= "
             f"{case.direction}); write theta, or PERIODIC_TYPE= translational"
         )
-        found.append((("PERIODIC_DIRECTION", "PERIODIC_TYPE"), sentence))
-    return found + ffd_contradictions(case)
+        problems.append((("PERIODIC_DIRECTION", "PERIODIC_TYPE"), sentence))
+    return problems + ffd_contradictions(case)
 
 
 def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
@@ -236,19 +236,19 @@ def _periodic_problems(case: Case, mesh: Mesh) -> Iterator[str]:
 
 def idle_roles(case: Case) -> tuple[str, ...]:
     """Return a sentence for each role without effect in the case's modes, seldom on purpose."""
-    found = []
+    problems = []
     periodic, sliding = case.markers_with("periodic"), case.markers_with("sliding")
     if periodic and case.periodic == "none":
-        found.append(
+        problems.append(
             f"PERIODIC_MODE= none: {' and '.join(periodic)} will not stay periodic; with "
             f"PERIODIC_MODE= moving (or fixed) they do"
         )
     if sliding and case.sliding == "none":
-        found.append(
+        problems.append(
             f"SLIDING_MODE= none: {', '.join(sliding)} will not slide but stay fixed; with "
             f"SLIDING_MODE= {SLIDES} they do"
         )
-    return tuple(found)
+    return tuple(problems)
 
 
 _SLIDES = {
@@ -278,15 +278,15 @@ def idle_settings(case: Case) -> tuple[str, ...]:
         for key in KEYS.values()
         if key.method not in (None, case.method) and key.get(case) not in (key.get(usual), "NO")
     ]
-    found = [_SLIDES[case.method, case.sliding]] if (case.method, case.sliding) in _SLIDES else []
+    notes = [_SLIDES[case.method, case.sliding]] if (case.method, case.sliding) in _SLIDES else []
     if idle:
-        found.append(f"METHOD= {case.method} does not use {', '.join(idle)}")
-    found += [
+        notes.append(f"METHOD= {case.method} does not use {', '.join(idle)}")
+    notes += [
         f"{_with_switch(key, case)} has no effect: {key.no_effect}"
         for key in KEYS.values()
         if key.no_effect and key.get(case) != key.get(usual)
     ]
-    found += [
+    notes += [
         f"{key.name} has no effect: DATA_REDUCTION= AUTO finds the tolerance; YES uses this one"
         for key in KEYS.values()
         if key.idle_reason is why_no_tolerance
@@ -294,7 +294,7 @@ def idle_settings(case: Case) -> tuple[str, ...]:
         and case.reduction.auto
         and key.get(case) != key.get(usual)
     ]
-    return tuple(Note(text) for text in found)
+    return tuple(Note(text) for text in notes)
 
 
 def _with_switch(key: Key, case: Case) -> str:

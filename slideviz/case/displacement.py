@@ -103,11 +103,11 @@ def parse_displacements(
         The text has mistakes: a line ``file:line: sentence`` for each.
     """
     table = parse_rows(text, path, nodes, shape, of)
-    given = table[:, 0].astype(np.int64)
+    numbers = table[:, 0].astype(np.int64)
     vectors = np.zeros((len(nodes), shape[1]))
-    vectors[np.searchsorted(nodes, given)] = table[:, 1:]
-    if len(given) < len(nodes):
-        missing = len(nodes) - len(given)
+    vectors[np.searchsorted(nodes, numbers)] = table[:, 1:]
+    if len(numbers) < len(nodes):
+        missing = len(nodes) - len(numbers)
         warning = f"{path}: {missing} of {len(nodes)} nodes on {of} are not listed; they stay"
         return Displacements(nodes, vectors, (warning,))
     return Displacements(nodes, vectors)

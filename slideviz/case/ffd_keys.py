@@ -25,7 +25,7 @@ def _groups(text: str) -> list[list[Word]]:
 
 
 def _read_definition(text: str) -> tuple[Definition, ...]:
-    found = []
+    problems = []
     groups = _groups(text)
     for group in groups:
         name, *corners = group
@@ -36,12 +36,12 @@ def _read_definition(text: str) -> tuple[Definition, ...]:
                 f"box {shown(name.text)} has {len(corners)} numbers; expected its name and "
                 f"{NUMBERS}: 8 corners x, y, z (in 2D 4 with z = 0, and zeros)"
             )
-        found.append((name.text, tuple(number(word.text) for word in corners)))
-    names = [box for box, _ in found]
+        problems.append((name.text, tuple(number(word.text) for word in corners)))
+    names = [box for box, _ in problems]
     for box in names:
         if names.count(box) > 1:
             raise CaseError(f"box {box!r} is defined twice; rename one")
-    return tuple(found)
+    return tuple(problems)
 
 
 def _without_zeros(words: list[Word]) -> list[Word]:

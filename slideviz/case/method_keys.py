@@ -61,12 +61,12 @@ def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Ke
     window = {"idle_reason": why_no_reduction, **window}
 
     def get(case: Case) -> Any:
-        given = case.reduction
-        if given is None:
+        reduction = case.reduction
+        if reduction is None:
             return None
-        value = getattr(given, field)
+        value = getattr(reduction, field)
         # A tolerance without effect is written to a file only where it is not the default.
-        idle = given.auto and window["idle_reason"] is why_no_tolerance and value == usual
+        idle = reduction.auto and window["idle_reason"] is why_no_tolerance and value == usual
         return None if idle else value
 
     return Key(name, REDUCTION, kind, meaning, put, get, default, field=field, **window)
@@ -84,8 +84,8 @@ def put_double_edge(case: Case, wanted: bool) -> Case:
 
 def put_reduction(case: Case, wanted: DataReduction) -> Case:
     """Return the case with data reduction (with the settings it has), automatic, or without."""
-    given = replace(case.reduction or Reduction(), auto=wanted == "AUTO")
-    return case.change(reduction=None if wanted == "NO" else given)
+    reduction = replace(case.reduction or Reduction(), auto=wanted == "AUTO")
+    return case.change(reduction=None if wanted == "NO" else reduction)
 
 
 def get_reduction(case: Case) -> DataReduction:

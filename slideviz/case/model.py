@@ -355,11 +355,11 @@ class Case(CheckedFields):
 
     def inputs(self) -> dict[Path, str]:
         """Return the files that the case is read from or names, with words for what each is."""
-        found = {} if self.mesh_file is None else {self.mesh_file: "the input mesh"}
+        inputs = {} if self.mesh_file is None else {self.mesh_file: "the input mesh"}
         if self.source is not None:
-            found[self.source] = "the case file"
+            inputs[self.source] = "the case file"
         files = (motion.path for motion in self.motions if isinstance(motion, FromFile))
-        return found | dict.fromkeys(files, "a displacement file")
+        return inputs | dict.fromkeys(files, "a displacement file")
 
     @classmethod
     @check_types

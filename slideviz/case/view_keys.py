@@ -47,11 +47,11 @@ def words(known: tuple[str, ...]) -> Kind:
     allowed = f"a list of {', '.join(known)}"
 
     def read(text: str) -> tuple[str, ...]:
-        given = [item.text.lower() for item in list_of(text)]
-        for word in given:
+        words = [item.text.lower() for item in list_of(text)]
+        for word in words:
             if word not in known:
                 raise CaseError(f"{shown(word)} is not one of {', '.join(known)}")
-        return tuple(word for word in known if word in given)
+        return tuple(word for word in known if word in words)
 
     return Kind(allowed, read, lambda value: f"( {', '.join(value)} )")
 
@@ -64,7 +64,7 @@ def read_sections(text: str) -> tuple[SectionText, ...]:
     CaseError
         One has another form, a wrong count of numbers, or numbers that give no section.
     """
-    found = []
+    sections = []
     for place, part in enumerate((p for p in text.split(";") if p.strip(" ()")), start=1):
         items = [item.text for item in list_of(part.strip())]
         form = items[0].lower() if items else ""
@@ -92,8 +92,8 @@ def read_sections(text: str) -> tuple[SectionText, ...]:
         fault = shape.size.fault(values[0]) if shape.size is not None else ""
         if fault and shape.size is not None:
             raise CaseError(f"section {place}: the {shape.size.word} {values[0]:g} {fault}")
-        found.append((form, values, how == "whole", flat, drawn))
-    return tuple(found)
+        sections.append((form, values, how == "whole", flat, drawn))
+    return tuple(sections)
 
 
 def write_sections(sections: tuple[SectionText, ...]) -> str:

@@ -45,15 +45,15 @@ def words_of(text: str) -> list[Word]:
     CaseError
         A quotation mark is not closed.
     """
-    found = []
+    words = []
     for match in _WORD.finditer(text):
         if match["bad"]:
             raise CaseError(f"the quotation mark in {shown(text)} is not closed; close it")
         if match["quoted"] is not None:
-            found.append(Word(match["quoted"].replace('""', '"'), quoted=True))
+            words.append(Word(match["quoted"].replace('""', '"'), quoted=True))
         else:
-            found.append(Word(match[0]))
-    return found
+            words.append(Word(match[0]))
+    return words
 
 
 def groups_of(words: Iterable[Word]) -> list[list[Word]]:

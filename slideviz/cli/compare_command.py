@@ -128,15 +128,15 @@ def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...
 
     def names(option: str, known: Sequence[str], usual: Sequence[str]) -> list[str]:
         text = getattr(arguments, option)
-        found = _items(text) if text is not None else list(usual)
-        if found == ["all"]:
+        items = _items(text) if text is not None else list(usual)
+        if items == ["all"]:
             return list(known)
-        for name in found:
+        for name in items:
             if name not in known:
                 raise CaseError(f"--{option}: {name!r} is not one of {', '.join(known)} (or all)")
-        if not found:
+        if not items:
             raise CaseError(f"--{option} names none of {', '.join(known)}")
-        return found
+        return items
 
     methods = names("methods", tuple(COMPARED_METHODS), wanted_methods(case))
     modes = names("periodic", tuple(PERIODIC_MODES), wanted_modes(case))

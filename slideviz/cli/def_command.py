@@ -127,19 +127,21 @@ def _run_def(arguments: argparse.Namespace) -> int:
     case = surface.case()
     steps[-1] = replace(steps[-1], warnings=(*steps[-1].warnings, *said))
     seconds["quality"] = -time.perf_counter()
-    found = quality(steps[-1].mesh, reference=mesh, metric=case.quality_metric)
+    measured = quality(steps[-1].mesh, reference=mesh, metric=case.quality_metric)
     before = quality(mesh, metric=case.quality_metric)
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
     deformed = surface.displacer.boxed(steps[-1].mesh)
     write(output, deformed, overwrite=arguments.force, base=mesh, file_format=kind)
     if rated:
-        write_qualities(rated, found)
+        write_qualities(rated, measured)
     seconds["write"] += time.perf_counter()
     seconds["total"] = time.perf_counter() - begin
-    folded = folded_cells(steps, mesh, found)
-    report = run_report(case, mesh, steps, seconds, quality=found, undeformed=before, folded=folded)
-    advice = advice_for(case, steps[-1].layers, mesh, found)
+    folded = folded_cells(steps, mesh, measured)
+    report = run_report(
+        case, mesh, steps, seconds, quality=measured, undeformed=before, folded=folded
+    )
+    advice = advice_for(case, steps[-1].layers, mesh, measured)
     report["design"] = {
         "variables": variable_rows(surface),
         "boxes": surface.displacer.inside,
@@ -147,7 +149,7 @@ def _run_def(arguments: argparse.Namespace) -> int:
         "ignored": list(config.ignored),
     }
     return report_outcome(
-        arguments, report, {"mesh": output, CELLS: rated}, found, before, folded, advice=advice
+        arguments, report, {"mesh": output, CELLS: rated}, measured, before, folded, advice=advice
     )
 
 

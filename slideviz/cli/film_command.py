@@ -169,8 +169,8 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Step
     frames = []
     with Bar(not arguments.quiet) as bar:
         for step in deform(case, mesh, bar):
-            found = quality(step.mesh, reference=mesh, metric=case.quality_metric)
-            frames.append(StepFrame(step.mesh, found, step))
+            measured = quality(step.mesh, reference=mesh, metric=case.quality_metric)
+            frames.append(StepFrame(step.mesh, measured, step))
     print_remarks(step.warnings, quiet=arguments.quiet)
     return tuple(frames)
 

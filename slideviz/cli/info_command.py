@@ -34,8 +34,8 @@ def info(arguments: argparse.Namespace) -> int:
     require_output_paths(arguments, OutputPath(arguments.json, "--json"))
     with open_mesh(arguments) as opened:
         counts = CellCounts(opened.source)
-        found = opened.quality(arguments, counts)
-        return _report(arguments, opened.source.mesh, counts, found)
+        measured = opened.quality(arguments, counts)
+        return _report(arguments, opened.source.mesh, counts, measured)
 
 
 def _report(arguments: argparse.Namespace, mesh: Mesh, counts: CellCounts, found: Quality) -> int:

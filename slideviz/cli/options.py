@@ -159,8 +159,8 @@ def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
                 taken[name] = f"{option} {text}", role
         case = after
     raise_all((*problems, *_taken(case, taken)))
-    kept = [warning for warning in case.warnings if warning not in before]
-    return case.change(warnings=(*kept, *idle_roles(case)))
+    added = [warning for warning in case.warnings if warning not in before]
+    return case.change(warnings=(*added, *idle_roles(case)))
 
 
 def _taken(case: Case, taken: Mapping[str, tuple[str, Role]]) -> Iterator[str]:

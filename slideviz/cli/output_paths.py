@@ -52,8 +52,8 @@ class OutputPath:
 
 def input_paths(arguments: argparse.Namespace) -> dict[Path, str]:
     """Return the input files of a command line, with words for what each is."""
-    found = {what: getattr(arguments, name, None) for name, what in _INPUTS.items()}
-    return {path: what for what, path in found.items() if path is not None}
+    inputs = {what: getattr(arguments, name, None) for name, what in _INPUTS.items()}
+    return {path: what for what, path in inputs.items() if path is not None}
 
 
 def qualities_path(output: Path) -> Path:

@@ -108,12 +108,12 @@ class Bar:
             return
         self._next = now + _EVERY
         done = (progress.step - 1) / progress.total
-        rest = None
+        remaining = None
         if progress.step > 1:
-            rest = (now - self._start) / done * (1 - done)
+            remaining = (now - self._start) / done * (1 - done)
         elif self._expected is not None:
-            rest = max(self._expected - (now - self._start), 0.0)
-        left = "" if rest is None else f", about {rest:.0f} s left"
+            remaining = max(self._expected - (now - self._start), 0.0)
+        left = "" if remaining is None else f", about {remaining:.0f} s left"
         word = _PHASES.get(progress.phase, progress.phase)
         steps = f"step {progress.step} of {progress.total}: {word}{left}"
         self._draw(done, f"{self._head}{steps}")

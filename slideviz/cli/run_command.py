@@ -172,16 +172,16 @@ def _deform(
     steps = run_steps(arguments, case, mesh)
     last = steps[-1]
     seconds["quality"] = -time.perf_counter()
-    found = quality(last.mesh, reference=mesh, metric=case.quality_metric)
+    measured = quality(last.mesh, reference=mesh, metric=case.quality_metric)
     before = quality(mesh, metric=case.quality_metric)
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
-    data = quality_data(output, found)
+    data = quality_data(output, measured)
     force = arguments.force
     write(output, last.mesh, overwrite=force, cell_data=data, base=mesh, file_format=kind)
     seconds["write"] += time.perf_counter()
-    folded = folded_cells(steps, mesh, found)
-    return RunResult(mesh, tuple(steps), found, before, folded, seconds)
+    folded = folded_cells(steps, mesh, measured)
+    return RunResult(mesh, tuple(steps), measured, before, folded, seconds)
 
 
 def _stream(

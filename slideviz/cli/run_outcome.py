@@ -80,8 +80,8 @@ def _note_of(output: Path) -> Path:
 
 def _states(files: list[Path]) -> list[list[str | int]]:
     """Return name, size in bytes and time of change of each file."""
-    found = [(path.name, path.stat()) for path in files]
-    return [[name, state.st_size, state.st_mtime_ns] for name, state in found]
+    stats = [(path.name, path.stat()) for path in files]
+    return [[name, state.st_size, state.st_mtime_ns] for name, state in stats]
 
 
 def report_outcome(

@@ -110,10 +110,10 @@ def limits(text: str) -> tuple[float, float]:
 
 def pixels(text: str) -> tuple[int, int]:
     """Return width and height of a text like ``1600x1000``."""
-    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text.strip().lower())
-    if not found:
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text.strip().lower())
+    if not match:
         raise argparse.ArgumentTypeError(f"{text!r} is no size; write it as 1600x1000")
-    width, height = int(found[1]), int(found[2])
+    width, height = int(match[1]), int(match[2])
     if not (300 <= width <= 20000 and 200 <= height <= 20000):
         raise argparse.ArgumentTypeError(
             f"{text!r}: pictures are 300x200 to 20000x20000 pixels large"

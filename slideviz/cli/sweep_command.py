@@ -102,13 +102,13 @@ def sweep(arguments: argparse.Namespace) -> int:
             what = f"{counted(len(designs.rows), 'design')} of {', '.join(designs.columns)}"
             print(f"{arguments.case}, {len(mesh.cells):,} cells: {what}", flush=True)
         begin = time.perf_counter()
-        found = _pulled(arguments, rows, len(designs.rows), folder / RESULTS)
-    report = _report(arguments, designs, found, time.perf_counter() - begin)
+        results = _pulled(arguments, rows, len(designs.rows), folder / RESULTS)
+    report = _report(arguments, designs, results, time.perf_counter() - begin)
     report["results"] = str(folder / RESULTS)
     if not save_json(arguments.json, report) and not arguments.quiet:
         _print_sweep(report)
-    _warn(case.warnings, found, arguments.quiet)
-    if report["failed"] == len(found):
+    _warn(case.warnings, results, arguments.quiet)
+    if report["failed"] == len(results):
         raise CaseError(f"no design could be computed; {folder / RESULTS} says why for each")
     return DONE
 

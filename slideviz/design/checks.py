@@ -206,8 +206,8 @@ class Checks:
         setup = self.setup
         if not len(setup.images):
             return
-        found = misfits(setup.frame, setup.coords, points, setup.images)
-        if not found.max() <= FAR * largest_coordinate(
+        gaps = misfits(setup.frame, setup.coords, points, setup.images)
+        if not gaps.max() <= FAR * largest_coordinate(
             self.mesh.points
         ):  # else it is rounding, without a closer look
             largest_misfit(setup.frame, setup.coords, points, setup.images)

@@ -110,8 +110,8 @@ def _reference(
 
     steps = list(all_steps(Stepping(case, mesh, replace(setup, solve=solve), report, {})))
     # Of steps that were tried, those that are in the run: each has the control nodes it found.
-    found = [next(s for s in made if s.control is step.control) for step in steps]
-    return [step.part for step in steps], found, steps[-1].mesh.points
+    chosen = [next(s for s in made if s.control is step.control) for step in steps]
+    return [step.part for step in steps], chosen, steps[-1].mesh.points
 
 
 def _report(report: Report, step: int, total: int, phase: str, fraction: float) -> None:

@@ -129,9 +129,9 @@ class Deformer:
         asked = motion.displacements(case, mesh)
         self.mesh, self.case = mesh, case
         self.nodes, self.displacement = asked.nodes, asked.vectors
-        given = asked.vectors if displacements is None else displacements
-        given = self._checked(given, "displacements")
-        references = given.reshape(-1, *asked.vectors.shape)
+        designs = asked.vectors if displacements is None else displacements
+        designs = self._checked(designs, "displacements")
+        references = designs.reshape(-1, *asked.vectors.shape)
         sizes = np.linalg.norm(references, axis=2).max(axis=1, initial=0.0)
         most = Displacements(asked.nodes, references[int(np.argmax(sizes))], asked.warnings)
         held = case

@@ -93,9 +93,9 @@ def section(
     require_picture_name(Path(path))
     if color_map not in COLOR_MAPS:
         raise CaseError(f"color_map: {not_one_of(color_map, COLOR_MAPS)}")
-    found = quality(mesh, reference=reference) if rated is None else rated
+    measured = quality(mesh, reference=reference) if rated is None else rated
     matrices = {0: np.eye(4)} if passages is None else passages
-    painted = replace(paint(mesh, found, color, reference), color_map=color_map)
+    painted = replace(paint(mesh, measured, color, reference), color_map=color_map)
     cutter = Cutter.of(mesh)
     pieces = show_passages(cutter, mesh.points, at, matrices)
     note = "" if reference is not None or painted.label == "skew" else NO_REFERENCE

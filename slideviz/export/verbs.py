@@ -70,13 +70,13 @@ def picture(
     """
     case = case or Case()
     metric = case.quality_metric
-    found = quality(mesh, reference=reference, metric=metric) if rated is None else rated
+    measured = quality(mesh, reference=reference, metric=metric) if rated is None else rated
     if reference is None:
-        session = session_of_runs(StepFrame(mesh, found))
+        session = session_of_runs(StepFrame(mesh, measured))
     else:
         before = quality(reference, metric=metric) if before is None else before
         first = StepFrame(reference, before)
-        session = session_of_runs(first, [Run(1, case, (StepFrame(mesh, found, step),), "done")])
+        session = session_of_runs(first, [Run(1, case, (StepFrame(mesh, measured, step),), "done")])
     offscreen_renderer.picture(session, path, size, zoom)
 
 

@@ -128,24 +128,24 @@ def blending(count: int, order: int, at: FloatArray) -> tuple[FloatArray, FloatA
     knot, degree = knots(count, order), order - 1
     span = np.clip(np.searchsorted(knot, at, "right") - 1, degree, count - 1)
     lower = np.zeros((len(at), 0))
-    found = np.ones((len(at), 1))
+    basis = np.ones((len(at), 1))
     for j in range(1, order):
-        lower = found
+        lower = basis
         # The two knots around each function of degree j - 1 that is not zero in the span.
         left = knot[span[:, None] + np.arange(1 - j, 1)]
         right = knot[span[:, None] + np.arange(1, j + 1)]
         part = lower / (right - left)
-        found = np.zeros((len(at), j + 1))
-        found[:, :-1] = (right - at[:, None]) * part
-        found[:, 1:] += (at[:, None] - left) * part
-    slope = np.zeros_like(found)
+        basis = np.zeros((len(at), j + 1))
+        basis[:, :-1] = (right - at[:, None]) * part
+        basis[:, 1:] += (at[:, None] - left) * part
+    slope = np.zeros_like(basis)
     if degree:
         left = knot[span[:, None] + np.arange(1 - degree, 1)]
         right = knot[span[:, None] + np.arange(1, degree + 1)]
         part = degree * lower / (right - left)
         slope[:, :-1] -= part
         slope[:, 1:] += part
-    return _placed(found, span - degree, count), _placed(slope, span - degree, count)
+    return _placed(basis, span - degree, count), _placed(slope, span - degree, count)
 
 
 def _placed(values: FloatArray, first: np.ndarray, count: int) -> FloatArray:

@@ -116,7 +116,7 @@ class BoxDeformation:
         have nested ones.
         """
         outer = {box.parent for box in self.boxes}
-        found = {}
+        boxes = {}
         for box in self.boxes:
             if not box.level and box.name not in outer:
                 continue
@@ -124,8 +124,8 @@ class BoxDeformation:
             moved = box.moved(self.change[box.name])
             there = self._base(box) + self.nodes[inside.nodes]
             if len(there):
-                found[box.name] = inside.nodes, placed_again(moved, there, inside.uvw)
-        return found
+                boxes[box.name] = inside.nodes, placed_again(moved, there, inside.uvw)
+        return boxes
 
     def _in_parent(self, box: Box) -> Embedding:
         """Return the control points of a nested box, embedded in its parent."""

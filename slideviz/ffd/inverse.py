@@ -96,19 +96,19 @@ def _solved(box: Box, points: FloatArray, size: FloatArray) -> FloatArray:
     steps = [np.linspace(0.0, 1.0, SAMPLES * (degree + 1)) for degree in box.degrees]
     seeds = np.array(list(product(*steps)))
     _, nearest = cKDTree(box.at(seeds)).query(points, k=min(STARTS, len(seeds)))
-    found = np.full(points.shape, np.nan)
+    coordinates = np.full(points.shape, np.nan)
     left = np.arange(len(points))
     close = CLOSE + ROUNDING * float((np.abs(points).max(initial=0.0) / size).max())
     for start in np.atleast_2d(nearest.T):
         uvw, gap = _newton(box, points[left], seeds[start[left]], size)
         met = gap <= close
-        found[left[met]] = uvw[met]
+        coordinates[left[met]] = uvw[met]
         # Outside of the box there may be a second solution within it, where it is bent.
         within = ((uvw >= -INSIDE) & (uvw <= 1.0 + INSIDE)).all(axis=1)
         left = left[~(met & within)]
         if not len(left):
             break
-    return found
+    return coordinates
 
 
 def _newton(

@@ -76,14 +76,14 @@ def read_boxes(mesh: Mesh, lines: list[str], system: CoordinateSystem) -> tuple[
 
 def _require_count(mesh: Mesh, lines: list[str], names: list[str]) -> None:
     """Raise MeshError where ``FFD_NBOX=`` is missing or is not the number of boxes that follow."""
-    given = [(at, line) for at, line in enumerate(lines) if key_of(line) == "FFD_NBOX"]
-    if not given:
+    entries = [(at, line) for at, line in enumerate(lines) if key_of(line) == "FFD_NBOX"]
+    if not entries:
         if names:
             raise _error(
                 mesh, 0, f"FFD_NBOX= is missing; write FFD_NBOX= {len(names)} before the FFD boxes"
             )
         return
-    at, line = given[0]
+    at, line = entries[0]
     word = _value(line)
     if not word.isdecimal() or int(word) != len(names):
         has = f"{len(names)} ({', '.join(names)})" if names else "none"
@@ -110,19 +110,19 @@ def _value(line: str) -> str:
 
 def entries_of(lines: list[str]) -> list[Entries]:
     """Return the keyword lines of each box, with their rows."""
-    found: list[Entries] = []
+    entries: list[Entries] = []
     entry = None
     for number, line in enumerate(lines):
         text = line.partition("%")[0]
         if key := key_of(line):
             entry = BoxEntry(_value(line), number)
             if key == "FFD_TAG":
-                found.append({})
-            if found:
-                found[-1][key] = entry
+                entries.append({})
+            if entries:
+                entries[-1][key] = entry
         elif entry is not None and (words := text.replace(",", " ").split()):
             entry.rows.append((number, words))
-    return found
+    return entries
 
 
 class _Reader:
@@ -234,7 +234,7 @@ class _Reader:
         on: dict[str, list[Row]] = {}
         for line, words in self.rows(key, self.count(key)):
             on.setdefault(words[0], []).append((line, words[1:]))
-        found = {}
+        surfaces = {}
         for marker, tails in on.items():
             table = self.table(key, tails, 4)
             number = table[:, 0]
@@ -254,8 +254,8 @@ class _Reader:
             if part is not None:  # which has all nodes of markers
                 inside = np.isin(nodes, part.points)
                 nodes, first = np.searchsorted(part.points, nodes[inside]), first[inside]
-            found[marker] = nodes, table[first, 1:]
-        return found
+            surfaces[marker] = nodes, table[first, 1:]
+        return surfaces
 
     def count(self, key: str) -> int:
         """Return the value of a key, a whole number from 0."""
@@ -315,10 +315,10 @@ def boxes_of(mesh: Mesh, system: CoordinateSystem = CARTESIAN) -> tuple[Box, ...
     MeshError
         The section has a mistake.
     """
-    kept = _BOXES.setdefault(mesh, {})
-    if system not in kept:
-        kept[system] = read_boxes(mesh, _lines(mesh), system)
-    return kept[system]
+    cache = _BOXES.setdefault(mesh, {})
+    if system not in cache:
+        cache[system] = read_boxes(mesh, _lines(mesh), system)
+    return cache[system]
 
 
 def with_boxes(

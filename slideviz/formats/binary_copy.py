@@ -183,13 +183,13 @@ def write_layout(
         for kind, pieces in (("cells", zone.elements), ("points", zone.points))
         for first in range(0, len(pieces), PIECES)
     ]
-    found: list[IntArray] = []
+    missing: list[IntArray] = []
     with ranks.sharing(_layout_tasks, layout, path, ranks.size > 1) as do:
         for k, (task, lost) in enumerate(zip(tasks, do(tasks), strict=True)):
             if task[0] == "points":
-                found.append(lost)
+                missing.append(lost)
             progress((k + 1) / len(tasks))
-    require_all_coordinates(lines, zone.points, zone.dim, np.concatenate(found))
+    require_all_coordinates(lines, zone.points, zone.dim, np.concatenate(missing))
     markers = [
         name + marker_table(parse_cells(lines, m.rows, zone.dim - 1, text.n_points, _silent), conn)
         for name, m in zip(layout.names(), zone.markers, strict=True)
@@ -226,10 +226,10 @@ def _layout_tasks(
     def work(task: _Task) -> IntArray:
         kind, first, end = task
         put = _write_cells if kind == "cells" else _write_points
-        found = list(ordered_map(partial(put, layout, out), range(first, end)))
+        written = list(ordered_map(partial(put, layout, out), range(first, end)))
         if synced:
             os.fsync(out)
-        return np.array(found)
+        return np.array(written)
 
     try:
         yield work
@@ -268,14 +268,14 @@ def _write_points(layout: BinaryLayout, out: int, k: int) -> IntArray:
     text = layout.text
     piece = text.zone.points[k]
     points = np.empty((piece.rows, text.zone.dim))
-    found = fill_points(text.lines, piece, points)
+    filled = fill_points(text.lines, piece, points)
     if not within(points, LARGEST):
         at = int(np.argmax((np.abs(points) > LARGEST).any(axis=1)))
         raise too_large(text.lines.name, piece.row + at, points[at])
     block = np.empty(piece.rows, layout.point)
     block["x"], block["i"] = points, np.arange(piece.row, piece.row + piece.rows)
     _write_at(out, layout.points + piece.row * layout.point.itemsize, block)
-    return found
+    return filled
 
 
 def _write_at(out: int, at: int, content: NDArray) -> None:

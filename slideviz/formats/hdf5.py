@@ -64,25 +64,25 @@ class Hdf5Draft:
 
     def write(self, data: bytes | memoryview) -> int:
         """Write bytes unless a write failed before; return their number, even if this one fails."""
-        rest = memoryview(data).cast("B")
-        size = len(rest)
+        remaining = memoryview(data).cast("B")
+        size = len(remaining)
         try:
-            while len(rest) and self._problem is None:
-                rest = rest[self._file.write(rest) :]
+            while len(remaining) and self._problem is None:
+                remaining = remaining[self._file.write(remaining) :]
         except OSError as problem:
             self._problem = problem
         return size
 
     def readinto(self, buffer: WriteableBuffer) -> int:
         """Fill a buffer from the file, beyond its end with zeros; return the buffer's size."""
-        rest = memoryview(buffer).cast("B")
-        size = len(rest)
-        while len(rest):
-            count = self._file.readinto(rest)
+        remaining = memoryview(buffer).cast("B")
+        size = len(remaining)
+        while len(remaining):
+            count = self._file.readinto(remaining)
             if not count:
-                rest[:] = bytes(len(rest))
+                remaining[:] = bytes(len(remaining))
                 break
-            rest = rest[count:]
+            remaining = remaining[count:]
         return size
 
     def read(self, size: int) -> bytes:

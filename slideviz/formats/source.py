@@ -75,8 +75,8 @@ class Source:
         """Return size and time stamp (ns) of an open file; 0, 0 for one that is kept in memory."""
         if self._file is None:
             return 0, 0
-        found = os.fstat(self._file.fileno())
-        return found.st_size, found.st_mtime_ns
+        status = os.fstat(self._file.fileno())
+        return status.st_size, status.st_mtime_ns
 
     def changed(self) -> MeshError:
         """Return the error for a file that was changed since it was opened."""

@@ -200,8 +200,8 @@ def own_endings(*fields: str) -> str:
 
     Only those whose ``fields`` are true, such as ``quality`` and ``series``.
     """
-    own = (row for row in _ROWS if row.writer != MESHIO.writer)
-    return ", ".join(row.ending for row in own if all(getattr(row, name) for name in fields))
+    rows = (row for row in _ROWS if row.writer != MESHIO.writer)
+    return ", ".join(row.ending for row in rows if all(getattr(row, name) for name in fields))
 
 
 def formats_for(mesh: Mesh) -> dict[str, MeshFormat]:
@@ -227,9 +227,9 @@ def readable_patterns() -> str:
     """Return the patterns of all files that can be read, as ``*.su2 *.su2b``, for a dialog."""
     import meshio
 
-    own = endings(lambda row: row.reader)
+    readable = endings(lambda row: row.reader)
     return " ".join(
-        f"*{end}" for end in dict.fromkeys([*own, *sorted(meshio.extension_to_filetypes)])
+        f"*{end}" for end in dict.fromkeys([*readable, *sorted(meshio.extension_to_filetypes)])
     )
 
 

@@ -134,8 +134,8 @@ class Running(QObject):
         self._deforms = True
         if session.in_file:
             assert output is not None
-            own = self._run_done, compute_in_file, case, session.first, output
-            self.start_job("Starting", *own)
+            call = self._run_done, compute_in_file, case, session.first, output
+            self.start_job("Starting", *call)
             return
         self.start_job("Starting", self._run_done, jobs.compute, case, session.mesh)
 

@@ -314,9 +314,9 @@ def prism_coefficients(at: FloatArray) -> FloatArray:
     ``[c, i]`` is coefficient c of the quadratic above corner i. Entries 0 and 2 are the corner
     Jacobians, and the volume is the sum of all, divided by 18.
     """
-    found = np.empty((3, 3, at.shape[2]))
-    _write_prism(np.ascontiguousarray(at), at.shape[2], found)
-    return found
+    coefficients = np.empty((3, 3, at.shape[2]))
+    _write_prism(np.ascontiguousarray(at), at.shape[2], coefficients)
+    return coefficients
 
 
 def hexahedron_coefficients(at: FloatArray) -> FloatArray:
@@ -329,6 +329,6 @@ def hexahedron_coefficients(at: FloatArray) -> FloatArray:
     coefficients are the corner Jacobians, and the mean of all is the volume (A. Johnen,
     J.-F. Remacle, C. Geuzaine, Geometrical validity of curvilinear finite elements, 2013).
     """
-    found = np.empty((3, 3, 3, at.shape[2]))
-    _write_hexahedron(np.ascontiguousarray(at), at.shape[2], found)
-    return found
+    coefficients = np.empty((3, 3, 3, at.shape[2]))
+    _write_hexahedron(np.ascontiguousarray(at), at.shape[2], coefficients)
+    return coefficients

@@ -175,9 +175,9 @@ def counts(size: int, shares: Shares = PASSAGE_SHARES) -> GridCounts:
 def channel_numbers(n: GridCounts) -> IntArray:
     """Return the node number at each place (i, j) of the channel along x and y, -1 in the hole."""
     shape = (n.ahead + n.along + n.behind + 1, n.below + n.beside + n.above + 1)
-    kept = np.ones(shape, bool)
-    kept[n.ahead + 1 : n.ahead + n.along, n.below + 1 : n.below + n.beside] = False
-    return np.where(kept, np.cumsum(kept).reshape(shape) - 1, -1)
+    mask = np.ones(shape, bool)
+    mask[n.ahead + 1 : n.ahead + n.along, n.below + 1 : n.below + n.beside] = False
+    return np.where(mask, np.cumsum(mask).reshape(shape) - 1, -1)
 
 
 def channel_points(n: GridCounts, section: BladeSection = PASSAGE) -> FloatArray:

@@ -94,7 +94,7 @@ def refined(coarse: Grid, points: FloatArray, fine: Grid, section: BladeSection)
 
     Nodes of the blade are moved onto it, those of the O-grid with them, less the further out.
     """
-    found = np.full((int(fine.quads.max()) + 1, 2), np.nan)
+    nodes = np.full((int(fine.quads.max()) + 1, 2), np.nan)
     places = [_channel_knots(grid.n) for grid in (coarse, fine)]
     for i, j in product(range(3), range(3)):
         if i == j == 1:
@@ -103,7 +103,7 @@ def refined(coarse: Grid, points: FloatArray, fine: Grid, section: BladeSection)
             grid.number[a[i] : a[i + 1] + 1, b[j] : b[j + 1] + 1]
             for grid, (a, b) in zip((coarse, fine), places, strict=True)
         )
-        found[new] = _spline(points[old], new.shape)
+        nodes[new] = _spline(points[old], new.shape)
     turns = [_ring_knots(grid.n) for grid in (coarse, fine)]
     for side in range(4):
         old, new = (
@@ -111,11 +111,11 @@ def refined(coarse: Grid, points: FloatArray, fine: Grid, section: BladeSection)
             for grid, knots in zip((coarse, fine), turns, strict=True)
             for start, stop in [list(pairwise(knots))[side]]
         )
-        found[new[:-1]] = _spline(points[old], new.shape)[:-1]
+        nodes[new[:-1]] = _spline(points[old], new.shape)[:-1]
     blade = blade_nodes(fine.n.lower, fine.ring.shape[1] - fine.n.lower, section)
     fade = 1 - layer_parts(fine.n)[:-1, None, None]
-    found[fine.ring[:-1]] += fade * (blade - found[fine.ring[0]])
-    return found
+    nodes[fine.ring[:-1]] += fade * (blade - nodes[fine.ring[0]])
+    return nodes
 
 
 def _channel_knots(n: GridCounts) -> tuple[list[int], list[int]]:

@@ -47,16 +47,16 @@ def triangulate(points: FloatArray, edges: IntArray) -> IntArray:
     edges : (e, 2)
         The boundary, closed, with the domain on its left.
     """
-    found = Delaunay(points).simplices.astype(np.int64)
-    at = points[found]
+    triangles = Delaunay(points).simplices.astype(np.int64)
+    at = points[triangles]
     (ax, ay), (bx, by) = (at[:, 1] - at[:, 0]).T, (at[:, 2] - at[:, 0]).T
-    found[ax * by < ay * bx] = found[ax * by < ay * bx][:, ::-1]
+    triangles[ax * by < ay * bx] = triangles[ax * by < ay * bx][:, ::-1]
     rim = np.zeros(len(points), bool)
     rim[edges] = True
     # A triangle with a node inside is inside; the others are few.
-    doubtful = np.flatnonzero(rim[found].all(axis=1))
-    outside = ~inside(points[found[doubtful]].mean(axis=1), points, edges)
-    return np.delete(found, doubtful[outside], axis=0)
+    doubtful = np.flatnonzero(rim[triangles].all(axis=1))
+    outside = ~inside(points[triangles[doubtful]].mean(axis=1), points, edges)
+    return np.delete(triangles, doubtful[outside], axis=0)
 
 
 def relax(points: FloatArray, fixed: int, edges: IntArray) -> tuple[FloatArray, IntArray]:
@@ -117,8 +117,8 @@ class Sizing:
     def at(self, points: FloatArray) -> FloatArray:
         """Return the edge length (k,) at points (k, 2), bilinear between grid points."""
         place = (points - self.low) / self.step
-        found: FloatArray = map_coordinates(self.table, place.T, order=1, mode="nearest")
-        return found
+        sizes: FloatArray = map_coordinates(self.table, place.T, order=1, mode="nearest")
+        return sizes
 
 
 def find_sizing(rim: FloatArray, triangles: float) -> Sizing:

@@ -50,8 +50,8 @@ def camber_line() -> FloatArray:
     steps = CHORD * np.diff(u) * [np.cos(middle), np.sin(middle)]
     xy = np.concatenate([np.zeros((2, 1)), np.cumsum(steps, axis=1)], axis=1)
     xy -= xy[:, [int(np.argmin(np.abs(u)))]]
-    kept = (xy[0] > -AHEAD - 1e-3) & (xy[0] < LENGTH - AHEAD + 1e-3)
-    return np.concatenate([[CHORD * u], xy, [angle]])[:, kept]
+    inside = (xy[0] > -AHEAD - 1e-3) & (xy[0] < LENGTH - AHEAD + 1e-3)
+    return np.concatenate([[CHORD * u], xy, [angle]])[:, inside]
 
 
 def camber(x: FloatArray) -> FloatArray:

@@ -105,8 +105,8 @@ class Cutter:
     ) -> Polygons:
         """Return the cut cells, whole or cut as the section says; with ``only``, some of them."""
         if not section.whole_cells:
-            found = self.cut(points, section)
-            return found if only is None else only.among(found)
+            polygons = self.cut(points, section)
+            return polygons if only is None else only.among(polygons)
         ids = self.which_cells(points, section)
         # Sides beside cells that are left out are shown, too.
         return self.surface(points, ids if only is None else ids[only.mask[ids]])

@@ -265,8 +265,8 @@ def _restricted_to_moving(motion: Motion, roles: Mapping[str, Role]) -> Motion |
 def confirm_guesses(session: Session, names: Iterable[str] | None = None) -> Session:
     """Return the session with the guesses for some boundaries (default: all) confirmed."""
     gone = set(session.guesses if names is None else names)
-    kept = {name: guess for name, guess in session.guesses.items() if name not in gone}
-    return replace(session, guesses=kept)
+    guesses = {name: guess for name, guess in session.guesses.items() if name not in gone}
+    return replace(session, guesses=guesses)
 
 
 @undoable("settings")
@@ -294,10 +294,10 @@ def add_motion(session: Session, motion: Motion, index: int | None = None) -> Se
 
 def _with_motions(session: Session, motions: Sequence[Motion]) -> Session:
     """Return the session with other motions; FFD boxes are drawn from the first FFD motion on."""
-    found = set_case(session, motions=tuple(motions))
-    if has_ffd(found.case) and not has_ffd(session.case):
-        return replace(found, view=found.view.with_drawn({"ffd": True}))
-    return found
+    changed = set_case(session, motions=tuple(motions))
+    if has_ffd(changed.case) and not has_ffd(session.case):
+        return replace(changed, view=changed.view.with_drawn({"ffd": True}))
+    return changed
 
 
 @undoable("motion")
@@ -421,17 +421,17 @@ def remove_run(session: Session, number: int) -> Session:
     run = session.run(number)
     if run is None or not run.end:
         return session
-    rest = tuple(other for other in session.runs if other.number != number)
+    runs = tuple(other for other in session.runs if other.number != number)
     beside = None if session.view.beside == number else session.view.beside
     removed = (*session.removed, run)[-MOST_REMOVED:]
     newest = max(session.newest, *(other.number for other in session.runs))
-    session = replace(session, runs=rest, removed=removed, newest=newest)
+    session = replace(session, runs=runs, removed=removed, newest=newest)
     session = set_view(session, beside=beside)
     if session.shown != number:
         return session
-    if not rest:
+    if not runs:
         return show_frame(set_view(replace(session, shown=None), beside=None), 0)
-    return show_run(session, rest[-1].number)
+    return show_run(session, runs[-1].number)
 
 
 def restore_run(session: Session, number: int) -> Session:

@@ -64,12 +64,12 @@ class DesignTable:
         there = column in self.columns
         columns = self.columns if there else (*self.columns, column)
         at = columns.index(column)
-        rest = dict.fromkeys((row[:at], row[at + 1 :]) for row in self.rows) or [((), ())]
-        given = list(values)
-        count = len(rest) * len(given) + there * len(self.rows)
+        others = dict.fromkeys((row[:at], row[at + 1 :]) for row in self.rows) or [((), ())]
+        numbers = list(values)
+        count = len(others) * len(numbers) + there * len(self.rows)
         if count > MOST:
             raise CaseError(f"{count:,} designs are too many; {MOST:,} are not")
-        rows = [(*left, value, *right) for left, right in rest for value in given]
+        rows = [(*left, value, *right) for left, right in others for value in numbers]
         return DesignTable(columns, tuple(dict.fromkeys((*self.rows, *rows)) if there else rows))
 
     def with_cell(self, row: int, column: int, text: str) -> DesignTable:
@@ -77,8 +77,8 @@ class DesignTable:
         cells = list(self.rows[row])
         cells[column] = text.strip()
         rows = (*self.rows[:row], tuple(cells), *self.rows[row + 1 :])
-        kept = {number: one for number, one in self.results.items() if number != row + 1}
-        return replace(self, rows=rows, results=MappingProxyType(kept))
+        results = {number: one for number, one in self.results.items() if number != row + 1}
+        return replace(self, rows=rows, results=MappingProxyType(results))
 
     def without(self, rows: Iterable[int]) -> DesignTable:
         """Return the table without some rows; results move with their designs."""
@@ -123,8 +123,8 @@ class DesignTable:
         """
         if case is None or not self.results or all(map(all, self.rows)):
             return self
-        own = case_values(case, columns_of(case, self.columns))
-        texts = {name: value_text(value) for name, value in own.items()}
+        values = case_values(case, columns_of(case, self.columns))
+        texts = {name: value_text(value) for name, value in values.items()}
         rows = (zip(self.columns, row, strict=True) for row in self.rows)
         return replace(self, rows=tuple(tuple(c or texts[name] for name, c in row) for row in rows))
 
@@ -140,8 +140,8 @@ class DesignTable:
         """
         if case is None or now is None or _settings(case) != _settings(now):
             return self.without_results()
-        kept = (row for row in self.results.values() if not row.problem)
-        return self.without_results().with_results(kept)
+        done = (row for row in self.results.values() if not row.problem)
+        return self.without_results().with_results(done)
 
     def unsaved(self, busy: bool, saved: DesignTable | None) -> str:
         """Return a sentence on what would be lost with the table; "" if nothing.
@@ -207,8 +207,8 @@ def column_choices(case: Case, dim: int) -> dict[str, str]:
         for name, key in KEYS.items()
         if key.group not in (FILES, VIEW, MOTION) and key.get(case) is not None
     }
-    found = case_values(case, {**numbers, **keys})
-    return {name: value_text(value) for name, value in found.items()}
+    values = case_values(case, {**numbers, **keys})
+    return {name: value_text(value) for name, value in values.items()}
 
 
 def values_of(text: str) -> list[str]:
@@ -221,14 +221,14 @@ def values_of(text: str) -> list[str]:
     """
     match = _RANGE.match(text.strip())
     if match is None:
-        found = [word.strip() for word in text.split(",")]
+        words = [word.strip() for word in text.split(",")]
         parts = text.split(":")
-        if not all(found) or (len(parts) > 1 and all(is_number(part.strip()) for part in parts)):
+        if not all(words) or (len(parts) > 1 and all(is_number(part.strip()) for part in parts)):
             raise CaseError(
                 f"“{text.strip()}” is neither values, such as 1, 2, 5, nor a range “a to b in n”, "
                 f"such as -8 to 0 in 9"
             )
-        return list(dict.fromkeys(found))
+        return list(dict.fromkeys(words))
     first, last, count = match.groups()
     if not (is_number(first) and is_number(last)) or not 2 <= int(count) <= MOST:
         raise CaseError(
@@ -259,12 +259,12 @@ def read_table(case: Case, path: Path) -> DesignTable:
     CaseError
         The file cannot be read, has mistakes, or more designs than the window allows.
     """
-    found = read_designs(case, path)
-    if len(found.rows) > MOST:
-        raise CaseError(f"{path}: has {len(found.rows):,} designs; use `slideviz sweep` for them")
-    columns = tuple(found.columns)
+    designs = read_designs(case, path)
+    if len(designs.rows) > MOST:
+        raise CaseError(f"{path}: has {len(designs.rows):,} designs; use `slideviz sweep` for them")
+    columns = tuple(designs.columns)
     rows = tuple(
-        tuple(value_text(design.values[name]) for name in columns) for design in found.rows
+        tuple(value_text(design.values[name]) for name in columns) for design in designs.rows
     )
     return DesignTable(columns, rows)
 
@@ -297,9 +297,11 @@ def read_results(path: Path) -> DesignTable:
         results = [replace(result_of(head, c), design=k) for k, c in enumerate(lines, start=1)]
     except (OSError, ValueError, KeyError) as problem:
         raise CaseError(f"{path}: is no table of results ({problem})") from problem
-    own = design_columns(head)
+    columns = design_columns(head)
     done = [row for row in results if row.problem or row.steps]
-    return DesignTable(tuple(head[own]), tuple(tuple(c[own]) for c in lines)).with_results(done)
+    return DesignTable(tuple(head[columns]), tuple(tuple(c[columns]) for c in lines)).with_results(
+        done
+    )
 
 
 def run_designs(
@@ -320,6 +322,6 @@ def run_designs(
     rows = sweep(case, wanted, mesh=mesh, going_on=lambda: raise_if_cancelled(stopped))
     for done, row in enumerate(rows, start=1):
         report(replace(row, design=left[row.design - 1]))
-        rest = (time.monotonic() - begin) / done * (len(left) - done)
-        words = f"{total - len(left) + done} of {total}, {rest:.0f} s left"
+        seconds = (time.monotonic() - begin) / done * (len(left) - done)
+        words = f"{total - len(left) + done} of {total}, {seconds:.0f} s left"
         report(JobProgress(words, done / len(left)))

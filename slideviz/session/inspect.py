@@ -188,8 +188,8 @@ def cell_at(mesh: Mesh, x: float, y: float, values: FloatArray) -> int | None:
     low, high = np.minimum.reduceat(at, first), np.maximum.reduceat(at, first)
     here = np.array([x, y])
     near = ((low <= here) & (here <= high)).all(axis=1) & ~np.isnan(values)
-    found = [cell for cell in np.flatnonzero(near) if _inside(mesh, int(cell), x, y)]
-    return int(min(found, key=lambda cell: values[cell])) if found else None
+    inside = [cell for cell in np.flatnonzero(near) if _inside(mesh, int(cell), x, y)]
+    return int(min(inside, key=lambda cell: values[cell])) if inside else None
 
 
 def _inside(mesh: Mesh, cell: int, x: float, y: float) -> bool:

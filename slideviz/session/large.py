@@ -79,10 +79,10 @@ def first_frame(skin: Mesh, metric: Metric, tick: Callable[[float], object]) -> 
     folder = Path(tempfile.gettempdir())
     with ExitStack() as stack:
         source = FileSource.open(stack, (skin.source, skin.zone))
-        found = measure_mesh(
+        measured = measure_mesh(
             stack, folder, source, metric=metric, worst=WORST, may_fold=True, tick=tick
         )
-    return frame_of(skin, skin, skin.source, found.totals, metric)
+    return frame_of(skin, skin, skin.source, measured.totals, metric)
 
 
 def frame_of(now: Mesh, skin: Mesh, file: Path, totals: QualityTotals, metric: Metric) -> StepFrame:
@@ -101,8 +101,8 @@ def frame_of(now: Mesh, skin: Mesh, file: Path, totals: QualityTotals, metric: M
     with ExitStack() as stack:
         source = FileSource.open(stack, (skin.source, skin.zone), moved=file)
         worst = source.with_points(source.elements(totals.worst))
-    found = replace(quality(now, skin, metric), of_mesh=totals)
-    return StepFrame(now, found, extra=block_frame(worst, skin, metric), file=file)
+    measured = replace(quality(now, skin, metric), of_mesh=totals)
+    return StepFrame(now, measured, extra=block_frame(worst, skin, metric), file=file)
 
 
 def block_frame(block: CellBlock, skin: Mesh, metric: Metric) -> StepFrame:

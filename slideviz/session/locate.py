@@ -67,8 +67,8 @@ def decimals(values: FloatArray) -> int:
 
 def nearest_boundary(mesh: Mesh, point: FloatArray) -> tuple[str, float] | None:
     """Return the name of the boundary nearest to a point (d,) and its distance, or None."""
-    found = [(_distance(mesh, marker, point), marker.name) for marker in mesh.markers]
-    far, name = min(found, default=(np.inf, ""))
+    distances = [(_distance(mesh, marker, point), marker.name) for marker in mesh.markers]
+    far, name = min(distances, default=(np.inf, ""))
     return (name, far) if np.isfinite(far) else None
 
 

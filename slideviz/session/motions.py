@@ -137,8 +137,8 @@ def centroid(mesh: Mesh, names: Iterable[str]) -> tuple[float, ...]:
 
 def chord_of(mesh: Mesh, names: Iterable[str]) -> tuple[float, float]:
     """Return from which x to which x some boundaries go, rounded to `DIGITS`; 0 to 1 for none."""
-    found = [mesh.marker(name).nodes for name in names if name in mesh.marker_names]
-    x = mesh.points[np.concatenate([*found, np.empty(0, np.int64)]), 0]
+    nodes = [mesh.marker(name).nodes for name in names if name in mesh.marker_names]
+    x = mesh.points[np.concatenate([*nodes, np.empty(0, np.int64)]), 0]
     if not len(x) or not x.min() < x.max():
         return 0.0, 1.0
     digits = DIGITS - math.ceil(math.log10(np.ptp(x)))
@@ -214,8 +214,8 @@ def largest_prescribed(case: Case, mesh: Mesh) -> float:
 
 def support_key(case: Case, mesh: Mesh) -> tuple[object, ...]:
     """Return the values on which `support_of` depends."""
-    given = case.method, case.influence_factor, case.support_radius
-    return mesh, case.markers_with("moving"), case.motions, box_definition(case), given
+    settings = case.method, case.influence_factor, case.support_radius
+    return mesh, case.markers_with("moving"), case.motions, box_definition(case), settings
 
 
 def shown_case(session: Session) -> Case:

@@ -71,11 +71,11 @@ def show_in(session: Session, pane: int, number: int) -> Session:
 
 def close_pane(session: Session, pane: int) -> Session:
     """Return the session with only one view, the one beside ``pane``."""
-    kept = panes(session)[1 - pane]
+    number = panes(session)[1 - pane]
     alone = show_beside(session, None)
-    if kept == UNDEFORMED:
+    if number == UNDEFORMED:
         return show_frame(alone, 0)
-    return _lead(alone, kept)
+    return _lead(alone, number)
 
 
 def _lead(session: Session, number: int | None) -> Session:

@@ -136,11 +136,11 @@ def show_passages(
     Passages whose transformation takes the section onto itself share one cut, transformed.
     """
     base: Polygons | None = None
-    found = {}
+    cuts = {}
     for number, matrix in matrices.items():
         if keeps(section, matrix):
             base = cutter.show(points, section, only) if base is None else base
-            found[number] = base.with_points(transformed(base.points, matrix))
+            cuts[number] = base.with_points(transformed(base.points, matrix))
         else:
-            found[number] = cutter.show(transformed(points, matrix), section, only)
-    return found
+            cuts[number] = cutter.show(transformed(points, matrix), section, only)
+    return cuts

@@ -47,8 +47,10 @@ class StepFrame:
 
     def place_of(self, cell: int) -> tuple[StepFrame, int]:
         """Return the frame that a cell belongs to, this one or ``extra``, and its number there."""
-        own = len(self.mesh.cells)
-        return (self, cell) if self.extra is None or cell < own else (self.extra, cell - own)
+        n_cells = len(self.mesh.cells)
+        return (
+            (self, cell) if self.extra is None or cell < n_cells else (self.extra, cell - n_cells)
+        )
 
     def values(
         self, what: ColorBy, undeformed: Mesh | None = None, cells: IntArray | None = None
@@ -122,17 +124,17 @@ def cell_displacement(mesh: Mesh, undeformed: Mesh, cells: IntArray | None = Non
     In the mesh's length unit. Only these cells take time and memory.
     """
     every, count = mesh.cells, len(mesh.cells) if cells is None else len(cells)
-    found = np.zeros(count)
+    values = np.zeros(count)
     if mesh.points is undeformed.points:
-        return found
+        return values
 
     def of_part(part: slice) -> None:
         ids = np.arange(part.start, part.stop) if cells is None else cells[part]
         here = mesh.points, undeformed.points, every.connectivity, every.offsets
-        _mean_distances(*here, ids, found[part])
+        _mean_distances(*here, ids, values[part])
 
     in_parts(of_part, count)
-    return found
+    return values
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -153,11 +155,11 @@ def largest_displacement(now: FloatArray, before: FloatArray) -> float:
     """Return the largest distance of a point ``now`` (n, d) from where it was ``before`` (n, d)."""
     if now is before or not len(now):
         return 0.0
-    found: list[float] = []
+    lengths: list[float] = []
 
     def of_part(part: slice) -> None:
         shifts = now[part] - before[part]
-        found.append(float(np.einsum("nd,nd->n", shifts, shifts).max()))
+        lengths.append(float(np.einsum("nd,nd->n", shifts, shifts).max()))
 
     in_parts(of_part, len(now))
-    return float(np.sqrt(max(found)))
+    return float(np.sqrt(max(lengths)))

@@ -115,15 +115,15 @@ def _last_valid_words(run: Run) -> str:
 def warnings_of(run: Run) -> tuple[str, ...]:
     """Return the warnings of a run, without its notes."""
     step = run.last.step if run.last is not None else None
-    found = () if step is None else step.warnings
-    return tuple(with_field_labels(text) for text in found if not isinstance(text, Note))
+    warnings = () if step is None else step.warnings
+    return tuple(with_field_labels(text) for text in warnings if not isinstance(text, Note))
 
 
 def notes_of(run: Run) -> tuple[str, ...]:
     """Return the notes of a run: remarks that are harmless."""
     step = run.last.step if run.last is not None else None
-    found = () if step is None else step.warnings
-    return tuple(with_field_labels(text) for text in found if isinstance(text, Note))
+    warnings = () if step is None else step.warnings
+    return tuple(with_field_labels(text) for text in warnings if isinstance(text, Note))
 
 
 @dataclass(frozen=True)
@@ -146,31 +146,35 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
         return (Requirement("Open a mesh first.", "open"),)
     case = session.case
     # Invalid fields come first: the case, which the rest is about, has their last valid values.
-    found = [Requirement(text, place) for place, text in session.invalid]
+    requirements = [Requirement(text, place) for place, text in session.invalid]
     moving = case.markers_with("moving")
     if not moving:
-        found.append(Requirement("No boundary moves: give one the role “moving”.", "boundaries"))
-    found += [
+        requirements.append(
+            Requirement("No boundary moves: give one the role “moving”.", "boundaries")
+        )
+    requirements += [
         Requirement(f"“{name}” has no motion: add one.", "motion", name)
         for name in moving
         if not any(applies_to(motion, name) for motion in case.motions)
     ]
     if case.motions and all(moves_nothing(motion) for motion in case.motions):
-        found.append(Requirement("Nothing moves yet: enter the values of the motion.", "motion"))
+        requirements.append(
+            Requirement("Nothing moves yet: enter the values of the motion.", "motion")
+        )
     for place, motion in enumerate(case.motions):
         if isinstance(motion, FromFile) and not motion.path.is_file():
-            found.append(Requirement(_lacks_file(motion.path), "motion", motion=place))
+            requirements.append(Requirement(_lacks_file(motion.path), "motion", motion=place))
     if case.periodic == "moving" and case.sliding == "none":
         text = "Moving periodic vertices need sliding: choose pseudo or direct."
-        found.append(Requirement(text, "method"))
+        requirements.append(Requirement(text, "method"))
     if session.in_file and case.method == "elastic":
         text = "Linear elasticity needs all of a mesh in memory, and this one stays in its file."
-        found.append(Requirement(f"{text} Choose another method.", "method"))
-    if not found:
-        found = [Requirement(text, "boundaries") for text in _problems(session)]
-    if not found and session.intersection:
-        found = [Requirement(session.intersection, "motion")]
-    return tuple(found)
+        requirements.append(Requirement(f"{text} Choose another method.", "method"))
+    if not requirements:
+        requirements = [Requirement(text, "boundaries") for text in _problems(session)]
+    if not requirements and session.intersection:
+        requirements = [Requirement(session.intersection, "motion")]
+    return tuple(requirements)
 
 
 def _lacks_file(path: Path) -> str:
@@ -208,10 +212,10 @@ def tolerance_warning(case: Case, extent: float, largest: float) -> str:
     largest
         The largest displacement that the motions prescribe; 0 where it is not known.
     """
-    given = case.reduction
-    if given is None or given.auto or case.method != "rbf" or not largest > 0.0:
+    reduction = case.reduction
+    if reduction is None or reduction.auto or case.method != "rbf" or not largest > 0.0:
         return ""
-    tolerance = given.relative * extent if given.relative else given.tolerance
+    tolerance = reduction.relative * extent if reduction.relative else reduction.tolerance
     if tolerance <= LOOSE * largest:
         return ""
     is_ = "not below" if tolerance >= largest else "more than a tenth of"
@@ -240,15 +244,15 @@ _KERNEL = re.compile(rf"\b({'|'.join(KERNELS)})\b(?= is too)|\b\w+-c\d[ab]?\b")
 
 def idle_text(case: Case) -> tuple[str, ...]:
     """Return a sentence for each role without effect in the case's modes, seldom on purpose."""
-    found: list[str] = []
+    sentences: list[str] = []
     for names, mode, title, verb in (
         (case.markers_with("periodic"), case.periodic, "Periodicity", "stay periodic"),
         (case.markers_with("sliding"), case.sliding, "Sliding", "slide"),
     ):
         who = " and ".join(names) if len(names) <= MOST_NAMES else f"{len(names)} boundaries"
         if names and mode == "none":
-            found.append(f"{title} is “none”: {who} will not {verb}.")
-    return tuple(found)
+            sentences.append(f"{title} is “none”: {who} will not {verb}.")
+    return tuple(sentences)
 
 
 def with_field_labels(text: str) -> str:

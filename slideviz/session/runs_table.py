@@ -40,8 +40,8 @@ def _radius(run: Run) -> float | None:
 
 
 def _misfit(run: Run) -> float | None:
-    found = [frame.step.periodic_misfit for frame in run.frames if frame.step is not None]
-    return max((value for value in found if value is not None), default=None)
+    misfits = [frame.step.periodic_misfit for frame in run.frames if frame.step is not None]
+    return max((value for value in misfits if value is not None), default=None)
 
 
 @dataclass(frozen=True)
@@ -91,11 +91,11 @@ def best_runs(runs: Sequence[Run]) -> frozenset[int]:
         if run.last is not None and run.end == "done":
             group = alike.setdefault(deformation(run.case), {})
             group[run.number] = round(run.last.quality.min, DIGITS)
-    found: set[int] = set()
+    best: set[int] = set()
     for group in alike.values():
         if len(set(group.values())) > 1:
-            found |= {number for number, value in group.items() if value == max(group.values())}
-    return frozenset(found)
+            best |= {number for number, value in group.items() if value == max(group.values())}
+    return frozenset(best)
 
 
 def describe_run(run: Run) -> str:

@@ -32,15 +32,15 @@ def _number_words(value: float) -> str:
 
 def reduction_words(case: Case) -> str:
     """Return the data reduction of a case in words."""
-    given = case.reduction
-    if given is None or case.method != "rbf":
+    reduction = case.reduction
+    if reduction is None or case.method != "rbf":
         return "all nodes"
-    if given.auto:
+    if reduction.auto:
         return "automatic data reduction"
-    part = _number_words(given.relative or given.tolerance)
-    part += " of the extent" if given.relative else ""
-    levels = ", in levels" if given.multilevel else ""
-    most = f", at most {given.max_nodes:,} nodes" if given.max_nodes else ""
+    part = _number_words(reduction.relative or reduction.tolerance)
+    part += " of the extent" if reduction.relative else ""
+    levels = ", in levels" if reduction.multilevel else ""
+    most = f", at most {reduction.max_nodes:,} nodes" if reduction.max_nodes else ""
     return f"reduced to {part}{levels}{most}"
 
 

@@ -136,17 +136,17 @@ def view_to_case(session: Session, camera: Camera | None = None) -> Case:
     """Return the case of a session with its view and camera as keys; defaults are left out."""
     view, first = session.view, ViewState()
     before = _plain(first)
-    kept = {key: value for key, value in _plain(view).items() if before[key] != value}
+    changed = {key: value for key, value in _plain(view).items() if before[key] != value}
     ranges = {"VIEW_RANGE": view.color_range, "VIEW_THRESHOLD": view.threshold}
-    kept |= {key: value for key, value in ranges.items() if value is not None}
+    changed |= {key: value for key, value in ranges.items() if value is not None}
     if view.hidden:
         names = session.mesh.marker_names if session.mesh is not None else ()
-        kept["VIEW_HIDDEN"] = tuple(name for name in names if name in view.hidden)
+        changed["VIEW_HIDDEN"] = tuple(name for name in names if name in view.hidden)
     if view.sections:
-        kept["VIEW_SECTIONS"] = tuple(_text(section) for section in view.sections)
+        changed["VIEW_SECTIONS"] = tuple(_text(section) for section in view.sections)
     if camera is not None:
-        kept["VIEW_CAMERA"] = camera
-    return session.case.change(view=kept)
+        changed["VIEW_CAMERA"] = camera
+    return session.case.change(view=changed)
 
 
 def view_from_case(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:

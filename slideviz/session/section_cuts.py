@@ -84,10 +84,10 @@ def slab_of(mesh: Mesh, section: Section) -> StepFrame | None:
 
 def keep_slab(mesh: Mesh, section: Section, slab: StepFrame) -> None:
     """Cache the slab of cells that a section cuts, for `slab_of`."""
-    kept = _SLABS.setdefault(mesh, {})
-    while len(kept) >= KEPT_SLABS:
-        kept.pop(next(iter(kept)))
-    kept[cut_key(section)] = slab
+    cache = _SLABS.setdefault(mesh, {})
+    while len(cache) >= KEPT_SLABS:
+        cache.pop(next(iter(cache)))
+    cache[cut_key(section)] = slab
 
 
 def read_slab(
@@ -188,8 +188,8 @@ def position_range(section: Section, points: FloatArray) -> tuple[float, float]:
     ends: list[float] = []
 
     def of_part(part: slice) -> None:
-        found = section.shape.positions(section, points[part])
-        ends.extend((float(found.min()), float(found.max())))
+        positions = section.shape.positions(section, points[part])
+        ends.extend((float(positions.min()), float(positions.max())))
 
     in_parts(of_part, len(points))
     return min(ends), max(ends)
@@ -202,10 +202,10 @@ def with_direction(section: Section, direction: Triple, points: FloatArray) -> S
     through their middle.
     """
     new = replace(section, direction=direction)
-    found = new.shape.positions(new, points)
-    if found.min() < new.shape.position(new) < found.max():
+    positions = new.shape.positions(new, points)
+    if positions.min() < new.shape.position(new) < positions.max():
         return new
-    return new.shape.at_position(new, round_middle(found))
+    return new.shape.at_position(new, round_middle(positions))
 
 
 NO_POLYGONS = Polygons(np.empty((0, 3)), *(np.zeros(n, np.int64) for n in (1, 0, 0)))

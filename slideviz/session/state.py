@@ -177,8 +177,8 @@ class Session:
 
     def inputs(self) -> dict[Path, str]:
         """Return the files that the session was read from, with words for what each is."""
-        found = self.case.inputs()
-        return found if self.path is None else found | {self.path: "the mesh that is open"}
+        inputs = self.case.inputs()
+        return inputs if self.path is None else inputs | {self.path: "the mesh that is open"}
 
     def run(self, number: int | None) -> Run | None:
         """Return the run with a number, or None."""
@@ -229,8 +229,8 @@ class Session:
     def repeatable(self) -> bool:
         """Return whether running the case file on disk would repeat the run that is shown."""
         run = self.run_shown
-        kept = self.case.source is not None and not self.unsaved_case
-        return kept and run is not None and run.end == "done" and not self.outdated
+        saved = self.case.source is not None and not self.unsaved_case
+        return saved and run is not None and run.end == "done" and not self.outdated
 
     @property
     def outdated(self) -> bool:

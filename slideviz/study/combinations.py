@@ -236,13 +236,13 @@ def _result(
         if steps:  # of the steps before the last only the numbers are needed
             steps[-1] = replace(steps[-1], mesh=mesh)
         steps.append(step)
-        found = quality(step.mesh, mesh, applied.quality_metric)
-        quality_of.append((found.min, found.mean))
+        measured = quality(step.mesh, mesh, applied.quality_metric)
+        quality_of.append((measured.min, measured.mean))
     minimum, mean = np.array(quality_of).T
     return Result(
         steps=len(steps),
         mesh=steps[-1].mesh,
-        quality=found,
+        quality=measured,
         minimum=frozen_array(minimum, np.float64),
         mean=frozen_array(mean, np.float64),
         control_nodes=steps[-1].control_nodes,
@@ -308,22 +308,22 @@ def refused(case: Case, mesh: Mesh, wanted: Iterable[Combination]) -> dict[Combi
     Nothing is deformed: other combinations may turn out to be impossible later.
     """
     problems: dict[tuple[str, str], str] = {}
-    found = {}
+    reason_of = {}
     for one in wanted:
         kind = one.method, one.periodic
         if kind not in problems:
             problems[kind] = "; ".join(dict.fromkeys(check_case(one.applied(case), mesh)))
         if problems[kind]:
-            found[one] = problems[kind]
-    return found
+            reason_of[one] = problems[kind]
+    return reason_of
 
 
 def reasons(problems: Mapping[Combination, str]) -> dict[str, list[Combination]]:
     """Return for each reason the combinations that have it."""
-    found: dict[str, list[Combination]] = {}
+    groups: dict[str, list[Combination]] = {}
     for combination, problem in problems.items():
-        found.setdefault(" ".join(problem.split()), []).append(combination)
-    return found
+        groups.setdefault(" ".join(problem.split()), []).append(combination)
+    return groups
 
 
 def words_for(some: Iterable[Combination], every: Iterable[Combination], names: Names) -> str:

@@ -118,20 +118,20 @@ def _words(
     """Return the words in places without a picture, and the notes at the foot."""
     problems = {row.combination: row.problem for row in rows if row.result is None}
     every = [row.combination for row in rows]
-    given = list(reasons(problems).items())
+    sentences = list(reasons(problems).items())
     notes = [
         f"[{number}] {words_for(some, every, TITLES)}: not possible: {reason}"
-        for number, (reason, some) in enumerate(given, start=1)
+        for number, (reason, some) in enumerate(sentences, start=1)
     ]
     words = {}
     for at, row in places.items():
         if row.result is None:
-            number = next(k for k, (_, some) in enumerate(given, 1) if row.combination in some)
+            number = next(k for k, (_, some) in enumerate(sentences, 1) if row.combination in some)
             words[at] = f"not possible [{number}]"
         elif at not in shown:
-            words[at] = f"not drawn [{len(given) + 1}]"
+            words[at] = f"not drawn [{len(sentences) + 1}]"
     if any(text.startswith("not drawn") for text in words.values()):
-        notes.append(f"[{len(given) + 1}] {NOT_KEPT}")
+        notes.append(f"[{len(sentences) + 1}] {NOT_KEPT}")
     return words, notes
 
 
@@ -172,8 +172,8 @@ def _drawn(images: Sequence[Pixels], axis: int) -> slice:
     some = np.zeros(images[0].shape[axis], bool)
     for image in images:
         some |= (image < WHITE).any(axis=(1 - axis, 2))
-    found = np.flatnonzero(some)
-    return slice(int(found[0]), int(found[-1]) + 1) if len(found) else slice(0, len(some))
+    indices = np.flatnonzero(some)
+    return slice(int(indices[0]), int(indices[-1]) + 1) if len(indices) else slice(0, len(some))
 
 
 def _fill(axes: Any, words: str, row: CombinationRow, wide: float) -> None:
@@ -186,9 +186,9 @@ def _fill(axes: Any, words: str, row: CombinationRow, wide: float) -> None:
 
 def _numbers(result: Result) -> str:
     """Return the lowest and mean quality, and the number of inverted cells, in words."""
-    found = result.quality
-    text = f"min {found.min:.3f}, mean {found.mean:.3f}"
-    return f"{text}\n{found.inverted} inverted" if found.inverted else text
+    measured = result.quality
+    text = f"min {measured.min:.3f}, mean {measured.mean:.3f}"
+    return f"{text}\n{measured.inverted} inverted" if measured.inverted else text
 
 
 def _foot(figure: Any, facets: Any, colors: Any, inverted: bool, notes: Sequence[str]) -> None:

@@ -53,13 +53,13 @@ def facets(rows: Sequence[CombinationRow]) -> tuple[Facet, ...]:
     # 0: each method is a line, each mode a facet; 1: the other way round.
     lined = 0 if modes == 1 or modes < methods else 1
     other = 1 - lined
-    found: dict[str, list[FacetLine]] = {title: [] for title in asked[other]}
+    lines_of: dict[str, list[FacetLine]] = {title: [] for title in asked[other]}
     for row in done:
         titles = _titles(row)
         line = FacetLine(titles[lined], asked[lined].index(titles[lined]), row)
-        found[titles[other]].append(line)
-    several = len(found) > 1
-    made = [Facet(title if several else "", tuple(lines)) for title, lines in found.items()]
+        lines_of[titles[other]].append(line)
+    several = len(lines_of) > 1
+    made = [Facet(title if several else "", tuple(lines)) for title, lines in lines_of.items()]
     return tuple(facet for facet in made if facet.lines)
 
 
@@ -185,10 +185,10 @@ _Draw = Callable[["Axes", Sequence[FacetLine]], None]
 
 def _outcomes(lines: Sequence[FacetLine]) -> list[plots.Outcome]:
     """Return the results of lines as plots against steps take them."""
-    found = []
+    outcomes = []
     for line in lines:
         result = result_of(line)
-        found.append(
+        outcomes.append(
             plots.Outcome(
                 line.label,
                 result.steps,
@@ -201,7 +201,7 @@ def _outcomes(lines: Sequence[FacetLine]) -> list[plots.Outcome]:
                 line.series,
             )
         )
-    return found
+    return outcomes
 
 
 def _minimum(axes: Axes, lines: Sequence[FacetLine]) -> None:
@@ -233,13 +233,13 @@ def _histogram(every: Sequence[FacetLine]) -> _Draw:
 
 
 def _inverted(line: FacetLine) -> np.ndarray:
-    found = result_of(line).quality
-    return np.asarray(found.status[found.counted] == INVERTED)
+    measured = result_of(line).quality
+    return np.asarray(measured.status[measured.counted] == INVERTED)
 
 
 def _values(line: FacetLine) -> np.ndarray:
-    found = result_of(line).quality
-    return found.values[found.counted]
+    measured = result_of(line).quality
+    return measured.values[measured.counted]
 
 
 def _by_step(axes: Axes, lines: Sequence[FacetLine]) -> None:

@@ -162,8 +162,8 @@ def keep_partial(path: Path, words: str) -> None:
 
 def leftover_message() -> str:
     """Return the words of `keep_partial` on the latest file that stays, else `NOTHING_LEFT`."""
-    kept = (words for path, words in reversed(_partial.items()) if path.exists())
-    return next(kept, NOTHING_LEFT)
+    sentences = (words for path, words in reversed(_partial.items()) if path.exists())
+    return next(sentences, NOTHING_LEFT)
 
 
 def is_alive(pid: str) -> bool:

@@ -86,12 +86,12 @@ def require_regular_file(path: Path, error: type[SlidevizError]) -> int:
     OSError, ValueError
         There is no such file, or it is a folder.
     """
-    found = path.stat()
-    if stat.S_ISDIR(found.st_mode):
+    status = path.stat()
+    if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(status.st_mode):
         raise error(f"{printable(path)}: this is a device or pipe; choose an ordinary file")
-    return found.st_size
+    return status.st_size
 
 
 def read_json(path: Path) -> Any:

@@ -32,13 +32,13 @@ def _environment(module: str, constants: list, name: str) -> Environment:
     """
     if module.partition(".")[0] != "numba" or module in sys.modules:
         return environment._rebuild_env(module, constants, name)
-    found = environment.lookup_environment(name)
-    if found is None:
-        found = Environment({"__name__": module})
-        found.consts[:] = constants
-        found.env_name = name
-        Environment._memo[name] = found
-    return found
+    known = environment.lookup_environment(name)
+    if known is None:
+        known = Environment({"__name__": module})
+        known.consts[:] = constants
+        known.env_name = name
+        Environment._memo[name] = known
+    return known
 
 
 class _Reader(pickle.Unpickler):

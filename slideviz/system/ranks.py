@@ -172,13 +172,13 @@ class Ranks(SerialPool):
             fault = self._portable(problem)
         while (order := self._received(0.001)[1]) is not None:
             index, task = order
-            found = None
+            result = None
             if work is not None:
                 try:
-                    fault, found = None, work(task)
+                    fault, result = None, work(task)
                 except Exception as problem:
                     fault = self._portable(problem)
-            self.comm.send((index, found, fault), 0)
+            self.comm.send((index, result, fault), 0)
 
     def _results(
         self, pool: ThreadPoolExecutor, work: Callable[[Task], Result], tasks: Sequence[Task]
@@ -189,14 +189,14 @@ class Ranks(SerialPool):
         """
         idle = list(range(1, self.size))
         local: Future[None] | None = None
-        found: dict[int, tuple[Any, BaseException | None]] = {}
+        results: dict[int, tuple[Any, BaseException | None]] = {}
         begun = done = 0
 
         def do(index: int) -> None:
             try:
-                found[index] = work(tasks[index]), None
+                results[index] = work(tasks[index]), None
             except BaseException as problem:
-                found[index] = None, problem
+                results[index] = None, problem
 
         while done < len(tasks):
             while begun < min(len(tasks), done + AHEAD * self.size) and (idle or local is None):
@@ -212,9 +212,9 @@ class Ranks(SerialPool):
                 local = None
             if answer is not None:
                 idle.append(rank)
-                found[answer[0]] = answer[1:]
-            while done in found:
-                result, fault = found.pop(done)
+                results[answer[0]] = answer[1:]
+            while done in results:
+                result, fault = results.pop(done)
                 if fault is not None:
                     raise fault
                 done += 1

@@ -130,24 +130,24 @@ class FrozenFit:
         solve, extra = self._solver(rows, index, level, stage)
         right = np.zeros((*value(rows.right).shape[:-2], count + extra, m))
         right[..., :count, :] = value(rows.right)
-        found: Array = solve(right)
+        weights: Array = solve(right)
         if isinstance(solve, MeasuredSystem) and self._problem.reduction is None:
             self.error_estimate = np.maximum(self.error_estimate, solve.error_estimate)
         if any(isinstance(x, Variable) for x in (rows.right, rows.normals, self._features)):
             data = join(rows.right, np.zeros((extra, m))) if extra else rows.right
             met = partial(self._system_times, rows, extra=extra)
             if isinstance(solve, LeastSquares):
-                found = solve.solution(met, data, value(found))
+                weights = solve.solution(met, data, value(weights))
             else:
                 forward, back = solve, None
                 if isinstance(solve, MeasuredSystem):
                     forward, back = solve.tangent, solve.adjoint
-                found = solution(met(value(found)) - data, value(found), forward, back)
+                weights = solution(met(value(weights)) - data, value(weights), forward, back)
         tail = None
         if extra:
-            tail = take(found, count + np.arange(extra))
+            tail = take(weights, count + np.arange(extra))
             tail = reshape(tail, extra * m // self._dim, self._dim)
-        return gathered(rows, take(found, np.arange(count)), tail)
+        return gathered(rows, take(weights, np.arange(count)), tail)
 
     def _system_times(self, rows: ConstraintRows, found: FloatArray, *, extra: int) -> Array:
         """Return the system times ``found`` (n, m), a constant, for the derivative of the system.

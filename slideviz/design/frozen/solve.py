@@ -42,15 +42,15 @@ class MeasuredSystem:
         out, error_estimate = np.empty_like(wide), np.zeros(len(largest))
         for block, system in zip(self._blocks, self._systems, strict=True):
             with enough_threads(2.0 * len(block) * wide[block].size):
-                found = system.factor.solve(wide[block])
+                solved = system.factor.solve(wide[block])
                 if self._refined:
-                    refined = system.refined(wide[block], largest, found, of_weights=of_weights)
-                    found, field_error = refined.weights, refined.error_estimate
+                    refined = system.refined(wide[block], largest, solved, of_weights=of_weights)
+                    solved, field_error = refined.weights, refined.error_estimate
                 else:
                     parts = [slice(first, first + m) for first in range(0, wide.shape[1], m)]
-                    off = [system.field_error(wide[block, at], found[:, at]) for at in parts]
+                    off = [system.field_error(wide[block, at], solved[:, at]) for at in parts]
                     field_error = np.concatenate(off) / np.where(largest > 0.0, largest, 1.0)
-            out[block], error_estimate = found, np.maximum(error_estimate, field_error)
+            out[block], error_estimate = solved, np.maximum(error_estimate, field_error)
         self.error_estimate = error_estimate.reshape(*right.shape[:-2], m).max(axis=-1)
         shaped = np.moveaxis(out.reshape(n, -1, m), 1, 0)
         return np.ascontiguousarray(shaped).reshape(right.shape)
@@ -63,7 +63,7 @@ class MeasuredSystem:
         ConditionWarning
             The field of a solution is not accurate to `TRUSTED`.
         """
-        found = self(right)
+        weights = self(right)
         worst = float(self.error_estimate.max(initial=0.0))
         if worst > TRUSTED:
             warnings.warn(
@@ -72,7 +72,7 @@ class MeasuredSystem:
                 ConditionWarning,
                 stacklevel=2,
             )
-        return found
+        return weights
 
     def adjoint(self, right: FloatArray) -> FloatArray:
         """Return the solutions (..., n, m) of the reverse pass, which are gradients themselves.
@@ -84,7 +84,7 @@ class MeasuredSystem:
         """
         if not self._refined:  # the error of a field is no measure for a gradient
             return solved(self._blocks, [system.factor for system in self._systems], right)
-        found = self(right, of_weights=True)
+        weights = self(right, of_weights=True)
         worst = float(self.error_estimate.max(initial=0.0))
         if worst > TRUSTED:
             warnings.warn(
@@ -94,7 +94,7 @@ class MeasuredSystem:
                 ConditionWarning,
                 stacklevel=2,
             )
-        return found
+        return weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,5 +189,5 @@ def columnwise(solve: Callable[[FloatArray], FloatArray], right: FloatArray) -> 
     n, m = right.shape[-2:]
     wide = np.moveaxis(right.reshape(-1, n, m), 0, 1).reshape(n, -1)
     with enough_threads(2.0 * n * wide.size):
-        found = solve(np.ascontiguousarray(wide)).reshape(n, -1, m)
-    return np.ascontiguousarray(np.moveaxis(found, 1, 0)).reshape(right.shape)
+        solved = solve(np.ascontiguousarray(wide)).reshape(n, -1, m)
+    return np.ascontiguousarray(np.moveaxis(solved, 1, 0)).reshape(right.shape)

@@ -274,7 +274,7 @@ def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Conf
 
 def _perhaps_ours(path: Path, ignored: tuple[str, ...], rows: dict[str, Entry]) -> list[str]:
     """Return a warning for each ignored key that resembles one that is read."""
-    found = []
+    messages = []
     for key in ignored:
         close = (
             get_close_matches(key, OWN, n=1, cutoff=ALIKE_OWN)
@@ -282,8 +282,8 @@ def _perhaps_ours(path: Path, ignored: tuple[str, ...], rows: dict[str, Entry]) 
             or sorted(other for other in _read_keys() if _one_letter_off(key, other))
         )
         if close:
-            found.append(f"{path}:{rows[key].line}: {key} is not read; did you mean {close[0]}?")
-    return found
+            messages.append(f"{path}:{rows[key].line}: {key} is not read; did you mean {close[0]}?")
+    return messages
 
 
 def _one_letter_off(one: str, other: str) -> bool:

@@ -96,13 +96,13 @@ def find_gradients(
     The warnings of the `Deformer` are among the warnings of the result.
     """
     mesh = surface.mesh
-    found = read_sensitivities(surface.config, mesh, surface.nodes)
+    sensitivities = read_sensitivities(surface.config, mesh, surface.nodes)
     displacement = surface.displacement
     if surface.moves_whole_mesh:
-        matched = match(found, mesh, surface.nodes, lambda: surface.moved().points)
+        matched = match(sensitivities, mesh, surface.nodes, lambda: surface.moved().points)
         moved = displacement if matched.at_design else np.zeros_like(displacement)
         warnings = (*surface.case().warnings, *matched.warnings)
-        return _gradients(surface, found, matched, matched.values, moved, warnings)
+        return _gradients(surface, sensitivities, matched, matched.values, moved, warnings)
     moves = bool(displacement.any())
     prepared: list[Deformer] = []
     written: list[FloatArray] = []
@@ -118,7 +118,7 @@ def find_gradients(
 
     messages: list[str] = []
     with _heard(messages):
-        matched = match(found, mesh, surface.nodes, design if moves else None)
+        matched = match(sensitivities, mesh, surface.nodes, design if moves else None)
         if moves and not matched.at_design:
             displacement = np.zeros_like(displacement)
             prepared.clear()
@@ -127,7 +127,7 @@ def find_gradients(
             messages += _difference(deformer.deform(displacement), written[0])
         pulled = deformer.vjp(displacement, matched.values)
     messages = [*deformer.warnings, *matched.warnings, *dict.fromkeys(messages)]
-    return _gradients(surface, found, matched, pulled, displacement, messages)
+    return _gradients(surface, sensitivities, matched, pulled, displacement, messages)
 
 
 def _gradients(

@@ -80,12 +80,12 @@ class NumberPlace:
 
 def numbers_of(case: Case) -> dict[str, NumberPlace]:
     """Return the places of all numbers of a case's motions, by their shortest unique name."""
-    found: dict[str, NumberPlace] = {}
+    places: dict[str, NumberPlace] = {}
     heads = [_head(motion) for motion in case.motions]
     for at, (motion, head) in enumerate(zip(case.motions, heads, strict=True)):
         name = head if heads.count(head) == 1 else f"motion{at + 1}"
-        found |= {f"{name}.{part}": place for part, place in _parts(motion, at)}
-    return found
+        places |= {f"{name}.{part}": place for part, place in _parts(motion, at)}
+    return places
 
 
 def columns_of(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]:
@@ -96,20 +96,20 @@ def columns_of(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]
     CaseError
         Some are unknown, mean the same, or cannot vary: a sentence for each.
     """
-    found: dict[str, NumberPlace | str] = {}
+    columns: dict[str, NumberPlace | str] = {}
     first: dict[NumberPlace | str, str] = {}
     problems = []
     known = _all_names(case)
     for name in names:
         try:
             meant = _column_meaning(case, name, known)
-            if first.setdefault(meant, name) != name or name in found:
+            if first.setdefault(meant, name) != name or name in columns:
                 raise CaseError(f"it means the same as column {first[meant]}; keep one of them")
-            found[name] = meant
+            columns[name] = meant
         except CaseError as problem:
             problems.append(f"column {shown(name)}: {problem}")
-    places = [name for name, what in found.items() if isinstance(what, NumberPlace)]
-    whole = [name for name, what in found.items() if what in _WHOLE_MOTION]
+    places = [name for name, what in columns.items() if isinstance(what, NumberPlace)]
+    whole = [name for name, what in columns.items() if what in _WHOLE_MOTION]
     if places and whole:
         problems.append(
             f"column {shown(whole[0])} replaces motions whose numbers column {shown(places[0])} "
@@ -117,7 +117,7 @@ def columns_of(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]
         )
     if problems:
         raise CaseError("\n".join(problems))
-    return found
+    return columns
 
 
 def applied(
@@ -162,14 +162,14 @@ def column_name(name: str) -> str:
 
 def case_values(case: Case, columns: Mapping[str, NumberPlace | str]) -> dict[str, Value]:
     """Return the case's own value for each column: a number, or a text."""
-    found: dict[str, Value] = {}
+    values: dict[str, Value] = {}
     for name, what in columns.items():
         if isinstance(what, NumberPlace):
-            found[name] = what.of(case)
+            values[name] = what.of(case)
         else:
             value = KEYS[what].get(case)
-            found[name] = "" if value is None else KEYS[what].kind.write(value)
-    return found
+            values[name] = "" if value is None else KEYS[what].kind.write(value)
+    return values
 
 
 def _column_meaning(case: Case, name: str, known: Mapping[str, NumberPlace]) -> NumberPlace | str:
@@ -187,9 +187,9 @@ def _column_meaning(case: Case, name: str, known: Mapping[str, NumberPlace]) -> 
     if wanted in known:
         return known[wanted]
     # Markers may differ in capitals alone.
-    found = {place for other, place in known.items() if other.lower() == wanted.lower()}
-    if len(found) == 1:
-        return found.pop()
+    places = {place for other, place in known.items() if other.lower() == wanted.lower()}
+    if len(places) == 1:
+        return places.pop()
     shortest = numbers_of(case)
     several = any(
         f"{_head(motion)}.{part}".lower() == wanted.lower()

@@ -103,8 +103,8 @@ class SweepResults:
     def _started(self, resume: bool, force: bool, meshes: bool) -> list[DesignRow]:
         """Do what `start` does, in the locked folder."""
         if resume and self.path.exists():
-            found = {row.design: row for row in self._earlier_rows()}
-            return [row for row in found.values() if not row.problem and _has_mesh(row, meshes)]
+            earlier = {row.design: row for row in self._earlier_rows()}
+            return [row for row in earlier.values() if not row.problem and _has_mesh(row, meshes)]
         if self.path.exists() and not force:
             raise CaseError(
                 f"{self.path}: there are results already; continue with --resume (resume=True), "
@@ -271,7 +271,7 @@ def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
 
     Digests are of the mesh, its FFD boxes, given displacements and files of displacements.
     """
-    given = [motion for motion in case.motions if isinstance(motion, Prescribed)]
+    prescribed = [motion for motion in case.motions if isinstance(motion, Prescribed)]
     written = tuple(motion for motion in case.motions if not isinstance(motion, Prescribed))
     plain = effective(case.change(motions=written))
     boundaries = [(marker.name.encode(), marker.cells.connectivity) for marker in mesh.markers]
@@ -281,7 +281,7 @@ def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
     if any(isinstance(motion, BoxMotion) for motion in written):
         boxes = boxes_of(mesh, system_of(case))
         found["FFD_TAG section of the mesh"] = _digest(pickle.dumps(boxes))
-    for at, one in enumerate(given, start=1):
+    for at, one in enumerate(prescribed, start=1):
         found[f"displacement {at}"] = _digest(one.nodes, one.vectors)
     for motion in written:
         if isinstance(motion, FromFile):

@@ -297,7 +297,7 @@ def _slots(executor: Executor) -> int:
     if client is not None and hasattr(client, "nthreads"):
         return sum(client.nthreads().values())
     for name in ("num_workers", "_max_workers"):  # of mpi4py, and of the standard library
-        found = getattr(executor, name, None)
-        if isinstance(found, int):
-            return found
+        attribute = getattr(executor, name, None)
+        if isinstance(attribute, int):
+            return attribute
     return 1

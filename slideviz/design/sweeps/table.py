@@ -222,16 +222,16 @@ def result_of(head: Sequence[str], cells: Sequence[str], folder: Path = Path()) 
     ValueError
         The line has other columns than ``head``, or a number is wrong.
     """
-    found = dict(zip(head, cells, strict=True))  # columns and results differ in name
+    fields = dict(zip(head, cells, strict=True))  # columns and results differ in name
     numbers: dict[str, Any] = {
-        name: read(found[name]) for name, (_, read) in NUMBERS.items() if found[name]
+        name: read(fields[name]) for name, (_, read) in NUMBERS.items() if fields[name]
     }
     return DesignRow(
-        int(found["design"]),
+        int(fields["design"]),
         **numbers,
-        mesh=folder / found["mesh"] if found.get("mesh") else None,
-        warnings=tuple(found["warnings"].split("; ")) if found.get("warnings") else (),
-        problem=found["problem"],
+        mesh=folder / fields["mesh"] if fields.get("mesh") else None,
+        warnings=tuple(fields["warnings"].split("; ")) if fields.get("warnings") else (),
+        problem=fields["problem"],
     )
 
 
@@ -245,11 +245,11 @@ def design_columns(head: Sequence[str]) -> slice:
 
 def _known_columns(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]:
     """Return the columns with known names, so that mistakes in their values are found, too."""
-    found: dict[str, NumberPlace | str] = {}
+    columns: dict[str, NumberPlace | str] = {}
     for name in names:
         with suppress(CaseError):
-            found |= columns_of(case, [name])
-    return found
+            columns |= columns_of(case, [name])
+    return columns
 
 
 def _design(

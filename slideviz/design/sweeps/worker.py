@@ -123,14 +123,14 @@ def _result(task: Task, mesh: Mesh, begin: float) -> DesignRow:
         last = step
         errors.append(step.max_error)
     assert last is not None
-    found = quality(last.mesh, reference=mesh, metric=task.case.quality_metric)
+    measured = quality(last.mesh, reference=mesh, metric=task.case.quality_metric)
     if task.output is not None:
         write(task.output, last.mesh, base=mesh, file_format=task.file_format)
     return DesignRow(
         design=task.design,
-        min=found.min,
-        mean=found.mean,
-        inverted=found.inverted,
+        min=measured.min,
+        mean=measured.mean,
+        inverted=measured.inverted,
         max_error=max(errors),
         control_nodes=last.control_nodes,
         steps=last.total,

@@ -83,10 +83,10 @@ def grid_nodes(along: Sequence[IntArray], shape: Sequence[int]) -> IntArray:
     ``along`` has the indices in each direction, from 0; ``shape`` the grid's number of nodes.
     """
     steps = np.cumprod([1, *shape[:-1]])
-    found = np.zeros(1, np.int64)
+    numbers = np.zeros(1, np.int64)
     for indices, step in zip(along, steps, strict=True):
-        found = (indices[:, None] * step + found).ravel()
-    return found
+        numbers = (indices[:, None] * step + numbers).ravel()
+    return numbers
 
 
 def read_sections(zone: Node, n_points: int) -> tuple[CgnsElements, list[Node]]:

@@ -110,7 +110,7 @@ def _interfaces(
     zones: Sequence[CgnsZone], zone: int, names: dict[str, int], tolerance: float
 ) -> list[Interface]:
     """Return the interfaces of a zone, given by index; ``names`` has the index of each zone."""
-    found = []
+    interfaces = []
     for group in zones[zone].node.children("ZoneGridConnectivity_t"):
         for node in group.children("GridConnectivity1to1_t", "GridConnectivity_t"):
             name = node.text().rpartition("/")[2]
@@ -119,8 +119,8 @@ def _interfaces(
                     f"is an interface with the zone {name!r}, which the base does not have (it "
                     f"has {', '.join(names)}); export all zones together"
                 )
-            found.append(_interface(zones, node, zone, names[name], tolerance))
-    return found
+            interfaces.append(_interface(zones, node, zone, names[name], tolerance))
+    return interfaces
 
 
 def _interface(
@@ -140,10 +140,10 @@ def _interface(
         if kind != _ONE_TO_ONE:
             return Interface(node, zone, donor, None, why=f"it is {kind}, not one to one")
         pairs = _lists_meet(zones[zone], zones[donor], node)
-    found = Interface(node, zone, donor, pairs)
-    gap = found.gap(zones)
+    interface = Interface(node, zone, donor, pairs)
+    gap = interface.gap(zones)
     if gap <= tolerance:
-        return found
+        return interface
     why = (
         f"its nodes lie up to {gap:.3g} from those of {zones[donor].node.name}, more than "
         f"{tolerance:.3g} ({JOINED:g} of the extent)"
@@ -179,8 +179,8 @@ def _blocks_meet(zone: CgnsZone, donor: CgnsZone, node: Node) -> tuple[IntArray,
     dim = zone.dim
     inside = node.needed("IndexRange_t", "PointRange").integers(2, dim)
     outside = node.needed("IndexRange_t", "PointRangeDonor").integers(2, dim)
-    given = node.child('"int[IndexDimension]"', "Transform")
-    turn = np.arange(1, dim + 1) if given is None else given.integers(dim)
+    transform = node.child('"int[IndexDimension]"', "Transform")
+    turn = np.arange(1, dim + 1) if transform is None else transform.integers(dim)
     if sorted(np.abs(turn).tolist()) != list(range(1, dim + 1)):
         raise node.fault(
             f"its Transform is {turn.tolist()}, but must have 1 to {dim} once, each with a sign; "
@@ -226,9 +226,9 @@ def _lists_meet(zone: CgnsZone, donor: CgnsZone, node: Node) -> tuple[IntArray, 
 
 def _vertices(zone: CgnsZone, node: Node) -> IntArray:
     """Return the vertices (m,) of an interface in its zone, in the order of its list or range."""
-    given = node.child("IndexArray_t", "PointList")
-    if given is not None:
-        return zone.nodes_at(given, given.integers(-1, len(zone.shape)))
+    point_list = node.child("IndexArray_t", "PointList")
+    if point_list is not None:
+        return zone.nodes_at(point_list, point_list.integers(-1, len(zone.shape)))
     area = node.needed("IndexRange_t", "PointRange")
     low, high = np.sort(area.integers(2, len(zone.shape)), axis=0)
     zone.nodes_at(area, np.stack((low, high)))
@@ -245,5 +245,5 @@ def _nearest(
     from scipy.spatial import KDTree
 
     here, there = faces.nodes, others.nodes
-    found = KDTree(donor.points[there]).query(zone.points[here])[1]
-    return here, there[found]
+    closest = KDTree(donor.points[there]).query(zone.points[here])[1]
+    return here, there[closest]

@@ -157,9 +157,9 @@ def _of_conditions(zone: CgnsZone, nodes: Sequence[Node]) -> list[tuple[Node, Ce
     """
     regions = {node: region_of(zone, node) for node in nodes}
     by_nodes = {node: at for node, at in regions.items() if not isinstance(at, Cells)}
-    found = in_node_sets(len(zone.points), zone.outer, by_nodes) if by_nodes else {}
+    sets = in_node_sets(len(zone.points), zone.outer, by_nodes) if by_nodes else {}
     return [
-        (node, at if isinstance(at, Cells) else Cells.from_blocks(found[node]))
+        (node, at if isinstance(at, Cells) else Cells.from_blocks(sets[node]))
         for node, at in regions.items()
     ]
 

@@ -98,7 +98,7 @@ class Node:
         """
         import h5py
 
-        found = []
+        nodes = []
         for name in self.group:
             thing = self.group.get(name)
             if not isinstance(thing, h5py.Group) or name.startswith(" "):
@@ -114,13 +114,13 @@ class Node:
                     )
             node = Node(self.file, thing, place)
             if node.label in labels:
-                found.append(node)
-        return found
+                nodes.append(node)
+        return nodes
 
     def child(self, label: str, *names: str) -> Node | None:
         """Return the first child of a kind, with one of these names if any are given, or None."""
-        found = self.children(label)
-        return next((node for node in found if not names or node.name in names), None)
+        nodes = self.children(label)
+        return next((node for node in nodes if not names or node.name in names), None)
 
     def needed(self, label: str, *names: str) -> Node:
         """Return the first child of a kind, with one of these names if any are given.

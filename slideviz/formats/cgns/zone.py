@@ -151,13 +151,13 @@ def region_of(zone: CgnsZone, node: Node) -> Cells | IntArray:
         ``GridLocation``: vertices (as without one) or faces (edges in 2D).
     """
     where = node.word("GridLocation_t", _BY_NODES, "GridLocation")
-    found = node.children(*_LABELS)
-    named = {one.name: one for one in found}
+    children = node.children(*_LABELS)
+    named = {one.name: one for one in children}
     elements = named.get("ElementRange", named.get("ElementList"))
     if elements is not None:
         return faces_by_number(zone, elements, elements.integers(-1))
-    given = named.get("PointRange", named.get("PointList"))
-    if given is None:
+    points = named.get("PointRange", named.get("PointList"))
+    if points is None:
         raise node.fault(
             "has no PointRange, PointList, ElementRange or ElementList, so it is nowhere; export "
             "the mesh again"
@@ -171,18 +171,18 @@ def region_of(zone: CgnsZone, node: Node) -> Cells | IntArray:
             "the mesh with one of them"
         )
     if zone.sides is not None and where != _BY_NODES:
-        return faces_by_number(zone, given, given.integers(-1))
-    indices = given.integers(-1, len(zone.shape))
-    if given.name == "PointList":
+        return faces_by_number(zone, points, points.integers(-1))
+    indices = points.integers(-1, len(zone.shape))
+    if points.name == "PointList":
         if where == _BY_NODES:
-            return np.unique(zone.nodes_at(given, indices))
-        return _listed_faces(zone, given, where, indices)
+            return np.unique(zone.nodes_at(points, indices))
+        return _listed_faces(zone, points, where, indices)
     if len(indices) != 2:
-        raise given.fault(f"has {len(indices)} corners; a range has two: export the mesh again")
+        raise points.fault(f"has {len(indices)} corners; a range has two: export the mesh again")
     if zone.sides is not None:
-        low, high = np.sort(zone.nodes_at(given, indices)).tolist()
+        low, high = np.sort(zone.nodes_at(points, indices)).tolist()
         return np.arange(low, high + 1)
-    return _range_faces(zone, given, where, np.sort(indices, axis=0))
+    return _range_faces(zone, points, where, np.sort(indices, axis=0))
 
 
 def facets_of(zone: CgnsZone, node: Node) -> Cells:

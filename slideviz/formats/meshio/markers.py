@@ -162,7 +162,7 @@ def in_node_sets(
     the others.
     """
     free = np.ones(len(facets), bool)
-    found: dict[Name, list[tuple[int, IntArray]]] = {name: [] for name in sets}
+    sets_of: dict[Name, list[tuple[int, IntArray]]] = {name: [] for name in sets}
     members = {name: np.asarray(nodes, np.int64) for name, nodes in sets.items()}
     for name, chosen in sorted(members.items(), key=lambda item: len(item[1])):
         inside = np.zeros(n_points, bool)
@@ -171,8 +171,8 @@ def in_node_sets(
             taken = free[ids] & inside[nodes].all(axis=1)
             free[ids[taken]] = False
             if taken.any():
-                found[name].append((vtk, nodes[taken]))
-    return found
+                sets_of[name].append((vtk, nodes[taken]))
+    return sets_of
 
 
 def _rows(cells: Cells) -> Iterator[tuple[int, IntArray, IntArray]]:

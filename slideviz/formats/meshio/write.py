@@ -158,7 +158,7 @@ def _not_held(path: Path, name: str, lost: list[str]) -> MeshError:
 def _compare(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
     """Raise MeshError, which names ``path``, if the file ``trial`` lacks some of ``data``."""
     try:
-        found = load(trial, [name])
+        loaded = load(trial, [name])
     except MeshError as problem:
         raise path_error(
             path,
@@ -166,16 +166,16 @@ def _compare(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
             "another format, such as .vtu",
         ) from problem
     lost = []
-    if found.points.shape != data.points.shape:
+    if loaded.points.shape != data.points.shape:
         lost.append("points")
-    elif np.abs(found.points - data.points).max() > _EXACT * np.ptp(data.points, axis=0).max():
+    elif np.abs(loaded.points - data.points).max() > _EXACT * np.ptp(data.points, axis=0).max():
         lost.append("digits of the coordinates")
     counts = [
         {kind: sum(len(c.data) for c in m.cells if c.type == kind) for kind in _NAMES.values()}
-        for m in (data, found)
+        for m in (data, loaded)
     ]
     lost += [f"{kind} cells" for kind in _NAMES.values() if counts[0][kind] != counts[1][kind]]
-    lost += [f"cell data {key!r}" for key in data.cell_data if key not in found.cell_data]
+    lost += [f"cell data {key!r}" for key in data.cell_data if key not in loaded.cell_data]
     if lost:
         raise _not_held(path, name, lost)
 
@@ -226,13 +226,13 @@ def _to_meshio(mesh: Mesh, cell_data: Mapping[str, NDArray], name: str) -> meshi
 
 def _boundary_blocks(mesh: Mesh) -> list[tuple[int, NDArray, NDArray]]:
     """Return for each type of boundary element: type, nodes (m, n), marker's number from 1 (m,)."""
-    found: dict[int, list[tuple[NDArray, NDArray]]] = {}
+    blocks: dict[int, list[tuple[NDArray, NDArray]]] = {}
     for number, marker in enumerate(mesh.markers, 1):
         for vtk, (_, nodes) in marker.cells.by_type.items():
-            found.setdefault(vtk, []).append((nodes, np.full(len(nodes), number)))
+            blocks.setdefault(vtk, []).append((nodes, np.full(len(nodes), number)))
     return [
         (vtk, np.concatenate([n for n, _ in parts]), np.concatenate([t for _, t in parts]))
-        for vtk, parts in found.items()
+        for vtk, parts in blocks.items()
     ]
 
 

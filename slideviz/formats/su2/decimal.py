@@ -138,15 +138,15 @@ def decimal(text, at, bits, k):  # type: ignore[no-untyped-def]
     at += (text[at] == 45) | (text[at] == 43)
     first, q, more = at, 0, False
     digits, at = _digits(text, at, _U0)
-    given = at - first
+    length = at - first
     if text[at] == 46:
         digits, stop = _digits(text, at + 1, digits)
         q = at + 1 - stop
-        given -= q
+        length -= q
         at = stop
-    if given == 0:
+    if length == 0:
         return -1
-    if given > _DIGITS:
+    if length > _DIGITS:
         digits, q, more = _first_digits(text, first)
     code = text[at]
     if code == 101 or code == 69:

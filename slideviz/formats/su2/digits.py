@@ -16,14 +16,14 @@ from slideviz.system.jit_cache import njit
 @njit(inline="always", **OPTIONS)
 def _print_whole(value, out, at):  # type: ignore[no-untyped-def]
     """Write a whole number, not negative, from ``out[at]`` on; return where it ends."""
-    stop, rest = at + 1, value
-    while rest >= 10:
-        rest //= 10
+    stop, quotient = at + 1, value
+    while quotient >= 10:
+        quotient //= 10
         stop += 1
-    rest = np.uint64(value)
+    quotient = np.uint64(value)
     for k in range(stop - 1, at - 1, -1):
-        out[k] = np.uint8(rest % U10 + U48)
-        rest //= U10
+        out[k] = np.uint8(quotient % U10 + U48)
+        quotient //= U10
     return stop
 
 

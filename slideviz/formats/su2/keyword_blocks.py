@@ -142,11 +142,11 @@ def _zone_heads(lines: Lines, sections: list[KeywordBlock]) -> dict[int, Keyword
     if total == 1 and not heads:
         return {}
     if sorted(heads) != list(range(1, len(heads) + 1)) or len(heads) != total:
-        given = ", ".join(map(str, list(heads)[:8])) or "none"
+        present = ", ".join(map(str, list(heads)[:8])) or "none"
         raise lines.error(
             totals[0].line,
             f"NZONE= {total} needs the lines IZONE= 1 to IZONE= {total}, each once, but the file "
-            f"has {given}; correct NZONE or restore the missing zone",
+            f"has {present}; correct NZONE or restore the missing zone",
         )
     return heads
 

@@ -134,10 +134,10 @@ class Lines:
     def row(self, pieces: Rows, number: int) -> int:
         """Return the line number of row ``number`` of a section."""
         piece = next(piece for piece in pieces if number < piece.row + piece.rows)
-        found = next(islice(self.numeric(piece), number - piece.row, None), None)
-        if found is None:
+        line = next(islice(self.numeric(piece), number - piece.row, None), None)
+        if line is None:
             raise self.raw.changed()
-        return found[0]
+        return line[0]
 
     def error(self, index: int, message: str) -> MeshError:
         """Return the error ``file:line: message`` for line ``index``, shown as counted from 1."""

@@ -163,11 +163,11 @@ def _numbers(lines: Lines, index: int, row: bytes, kind: type) -> NDArray:
     words = row.split()
     numbers = []
     for word in words:
-        found = _parse(word, kind)
-        if found is None or len(found) != 1:
+        number = _parse(word, kind)
+        if number is None or len(number) != 1:
             what = "a whole number" if kind is np.int64 else "a number"
             raise lines.error(index, f"'{show(word)}' stands where {what} should be; correct it")
-        numbers.append(found)
+        numbers.append(number)
     return np.concatenate(numbers)
 
 
@@ -194,15 +194,15 @@ def parse_points(lines: Lines, rows: Rows, dim: int, progress: Tick) -> FloatArr
         A row has too few or many numbers, or one that is not finite; the message has its line.
     """
     points = np.empty((number_of(rows), dim))
-    found = np.empty((len(rows), 2), np.int64)
+    ends = np.empty((len(rows), 2), np.int64)
     place = {piece.row: k for k, piece in enumerate(rows)}
 
     def parsed(piece: Piece) -> None:
         mine = points[piece.row : piece.row + piece.rows]
-        found[place[piece.row]] = fill_points(lines, piece, mine)
+        ends[place[piece.row]] = fill_points(lines, piece, mine)
 
     _each(parsed, rows, progress)
-    require_all_coordinates(lines, rows, dim, found)
+    require_all_coordinates(lines, rows, dim, ends)
     points.flags.writeable = False
     return points
 

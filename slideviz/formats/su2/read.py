@@ -137,7 +137,7 @@ def _table(lines: Lines, parts: Sequence[SendRows], count: int) -> IntArray | No
 
 def _transforms(lines: Lines, zone: TextZone) -> dict[int, FloatArray]:
     """Return centre, angles and translation (rows of (3, 3)) by PERIODIC_INDEX, where readable."""
-    found = {}
+    markers = {}
     for section in zone.unknown:
         if section.key == "PERIODIC_INDEX" and section.value.isdigit():
             words = b" ".join(lines.line(k) for k in range(section.line + 1, section.stop)).split()
@@ -146,8 +146,8 @@ def _transforms(lines: Lines, zone: TextZone) -> dict[int, FloatArray]:
             except ValueError:
                 continue
             if len(numbers) == 9 and np.isfinite(numbers).all():
-                found[int(section.value)] = numbers.reshape(3, 3)
-    return found
+                markers[int(section.value)] = numbers.reshape(3, 3)
+    return markers
 
 
 def _readings(transform: FloatArray, dim: int) -> Iterator[RigidMotion]:
@@ -246,32 +246,32 @@ def read_su2(raw: Source, zone: int | None, progress: Tick) -> Mesh:
     """
     lines = scan(raw, lambda done: progress(_SCANNED * done))
     sections = find_blocks(lines)
-    found = find_zone(lines, sections, find_bounds(lines, sections, zone))
-    n_points = number_of(found.points)
+    text_zone = find_zone(lines, sections, find_bounds(lines, sections, zone))
+    n_points = number_of(text_zone.points)
     sizes = [
         rows[-1].end - rows[0].begin if rows else 0
-        for rows in (found.elements, found.points, *(m.rows for m in found.markers))
+        for rows in (text_zone.elements, text_zone.points, *(m.rows for m in text_zone.markers))
     ]
     first, second, *rest = _shares(sizes, progress)
-    cells = parse_cells(lines, found.elements, found.dim, n_points, first)
-    points = parse_points(lines, found.points, found.dim, second)
+    cells = parse_cells(lines, text_zone.elements, text_zone.dim, n_points, first)
+    points = parse_points(lines, text_zone.points, text_zone.dim, second)
     markers = tuple(
-        Marker(part.name, parse_cells(lines, part.rows, found.dim - 1, n_points, share))
-        for part, share in zip(found.markers, rest, strict=True)
+        Marker(part.name, parse_cells(lines, part.rows, text_zone.dim - 1, n_points, share))
+        for part, share in zip(text_zone.markers, rest, strict=True)
     )
     raw.require_same()
     progress(1.0)
     document = Document(
         raw=raw,
-        rows=found.points,
+        rows=text_zone.points,
         points=points,
         cells=cells,
         markers=markers,
-        zone=lines.bytes_of((found.bounds.begin, found.bounds.end))[0],
-        sends=lines.bytes_of(*((part.begin, part.end) for part in found.sends)),
-        unknown=lines.bytes_of(*((part.line, part.stop) for part in found.unknown)),
-        ffd_at=found.ffd_at,
-        ffd_elsewhere=boxes_elsewhere(sections, found.bounds),
+        zone=lines.bytes_of((text_zone.bounds.begin, text_zone.bounds.end))[0],
+        sends=lines.bytes_of(*((part.begin, part.end) for part in text_zone.sends)),
+        unknown=lines.bytes_of(*((part.line, part.stop) for part in text_zone.unknown)),
+        ffd_at=text_zone.ffd_at,
+        ffd_elsewhere=boxes_elsewhere(sections, text_zone.bounds),
     )
     mesh = Mesh(
         points=points,
@@ -279,16 +279,16 @@ def read_su2(raw: Source, zone: int | None, progress: Tick) -> Mesh:
         markers=markers,
         origin=document,
         name=printable(raw.path.name),
-        zone=found.bounds.number,
-        zones=found.bounds.zones,
+        zone=text_zone.bounds.number,
+        zones=text_zone.bounds.zones,
         source=raw.path.resolve(),
     )
-    halo, remarks = find_halo(lines, found, mesh)
-    others = boundaries_elsewhere(lines, sections, found, progress)
+    halo, remarks = find_halo(lines, text_zone, mesh)
+    others = boundaries_elsewhere(lines, sections, text_zone, progress)
     return replace(
         mesh,
         halo=halo,
-        remarks=(*found.remarks, *remarks),
+        remarks=(*text_zone.remarks, *remarks),
         interfaces=find_interfaces(mesh, others),
     )
 

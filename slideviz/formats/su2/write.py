@@ -86,8 +86,8 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
     yield from (raw[a:b] for a, b in _ranges(0, begin))
     yield from _whole_zone(mesh)
     yield from _markers(mesh.markers, len(document.sends))
-    kept = (_with_line_break(raw[a:b]) for a, b in (*document.sends, *document.unknown))
-    yield from (text for text in kept if boxes is None or not is_ffd(text))
+    sections = (_with_line_break(raw[a:b]) for a, b in (*document.sends, *document.unknown))
+    yield from (text for text in sections if boxes is None or not is_ffd(text))
     yield boxes or b""
     yield from (raw[a:b] for a, b in _ranges(end, raw.size))
     raw.require_same()

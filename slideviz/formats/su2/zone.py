@@ -203,8 +203,8 @@ class _Walk:
 
     def _only(self, key: str) -> KeywordBlock:
         """Return the section of a key; raise MeshError if there is none or a second one."""
-        found = [section for section in self.sections if section.key == key]
-        if not found:
+        matches = [section for section in self.sections if section.key == key]
+        if not matches:
             remedy = "; write NMARK= 0 if it has no boundaries" if key == "NMARK" else ""
             meant = misspelt(self.sections, key)
             why = "" if meant else "; perhaps the file is cut off, so write it again" + remedy
@@ -212,13 +212,13 @@ class _Walk:
                 self.bounds.end - 1,
                 f"the mesh ends here, but has no line {key}={meant}{why}",
             )
-        if len(found) > 1:
+        if len(matches) > 1:
             raise self.lines.error(
-                found[1].line,
-                f"{key}= stands a second time (first on line {found[0].line + 1}); remove one, "
+                matches[1].line,
+                f"{key}= stands a second time (first on line {matches[0].line + 1}); remove one, "
                 "or number the zones with NZONE= and IZONE=",
             )
-        return found[0]
+        return matches[0]
 
     def _walk(
         self,

@@ -167,12 +167,12 @@ class BinaryFile:
         try:
             with self._lock:
                 self._file.seek(at)
-                found = np.fromfile(self._file, kind, count)
+                array = np.fromfile(self._file, kind, count)
         except OSError as problem:
             raise self.error(at, f"cannot be read: {problem}; check the disk") from problem
-        if len(found) != count:
+        if len(array) != count:
             raise self.error(at, f"{what}: the file became shorter while it was read; read again")
-        return found
+        return array
 
     def bytes(self, begin: int, end: int) -> bytes:
         """Return the bytes ``begin`` to ``end - 1``."""
@@ -236,10 +236,10 @@ def open_zone(path: Path, number: int | None) -> Iterator[tuple[BinaryFile, Zone
 
 def _zone(source: BinaryFile, begin: int, number: int) -> ZonePlace:
     """Return where zone ``number`` is, which begins at byte ``begin``; raise as `find_zones`."""
-    given = source.integer(begin, f"the number of zone {number}")
-    if given != number:
+    index = source.integer(begin, f"the number of zone {number}")
+    if index != number:
         raise source.error(
-            begin, f"zone {number} has the number {given}; zones are numbered from 1, so correct it"
+            begin, f"zone {number} has the number {index}; zones are numbered from 1, so correct it"
         )
     dim = source.integer(begin + _INT, "the dimension")
     if dim not in (2, 3):

@@ -60,13 +60,13 @@ def copying(
 
 def checksums(path: Path, tick: Tick, ranks: SerialPool = SERIAL) -> list[int]:
     """Return the CRC-32 of each piece of a file."""
-    found: list[int] = []
+    sums: list[int] = []
     tasks = _pieces(0, path.stat().st_size)
     with ranks.sharing(_checksums, path) as do:
         for checksum in do(tasks):
-            found.append(checksum)
-            tick(len(found) / len(tasks))
-    return found
+            sums.append(checksum)
+            tick(len(sums) / len(tasks))
+    return sums
 
 
 def _pieces(begin: int, end: int) -> list[Piece]:
@@ -112,13 +112,13 @@ def _beside(
                 done += 1
 
     with ThreadPoolExecutor(1, "slideviz-copy") as pool:
-        found = pool.submit(run)
+        future = pool.submit(run)
 
         def ready(tick: Tick) -> None:
-            while not found.done():
+            while not future.done():
                 tick(done / max(len(tasks), 1))
-                wait([found], 0.05)
-            found.result()
+                wait([future], 0.05)
+            future.result()
             tick(1.0)
 
         try:
@@ -178,10 +178,10 @@ def _checksums(path: Path) -> Iterator[Callable[[Piece], int]]:
     with path.open("rb") as file:
 
         def add_up(task: Piece) -> int:
-            found = 0
+            checksum = 0
             for at, count in _blocks(task):
-                found = zlib.crc32(os.pread(file.fileno(), count, at), found)
-            return found
+                checksum = zlib.crc32(os.pread(file.fileno(), count, at), checksum)
+            return checksum
 
         yield add_up
 
@@ -370,8 +370,8 @@ def _kept_words(ours: Path) -> str:
 def _noted(note: Path, about: str) -> list[int]:
     """Return the checksums in a note on the same work ``about``; empty if there is no such note."""
     try:
-        kept = read_json(note)
-        return [int(one) for one in kept["sums"]] if kept["about"] == about else []
+        record = read_json(note)
+        return [int(one) for one in record["sums"]] if record["about"] == about else []
     except (OSError, ValueError, KeyError, TypeError, OverflowError):
         return []
 

@@ -367,8 +367,8 @@ class MethodPanel(Panel):
         mesh = session.mesh
         key = (mesh, session.case.roles, session.case.motions)
         if key != self._largest[0]:
-            found = 0.0 if mesh is None else largest_prescribed(session.case, mesh)
-            self._largest = key, found
+            largest = 0.0 if mesh is None else largest_prescribed(session.case, mesh)
+            self._largest = key, largest
         return self._largest[1]
 
 

@@ -55,9 +55,9 @@ def _path(x: np.ndarray, y: np.ndarray, style: str) -> str:
 def _lines(to: Map, columns: int, rows: int) -> str:
     """Return the SVG of the lines of a structured mesh of a mapped square."""
     along, style = np.linspace(0, 1, 25), 'fill="none" stroke="{line}" stroke-width="0.6"'
-    found = [_path(*to(np.full(25, u), along), style) for u in np.linspace(0, 1, columns + 1)]
+    paths = [_path(*to(np.full(25, u), along), style) for u in np.linspace(0, 1, columns + 1)]
     return "".join(
-        found + [_path(*to(along, np.full(25, v)), style) for v in np.linspace(0, 1, rows + 1)]
+        paths + [_path(*to(along, np.full(25, v)), style) for v in np.linspace(0, 1, rows + 1)]
     )
 
 
