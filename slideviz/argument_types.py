@@ -79,10 +79,10 @@ def check_types(function: Callable[P, Result]) -> Callable[P, Result]:
 
 
 def check_fields(value: Any) -> None:
-    """Raise ArgumentError where a field of a dataclass is not as annotated, as `check_types` does.
+    """Raise ArgumentError if a field of a dataclass does not fit its annotation; see `check_types`.
 
-    Lists and arrays that fit a tuple become tuples. A field with metadata is an enumeration with
-    these terms; its default is always allowed.
+    Lists and arrays are converted to tuples if the annotation is a tuple. A field with metadata is
+    an enumeration with these terms; its default is always allowed.
 
     Raises
     ------

@@ -329,7 +329,7 @@ class USMesh:
         self._gradient = np.array(self.deformer.vjp(self._displacement, weights))
 
     def getdXs(self) -> FloatArray:
-        """Return the product that `warpDeriv` computed, for each node of the surface, (N, d)."""
+        """Return the result of `warpDeriv` at the nodes of the surface, (N, d)."""
         return self._surface.spread(self._gradient / self._surface.copies)
 
     def warpDerivFwd(self, dXs: ArrayLike, solverVec: bool = True) -> FloatArray:

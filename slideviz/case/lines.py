@@ -75,7 +75,7 @@ def read_text(path: Path, what: str) -> tuple[str, tuple[str, ...]]:
 
 
 def entries_of(text: str, signs: str = COMMENT_SIGNS) -> tuple[list[Entry], list[Problem]]:
-    """Return the entries of a case file in order, and a problem for each line that is none.
+    """Return the entries of a case file in order, and a problem for each invalid line.
 
     Comments begin with one of ``signs``.
     """
@@ -118,10 +118,10 @@ def require_some_key(
 
 
 def _joined(text: str, problems: list[Problem], signs: str) -> Iterator[tuple[int, str]]:
-    """Yield line number and content of each line, joined with those that continue it.
+    """Yield the number and the content of each line, joined with its continuation lines.
 
-    Comments and empty lines are left out. A problem is added to ``problems`` where a backslash
-    joins a line with a key to the one before.
+    Comments and empty lines are left out. If a backslash joins a line that has a key to the line
+    before, a problem is added to ``problems``.
     """
     start = 0
     parts: list[str] = []

@@ -60,7 +60,7 @@ def lost_of_mesh(mesh: Mesh) -> tuple[str, ...]:
 
 
 def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:
-    """Return what of an SU2 text is lost as binary, in words; empty if nothing is.
+    """Describe which parts of an SU2 text a binary file cannot hold; empty if none.
 
     ``keys`` are those of sections that slideviz does not know, ``zones`` the number of zones.
     """

@@ -171,8 +171,8 @@ def pair_up(
 ) -> tuple[Pair, ...]:
     """Return the pairs that the named markers form, whatever their order.
 
-    All pairs have the same transformation, or its inverse: where a marker matches several others
-    (two halves of a straight side), its partner is chosen so.
+    All pairs have the same transformation or its inverse. If a marker matches several others (two
+    halves of a straight side), the partner with this transformation is chosen.
 
     Raises
     ------

@@ -80,9 +80,9 @@ class FacetSimplices:
         return self.keep(~held[self.facet])
 
     def within(self, points: FloatArray, other: FacetSimplices, margin: float) -> FacetSimplices:
-        """Return the simplices whose bounding boxes touch the one around all of ``other``.
+        """Return the simplices whose bounding boxes touch the bounding box of ``other``.
 
-        ``points`` are (n, d); boxes up to the length ``margin`` from each other touch.
+        ``points`` are (n, d). Boxes count as touching up to a distance of ``margin``.
         """
         if not len(other):
             return other

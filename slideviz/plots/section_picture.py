@@ -242,7 +242,7 @@ class SectionInRun:
 
     @property
     def drawn(self) -> dict[int, Polygons]:
-        """Return the pieces that are not empty."""
+        """Return the pieces of the section that are not empty."""
         return {number: piece for number, piece in self.pieces.items() if len(piece)}
 
     @property

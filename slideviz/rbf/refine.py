@@ -252,7 +252,7 @@ class System:
         return factor
 
     def _residuals(self) -> Residuals:
-        """Return what computes residuals of this system with twice the precision."""
+        """Return the object that computes residuals in double-double arithmetic."""
         if "residuals" not in self._cache:
             self._cache["residuals"] = Residuals(self.basis, self.place)
         residuals: Residuals = self._cache["residuals"]

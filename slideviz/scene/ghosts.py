@@ -110,7 +110,7 @@ class GhostLayer(Layer):
             _shift_depth(wire, -ON_TOP)
 
     def _rim_color(self, color: str) -> tuple[float, float, float]:
-        """Return a color that contrasts with a ghost's own: mixed with that of the text."""
+        """Return a color that contrasts with the ghost: its color mixed with that of the text."""
         base, text = (np.array(pv.Color(one).float_rgb) for one in (color, self.stage.scheme.text))
         red, green, blue = (0.5 * (base + text)).tolist()
         return red, green, blue

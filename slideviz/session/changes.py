@@ -397,7 +397,7 @@ def show_run(session: Session, number: int) -> Session:
 
 
 def show_design(session: Session, number: int) -> Session:
-    """Return the session with the last step of a design's run shown, as asked for in this case."""
+    """Show the last step of a design's run, and remember the panels' settings for it."""
     asked = (
         replace(one, panels=session.case) if one.number == number else one for one in session.runs
     )

@@ -174,7 +174,7 @@ def _shown_points(session: Session) -> FloatArray:
 
 
 def _middle_of_moving(session: Session) -> FloatArray:
-    """Return the middle (3,) of the box around the moving boundaries; around the mesh if none."""
+    """Return the centre (3,) of the bounding box of the moving boundaries, or else of the mesh."""
     mesh = session.mesh
     assert mesh is not None
     names = [name for name in mesh.marker_names if session.role(name) == "moving"]

@@ -287,7 +287,7 @@ def _perhaps_ours(path: Path, ignored: tuple[str, ...], rows: dict[str, Entry]) 
 
 
 def _one_letter_off(one: str, other: str) -> bool:
-    """Return whether a letter is wrong, missing or too many in a word, or two are swapped."""
+    """Return whether two words differ by one letter, or by two that are swapped."""
     short, long = sorted((one, other), key=len)
     apart = (k for k, letters in enumerate(zip(short, long, strict=False)) if len({*letters}) > 1)
     at = next(apart, len(short))

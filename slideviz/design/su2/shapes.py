@@ -290,7 +290,7 @@ class Shapes:
         return self.config.relaxation if formula.relaxed else 1.0
 
     def boxed(self, mesh: Mesh) -> Mesh:
-        """Return the mesh: its FFD boxes stay."""
+        """Return the mesh unchanged: these variables do not move FFD boxes."""
         return mesh
 
 

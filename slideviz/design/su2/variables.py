@@ -119,7 +119,7 @@ class DesignVariable:
 
     @property
     def is_angle(self) -> bool:
-        """Return whether it is an angle of attack, which moves no node."""
+        """Return whether the variable is an angle of attack, which moves no node."""
         return self.kind.endswith("ANGLE_OF_ATTACK") and not self.ignored
 
     def parameter(self, name: str, default: float = 0.0) -> float:

@@ -292,7 +292,7 @@ class _Loop:
 
 
 def _slots(executor: Executor) -> int:
-    """Return how many calls an executor does at once; 1 where that is not known."""
+    """Return the number of calls that an executor does at once; 1 if unknown."""
     client = getattr(executor, "_client", None)  # of Dask
     if client is not None and hasattr(client, "nthreads"):
         return sum(client.nthreads().values())

@@ -243,8 +243,8 @@ def fill_points(lines: Lines, piece: Piece, points: FloatArray) -> IntArray:
 def require_all_coordinates(lines: Lines, rows: Rows, dim: int, found: IntArray) -> None:
     """Raise if a point lacks a coordinate, by the results (p, 2) of `fill_points` for p pieces.
 
-    If any row has an index after its coordinates, then a row with only ``dim`` numbers, the last
-    of which is its index, lacks a coordinate.
+    If some rows have an index after their coordinates, a row with only ``dim`` numbers lacks a
+    coordinate: its last number is the index.
 
     Raises
     ------

@@ -257,10 +257,10 @@ def keep_earlier(path: Path) -> None:
 def partial_file(
     path: Path, size: int, about: str, *, resume: bool, more: str = ""
 ) -> Iterator[Partial]:
-    """Context with a partial file of ``size`` bytes, zeros or as a stopped process left it.
+    """Context with a partial file of ``size`` bytes: zeros, or the content that a process left.
 
-    An error in the block removes the file. If the program is stopped, the file stays once a part is
-    noted as done, so that ``resume`` can continue. Otherwise the caller removes or renames it.
+    An error in the block removes the file. If the program is stopped, the file stays if a part is
+    recorded as done, so that ``resume`` can continue. Otherwise the caller removes or renames it.
 
     Parameters
     ----------
@@ -363,7 +363,7 @@ def finish_head(file: BinaryIO, head: bytes) -> None:
 
 
 def _kept_words(ours: Path) -> str:
-    """Return the words for the user on a partial file that stays."""
+    """Return the message about a partial file that stays on the disk."""
     return f"the partial result is in {ours}; continue with --resume"
 
 

@@ -87,7 +87,7 @@ class CellMouse(QObject):
             QToolTip.showText(event.globalPos(), info_text(self.scene.session, cell), self.view)
 
     def mark(self, where: QPoint) -> None:
-        """Mark the cell at a position in the view; take the mark away beside the mesh or on it."""
+        """Mark the cell at a position in the view; clear the mark if there is none, or the same."""
         cell = self.scene.pick_cell(*self.view.to_pixels(where))
         marked = self.store.session.view.marked_cell
         self.store.change(changes.mark_cell, None if cell == marked else cell)
