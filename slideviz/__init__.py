@@ -36,18 +36,22 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import Cells, Marker, Mesh
     from slideviz.mesh.quality import Quality, quality
     from slideviz.mesh.quality_derivative import QualityDerivative
+    from slideviz.plots.section_picture import SectionStyle
     from slideviz.rbf.reduction import Reduction
+    from slideviz.scene.overview import Detail
     from slideviz.sections.model import Section
     from slideviz.solver.deform import Step, deform
-    from slideviz.study.combinations import compare
+    from slideviz.study.combinations import Combination, compare
 
 _HOME = {
     "Bump": "case.model",
     "Case": "case.model",
     "Cells": "mesh.model",
+    "Combination": "study.combinations",
     "ConditionWarning": "errors",
     "Cst": "case.model",
     "Deformer": "design.deformer",
+    "Detail": "scene.overview",
     "Ffd": "case.model",
     "FfdCamber": "case.model",
     "FfdThickness": "case.model",
@@ -64,6 +68,7 @@ _HOME = {
     "Rotate": "case.model",
     "Scale": "case.model",
     "Section": "sections.model",
+    "SectionStyle": "plots.section_picture",
     "SlidevizError": "errors",
     "Step": "solver.deform",
     "ToleranceWarning": "errors",
@@ -84,9 +89,11 @@ __all__ = [
     "Bump",
     "Case",
     "Cells",
+    "Combination",
     "ConditionWarning",
     "Cst",
     "Deformer",
+    "Detail",
     "Ffd",
     "FfdCamber",
     "FfdThickness",
@@ -103,6 +110,7 @@ __all__ = [
     "Rotate",
     "Scale",
     "Section",
+    "SectionStyle",
     "SlidevizError",
     "Step",
     "ToleranceWarning",

@@ -130,7 +130,8 @@ class Running(QObject):
             self.store.change(changes.set_view, color_by="size-skew")
         periodic = PERIODIC_MODES[case.periodic].name
         steps = case.steps or "automatic"
-        log.info("run: %s, %s, %s steps", method_words(case), periodic, steps)
+        words = "1 step" if steps == 1 else f"{steps} steps"
+        log.info("run: %s, %s, %s", method_words(case), periodic, words)
         self._deforms = True
         if session.in_file:
             assert output is not None

@@ -54,7 +54,7 @@ class Combination:
     """A method, a periodic mode and a number of steps."""
 
     method: str
-    """One of ``COMPARED_METHODS``."""
+    """One of ``COMPARED_METHODS``: none, ps, ds, idw or elastic."""
     periodic: PeriodicMode
     steps: int
     """``AUTO``: the solver chooses."""
@@ -152,7 +152,7 @@ def compare(
     case: Case,
     mesh: Mesh,
     wanted: Sequence[Combination] | None = None,
-    tell: Callable[[Combination, Progress], None] | None = None,
+    report: Callable[[Combination, Progress], None] | None = None,
 ) -> Iterator[CombinationRow]:
     """Deform a mesh by several methods; yield a row for each combination, in order.
 
@@ -165,13 +165,13 @@ def compare(
     wanted : sequence of Combination, optional
         Methods, periodic modes and numbers of steps (`combinations`); by default the methods that
         suit the case, in 1, 5 and 20 steps.
-    tell : callable, optional
+    report : callable, optional
         Called often with the progress of a combination; raising `Cancelled` ends the comparison.
 
     Raises
     ------
     Cancelled
-        ``tell`` ended the comparison. The problem of a combination that fails is in its row.
+        ``report`` ended the comparison. The problem of a combination that fails is in its row.
 
     Examples
     --------
@@ -191,7 +191,7 @@ def compare(
             if shared is None or not shared.serves(combination):
                 shared = None  # the old one need not be kept while the new one is made
                 shared = _share(combination, case, mesh)
-            yield CombinationRow(combination, _result(combination, case, mesh, shared, tell))
+            yield CombinationRow(combination, _result(combination, case, mesh, shared, report))
         except Cancelled:
             raise
         except SlidevizError as problem:
@@ -219,11 +219,11 @@ def _result(
     case: Case,
     mesh: Mesh,
     shared: _Shared,
-    tell: Callable[[Combination, Progress], None] | None,
+    report: Callable[[Combination, Progress], None] | None,
 ) -> Result:
     """Return the result of a combination; its times are those of setup and deformation only."""
     applied = combination.applied(case)
-    progress = (lambda now: tell(combination, now)) if tell else None
+    progress = (lambda now: report(combination, now)) if report else None
     pulled = deform(applied, mesh, progress, shared.setup)
     clock = _Clock(shared.seconds, shared.processor_seconds)
     steps: list[Step] = []
