@@ -136,7 +136,7 @@ def test_the_example_widens_the_throat_with_a_tenth_of_the_meshes(monkeypatch):
     assert rated.inverted == 0
     assert rated.min >= rated.derivative.minimum == pytest.approx(0.5, abs=1e-4)
     assert moved.points.shape == ran["mesh"].points.shape
-    exact, differences = ran["found"]["exact gradients"], ran["found"]["finite differences"]
+    exact, differences = ran["results"]["exact gradients"], ran["results"]["finite differences"]
     assert exact.fun == pytest.approx(differences.fun, abs=1e-4)
     assert exact.nfev * 8 < differences.nfev
     assert ran["width"] == pytest.approx(-exact.fun, abs=1e-4)
