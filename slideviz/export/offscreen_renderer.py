@@ -314,21 +314,7 @@ _SMALL = 10
 def picture(
     session: Session, file: str | Path, size: tuple[int, int] = PICTURE_SIZE, zoom: Zoom = "auto"
 ) -> None:
-    """Write a PNG of a mesh in the colors of its quality, with name and quality as title.
-
-    A 2D mesh is shown whole. Of a 3D mesh, the whole cells behind a plane are shown, which goes
-    through the boundary that moved most, along its displacement.
-
-    Parameters
-    ----------
-    session : Session
-        Shows a run, or a mesh alone (`slideviz.session.opening.session_of_runs`).
-    file : str or Path
-        The PNG file.
-    size : (int, int)
-        Width and height in pixels.
-    zoom : Detail, "auto" or "all"
-        What part of the mesh is seen; "auto" is the whole, unless what moved is tiny in it.
+    """Write a PNG of what a session shows, a run or a mesh alone, for `slideviz.picture`.
 
     Raises
     ------

@@ -60,20 +60,25 @@ def columns(x: Array, nodes: IntArray) -> Array:
 
 def points(frame: Frame, coords: Array) -> Array:
     """Return the Cartesian points of coordinates (..., n, d), as ``Frame.points``."""
-    x = value(coords)
-    if not frame.cylindrical:
-        return coords
-    out = frame.points(flat(x)).reshape(x.shape)
-    return _turned(coords, out, lambda: points_slopes(frame, x))
+    return _converted(frame, coords, frame.points, points_slopes)
 
 
 def coords(frame: Frame, at: Array) -> Array:
     """Return the coordinates of Cartesian points (..., n, d), as ``Frame.coords``."""
-    x = value(at)
+    return _converted(frame, at, frame.coords, coords_slopes)
+
+
+def _converted(
+    frame: Frame,
+    x: Array,
+    convert: Callable[[FloatArray], FloatArray],
+    slopes_of: Callable[[Frame, FloatArray], FloatArray],
+) -> Array:
+    """Return rows (..., n, d) converted in a cylindrical frame; those of others are themselves."""
     if not frame.cylindrical:
-        return at
-    out = frame.coords(flat(x)).reshape(x.shape)
-    return _turned(at, out, lambda: coords_slopes(frame, x))
+        return x
+    rows = value(x)
+    return _turned(x, convert(flat(rows)).reshape(rows.shape), lambda: slopes_of(frame, rows))
 
 
 def difference(frame: Frame, start: FloatArray, vectors: Array) -> Array:
