@@ -1,1 +1,1 @@
-"""Methods to compare with: inverse distance weighting and linear elasticity."""
+"""Methods to compare with: inverse distance weighting."""

@@ -26,8 +26,8 @@ from slideviz.solver.domain import Domain, find_domain
 from slideviz.solver.prescribed import fitted_radius, largest_of, prescribe, support_radius
 
 if TYPE_CHECKING:
-    from slideviz.baselines.conditions import Body
     from slideviz.baselines.idw import Weights
+    from slideviz.elastic.conditions import Body
 
 EXACT_NODES = 2000
 """Most candidates with which DATA_REDUCTION= AUTO makes all of them control nodes. The text in
@@ -287,7 +287,7 @@ def _method(
 
         return partial(deform_idw, weights=idw_weights(case, mesh.dim))
     if case.method == "elastic":
-        from slideviz.baselines.elastic import deform_elastic
+        from slideviz.elastic.linear import deform_elastic
 
         return partial(deform_elastic, body=elastic_body(mesh, frame, axis))
     return SLIDING_METHODS[case.sliding]
@@ -295,8 +295,8 @@ def _method(
 
 def elastic_body(mesh: Mesh, frame: Frame, axis: np.ndarray) -> Body:
     """Return the mesh as an elastic body, without its halo."""
-    from slideviz.baselines.conditions import Body
-    from slideviz.baselines.stiffness import blocks
+    from slideviz.elastic.conditions import Body
+    from slideviz.elastic.stiffness import blocks
 
     return Body(blocks(without_halo(mesh)[0].cells), frame, axis)
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.baselines import multigrid
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.design.frozen import fit
+from slideviz.elastic import multigrid
 from slideviz.errors import DeformError
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.rbf.methods import SLIDING_METHODS

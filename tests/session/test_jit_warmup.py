@@ -1,6 +1,7 @@
 import pytest
 
-from slideviz.baselines import idw, multigrid, stiffness
+from slideviz.baselines import idw
+from slideviz.elastic import multigrid, stiffness
 from slideviz.rbf import closest, compiled
 from slideviz.session import jit_warmup
 

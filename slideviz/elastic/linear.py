@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from slideviz.baselines.conditions import (
+from slideviz.elastic.conditions import (
     Body,
     cartesian_normals,
     conditions,
@@ -22,15 +22,15 @@ from slideviz.baselines.conditions import (
     rigid_motions,
     unknowns,
 )
-from slideviz.baselines.elastic_forces import Forces
-from slideviz.baselines.multigrid import (
+from slideviz.elastic.forces import Forces
+from slideviz.elastic.multigrid import (
     Level,
     LinearSolution,
     conjugate_gradients,
     hierarchy,
     solve,
 )
-from slideviz.baselines.stiffness import assemble
+from slideviz.elastic.stiffness import assemble
 from slideviz.errors import DeformError
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
@@ -223,7 +223,7 @@ def _longer(size: FloatArray, least: float) -> IntArray:
 
 
 def _cartesian(frame: Frame, coords: Array, normals: Array) -> Array:
-    """Return what ``slideviz.baselines.elastic.cartesian_normals`` does, on a tape."""
+    """Return what ``slideviz.elastic.linear.cartesian_normals`` does, on a tape."""
     if not any(isinstance(x, Variable) for x in (coords, normals)):
         return cartesian_normals(frame, value(coords), value(normals))
     if not frame.cylindrical:

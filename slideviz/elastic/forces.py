@@ -5,7 +5,7 @@ With G the gradient of the displacement u, and its stress per modulus of the cel
     S = lam tr(G) I + mu (G + G^T),
 
 the force at node a is the sum of E |det J| w S grad N_a over the integration points of its
-elements (see `slideviz.baselines.stiffness`). Where positions change by t, with gradient T,
+elements (see `slideviz.elastic.stiffness`). Where positions change by t, with gradient T,
 
     dG = -G T,     d grad N_a = -T^T grad N_a,     d|det J| = |det J| tr T,
 
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.baselines.stiffness import (
+from slideviz.elastic.stiffness import (
     OPTIONS,
     POISSON,
     ShapeBlock,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.baselines.stiffness import Conditions, ShapeBlock
+from slideviz.elastic.stiffness import Conditions, ShapeBlock
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.classify import RANK_TOLERANCE

@@ -10,11 +10,11 @@ import pytest
 from scipy.sparse import bsr_array
 
 import slideviz as sv
-from slideviz.baselines import elastic, multigrid
-from slideviz.baselines.elastic_forces import Forces
-from slideviz.baselines.multigrid import LinearSolution
-from slideviz.baselines.stiffness import _CORNERS, Conditions, assemble, blocks, shape
 from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
+from slideviz.elastic import linear, multigrid
+from slideviz.elastic.forces import Forces
+from slideviz.elastic.multigrid import LinearSolution
+from slideviz.elastic.stiffness import _CORNERS, Conditions, assemble, blocks, shape
 from slideviz.errors import Cancelled, DeformError
 from slideviz.mesh.model import Cells, Marker, Mesh
 from tests import builders
@@ -440,11 +440,11 @@ def test_what_the_solver_does_not_reach_is_told(monkeypatch):
     monkeypatch.setattr(multigrid, "COARSE", 10)
     with pytest.raises(DeformError, match="were not solved: after 1 iterations"):
         last(box_case(2), mesh)
-    monkeypatch.setattr(elastic, "HOPELESS", 1.0)
+    monkeypatch.setattr(linear, "HOPELESS", 1.0)
     warnings = last(box_case(2), mesh).warnings
     assert any("only, in 1 iterations" in text for text in warnings)
     with pytest.raises(DeformError, match="not solved"):
-        elastic._warnings(LinearSolution(np.zeros(1), 3, float("nan")))
+        linear._warnings(LinearSolution(np.zeros(1), 3, float("nan")))
 
 
 def test_progress_rises_and_a_callback_that_raises_ends_the_run(monkeypatch):
