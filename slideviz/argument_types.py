@@ -82,12 +82,8 @@ def check_fields(value: Any) -> None:
     """Raise ArgumentError if a field of a dataclass does not fit its annotation; see `check_types`.
 
     Lists and arrays are converted to tuples if the annotation is a tuple. A field with metadata is
-    an enumeration with these terms; its default is always allowed.
-
-    Raises
-    ------
-    CaseError
-        An enumeration has another value.
+    an enumeration with these terms; its default is always allowed. Raises CaseError if an
+    enumeration has another value.
     """
     kind: Any = type(value)
     fields, hints = value.__dataclass_fields__, _annotations(kind)

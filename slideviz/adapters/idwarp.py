@@ -123,10 +123,8 @@ class SolverSurface:
 def surface_at(mesh: Mesh, moving: IntArray, given: FloatArray) -> SolverSurface:
     """Return the surface whose undeformed coordinates (N, d) are given.
 
-    Raises
-    ------
-    CaseError
-        A node is on none of the mesh's boundaries, or a moving node is not in the surface.
+    Raises CaseError if a node is on none of the mesh's boundaries, or a moving node is not in the
+    surface.
     """
     boundary = np.unique(np.concatenate([moving, *(marker.nodes for marker in mesh.markers)]))
     distance, found = cKDTree(mesh.points[boundary]).query(given)
@@ -230,10 +228,7 @@ class USMesh:
     def setExternalMeshIndices(self, ind: ArrayLike) -> None:
         """Set which coordinates of the grid, counted from 0, the solver has, and in which order.
 
-        Raises
-        ------
-        CaseError
-            There is no such coordinate.
+        Raises CaseError if there is no such coordinate.
         """
         indices, size = np.asarray(ind, np.int64).ravel(), self._order.size * self._points.shape[1]
         if len(indices) and not 0 <= indices.min() <= indices.max() < size:
@@ -253,12 +248,8 @@ class USMesh:
         """Set the solver's surface by its undeformed coordinates ``pts`` (N, d).
 
         Its nodes are found in the mesh by their coordinates; so ``conn`` and the rest, which
-        IDWarp needs, are not used.
-
-        Raises
-        ------
-        CaseError
-            A node is on none of the mesh's boundaries, or a moving node is not in the surface.
+        IDWarp needs, are not used. Raises CaseError if a node is on none of the mesh's boundaries,
+        or a moving node is not in the surface.
         """
         del conn, faceSizes, cgnsBlockID
         nodes = np.asarray(self.deformer.nodes)
@@ -275,11 +266,8 @@ class USMesh:
     def setSurfaceCoordinates(self, coordinates: ArrayLike) -> None:
         """Set the coordinates of the surface (N, d); `warpMesh` moves the grid.
 
-        Raises
-        ------
-        CaseError
-            The number of nodes is wrong, copies of a node disagree, or a node was moved that the
-            case does not move.
+        Raises CaseError if the number of nodes is wrong, copies of a node disagree, or a node was
+        moved that the case does not move.
         """
         shaped = self._shaped(coordinates)
         now = self._points[self._surface.nodes]
@@ -306,10 +294,7 @@ class USMesh:
     def writeGrid(self, fileName: str | Path | None = None) -> None:
         """Write the grid into a file, of the format that its ending names.
 
-        Raises
-        ------
-        CaseError
-            No name was given.
+        Raises CaseError if no name was given.
         """
         from slideviz.formats.files import write
 

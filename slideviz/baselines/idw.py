@@ -165,10 +165,7 @@ def weighted_mean(
 def deform_idw(problem: Problem, timer: PhaseTimer, weights: Weights) -> Solution:
     """Return the solution of one step: displacements are weighted means of those of the boundary.
 
-    Raises
-    ------
-    DeformError
-        Coinciding nodes are asked to move differently.
+    Raises DeformError if coinciding nodes are asked to move differently.
     """
     nodes, values = problem.known, problem.values
     for level in (problem.edge, problem.surface):

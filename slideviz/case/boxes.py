@@ -40,10 +40,7 @@ _DEFINED: WeakKeyDictionary[Mesh, dict[object, dict[str, Box]]] = WeakKeyDiction
 def boxes_for(case: Case, mesh: Mesh) -> dict[str, Box]:
     """Return the boxes of the mesh and of the case, by name; of two with one name the mesh's.
 
-    Raises
-    ------
-    SlidevizError
-        The boxes in the mesh file or in FFD_DEFINITION have mistakes.
+    Raises SlidevizError if the boxes in the mesh file or in FFD_DEFINITION have mistakes.
     """
     boxes = boxes_of(mesh, system_of(case))
     return {**defined_boxes(case, mesh), **{box.name: box for box in boxes}}
@@ -64,12 +61,8 @@ def box_definition(case: Case) -> tuple[object, ...]:
 def defined_boxes(case: Case, mesh: Mesh) -> dict[str, Box]:
     """Return the boxes that FFD_DEFINITION of the case defines, undeformed, by name.
 
-    They are found once for each mesh.
-
-    Raises
-    ------
-    CaseError
-        The corners, degrees or orders of a box make none.
+    They are found once for each mesh. Raises CaseError if the corners, degrees or orders of a box
+    make none.
     """
     key = box_definition(case)
     cache = _DEFINED.setdefault(mesh, {})
@@ -241,12 +234,8 @@ def ffd_displacements(
 ) -> dict[object, Displacements]:
     """Return the displacements of the nodes ``on`` moving markers, by motion of a box.
 
-    Equal motions have one entry, with the mean of their displacements.
-
-    Raises
-    ------
-    CaseError
-        None of the nodes that a motion should move is in its box; a line for each such motion.
+    Equal motions have one entry, with the mean of their displacements. Raises CaseError if none of
+    the nodes that a motion should move is in its box; a line for each such motion.
     """
     motions = box_motions(case)
     boxes = boxes_for(case, mesh) if motions else {}

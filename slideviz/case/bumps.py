@@ -78,10 +78,7 @@ def bump_displacements(
 ) -> dict[object, Displacements]:
     """Return the displacements of the nodes ``on`` moving markers, by airfoil motion.
 
-    Raises
-    ------
-    CaseError
-        A motion with a height moves no node: none is on its side, along its chord.
+    Raises CaseError if a motion with a height moves no node: none is on its side, along its chord.
     """
     displacements: dict[object, Displacements] = {}
     problems = []

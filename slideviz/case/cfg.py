@@ -36,10 +36,8 @@ _ROLE_OF = {term.key: role for role, term in ROLES.items()}
 def read_case(path: Path) -> Case:
     """Return the case that a file describes.
 
-    Raises
-    ------
-    CaseError
-        The file cannot be read, or has mistakes: a line ``file:line: sentence`` for each.
+    Raises CaseError if the file cannot be read, or has mistakes: a line ``file:line: sentence`` for
+    each.
     """
     text, warnings = read_text(path, "case file")
     case, problems, remarks = _parsed(path, text)
@@ -57,12 +55,8 @@ def write_case(path: Path, case: Case, remarks: Iterable[str] = ()) -> None:
     """Write a case file that ``read_case`` reads back without loss.
 
     Paths in it are relative to its folder, so that both can be moved together; absolute where they
-    have nothing but the root in common. Remarks, of one line each, are comments at its top.
-
-    Raises
-    ------
-    CaseError
-        The file cannot be written, or a value of the case has no form in a case file.
+    have nothing but the root in common. Remarks, of one line each, are comments at its top. Raises
+    CaseError if the file cannot be written, or a value of the case has no form in a case file.
     """
     folder = Path(os.path.realpath(path.parent))
     named = _with_paths(case, lambda file: _to_folder(file, folder))
@@ -82,12 +76,8 @@ def set_key(case: Case, key: str, value: str) -> Case:
 
     A list of markers replaces all markers with that role; one that had another role loses it. A
     path is relative to the current folder. Contradictions between keys are not looked for here
-    but by ``check_case``, so that several keys can be set one after the other.
-
-    Raises
-    ------
-    CaseError
-        There is no such key, or the value is wrong.
+    but by ``check_case``, so that several keys can be set one after the other. Raises CaseError if
+    there is no such key, or the value is wrong.
     """
     place = f"--set {key}={value}"
     row = KEYS.get(key.strip().upper())

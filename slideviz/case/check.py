@@ -55,10 +55,7 @@ def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
 def require_valid(case: Case, mesh: Mesh) -> None:
     """Raise where the case does not fit the mesh (`check_case`).
 
-    Raises
-    ------
-    CaseError
-        It does not; the message has a line for each problem.
+    Raises CaseError if it does not; the message has a line for each problem.
     """
     raise_all(check_case(case, mesh))
 

@@ -95,12 +95,8 @@ def parse_displacements(
 ) -> Displacements:
     """Return the displacements that the text of a file lists for ``nodes``, zero for others.
 
-    Parameters as of `read_displacements`; ``path`` is for messages only.
-
-    Raises
-    ------
-    CaseError
-        The text has mistakes: a line ``file:line: sentence`` for each.
+    Parameters as of `read_displacements`; ``path`` is for messages only. Raises CaseError if the
+    text has mistakes: a line ``file:line: sentence`` for each.
     """
     table = parse_rows(text, path, nodes, shape, of)
     numbers = table[:, 0].astype(np.int64)
@@ -124,11 +120,7 @@ def parse_rows(
     """Return the table in a text, (k, 1 + d): a node and its d numbers, by ascending node.
 
     Parameters as of `read_displacements`; ``path`` is for messages only. Each node is there once.
-
-    Raises
-    ------
-    CaseError
-        The text has mistakes: a line ``file:line: sentence`` for each.
+    Raises CaseError if the text has mistakes: a line ``file:line: sentence`` for each.
     """
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     if any(sign in text for sign in COMMENT_SIGNS):
@@ -144,10 +136,7 @@ def parse_rows(
 def _table(path: Path, lines: list[str], dim: int, columns: Columns) -> FloatArray:
     """Return the numbers in the lines, (m, 1 + d), in their order.
 
-    Raises
-    ------
-    CaseError
-        There are none, or some line is no row of finite numbers.
+    Raises CaseError if there are none, or some line is no row of finite numbers.
     """
     if not any(line.strip() for line in lines):
         raise CaseError(f"{path}: the file lists no node; expected lines {columns.heading(dim)}")
@@ -188,10 +177,7 @@ def _numbers(lines: list[str]) -> FloatArray:
 def _row(content: str, dim: int, columns: Columns) -> list[list[float]]:
     """Return a list with the numbers of a line as its one row; without a row for an empty line.
 
-    Raises
-    ------
-    CaseError
-        The line has another number of columns, or words that are no numbers.
+    Raises CaseError if the line has another number of columns, or words that are no numbers.
     """
     words = content.split()
     if columns.flat and dim == 2 and len(words) == 4:

@@ -40,13 +40,8 @@ def read_text(path: Path, what: str) -> tuple[str, tuple[str, ...]]:
     """Return the text of a file, and warnings.
 
     UTF-8 with or without a byte order mark, UTF-16 with one; anything else is read as Latin-1,
-    with a warning.
-
-    Raises
-    ------
-    CaseError
-        It cannot be read, is empty, too large, or not text; the message calls it ``what``, one of
-        ``LARGEST``.
+    with a warning. Raises CaseError if it cannot be read, is empty, too large, or not text; the
+    message calls it ``what``, one of ``LARGEST``.
     """
     try:
         with suppress(FileNotFoundError):  # reported below

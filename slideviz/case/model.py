@@ -366,10 +366,8 @@ class Case(CheckedFields):
     def read(cls, path: str | Path) -> Case:
         """Return the case that a ``.cfg`` file describes.
 
-        Raises
-        ------
-        CaseError
-            The file cannot be read, or has mistakes: all of them, each with its line.
+        Raises CaseError if the file cannot be read, or has mistakes: all of them, each with its
+        line.
         """
         from slideviz.case.cfg import read_case
 

@@ -63,13 +63,8 @@ def reference_displacements(
 ) -> dict[object, Displacements]:
     """Return the displacements by files, FFD boxes and bumps of a case, by `key_of` their motion.
 
-    ``on`` has the nodes (k,) of each moving marker.
-
-    Raises
-    ------
-    CaseError
-        A file cannot be read or has mistakes, or a box has none of the nodes that it should move;
-        the message has all of these.
+    ``on`` has the nodes (k,) of each moving marker. Raises CaseError if a file cannot be read or
+    has mistakes, or a box has none of the nodes that it should move; the message has all of these.
     """
     files: dict[object, Displacements] = {}
     problems: list[str] = []
@@ -119,14 +114,10 @@ ROUNDING = 1e-13
 def displacements(case: Case, mesh: Mesh) -> Displacements:
     """Return the displacement of every node of the moving markers, sorted by node.
 
-    A node on two moving markers has the displacement that the first of them gives it.
-
-    Raises
-    ------
-    CaseError
-        A marker is unknown or has no motion, a motion does not fit the dimension of the mesh, a
-        displacement file has mistakes, two markers displace one node differently, or a node goes
-        too far to compute with.
+    A node on two moving markers has the displacement that the first of them gives it. Raises
+    CaseError if a marker is unknown or has no motion, a motion does not fit the dimension of the
+    mesh, a displacement file has mistakes, two markers displace one node differently, or a node
+    goes too far to compute with.
     """
     # Motions of markers that do not move are ignored here; `check_case` reports them.
     raise_all((*marker_problems(case, mesh), *motion_problems(case, mesh)))

@@ -58,10 +58,7 @@ MOST_TERMS = 100
 def read_motions(text: str) -> tuple[Motion, ...]:
     """Return the motions that the value of ``MOTION`` describes.
 
-    Raises
-    ------
-    CaseError
-        Some have mistakes: a sentence for each, with the number of the motion.
+    Raises CaseError if some have mistakes: a sentence for each, with the number of the motion.
     """
     groups = _groups(words_of(text), text)
     if not [group for group in groups if group]:
@@ -81,12 +78,7 @@ def read_motions(text: str) -> tuple[Motion, ...]:
 def write_motions(motions: tuple[Motion, ...]) -> str:
     """Return the value of ``MOTION`` that ``read_motions`` reads back without loss.
 
-    It has a line for each motion.
-
-    Raises
-    ------
-    CaseError
-        A motion has no form in a case file.
+    It has a line for each motion. Raises CaseError if a motion has no form in a case file.
     """
     return " ; \\\n    ".join(_motion_text(motion) for motion in motions) or "( )"
 

@@ -215,10 +215,7 @@ def _remark_pairs(text: str) -> str:
 def read_vector(items: list[Word], what: str) -> tuple[float, ...]:
     """Return the numbers of a vector, 2 or 3; messages call it ``what``.
 
-    Raises
-    ------
-    CaseError
-        The words are not two or three, or not numbers.
+    Raises CaseError if the words are not two or three, or not numbers.
     """
     if len(items) not in (2, 3):
         raise CaseError(f"{what} has {len(items)} values; expected 2 or 3 numbers")
@@ -228,10 +225,7 @@ def read_vector(items: list[Word], what: str) -> tuple[float, ...]:
 def read_axis(items: list[Word]) -> tuple[float, float, float]:
     """Return the direction given as ``x``, ``y``, ``z`` or three numbers; not of unit length.
 
-    Raises
-    ------
-    CaseError
-        The words are none of these, or the direction has no length.
+    Raises CaseError if the words are none of these, or the direction has no length.
     """
     if len(items) == 1 and items[0].text.lower() in AXES:
         return AXES[items[0].text.lower()]

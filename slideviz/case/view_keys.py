@@ -59,10 +59,8 @@ def words(known: tuple[str, ...]) -> Kind:
 def read_sections(text: str) -> tuple[SectionText, ...]:
     """Return the sections that the value of ``VIEW_SECTIONS`` describes.
 
-    Raises
-    ------
-    CaseError
-        One has another form, a wrong count of numbers, or numbers that give no section.
+    Raises CaseError if one has another form, a wrong count of numbers, or numbers that give no
+    section.
     """
     sections = []
     for place, part in enumerate((p for p in text.split(";") if p.strip(" ()")), start=1):

@@ -40,10 +40,7 @@ class Word:
 def words_of(text: str) -> list[Word]:
     """Return the words of a value, brackets, commas and semicolons among them.
 
-    Raises
-    ------
-    CaseError
-        A quotation mark is not closed.
+    Raises CaseError if a quotation mark is not closed.
     """
     words = []
     for match in _WORD.finditer(text):
@@ -81,10 +78,7 @@ def without_comment(line: str, signs: str = COMMENT_SIGNS) -> str:
 def list_of(text: str) -> list[Word]:
     """Return the items of a list like ``(A, B)``, ``A, B`` or ``A B``; [] for ``( )``, ``(NONE)``.
 
-    Raises
-    ------
-    CaseError
-        A bracket is missing or misplaced, or a quotation mark is not closed.
+    Raises CaseError if a bracket is missing or misplaced, or a quotation mark is not closed.
     """
     words = words_of(text)
     opened = bool(words) and words[0].is_sign("(")
@@ -114,10 +108,7 @@ def is_number(text: str) -> bool:
 def number(text: str) -> float:
     """Return the number that a text is.
 
-    Raises
-    ------
-    CaseError
-        It is no number, or not finite.
+    Raises CaseError if it is no number, or not finite.
     """
     if not is_number(text):
         hint = "; write decimals with a point" if is_number(text.replace(",", ".")) else ""
@@ -131,10 +122,7 @@ def number(text: str) -> float:
 def name_text(name: str) -> str:
     """Return a name as it is written in a case file, in quotes where needed.
 
-    Raises
-    ------
-    CaseError
-        A case file cannot have it (`check_writable`).
+    Raises CaseError if a case file cannot have it (`check_writable`).
     """
     check_writable(name)
     if _PLAIN_NAME.match(name) and not is_number(name) and name.upper() != "NONE":
@@ -145,10 +133,7 @@ def name_text(name: str) -> str:
 def check_writable(text: str) -> None:
     """Raise where a text cannot be written in a line of a case file.
 
-    Raises
-    ------
-    CaseError
-        It is empty, has a line break or a zero byte, or cannot be written in UTF-8.
+    Raises CaseError if it is empty, has a line break or a zero byte, or cannot be written in UTF-8.
     """
     if not text:
         raise CaseError("an empty name cannot be written to a case file; give it a name")

@@ -111,10 +111,7 @@ def _say(arguments: argparse.Namespace, text: str) -> None:
 def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...]:
     """Return the combinations of methods, periodic modes and steps that the arguments ask for.
 
-    Raises
-    ------
-    CaseError
-        A name is unknown, a list is empty, or a number of steps is not valid.
+    Raises CaseError if a name is unknown, a list is empty, or a number of steps is not valid.
     """
     from slideviz.errors import CaseError
     from slideviz.study.combinations import (

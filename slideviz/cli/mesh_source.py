@@ -60,13 +60,8 @@ def open_mesh(arguments: argparse.Namespace, case: Case | None = None) -> Iterat
 
     That is of ``--reference`` or else of ``--case``, but only where it has the same cells: the case
     may have been given only for its periodic boundaries. Binary copies of texts are in the folder
-    for temporary files until the context ends.
-
-    Raises
-    ------
-    MeshError
-        The mesh has a mistake or, with ``--stream``, is of no format that can be streamed; or
-        ``--reference`` has other cells.
+    for temporary files until the context ends. Raises MeshError if the mesh has a mistake or, with
+    ``--stream``, is of no format that can be streamed; or ``--reference`` has other cells.
     """
     from slideviz.errors import MeshError
     from slideviz.formats.files import read

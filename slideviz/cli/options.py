@@ -103,10 +103,7 @@ def read_case(arguments: argparse.Namespace) -> Case:
 def require_mesh_file(arguments: argparse.Namespace, case: Case) -> Path:
     """Return the mesh file of a case.
 
-    Raises
-    ------
-    CaseError
-        The case has none.
+    Raises CaseError if the case has none.
     """
     from slideviz.errors import CaseError
 
@@ -130,13 +127,9 @@ def optional_case(arguments: argparse.Namespace) -> Case | None:
 def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
     """Return the case with other values of some keys, given as texts KEY=VALUE.
 
-    ``option`` is what messages call the texts.
-
-    Raises
-    ------
-    CaseError
-        Texts have another form, there is no such key, a value is wrong, or a list of markers takes
-        a marker from the role that it needs; with a line for each.
+    ``option`` is what messages call the texts. Raises CaseError if texts have another form, there
+    is no such key, a value is wrong, or a list of markers takes a marker from the role that it
+    needs; with a line for each.
     """
     from slideviz.case.cfg import set_key
     from slideviz.case.check import idle_roles, raise_all

@@ -59,10 +59,7 @@ def input_paths(arguments: argparse.Namespace) -> dict[Path, str]:
 def qualities_path(output: Path) -> Path:
     """Return the path of the qualities of each cell, beside a mesh that is written.
 
-    Raises
-    ------
-    CaseError
-        The path of the mesh is that of a folder.
+    Raises CaseError if the path of the mesh is that of a folder.
     """
     if not output.name:
         from slideviz.errors import CaseError
@@ -80,13 +77,9 @@ def add_case_inputs(arguments: argparse.Namespace, case: Case) -> None:
 def require_output_paths(arguments: argparse.Namespace, *outputs: OutputPath) -> None:
     """Raise where a result must not or cannot be written; print which older files are replaced.
 
-    Folders for results are made where they are missing.
-
-    Raises
-    ------
-    SlidevizError
-        A result is an input file, or two results are one file; the folder is missing, there is no
-        permission, a folder has that name, or no mesh format has that ending.
+    Folders for results are made where they are missing. Raises SlidevizError if a result is an
+    input file, or two results are one file; the folder is missing, there is no permission, a folder
+    has that name, or no mesh format has that ending.
     """
     from slideviz.errors import CaseError
     from slideviz.system.atomic import require_writable
@@ -167,10 +160,7 @@ def _require_mesh_ending(file: Path) -> None:
 def make_folder(folder: Path) -> None:
     """Make a folder and its parents where they are missing.
 
-    Raises
-    ------
-    CaseError
-        It cannot be made.
+    Raises CaseError if it cannot be made.
     """
     from slideviz.errors import CaseError
     from slideviz.system.atomic import reason_of

@@ -67,10 +67,7 @@ a first try:  slideviz sample passage -o try && slideviz run try/passage.cfg
 def parse(argv: Sequence[str]) -> argparse.Namespace:
     """Return the arguments, with ``command`` set to the function to call.
 
-    Raises
-    ------
-    SystemExit
-        Wrong usage (code 2), or help was asked for (code 0).
+    Raises SystemExit on wrong usage (code 2), or if help was asked for (code 0).
     """
     if not any(word in COMMANDS for word in argv[:1]) and not _asks_help(argv):
         parser = _window_parser()

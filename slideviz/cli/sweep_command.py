@@ -134,10 +134,7 @@ def _print_columns(case: Any) -> int:
 def _executor(arguments: argparse.Namespace) -> Iterator[Executor | None]:
     """Context with the executor of ``--scheduler``; with None where the option is not given.
 
-    Raises
-    ------
-    CaseError
-        Dask is not installed, no scheduler answers, or ``--workers`` is given, too.
+    Raises CaseError if Dask is not installed, no scheduler answers, or ``--workers`` is given, too.
     """
     from slideviz.errors import CaseError
 

@@ -93,10 +93,7 @@ class KnownNodeMap:
 def known_node_map(mesh: Mesh, setup: Setup, asked: Displacements) -> KnownNodeMap:
     """Return the map from the displacement of the moving nodes to that of the known nodes.
 
-    Raises
-    ------
-    CaseError
-        A moving node in a halo is a copy of a node that does not move.
+    Raises CaseError if a moving node in a halo is a copy of a node that does not move.
     """
     moved = displaced(asked, mesh)
     spread = ImageDisplacements(moved.nodes, moved.vectors, setup.classes.representative)

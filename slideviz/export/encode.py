@@ -60,12 +60,8 @@ class EncoderSettings:
 def film_kind(file: Path) -> str:
     """Return the kind of a film by its name: ".mp4", ".gif", or ".png" for numbered pictures.
 
-    ".png" is that of a folder, or of a name with one number such as ``step_%03d.png``.
-
-    Raises
-    ------
-    SlidevizError
-        The name is none of these.
+    ".png" is that of a folder, or of a name with one number such as ``step_%03d.png``. Raises
+    SlidevizError if the name is none of these.
     """
     suffix = file.suffix.lower()
     if file.is_dir() or not (suffix or file.exists()):

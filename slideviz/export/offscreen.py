@@ -35,10 +35,7 @@ LETTERS = 1.25
 def offscreen(size: tuple[int, int]) -> Iterator[Any]:
     """Yield an off-screen plotter of ``size`` pixels, which works without a display too.
 
-    Raises
-    ------
-    SlidevizError
-        The size cannot be drawn.
+    Raises SlidevizError if the size cannot be drawn.
     """
     import pyvista as pv
 

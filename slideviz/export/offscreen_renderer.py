@@ -76,10 +76,8 @@ class OffscreenRenderer:
     def of_runs(cls, session: Session, zoom: Zoom = "auto") -> OffscreenRenderer:
         """Return a renderer with the overview of the run with the largest displacement.
 
-        Raises
-        ------
-        SlidevizError
-            The detail has not as many coordinates as the mesh, or is outside the mesh.
+        Raises SlidevizError if the detail has not as many coordinates as the mesh, or is outside
+        the mesh.
         """
         base = session.mesh
         assert base is not None
@@ -146,10 +144,7 @@ class OffscreenRenderer:
     def image(self, options: PictureOptions) -> Pixels:
         """Draw a picture and return it, (height, width, 3), or 4 with a transparent background.
 
-        Raises
-        ------
-        SlidevizError
-            The size cannot be drawn.
+        Raises SlidevizError if the size cannot be drawn.
         """
         return run_to_end(self.render_steps(options))
 
@@ -225,11 +220,8 @@ class OffscreenRenderer:
     def write(self, options: PictureOptions, file: Path) -> None:
         """Write the picture as a PNG file, whole or not at all.
 
-        Raises
-        ------
-        SlidevizError
-            The size cannot be drawn, the name does not end with .png, or the file cannot be
-            written.
+        Raises SlidevizError if the size cannot be drawn, the name does not end with .png, or the
+        file cannot be written.
         """
         from PIL import Image
 
@@ -316,10 +308,7 @@ def picture(
 ) -> None:
     """Write a PNG of what a session shows, a run or a mesh alone, for `slideviz.picture`.
 
-    Raises
-    ------
-    SlidevizError
-        The size cannot be drawn, or the file cannot be written.
+    Raises SlidevizError if the size cannot be drawn, or the file cannot be written.
     """
     check_png(Path(file))
     assert session.frame is not None

@@ -60,13 +60,9 @@ def save_section(
 ) -> Path:
     """Write the picture of a section as the view shows it: step, colors, neighbouring passages.
 
-    With a comparison, it shows both views. Return the path.
-
-    Raises
-    ------
-    CaseError
-        No mesh is open, the section cuts no cell that is shown, the name has a suffix other than a
-        picture's, or the file cannot be written.
+    With a comparison, it shows both views. Return the path. Raises CaseError if no mesh is open,
+    the section cuts no cell that is shown, the name has a suffix other than a picture's, or the
+    file cannot be written.
     """
     if session.frame is None:
         raise CaseError("no mesh is open, so there is no section to draw")

@@ -274,10 +274,7 @@ class Box:
     def change(self, index: Index, vector: tuple[float, ...]) -> FloatArray:
         """Return the change (I, J, K, 3) of all control points that moves those of ``index``.
 
-        Raises
-        ------
-        CaseError
-            The box has no such control point.
+        Raises CaseError if the box has no such control point.
         """
         problem = self.problem(index)
         if problem:
@@ -329,10 +326,8 @@ def regular_box(
 ) -> Box:
     """Return the undeformed box between corners (8, 3), with a regular lattice in q.
 
-    Raises
-    ------
-    CaseError
-        A degree or an order is not possible, or the corners in this order enclose no volume.
+    Raises CaseError if a degree or an order is not possible, or the corners in this order enclose
+    no volume.
     """
     for letter, degree in zip("ijk", degrees, strict=True):
         if degree < 1:

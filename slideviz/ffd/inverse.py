@@ -68,12 +68,7 @@ def parametric(box: Box, points: FloatArray) -> tuple[FloatArray, np.ndarray]:
 def placed_again(box: Box, points: FloatArray, uvw: FloatArray) -> FloatArray:
     """Return the parametric coordinates (m, 3) of points (m, 3) near known ones, uvw (m, 3).
 
-    They may be outside of [0, 1].
-
-    Raises
-    ------
-    CaseError
-        The box has no such point there.
+    They may be outside of [0, 1]. Raises CaseError if the box has no such point there.
     """
     size = np.ptp(box.points.reshape(-1, 3), axis=0)
     found, gap = _newton(box, points, uvw, size)

@@ -52,10 +52,7 @@ Entries = dict[str, BoxEntry]
 def read_boxes(mesh: Mesh, lines: list[str], system: CoordinateSystem) -> tuple[Box, ...]:
     """Return the boxes in the lines of a section, in a coordinate system.
 
-    Raises
-    ------
-    MeshError
-        The section has a mistake.
+    Raises MeshError if the section has a mistake.
     """
     entries = entries_of(lines)
     readers = [_Reader(mesh, one, system) for one in entries]
@@ -310,10 +307,7 @@ _BOXES: WeakKeyDictionary[Mesh, dict[CoordinateSystem, tuple[Box, ...]]] = WeakK
 def boxes_of(mesh: Mesh, system: CoordinateSystem = CARTESIAN) -> tuple[Box, ...]:
     """Return the boxes of a mesh, in the order of its file, in a coordinate system.
 
-    Raises
-    ------
-    MeshError
-        The section has a mistake.
+    Raises MeshError if the section has a mistake.
     """
     cache = _BOXES.setdefault(mesh, {})
     if system not in cache:

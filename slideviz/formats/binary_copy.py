@@ -169,12 +169,8 @@ def write_layout(
 ) -> bytes:
     """Write the binary form of a text into an existing file of its size, but for the file's head.
 
-    Returns the head (``HEAD`` bytes) for a file with only this zone; the caller writes it.
-
-    Raises
-    ------
-    MeshError
-        The text has a mistake; the message has its line.
+    Returns the head (``HEAD`` bytes) for a file with only this zone; the caller writes it. Raises
+    MeshError if the text has a mistake; the message has its line.
     """
     text, conn = layout.text, layout.conn
     zone, lines = text.zone, text.lines

@@ -242,10 +242,7 @@ def write(
 def _checked_path(path: str | Path, file_format: FileFormat | None) -> Path:
     """Return the path of a file whose format, where it is given, is one of SU2.
 
-    Raises
-    ------
-    MeshError
-        It is none.
+    Raises MeshError if it is none.
     """
     if file_format not in (None, *FILE_FORMATS):
         known = " | ".join(FILE_FORMATS)

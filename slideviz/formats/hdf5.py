@@ -49,10 +49,7 @@ class Hdf5Draft:
     def require(self) -> None:
         """Raise if anything could not be written so far.
 
-        Raises
-        ------
-        MeshError
-            With the reason of the first failure, and the remedy.
+        Raises MeshError with the reason of the first failure, and the remedy.
         """
         if self._problem is not None:
             reason = reason_of(self._problem)

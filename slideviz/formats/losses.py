@@ -106,12 +106,8 @@ def warning_of_losses(
 ) -> str:
     """Return a warning on what a file will lack of a mesh; "" if nothing.
 
-    ``alone`` is whether one of several zones is converted.
-
-    Raises
-    ------
-    MeshError
-        The format cannot hold the mesh.
+    ``alone`` is whether one of several zones is converted. Raises MeshError if the format cannot
+    hold the mesh.
     """
     row = format_for(output, file_format)
     if row.require:

@@ -40,10 +40,7 @@ class Source:
     def __getitem__(self, part: slice) -> bytes:
         """Return a range of the bytes; may be called from several threads at once.
 
-        Raises
-        ------
-        MeshError
-            They cannot be read, or the file has become shorter since it was opened.
+        Raises MeshError if they cannot be read, or the file has become shorter since it was opened.
         """
         if self._file is None:
             assert self._content is not None
@@ -63,10 +60,7 @@ class Source:
     def require_same(self) -> None:
         """Raise if the size or time stamp of an open file changed since it was opened.
 
-        Raises
-        ------
-        MeshError
-            It was changed.
+        Raises MeshError if it was changed.
         """
         if self._now() != self._stamp:
             raise self.changed()
@@ -86,10 +80,7 @@ class Source:
 def open_source(path: Path) -> Source:
     """Return the source of a file: its bytes, or the open file if it is larger than ``KEPT_BYTES``.
 
-    Raises
-    ------
-    MeshError
-        It cannot be opened.
+    Raises MeshError if it cannot be opened.
     """
     try:
         if path.stat().st_size <= KEPT_BYTES:

@@ -43,10 +43,8 @@ _SET_DEATH_SIGNAL = 1
 def read_in_subprocess(path: Path, progress: Tick) -> Mesh:
     """Return the mesh of a file, read by the isolated reader of its format.
 
-    Raises
-    ------
-    MeshError
-        As by the reader, and if the process takes too long, crashes or does not start.
+    Raises MeshError as the reader does, and if the process takes too long, crashes or does not
+    start.
     """
     begun = time.monotonic()
     expected = 1.0 + path.stat().st_size / _BYTES_PER_SECOND

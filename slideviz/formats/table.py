@@ -165,10 +165,7 @@ def format_for(path: Path, file_format: FileFormat | None = None) -> MeshFormat:
 def format_of(path: Path, file_format: FileFormat | None = None) -> MeshFormat:
     """Return the format of a file to read: ``file_format``, or by its ending and its content.
 
-    Raises
-    ------
-    MeshError
-        The file cannot be read, or is no ordinary file.
+    Raises MeshError if the file cannot be read, or is no ordinary file.
     """
     from slideviz.formats.source import unreadable
 
@@ -236,10 +233,7 @@ def readable_patterns() -> str:
 def write_blocks(path: Path, blocks: Iterable[bytes], options: WriteOptions) -> None:
     """Write a file block by block, whole or not at all.
 
-    Raises
-    ------
-    MeshError
-        It cannot be written; what was at ``path`` is as before.
+    Raises MeshError if it cannot be written; what was at ``path`` is as before.
     """
     with atomic_write(path, replaces=options.replaces) as file:
         for block in blocks:

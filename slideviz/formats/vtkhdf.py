@@ -137,10 +137,7 @@ class StepSeries:
 def vtkhdf_series(path: Path, mesh: Mesh, replaces: Path | None = None) -> Iterator[StepSeries]:
     """Context with a file to add steps of a mesh to, which replaces ``path`` at the end.
 
-    Raises
-    ------
-    MeshError
-        It cannot be written.
+    Raises MeshError if it cannot be written.
     """
     with _collection(path, mesh, replaces, is_series=True) as series:
         yield series
@@ -149,10 +146,7 @@ def vtkhdf_series(path: Path, mesh: Mesh, replaces: Path | None = None) -> Itera
 def write_vtkhdf(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write one mesh to a VTKHDF file, with values on its cells and points.
 
-    Raises
-    ------
-    MeshError
-        It cannot be written.
+    Raises MeshError if it cannot be written.
     """
     check_mesh(mesh)
     with _collection(path, mesh, options.replaces, is_series=False) as series:

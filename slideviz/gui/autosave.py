@@ -280,10 +280,7 @@ class OrphanedSession:
     def designs(self) -> tuple[DesignTable, bool]:
         """Return the table of designs, and whether its results belong to the present case.
 
-        Raises
-        ------
-        CaseError
-            It cannot be read.
+        Raises CaseError if it cannot be read.
         """
         file = _designs_file(self.path)
         if not file.exists():

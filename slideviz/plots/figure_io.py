@@ -109,10 +109,7 @@ def write_figure(
 ) -> None:
     """Write a figure to a PNG, SVG or PDF file, by its suffix, whole or not at all.
 
-    Raises
-    ------
-    SlidevizError
-        The file cannot be written; of the class ``error``.
+    Raises an error of the class ``error`` if the file cannot be written.
     """
     data = figure_bytes(figure, file.suffix.lower()[1:], dpi, transparent)
     with atomic_write(file, error) as out:

@@ -31,10 +31,7 @@ class Paint:
     def within(self, low: float, high: float) -> Paint:
         """Return the paint with other limits.
 
-        Raises
-        ------
-        CaseError
-            They are not finite or not in order.
+        Raises CaseError if they are not finite or not in order.
         """
         if not (np.isfinite([low, high]).all() and low < high):
             raise CaseError(

@@ -297,10 +297,7 @@ def section_picture(
 def draw_section(shown: Sequence[SectionInRun], section: Section, style: SectionStyle) -> Any:
     """Return the matplotlib figure of a section of one run, or of two.
 
-    Raises
-    ------
-    CaseError
-        There is nothing to draw.
+    Raises CaseError if there is nothing to draw.
     """
     every = [piece for one in shown for piece in one.drawn.values()]
     if not every:

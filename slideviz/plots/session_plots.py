@@ -91,10 +91,7 @@ class Profiles:
     def of(self, session: Session, coordinate: Coordinate) -> list[Profile]:
         """Return the profiles of the shown step, other runs' last steps, and the undeformed mesh.
 
-        Raises
-        ------
-        SlidevizError
-            The mesh has no extent along the coordinate.
+        Raises SlidevizError if the mesh has no extent along the coordinate.
         """
         profiles = []
         shown, run_shown = session.frame, session.run_shown

@@ -102,10 +102,8 @@ def along(
 ) -> Profile:
     """Return the quality in layers of equal height along a direction; as `along_radius`.
 
-    Raises
-    ------
-    SlidevizError
-        There is not a value for each cell, no layer, or the mesh has no span that way.
+    Raises SlidevizError if there is not a value for each cell, no layer, or the mesh has no span
+    that way.
     """
     name = direction if isinstance(direction, str) else "s"
     axis = np.eye(3)["xyz".index(name)] if isinstance(direction, str) else np.array(direction)

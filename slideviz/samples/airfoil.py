@@ -29,12 +29,8 @@ THIN, GROWTH = 1e-3, 1.25
 def airfoil_mesh(size: int, variant: str) -> Mesh:
     """Return the mesh with ``size`` cells around the airfoil; its chord is 1.
 
-    Variant ``layers`` has cells of a thousandth of their length at the airfoil.
-
-    Raises
-    ------
-    CaseError
-        ``size`` is below `LEAST`.
+    Variant ``layers`` has cells of a thousandth of their length at the airfoil. Raises CaseError if
+    ``size`` is below `LEAST`.
     """
     if size < LEAST:
         raise CaseError(

@@ -147,10 +147,7 @@ class GridCounts:
 def counts(size: int, shares: Shares = PASSAGE_SHARES) -> GridCounts:
     """Return the numbers of cells for ``size`` cells along the inflow.
 
-    Raises
-    ------
-    CaseError
-        ``size`` is below 12, too few to follow the blade.
+    Raises CaseError if ``size`` is below 12, too few to follow the blade.
     """
     if size < 12:
         raise CaseError(f"size {size} is too coarse for the blade; expected 12 cells or more")
@@ -243,10 +240,7 @@ class Grid:
 def passage_mesh(size: int) -> Mesh:
     """Return the mesh of the sample ``passage``, with ``size`` cells along the inflow.
 
-    Raises
-    ------
-    CaseError
-        ``size`` is below 12.
+    Raises CaseError if ``size`` is below 12.
     """
     grid = make_grid(counts(size))
     points = smoothed(grid, straight_points(grid, PASSAGE))

@@ -175,10 +175,7 @@ ROUGH = 1e-3
 def stator_mesh(size: int) -> Mesh:
     """Return the mesh of the sample ``stator``, of about ``size`` hexahedra.
 
-    Raises
-    ------
-    CaseError
-        ``size`` is not within ``SIZES``.
+    Raises CaseError if ``size`` is not within ``SIZES``.
     """
     if not SIZES[0] <= size <= SIZES[1]:
         raise CaseError(
@@ -191,10 +188,7 @@ def stator_mesh(size: int) -> Mesh:
 def stator_zone(size: int) -> tuple[ZoneContent, Displacements]:
     """Return the zone to write to a file block by block, and the displacement of the blade.
 
-    Raises
-    ------
-    CaseError
-        ``size`` is below ``SIZES`` or above ``LARGEST``.
+    Raises CaseError if ``size`` is below ``SIZES`` or above ``LARGEST``.
     """
     if not SIZES[0] <= size <= LARGEST:
         raise CaseError(f"size {size} is out of range; a stator has {SIZES[0]} to {LARGEST}")

@@ -63,10 +63,7 @@ def mesh_of(grid: Structured, name: str) -> Mesh:
 def zone_of(grid: Structured) -> ZoneContent:
     """Return the zone of a grid's mesh, to be written to a file block by block.
 
-    Raises
-    ------
-    CaseError
-        The mesh has more than ``LARGEST`` cells.
+    Raises CaseError if the mesh has more than ``LARGEST`` cells.
     """
     if grid.n_cells > LARGEST:
         raise CaseError(f"{grid.n_cells} cells are too many; a sample has {LARGEST} at most")
@@ -120,12 +117,7 @@ _CORNERS = {
 def thesis_case(name: str, size: int, variant: str) -> tuple[Mesh, Case, Displacements | None]:
     """Return mesh, case and the displacement file's content, None if ``variant`` is ``motion``.
 
-    ``variant`` is one of ``SAMPLES[name].variants``.
-
-    Raises
-    ------
-    CaseError
-        The size is below 3.
+    ``variant`` is one of ``SAMPLES[name].variants``. Raises CaseError if the size is below 3.
     """
     grid = layout(name, size)
     return mesh_of(grid, name), *_case(grid, variant)
@@ -136,10 +128,7 @@ def thesis_zone(
 ) -> tuple[ZoneContent, Case, Displacements | None]:
     """Return the same as `thesis_case`, with a zone to write block by block in place of the mesh.
 
-    Raises
-    ------
-    CaseError
-        The size is below 3, or has too many cells.
+    Raises CaseError if the size is below 3, or has too many cells.
     """
     grid = layout(name, size)
     return zone_of(grid), *_case(grid, variant)
@@ -327,12 +316,8 @@ def layout(name: str, n: int) -> Layout:
     """Return the grid of a sample with n cells in each direction, the block in its middle.
 
     The block is 0.2 n cells long and 0.04 n wide, as in the thesis for 25 and 200; for another n
-    it has the nearest numbers of cells, at least one, with which it can be in the middle.
-
-    Raises
-    ------
-    CaseError
-        n is below 3, so that the block would touch the sides.
+    it has the nearest numbers of cells, at least one, with which it can be in the middle. Raises
+    CaseError if n is below 3, so that the block would touch the sides.
     """
     if n < 3:
         raise CaseError(f"size {n} leaves no room for the block; expected 3 cells or more")

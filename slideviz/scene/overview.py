@@ -74,12 +74,8 @@ class Overview:
         """Return the overview of a deformed mesh whose undeformed one is ``base``.
 
         A 2D mesh is seen along z. Of a 3D mesh, the whole cells behind a plane are seen, which
-        goes through the boundary that moved most, along its displacement.
-
-        Raises
-        ------
-        SlidevizError
-            The detail has not as many coordinates as the mesh, or is outside the mesh.
+        goes through the boundary that moved most, along its displacement. Raises SlidevizError if
+        the detail has not as many coordinates as the mesh, or is outside the mesh.
         """
         require_detail(zoom, base)
         detail = tiny_motion(mesh, base) if zoom == "auto" else zoom

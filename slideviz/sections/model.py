@@ -109,10 +109,7 @@ class Section:
     def sized(self, value: float) -> Section:
         """Return the section with another size.
 
-        Raises
-        ------
-        CaseError
-            The shape cannot have it.
+        Raises CaseError if the shape cannot have it.
         """
         size = self.shape.terms.size
         assert size is not None

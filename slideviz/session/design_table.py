@@ -55,11 +55,7 @@ class DesignTable:
         """Return the table with each design once for each of ``values`` in a column, and no result.
 
         Where there is a column of that name, its designs stay, and those that are new follow.
-
-        Raises
-        ------
-        CaseError
-            There would be too many designs.
+        Raises CaseError if there would be too many designs.
         """
         there = column in self.columns
         columns = self.columns if there else (*self.columns, column)
@@ -214,10 +210,7 @@ def column_choices(case: Case, dim: int) -> dict[str, str]:
 def values_of(text: str) -> list[str]:
     """Return the values that a text lists: ``-8 to 0 in 9``, or ``1, 2, 5``.
 
-    Raises
-    ------
-    CaseError
-        A value is missing, or the range has wrong numbers.
+    Raises CaseError if a value is missing, or the range has wrong numbers.
     """
     match = _RANGE.match(text.strip())
     if match is None:
@@ -254,10 +247,8 @@ def value_text(value: str | float) -> str:
 def read_table(case: Case, path: Path) -> DesignTable:
     """Return the table of designs in a CSV file, whose columns and values must fit the case.
 
-    Raises
-    ------
-    CaseError
-        The file cannot be read, has mistakes, or more designs than the window allows.
+    Raises CaseError if the file cannot be read, has mistakes, or more designs than the window
+    allows.
     """
     designs = read_designs(case, path)
     if len(designs.rows) > MOST:
@@ -272,10 +263,7 @@ def read_table(case: Case, path: Path) -> DesignTable:
 def write_results(path: Path, table: DesignTable) -> None:
     """Write designs and results as CSV, a row for each design.
 
-    Raises
-    ------
-    CaseError
-        The file cannot be written.
+    Raises CaseError if the file cannot be written.
     """
     lines = [
         cells_of(number, values, table.results.get(number), _WORDS)
@@ -287,10 +275,7 @@ def write_results(path: Path, table: DesignTable) -> None:
 def read_results(path: Path) -> DesignTable:
     """Return the table that `write_results` wrote, with its results.
 
-    Raises
-    ------
-    CaseError
-        The file cannot be read, or is no table of results.
+    Raises CaseError if the file cannot be read, or is no table of results.
     """
     try:
         head, *lines = csv_rows(path.read_text(encoding="utf-8"))
@@ -309,10 +294,7 @@ def run_designs(
 ) -> None:
     """Run designs without a result; report each `DesignRow`, and the progress as `JobProgress`.
 
-    Raises
-    ------
-    SlidevizError
-        The table has mistakes, or no process can be started.
+    Raises SlidevizError if the table has mistakes, or no process can be started.
     """
     total = len(table.rows)
     left = [at for at in range(1, total + 1) if at not in table.results]

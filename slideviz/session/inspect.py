@@ -149,10 +149,7 @@ def surroundings(mesh: Mesh, cell: int) -> tuple[FloatArray, float]:
 def cell_info(frame: StepFrame, cell: int) -> CellInfo:
     """Return the facts about a cell.
 
-    Raises
-    ------
-    MeshError
-        There is no such cell.
+    Raises MeshError if there is no such cell.
     """
     frame, cell = frame.place_of(cell)
     mesh, found = frame.mesh, frame.quality
@@ -218,10 +215,7 @@ def table_rows(worst: WorstCells, header: bool = True) -> list[list[str]]:
 def write_table(worst: WorstCells, path: Path) -> None:
     """Write the worst cells as comma-separated values, whole or not at all.
 
-    Raises
-    ------
-    SlidevizError
-        The file cannot be written.
+    Raises SlidevizError if the file cannot be written.
     """
     lines = [",".join(row) for row in table_rows(worst)]
     with atomic_write(path, SlidevizError) as file:

@@ -45,10 +45,7 @@ _ROWS = 5_000
 def save_quality(path: Path, frame: StepFrame, report: Report, stopped: Stopped) -> Path:
     """Write a CSV file with number, type, qualities, status and middle of every cell.
 
-    Raises
-    ------
-    SlidevizError
-        The file cannot be written.
+    Raises SlidevizError if the file cannot be written.
     """
     mesh, found = frame.mesh, frame.quality
     middles = centroids(mesh)
@@ -236,10 +233,7 @@ def require_openable(path: Path) -> None:
 def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) -> Opened:
     """Return a mesh, or the case of a ``.cfg`` file with its mesh, ready to be shown.
 
-    Raises
-    ------
-    SlidevizError
-        The file cannot be used; the message says what and where.
+    Raises SlidevizError if the file cannot be used; the message says what and where.
     """
     from slideviz.formats.files import read
 
@@ -352,12 +346,8 @@ def compute_in_file(
 ) -> None:
     """Deform a mesh from file to file; report the progress, and the last step as a `StepFrame`.
 
-    ``first`` is the undeformed frame, of the boundary.
-
-    Raises
-    ------
-    Cancelled
-        It was stopped; a file that was at ``output`` is as before.
+    ``first`` is the undeformed frame, of the boundary. Raises Cancelled if it was stopped; a file
+    that was at ``output`` is as before.
     """
     from slideviz.session.inspect import WORST
     from slideviz.solver.steps import Progress
@@ -401,12 +391,8 @@ def save_mesh(
 ) -> Path:
     """Write the mesh of a frame, with its quality where the format has values of cells.
 
-    With the undeformed mesh ``base``, the displacement is written, too.
-
-    Raises
-    ------
-    Cancelled
-        It was stopped; what was at ``path`` is as before.
+    With the undeformed mesh ``base``, the displacement is written, too. Raises Cancelled if it was
+    stopped; what was at ``path`` is as before.
     """
     from slideviz.formats.files import write
 
@@ -437,12 +423,8 @@ def open_sample(
 ) -> Opened:
     """Return a sample case, written into a folder of its own and ready to be shown.
 
-    ``size`` as of ``slideviz.samples.table.sample``; without one, not larger than ``SIZES``.
-
-    Raises
-    ------
-    SlidevizError
-        There is no such sample, or it cannot be written.
+    ``size`` as of ``slideviz.samples.table.sample``; without one, not larger than ``SIZES``. Raises
+    SlidevizError if there is no such sample, or it cannot be written.
     """
     from slideviz.samples.table import write_sample
 

@@ -55,10 +55,7 @@ class TableRows:
     def check(self, text: str) -> str:
         """Return a sentence on how many nodes a table moves, and how far.
 
-        Raises
-        ------
-        CaseError
-            It has no rows, or mistakes; the message has the first one.
+        Raises CaseError if it has no rows, or mistakes; the message has the first one.
         """
         if not text.strip():
             raise CaseError(f"Type or paste rows: {self.heading}")
@@ -90,11 +87,7 @@ def write_table(path: Path, text: str, replaces: Path | None = None) -> None:
     """Write a table as a displacement file, whole or not at all.
 
     ``replaces`` is the only input file that may be overwritten: the one the table was read from.
-
-    Raises
-    ------
-    CaseError
-        It cannot be written.
+    Raises CaseError if it cannot be written.
     """
     with atomic_write(path, CaseError, replaces) as file:
         file.write(f"{text.rstrip()}\n".encode())
@@ -103,10 +96,7 @@ def write_table(path: Path, text: str, replaces: Path | None = None) -> None:
 def table_text(path: Path) -> str:
     """Return the text of a displacement file; "" where there is no such file.
 
-    Raises
-    ------
-    CaseError
-        It is too large to be edited by hand, or cannot be read.
+    Raises CaseError if it is too large to be edited by hand, or cannot be read.
     """
     if not path.is_file():
         return ""

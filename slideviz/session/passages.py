@@ -35,12 +35,8 @@ def find_period(
 
     Of a case with periodic boundaries it is their first pair. Otherwise it is guessed among the
     boundaries that match (``pairs``, if known already): those with names that hint at periodicity
-    come first, then rotations; the ends of every straight duct match, too.
-
-    Raises
-    ------
-    MeshError
-        The periodic boundaries of the case do not match.
+    come first, then rotations; the ends of every straight duct match, too. Raises MeshError if the
+    periodic boundaries of the case do not match.
     """
     names = case.markers_with("periodic") if case is not None else ()
     if case is not None and names:

@@ -116,10 +116,7 @@ def table_text(runs: Sequence[Run], delimiter: str = ",") -> str:
 def write_table(path: Path, runs: Sequence[Run]) -> None:
     """Write the table as CSV.
 
-    Raises
-    ------
-    SlidevizError
-        The file cannot be written.
+    Raises SlidevizError if the file cannot be written.
     """
     write_csv(path, _rows(runs), SlidevizError)
 

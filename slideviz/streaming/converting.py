@@ -99,12 +99,8 @@ PLACE_BYTES = 8
 def streamed_kind(source: Path, target: Path) -> FileFormat | None:
     """Return the format of ``source`` where it can be converted to ``target`` piece by piece.
 
-    That is from SU2 text to SU2 binary or back; None for all others.
-
-    Raises
-    ------
-    MeshError
-        The file cannot be read.
+    That is from SU2 text to SU2 binary or back; None for all others. Raises MeshError if the file
+    cannot be read.
     """
     kind = format_of(source).value
     other = target.suffix.lower().removeprefix(".")
@@ -164,10 +160,7 @@ def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: T
 def _require_binary(text: Text, name: str) -> None:
     """Raise where an SU2 binary file cannot hold a zone: with a halo, or long or odd marker names.
 
-    Raises
-    ------
-    MeshError
-        As by `slideviz.formats.su2b.write.require_binary`, for a mesh in memory.
+    Raises MeshError as `slideviz.formats.su2b.write.require_binary` does for a mesh in memory.
     """
     if text.zone.sends:
         raise halo_error(name)

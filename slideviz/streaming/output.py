@@ -148,10 +148,7 @@ class Output:
     def measure(self, listed: int) -> RunCollector:
         """Return the quality of all cells, before and after, with ``listed`` inverted ones.
 
-        Raises
-        ------
-        MeshError
-            Cells are numbered in both directions, and some are folded.
+        Raises MeshError if cells are numbered in both directions, and some are folded.
         """
         partial, count = self._opened(), self.source.n_cells
         metric, folder = self._metric, self._path.parent

@@ -26,12 +26,7 @@ def missing_memory(case: Case) -> str:
     """Return the sentence that the mesh of a case needs more memory than is free; "" if it fits.
 
     Also "" where streaming would not help: it can stream neither this format, nor a mesh with
-    a halo, nor linear elasticity.
-
-    Raises
-    ------
-    MeshError
-        The mesh cannot be read.
+    a halo, nor linear elasticity. Raises MeshError if the mesh cannot be read.
     """
     path = case.mesh_file
     if path is None or case.method == "elastic":
@@ -58,10 +53,8 @@ CELL_BYTES = 18
 def require_disk_space(place: Path, path: Path, size: int) -> None:
     """Raise where the disk of the file ``place`` has no room for ``size`` more bytes.
 
-    Raises
-    ------
-    MeshError
-        It has not, or the folder of ``place`` does not exist; the message names ``path``.
+    Raises MeshError if it has not, or the folder of ``place`` does not exist; the message names
+    ``path``.
     """
     folder = Path(os.path.realpath(place)).parent
     try:

@@ -340,10 +340,8 @@ class FileSource:
 def has_cells_of(mesh: Zone, other: Zone) -> bool:
     """Return whether two SU2 binary meshes have the same cells, by types and nodes.
 
-    Raises
-    ------
-    MeshError
-        Their cells are in different orders in the files, so they cannot be compared.
+    Raises MeshError if their cells are in different orders in the files, so they cannot be
+    compared.
     """
     with open_zone(*mesh) as (one, place), open_zone(*other) as (two, there):
         same = place.dim == there.dim and place.n_points == there.n_points
@@ -370,10 +368,7 @@ def has_cells_of(mesh: Zone, other: Zone) -> bool:
 class Scratch:
     """An array (count,) in a temporary file, which is removed when ``stack`` closes.
 
-    Raises
-    ------
-    MeshError
-        The file cannot be made in ``folder``: the disk may be full.
+    Raises MeshError if the file cannot be made in ``folder``: the disk may be full.
     """
 
     def __init__(self, stack: ExitStack, folder: Path, count: int, kind: type) -> None:

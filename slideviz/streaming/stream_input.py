@@ -65,10 +65,7 @@ class StreamInput:
     def skin(self, tick: Tick, ranks: SerialPool = SERIAL) -> Mesh:
         """Return the boundary and the cells at it; the whole mesh is read and checked.
 
-        Raises
-        ------
-        MeshError
-            The file has a mistake.
+        Raises MeshError if the file has a mistake.
         """
         if self.text is None:
             return read_skin(self.path, self.zone, tick, ranks)
@@ -83,10 +80,7 @@ def progress_share(tick: Tick, begin: float, end: float = 1.0) -> Tick:
 def require_su2(path: Path, file_format: FileFormat | None = None) -> FileFormat:
     """Return the format of a mesh file, SU2 text or binary: only these can be streamed.
 
-    Raises
-    ------
-    MeshError
-        It is of another format.
+    Raises MeshError if it is of another format.
     """
     kind = format_of(path, file_format).value
     if kind is None:
@@ -100,10 +94,8 @@ def require_su2(path: Path, file_format: FileFormat | None = None) -> FileFormat
 def _streamable(path: Path, zone: int | None, tick: Tick) -> Text:
     """Return the places of points, cells and markers in an SU2 text.
 
-    Raises
-    ------
-    MeshError
-        It has a mistake, or a halo: nodes that follow others are not all on the boundary.
+    Raises MeshError if it has a mistake, or a halo: nodes that follow others are not all on the
+    boundary.
     """
     text = find_text(path, zone, progress_share(tick, 0.0, SCANNED))
     if text.zone.sends:
@@ -125,12 +117,8 @@ def open_read_only(
 ) -> Iterator[StreamInput]:
     """Context with a mesh that is only read; the binary copy of a text is in ``folder``.
 
-    The copy is removed at the end.
-
-    Raises
-    ------
-    MeshError
-        It is of no format that can be streamed, or has a mistake.
+    The copy is removed at the end. Raises MeshError if it is of no format that can be streamed, or
+    has a mistake.
     """
     if require_su2(path, file_format) == "su2b":
         yield StreamInput(path, zone)
@@ -223,10 +211,7 @@ def open_for_run(
 def _lost_in_text(output: Path, path: Path, zone: int | None) -> str:
     """Return a sentence on the other zones of a binary mesh, which a text lacks; "" if none.
 
-    Raises
-    ------
-    MeshError
-        The name of a boundary cannot be written in a text.
+    Raises MeshError if the name of a boundary cannot be written in a text.
     """
     with open_zone(path, zone) as (source, place):
         name = printable(path.name)

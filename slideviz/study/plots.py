@@ -169,10 +169,7 @@ def save_figure(
 ) -> list[Path]:
     """Write a figure as PNG and SVG, each whole or not at all; return the paths.
 
-    Raises
-    ------
-    CaseError
-        A file cannot be written.
+    Raises CaseError if a file cannot be written.
     """
     paths = [folder / f"{name}{suffix}" for suffix in suffixes]
     for path in paths:

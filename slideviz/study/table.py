@@ -88,10 +88,7 @@ def history_text(rows: Sequence[CombinationRow]) -> str:
 def save_text(path: Path, text: str) -> None:
     """Write a text file, whole or not at all.
 
-    Raises
-    ------
-    CaseError
-        The file cannot be written.
+    Raises CaseError if the file cannot be written.
     """
     with atomic_write(path, CaseError) as file:
         file.write(text.encode())

@@ -85,12 +85,8 @@ def require_writable(
 ) -> None:
     """Raise if a file cannot be written now; called before the work whose result it is to hold.
 
-    A temporary file is made beside it and removed. Parameters are those of `atomic_write`.
-
-    Raises
-    ------
-    SlidevizError
-        The file cannot be written, as for `atomic_write`.
+    A temporary file is made beside it and removed. Parameters are those of `atomic_write`. Raises
+    SlidevizError if the file cannot be written, as for `atomic_write`.
     """
     require_no_input(Path(path), error, replaces)
     real = Path(os.path.realpath(path))
@@ -105,10 +101,7 @@ def require_writable(
 def mode_of(path: Path) -> int | None:
     """Return the permission bits of an existing file, or None if there is none.
 
-    Raises
-    ------
-    OSError
-        It may not be replaced: it is a folder, a device, a pipe or write-protected.
+    Raises OSError if it may not be replaced: it is a folder, a device, a pipe or write-protected.
     """
     if not path.exists():
         return None

@@ -20,10 +20,7 @@ from typing import BinaryIO, Protocol
 def private_folder(folder: Path) -> Path:
     """Make a folder if there is none, let only its owner enter it, and return it.
 
-    Raises
-    ------
-    OSError
-        It cannot be made, or is somebody else's.
+    Raises OSError if it cannot be made, or is somebody else's.
     """
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     folder.chmod(0o700)
@@ -33,10 +30,7 @@ def private_folder(folder: Path) -> Path:
 def private_file(path: Path) -> None:
     """Make an empty file if there is none, and let only its owner read and write it.
 
-    Raises
-    ------
-    OSError
-        It cannot be made, is somebody else's, or a symbolic link.
+    Raises OSError if it cannot be made, is somebody else's, or a symbolic link.
     """
     with open_temporary(path, new=True) as file:
         os.fchmod(file.fileno(), 0o600)
@@ -101,12 +95,8 @@ def draft(folder: Path, is_folder: bool = False) -> Iterator[Path]:
 def open_temporary(path: Path, *, new: bool = False, buffering: int = -1) -> BinaryIO:
     """Return a temporary file, open for reading and writing; never through a symbolic link.
 
-    With ``new`` it is made if there is none, for its owner only.
-
-    Raises
-    ------
-    OSError
-        It cannot be opened, or is a symbolic link, a device or a pipe.
+    With ``new`` it is made if there is none, for its owner only. Raises OSError if it cannot be
+    opened, or is a symbolic link, a device or a pipe.
     """
     try:
         opened = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_CREAT * new, 0o600)

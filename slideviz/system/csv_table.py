@@ -23,10 +23,7 @@ def csv_text(rows: Iterable[Sequence[object]], delimiter: str = ",") -> str:
 def write_csv(path: Path, rows: Iterable[Sequence[object]], error: type[SlidevizError]) -> None:
     """Write rows of cells to a file as CSV, whole or not at all.
 
-    Raises
-    ------
-    SlidevizError
-        The file cannot be written; ``error`` is the class.
+    Raises an error of the class ``error`` if the file cannot be written.
     """
     text = csv_text(rows)
     with atomic_write(path, error) as file:
@@ -36,10 +33,7 @@ def write_csv(path: Path, rows: Iterable[Sequence[object]], error: type[Slideviz
 def csv_rows(text: str, delimiter: str = ",") -> list[list[str]]:
     """Return the cells of each line of CSV; spaces after a separator are left out.
 
-    Raises
-    ------
-    ValueError
-        A cell is longer than the 131,072 characters that Python reads.
+    Raises ValueError if a cell is longer than the 131,072 characters that Python reads.
     """
     try:
         lines = StringIO(text, newline="")

@@ -97,10 +97,7 @@ def require_regular_file(path: Path, error: type[SlidevizError]) -> int:
 def read_json(path: Path) -> Any:
     """Return the content of a JSON file.
 
-    Raises
-    ------
-    OSError, ValueError
-        It cannot be read, is no JSON, or nested too deep.
+    Raises OSError or ValueError if it cannot be read, is no JSON, or nested too deep.
     """
     try:
         return json.loads(path.read_bytes())

@@ -150,10 +150,7 @@ def _with_checksum(content: bytes) -> bytes:
 def _without_checksum(sealed: bytes) -> bytes:
     """Return the content that `_with_checksum` put a checksum before.
 
-    Raises
-    ------
-    ValueError
-        The content does not have that checksum.
+    Raises ValueError if the content does not have that checksum.
     """
     content = sealed[32:]
     if hashlib.sha256(content).digest() != sealed[:32]:

@@ -82,10 +82,8 @@ class Ranks(SerialPool):
     def joined(cls, launched: int) -> Ranks:
         """Return the ranks of the ``launched`` processes; all of them have to call it.
 
-        Raises
-        ------
-        SlidevizError
-            mpi4py or an MPI library is missing, or is of another MPI than the launcher.
+        Raises SlidevizError if mpi4py or an MPI library is missing, or is of another MPI than the
+        launcher.
         """
         try:
             from mpi4py import MPI

@@ -168,10 +168,7 @@ def solved(blocks: list[IntArray], factors: list[Factor], right: FloatArray) -> 
 def full_factor(system: FloatArray) -> Factor:
     """Return a factor of all rows of a system (n, n), without the pivot guard.
 
-    Raises
-    ------
-    DeformError
-        The system is singular at the positions of a design.
+    Raises DeformError if the system is singular at the positions of a design.
     """
     try:
         lower = np.linalg.cholesky(system)

@@ -292,10 +292,7 @@ def limits_of(config: Su2Config) -> Limits:
 def move_boxes(config: Su2Config, mesh: Mesh, nodes: IntArray) -> MovedBoxes:
     """Return the boxes that the variables deform, with the nodes (m,) that are inside.
 
-    Raises
-    ------
-    CaseError
-        A box has no node inside, or a nested one is not inside its parent.
+    Raises CaseError if a box has no node inside, or a nested one is not inside its parent.
     """
     known, names = boxes_for(config.case, mesh), {each.box for each in config.variables}
     nested = {name for box in known.values() if box.parent for name in (box.name, box.parent)}
@@ -350,10 +347,8 @@ def _without_effect(found: MovedBoxes) -> list[str]:
 def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
     """Return the mesh with the boxes that a configuration defines, and the boxes (FFD_SETTING).
 
-    Raises
-    ------
-    CaseError
-        The configuration defines no box, a box is not possible, or no node is in any.
+    Raises CaseError if the configuration defines no box, a box is not possible, or no node is in
+    any.
     """
     contradictions = (f"{config.source}: {text}" for _, text in ffd_contradictions(config.case))
     raise_all((*problems_of_markers(config, mesh), *contradictions))

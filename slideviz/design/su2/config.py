@@ -209,12 +209,8 @@ class Su2Config:
 def own_changes(texts: Iterable[str]) -> tuple[dict[str, str], list[str]]:
     """Return the values of keys of a configuration among texts KEY=VALUE, and the other texts.
 
-    The first replace those in the file: they are SU2's keys, and lists of boundaries.
-
-    Raises
-    ------
-    CaseError
-        A key is none of a configuration or of slideviz, or has no meaning here.
+    The first replace those in the file: they are SU2's keys, and lists of boundaries. Raises
+    CaseError if a key is none of a configuration or of slideviz, or has no meaning here.
     """
     found, others, known = {}, [], _read_keys() | {FUNCTION, *READ_WITH_RBF}
     listed = {term.key for term in ROLES.values()} | {*ELSEWHERE}
@@ -236,12 +232,8 @@ def own_changes(texts: Iterable[str]) -> tuple[dict[str, str], list[str]]:
 def read_config(path: Path, changes: Mapping[str, str] | None = None) -> Su2Config:
     """Return what of a configuration concerns a deformation. Paths are those of the working folder.
 
-    ``changes`` are values of SU2's keys that stand in place of those in the file.
-
-    Raises
-    ------
-    CaseError
-        It cannot be read, or has mistakes: a line ``file:line: sentence`` for each.
+    ``changes`` are values of SU2's keys that stand in place of those in the file. Raises CaseError
+    if it cannot be read, or has mistakes: a line ``file:line: sentence`` for each.
     """
     text, warnings = read_text(path, "case file")
     entries, problems = entries_of(text, "%")  # other signs have a meaning in some values

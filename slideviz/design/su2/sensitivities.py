@@ -24,10 +24,7 @@ NAME_BYTES = 33
 def read_restart(path: Path) -> tuple[list[str], FloatArray]:
     """Return the names of the columns of a restart, and its rows (n, c).
 
-    Raises
-    ------
-    CaseError
-        The file is cut off, or has a value that is not a number.
+    Raises CaseError if the file is cut off, or has a value that is not a number.
     """
     require_regular_file(path, CaseError)
     with path.open("rb") as file:
@@ -181,10 +178,8 @@ class Matched:
 def read_sensitivities(config: Su2Config, mesh: Mesh, moving: IntArray) -> Sensitivities:
     """Read the sensitivities that a configuration names; ``moving`` (m,) are the moving nodes.
 
-    Raises
-    ------
-    CaseError
-        The file is missing, lacks columns or points, or has a value that is not a number.
+    Raises CaseError if the file is missing, lacks columns or points, or has a value that is not a
+    number.
     """
     path = sensitivity_file(config)
     if _is_unordered(config):
@@ -207,12 +202,7 @@ def sensitivity_file(config: Su2Config) -> Path:
     """Return the path of the file of sensitivities.
 
     An adjoint restart has the suffix of its objective in its name, and ends with ``.csv`` or
-    ``.dat``.
-
-    Raises
-    ------
-    CaseError
-        There is none.
+    ``.dat``. Raises CaseError if there is none.
     """
     if _is_unordered(config):
         return config.files["DV_UNORDERED_SENS_FILENAME"]
@@ -245,12 +235,8 @@ def match(
     An adjoint solution belongs to the mesh that it was computed on: that of this design, whose
     points (n, d) ``design`` returns (None: it moves nothing), or MESH_FILENAME itself where that
     is deformed already, as in SU2's own loop. The points in the file decide. ``moving`` (m,) are
-    the nodes of the boundaries that move; a file may have these only.
-
-    Raises
-    ------
-    CaseError
-        The points in the file are neither, or several rows are at one point.
+    the nodes of the boundaries that move; a file may have these only. Raises CaseError if the
+    points in the file are neither, or several rows are at one point.
     """
     if found.points is None:
         sentence = f"{found.path} has no coordinates: taken as those of this design"

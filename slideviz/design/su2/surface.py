@@ -345,10 +345,7 @@ def _overflow_as_case_error(config: Su2Config) -> Iterator[None]:
 def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
     """Return the moving boundaries of a configuration, and what moves them.
 
-    Raises
-    ------
-    CaseError
-        Markers or boxes are missing, or variables do not fit the mesh.
+    Raises CaseError if markers or boxes are missing, or variables do not fit the mesh.
     """
     group = config.variables[0].group
     problems = problems_of_markers(config, mesh, needed=group not in ("grid", "nothing"))

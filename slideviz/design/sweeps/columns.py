@@ -91,10 +91,7 @@ def numbers_of(case: Case) -> dict[str, NumberPlace]:
 def columns_of(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]:
     """Return for the name of each column the place of its number, or its key.
 
-    Raises
-    ------
-    CaseError
-        Some are unknown, mean the same, or cannot vary: a sentence for each.
+    Raises CaseError if some are unknown, mean the same, or cannot vary: a sentence for each.
     """
     columns: dict[str, NumberPlace | str] = {}
     first: dict[NumberPlace | str, str] = {}
@@ -125,10 +122,7 @@ def applied(
 ) -> Case:
     """Return the case with the values of one design; an empty value leaves the case's own.
 
-    Raises
-    ------
-    CaseError
-        Some values are wrong: a sentence for each, which names the column.
+    Raises CaseError if some values are wrong: a sentence for each, which names the column.
     """
     problems = []
     keys = {what: name for name, what in columns.items() if isinstance(what, str)}

@@ -158,10 +158,7 @@ class Processes(Executor):
     def _start(self) -> tuple[SpawnProcess, Connection]:
         """Start a process, send it the mesh, and return it with the pipe to it.
 
-        Raises
-        ------
-        EOFError
-            It cannot be started, or ended before it had the mesh.
+        Raises EOFError if it cannot be started, or ended before it had the mesh.
         """
         context = get_context("spawn")
         here, there = context.Pipe()

@@ -72,12 +72,9 @@ class SweepResults:
         """Lock the folder; begin the table, or with ``resume`` return the rows that are done.
 
         Not among them are designs that failed, and with ``meshes`` those whose mesh is missing.
-
-        Raises
-        ------
-        CaseError
-            There are results, with neither ``resume`` nor ``force``; or, to be resumed, they are of
-            another case, mesh or table; or the table cannot be written; or another sweep writes it.
+        Raises CaseError if there are results, with neither ``resume`` nor ``force``; or, to be
+        resumed, they are of another case, mesh or table; or the table cannot be written; or another
+        sweep writes it.
         """
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -148,10 +145,7 @@ class SweepResults:
     def add(self, row: DesignRow) -> None:
         """Append a row to the table, by one write.
 
-        Raises
-        ------
-        CaseError
-            The table cannot be written.
+        Raises CaseError if the table cannot be written.
         """
         try:
             with self.path.open("ab", buffering=0) as file:
@@ -230,12 +224,8 @@ def lock_folder(folder: Path) -> BaseFileLock:
     """Return the lock of a folder, held: two sweeps would write over each other's results.
 
     The system frees it however the process ends; where a network's file system has no locks, the
-    file itself is the lock, and counts for nothing once its process has ended.
-
-    Raises
-    ------
-    CaseError
-        Another sweep has the lock, or its file cannot be written.
+    file itself is the lock, and counts for nothing once its process has ended. Raises CaseError if
+    another sweep has the lock, or its file cannot be written.
     """
     path = folder / LOCK
     try:

@@ -95,11 +95,8 @@ what `read_designs` returned."""
 def read_designs(case: Case, table: Table) -> Designs:
     """Return the designs of a table.
 
-    Raises
-    ------
-    CaseError
-        The file cannot be read, a column is unknown, or values are wrong; all mistakes are listed,
-        each with its line.
+    Raises CaseError if the file cannot be read, a column is unknown, or values are wrong; all
+    mistakes are listed, each with its line.
     """
     if isinstance(table, Designs):
         return table
@@ -217,10 +214,7 @@ def cells_of(
 def result_of(head: Sequence[str], cells: Sequence[str], folder: Path = Path()) -> DesignRow:
     """Return the result in a line of a table, without the design's values.
 
-    Raises
-    ------
-    ValueError
-        The line has other columns than ``head``, or a number is wrong.
+    Raises ValueError if the line has other columns than ``head``, or a number is wrong.
     """
     fields = dict(zip(head, cells, strict=True))  # columns and results differ in name
     numbers: dict[str, Any] = {

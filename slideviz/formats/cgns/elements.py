@@ -92,10 +92,8 @@ def grid_nodes(along: Sequence[IntArray], shape: Sequence[int]) -> IntArray:
 def read_sections(zone: Node, n_points: int) -> tuple[CgnsElements, list[Node]]:
     """Return the elements of an unstructured zone in the order of their numbers, and its sections.
 
-    Raises
-    ------
-    MeshError
-        A section has elements that are not linear, or it contradicts itself or another one.
+    Raises MeshError if a section has elements that are not linear, or it contradicts itself or
+    another one.
     """
     nodes = zone.children("Elements_t")
     if not nodes:

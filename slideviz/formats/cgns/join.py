@@ -66,12 +66,8 @@ class Joined:
 def join(zones: Sequence[CgnsZone]) -> Joined:
     """Return the zones of a base, joined by their interfaces.
 
-    A node of several zones gets the coordinates of the first of them.
-
-    Raises
-    ------
-    MeshError
-        An interface is wrong; the message has its node.
+    A node of several zones gets the coordinates of the first of them. Raises MeshError if an
+    interface is wrong; the message has its node.
     """
     names = {zone.node.name: number for number, zone in enumerate(zones)}
     points = np.concatenate([zone.points for zone in zones])

@@ -47,12 +47,8 @@ def read_cgns(path: Path) -> Mesh:
     Boundaries are the families of boundary conditions, named by the condition where it has no
     family; for a zone without conditions, its sections of boundary elements; if there are none of
     these at all, the outer surface divided at its edges. Open interfaces are boundaries with their
-    names, those of the same period together.
-
-    Raises
-    ------
-    MeshError
-        It cannot be read, or has what slideviz cannot use: the node, the rule and the remedy.
+    names, those of the same period together. Raises MeshError if it cannot be read, or has what
+    slideviz cannot use: the node, the rule and the remedy.
     """
     with cgns_file(path) as root:
         require_own_folder(path)

@@ -36,10 +36,7 @@ _LINK = " link"
 def cgns_file(path: Path) -> Iterator[Node]:
     """Context with the root node of an open CGNS file.
 
-    Raises
-    ------
-    MeshError
-        It is no HDF5 file, or h5py raises any other error in the block.
+    Raises MeshError if it is no HDF5 file, or h5py raises any other error in the block.
     """
     import h5py
 
@@ -91,10 +88,7 @@ class Node:
     def children(self, *labels: str) -> list[Node]:
         """Return the children whose kind is one of ``labels``, in their order in the file.
 
-        Raises
-        ------
-        MeshError
-            A link leads to no node.
+        Raises MeshError if a link leads to no node.
         """
         import h5py
 
@@ -125,10 +119,7 @@ class Node:
     def needed(self, label: str, *names: str) -> Node:
         """Return the first child of a kind, with one of these names if any are given.
 
-        Raises
-        ------
-        MeshError
-            There is none.
+        Raises MeshError if there is none.
         """
         node = self.child(label, *names)
         if node is None:
@@ -139,10 +130,7 @@ class Node:
     def value(self) -> NDArray:
         """Return its value, with the axes as in the dataset.
 
-        Raises
-        ------
-        MeshError
-            It has no value.
+        Raises MeshError if it has no value.
         """
         import h5py
 
@@ -154,10 +142,7 @@ class Node:
     def text(self) -> str:
         """Return its value as text, without the spaces and zero bytes at its end.
 
-        Raises
-        ------
-        MeshError
-            The value is no text, or there is none.
+        Raises MeshError if the value is no text, or there is none.
         """
         data = self.value()
         if data.dtype.kind not in "iuS":
@@ -169,10 +154,7 @@ class Node:
     def integers(self, *shape: int) -> IntArray:
         """Return its value as integers, reshaped to ``shape``; -1 in it is any length.
 
-        Raises
-        ------
-        MeshError
-            The value is not of integers, or does not fit the shape.
+        Raises MeshError if the value is not of integers, or does not fit the shape.
         """
         data = self.value()
         if data.dtype.kind not in "iu":

@@ -23,13 +23,8 @@ def write_cgns(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write a mesh that was read from a CGNS file as a copy of that file with its points.
 
     Coordinates that did not change keep the bits of the file; others are rounded to the file's
-    type, R4 or R8.
-
-    Raises
-    ------
-    MeshError
-        The mesh was not read from a CGNS file, that file was changed, or the new one cannot be
-        written.
+    type, R4 or R8. Raises MeshError if the mesh was not read from a CGNS file, that file was
+    changed, or the new one cannot be written.
     """
     check_mesh(mesh)
     form, source = require_cgns(mesh, path)
@@ -47,12 +42,8 @@ def write_cgns(path: Path, mesh: Mesh, options: WriteOptions) -> None:
 def require_cgns(mesh: Mesh, path: Path) -> tuple[CgnsForm, Path]:
     """Return where the coordinates of a mesh are in the CGNS file it was read from, and that file.
 
-    ``path`` is the file to write, for messages.
-
-    Raises
-    ------
-    MeshError
-        It was not read from a CGNS file, so it cannot be written as one.
+    ``path`` is the file to write, for messages. Raises MeshError if it was not read from a CGNS
+    file, so it cannot be written as one.
     """
     form, source = mesh.origin, mesh.source
     if not (isinstance(form, CgnsForm) and source and len(mesh.points) == len(form.points)):

@@ -69,10 +69,7 @@ class CgnsZone:
 def read_zone(node: Node, dim: int, physical: int) -> CgnsZone:
     """Return a zone of a base whose cells have dimension ``dim``, with ``physical`` coordinates.
 
-    Raises
-    ------
-    MeshError
-        It is wrong, or has what slideviz cannot use; the message has the node.
+    Raises MeshError if it is wrong, or has what slideviz cannot use; the message has the node.
     """
     kind = node.needed("ZoneType_t", "ZoneType").text()
     if kind not in ("Structured", "Unstructured"):
@@ -199,10 +196,7 @@ def facets_of(zone: CgnsZone, node: Node) -> Cells:
 def faces_by_number(zone: CgnsZone, node: Node, numbers: IntArray) -> Cells:
     """Return the facets whose element numbers are ``numbers`` or, of a range node, in its range.
 
-    Raises
-    ------
-    MeshError
-        The zone has no such elements of one dimension less than its cells.
+    Raises MeshError if the zone has no such elements of one dimension less than its cells.
     """
     if zone.sides is None:
         raise node.fault(

@@ -40,10 +40,7 @@ _UNKNOWN = re.compile(r"Element type not available: (\S+)")
 def formats_of(path: Path) -> list[str]:
     """Return the names of meshio's formats that have the file's ending, the likeliest first.
 
-    Raises
-    ------
-    MeshError
-        There is no such format.
+    Raises MeshError if there is no such format.
     """
     import meshio
 
@@ -67,11 +64,8 @@ def formats_of(path: Path) -> list[str]:
 def meshio_errors(path: Path, what: str) -> Iterator[None]:
     """Context in which meshio neither prints nor ends the process.
 
-    Raises
-    ------
-    MeshError
-        In place of any error of the block, as one sentence: ``path: cannot be <what>: ...``. A
-        MeshError or MemoryError is raised as it is.
+    Raises MeshError in place of any error of the block, as one sentence: ``path: cannot be <what>:
+    ...``. A MeshError or MemoryError is raised as it is.
     """
     said = StringIO()
     try:
@@ -108,10 +102,7 @@ def meshio_errors(path: Path, what: str) -> Iterator[None]:
 def load(path: Path, formats: list[str]) -> meshio.Mesh:
     """Return meshio's mesh of a file, read in the first of ``formats`` that succeeds.
 
-    Raises
-    ------
-    MeshError
-        It can be read in none of them; the message is that of the first.
+    Raises MeshError if it can be read in none of them; the message is that of the first.
     """
     import meshio
 
@@ -155,12 +146,8 @@ def read_with_meshio(path: Path) -> Mesh:
 
     Its cells are those of the highest dimension; those of one dimension less are its boundaries,
     with the names of the file. A file without named boundaries gets its outer surface, divided
-    at its edges: ``boundary_1``, ``boundary_2`` and so on, the largest first.
-
-    Raises
-    ------
-    MeshError
-        meshio cannot read the file, it names files elsewhere, or slideviz cannot use the mesh.
+    at its edges: ``boundary_1``, ``boundary_2`` and so on, the largest first. Raises MeshError if
+    meshio cannot read the file, it names files elsewhere, or slideviz cannot use the mesh.
     """
     with meshio_errors(path, "read"):
         require_own_folder(path)

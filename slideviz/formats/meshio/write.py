@@ -59,10 +59,7 @@ _PRISM = np.array([0, 2, 1, 3, 5, 4])
 def write_vtu(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write a mesh as VTU, with values on its cells and points and the names of its boundaries.
 
-    Raises
-    ------
-    MeshError
-        The file cannot be written.
+    Raises MeshError if the file cannot be written.
     """
     check_mesh(mesh)
     write_blocks(path, vtu_blocks(mesh, options.cell_data, options.point_data), options)
@@ -73,12 +70,7 @@ def write_with_meshio(path: Path, mesh: Mesh, options: WriteOptions) -> None:
 
     Gmsh, MED and Abaqus files have the names of boundaries; other formats have their numbers at
     most. What meshio wrote is read again and compared, for meshio leaves out what a format cannot
-    hold.
-
-    Raises
-    ------
-    MeshError
-        The file cannot be written, or the format cannot hold the mesh.
+    hold. Raises MeshError if the file cannot be written, or the format cannot hold the mesh.
     """
     check_mesh(mesh)
     name = formats_of(path)[0]

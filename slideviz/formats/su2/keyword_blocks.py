@@ -162,10 +162,7 @@ def misspelt(sections: list[KeywordBlock], key: str) -> str:
 def count_of(lines: Lines, section: KeywordBlock) -> int:
     """Return the number after the keyword; further words are ignored.
 
-    Raises
-    ------
-    MeshError
-        The first word is no whole number, or negative.
+    Raises MeshError if the first word is no whole number, or negative.
     """
     word = (section.value.split() or [b""])[0]
     if not _COUNT.fullmatch(word):

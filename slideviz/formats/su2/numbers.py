@@ -72,10 +72,7 @@ def fill_cells(
 ) -> None:
     """Write the m elements of a piece into ``types`` (m,) and ``nodes`` (k,).
 
-    Raises
-    ------
-    MeshError
-        An element has a wrong type, dimension or nodes; the message has its line.
+    Raises MeshError if an element has a wrong type, dimension or nodes; the message has its line.
     """
     from slideviz.formats.su2.loops import cell_block
 
@@ -108,10 +105,7 @@ def _line_at(lines: Lines, piece: Piece, text: bytes, begin: int) -> tuple[Lines
 def _element(lines: Lines, index: int, row: bytes, dim: int, n_points: int) -> tuple[int, IntArray]:
     """Return type and nodes of the element on a row; ``index`` is the number of its line.
 
-    Raises
-    ------
-    MeshError
-        It has a wrong type, dimension or nodes, or a word that is no whole number.
+    Raises MeshError if it has a wrong type, dimension or nodes, or a word that is no whole number.
     """
     numbers = _numbers(lines, index, row, np.int64)
     words, vtk, n_numbers = row.split(), int(numbers[0]), len(numbers) - 1
@@ -155,10 +149,7 @@ def _wrong_type(lines: Lines, index: int, vtk: int, dim: int, word: str) -> Mesh
 def _numbers(lines: Lines, index: int, row: bytes, kind: type) -> NDArray:
     """Return the numbers of a row, (w,) of dtype ``kind``: ``np.int64`` or ``np.float64``.
 
-    Raises
-    ------
-    MeshError
-        A word is not one such number.
+    Raises MeshError if a word is not one such number.
     """
     words = row.split()
     numbers = []
@@ -188,10 +179,8 @@ def _parse(text: bytes, kind: type) -> NDArray | None:
 def parse_points(lines: Lines, rows: Rows, dim: int, progress: Tick) -> FloatArray:
     """Return the coordinates (n, dim) of the points on rows, read-only.
 
-    Raises
-    ------
-    MeshError
-        A row has too few or many numbers, or one that is not finite; the message has its line.
+    Raises MeshError if a row has too few or many numbers, or one that is not finite; the message
+    has its line.
     """
     points = np.empty((number_of(rows), dim))
     ends = np.empty((len(rows), 2), np.int64)
@@ -244,12 +233,8 @@ def require_all_coordinates(lines: Lines, rows: Rows, dim: int, found: IntArray)
     """Raise if a point lacks a coordinate, by the results (p, 2) of `fill_points` for p pieces.
 
     If some rows have an index after their coordinates, a row with only ``dim`` numbers lacks a
-    coordinate: its last number is the index.
-
-    Raises
-    ------
-    MeshError
-        A point lacks a coordinate; the message has its line.
+    coordinate: its last number is the index. Raises MeshError if a point lacks a coordinate; the
+    message has its line.
     """
     lost = int(found[:, 1].min())
     if found[:, 0].max() > dim and lost < number_of(rows):
@@ -259,10 +244,7 @@ def require_all_coordinates(lines: Lines, rows: Rows, dim: int, found: IntArray)
 def _point(lines: Lines, index: int, row: bytes, dim: int) -> FloatArray:
     """Return the numbers of a row with a point, coordinates first; ``index`` is that of its line.
 
-    Raises
-    ------
-    MeshError
-        It has too few or many numbers, or a coordinate that is not finite.
+    Raises MeshError if it has too few or many numbers, or a coordinate that is not finite.
     """
     numbers = _numbers(lines, index, row, np.float64)
     if not dim <= len(numbers) <= dim + _EXTRA_POINT_WORDS:

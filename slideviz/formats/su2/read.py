@@ -213,10 +213,7 @@ class Document(Origin):
 def is_su2(path: Path) -> bool:
     """Return whether a file begins as an SU2 text does, by its ``NDIME=``.
 
-    Raises
-    ------
-    OSError
-        It cannot be read.
+    Raises OSError if it cannot be read.
     """
     with path.open("rb") as file:
         return _NDIME.search(file.read(_SNIFFED_BYTES)) is not None

@@ -61,12 +61,7 @@ class Text:
 def find_text(path: Path, zone: int | None, progress: Tick = lambda _: None) -> Text:
     """Return a zone of an SU2 text file; its parts are located and counted, but not read.
 
-    ``zone`` is counted from 1; None: the first.
-
-    Raises
-    ------
-    MeshError
-        The file has a mistake.
+    ``zone`` is counted from 1; None: the first. Raises MeshError if the file has a mistake.
     """
     lines = scan(open_source(path), progress)
     sections = find_blocks(lines)

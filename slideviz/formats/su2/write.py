@@ -35,10 +35,7 @@ Edit = tuple[int, int, bytes]
 def write_su2(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write a mesh as SU2 text.
 
-    Raises
-    ------
-    MeshError
-        As by `su2_blocks`, or the file cannot be written.
+    Raises MeshError as `su2_blocks` does, or if the file cannot be written.
     """
     write_blocks(path, su2_blocks(mesh), options)
 
@@ -46,10 +43,7 @@ def write_su2(path: Path, mesh: Mesh, options: WriteOptions) -> None:
 def su2_zones(*meshes: Mesh) -> Iterator[bytes]:
     """Yield an SU2 file with a zone for each mesh, block by block.
 
-    Raises
-    ------
-    MeshError
-        As by `su2_blocks`.
+    Raises MeshError as `su2_blocks` does.
     """
     yield f"NZONE= {len(meshes)}\n".encode()
     for number, mesh in enumerate(meshes, 1):
@@ -62,12 +56,8 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
 
     For a mesh that was read from an SU2 file and has the same cells and markers it is that file, in
     which only the coordinates that changed are replaced. Any other mesh is written anew; sections
-    of its file that slideviz does not know follow at the end of its zone.
-
-    Raises
-    ------
-    MeshError
-        The mesh cannot be used, or a marker's name cannot stand in an SU2 file.
+    of its file that slideviz does not know follow at the end of its zone. Raises MeshError if the
+    mesh cannot be used, or a marker's name cannot stand in an SU2 file.
     """
     document, boxes = mesh.origin, mesh.origin.ffd
     if isinstance(document, Document) and _only_points_differ(mesh, document):
@@ -122,12 +112,8 @@ def patched_blocks(
 ) -> Iterator[bytes]:
     """Yield a file, block by block, with new texts for the pieces of points, and with ``edits``.
 
-    ``rows_text`` returns the new text of a piece of ``rows``.
-
-    Raises
-    ------
-    MeshError
-        The file was changed since it was read.
+    ``rows_text`` returns the new text of a piece of ``rows``. Raises MeshError if the file was
+    changed since it was read.
     """
     raw.require_same()
     done = 0
@@ -216,13 +202,8 @@ def _digits(points: FloatArray) -> NDArray[np.uint8]:
 def require_text_names(mesh: str, names: Iterable[str]) -> None:
     """Raise if the name of a marker cannot be written to an SU2 text file and read again.
 
-    ``mesh`` is the name of the mesh, for the message.
-
-    Raises
-    ------
-    MeshError
-        A name is empty, has a percent sign, blanks around it or control characters, or is
-        ``SEND_RECEIVE``.
+    ``mesh`` is the name of the mesh, for the message. Raises MeshError if a name is empty, has a
+    percent sign, blanks around it or control characters, or is ``SEND_RECEIVE``.
     """
     for name in names:
         if not name or name != name.strip() or not name.isprintable() or "%" in name:

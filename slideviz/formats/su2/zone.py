@@ -39,10 +39,7 @@ class SectionRows:
     def none(self, section: KeywordBlock) -> None:
         """Raise if a section that should have no rows of numbers has any.
 
-        Raises
-        ------
-        MeshError
-            The section has rows.
+        Raises MeshError if the section has rows.
         """
         rows = self.lines.pieces(section.line, section.stop)
         if rows:
@@ -144,11 +141,8 @@ class TextZone:
 def find_zone(lines: Lines, sections: list[KeywordBlock], bounds: Bounds) -> TextZone:
     """Return where the parts of a zone are.
 
-    Raises
-    ------
-    MeshError
-        A section is missing or occurs twice, a count is wrong, or the name of a marker is empty,
-        not printable or used twice.
+    Raises MeshError if a section is missing or occurs twice, a count is wrong, or the name of a
+    marker is empty, not printable or used twice.
     """
     inside = [
         section

@@ -40,10 +40,7 @@ def element_blocks(
 ) -> Iterator[ElementBlock]:
     """Yield the elements of a table, of dimension ``dim``, in blocks of at most ``size``.
 
-    Raises
-    ------
-    MeshError
-        As `element_block`.
+    Raises MeshError as `element_block` does.
     """
     for first in range(0, table.count, size):
         yield element_block(source, place, table, dim, first, size)
@@ -56,10 +53,8 @@ def element_block(
 ) -> ElementBlock:
     """Return at most ``size`` elements of a table, of dimension ``dim``, from place ``first`` on.
 
-    Raises
-    ------
-    MeshError
-        An element has a wrong offset, type, dimension or node; the message has the byte.
+    Raises MeshError if an element has a wrong offset, type, dimension or node; the message has the
+    byte.
     """
     width, count = source.width, min(size, table.count - first)
     at = table.offsets + first * width

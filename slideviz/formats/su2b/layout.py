@@ -136,12 +136,7 @@ class BinaryFile:
     def require(self, at: int, count: int, width: int, what: str) -> int:
         """Return the byte after ``count`` items of ``width`` bytes that begin at byte ``at``.
 
-        ``what`` names the items in the message.
-
-        Raises
-        ------
-        MeshError
-            The file ends before that byte.
+        ``what`` names the items in the message. Raises MeshError if the file ends before that byte.
         """
         end = at + count * width
         if end > self.size:
@@ -155,12 +150,8 @@ class BinaryFile:
     def array(self, at: int, count: int, dtype: DTypeLike, what: str) -> NDArray:
         """Return the ``count`` items of type ``dtype`` that begin at byte ``at``.
 
-        ``what`` names the items in the message.
-
-        Raises
-        ------
-        MeshError
-            The file ends before the last item, or cannot be read.
+        ``what`` names the items in the message. Raises MeshError if the file ends before the last
+        item, or cannot be read.
         """
         kind = np.dtype(dtype)
         self.require(at, count, kind.itemsize, what)
@@ -190,10 +181,8 @@ class BinaryFile:
 def find_zones(source: BinaryFile) -> tuple[ZonePlace, ...]:
     """Return where the zones of a file are.
 
-    Raises
-    ------
-    MeshError
-        A part goes beyond the end of the file, a number is wrong, or bytes follow the last zone.
+    Raises MeshError if a part goes beyond the end of the file, a number is wrong, or bytes follow
+    the last zone.
     """
     zones: list[ZonePlace] = []
     at = 2 * _INT
@@ -212,10 +201,7 @@ def find_zones(source: BinaryFile) -> tuple[ZonePlace, ...]:
 def find_zone(source: BinaryFile, number: int | None) -> ZonePlace:
     """Return where the zone of that number (from 1) is; None: the first.
 
-    Raises
-    ------
-    MeshError
-        There is no such zone, or as `find_zones`.
+    Raises MeshError if there is no such zone, or as `find_zones` does.
     """
     zones, chosen = find_zones(source), 1 if number is None else number
     if not 1 <= chosen <= len(zones):

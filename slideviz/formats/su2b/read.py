@@ -144,10 +144,7 @@ def point_blocks(
 ) -> Iterator[tuple[int, FloatArray]]:
     """Yield the points of a zone in blocks: number of the first point, and coordinates (k, d).
 
-    Raises
-    ------
-    MeshError
-        A coordinate is not finite, or a point has another index than its place.
+    Raises MeshError if a coordinate is not finite, or a point has another index than its place.
     """
     for first in range(0, place.n_points, size):
         yield first, point_block(source, place, first, size)
@@ -156,10 +153,7 @@ def point_blocks(
 def point_block(source: BinaryFile, place: ZonePlace, first: int, size: int) -> FloatArray:
     """Return the coordinates (k, d) of the points from number ``first`` on, at most ``size``.
 
-    Raises
-    ------
-    MeshError
-        A coordinate is not finite, or a point has another index than its place.
+    Raises MeshError if a coordinate is not finite, or a point has another index than its place.
     """
     kind = source.point(place.dim)
     count = min(size, place.n_points - first)
@@ -246,10 +240,7 @@ def sorted_back(cells: Cells, order: IntArray) -> Cells:
 def is_su2b(path: Path) -> bool:
     """Return whether a file begins as an SU2 binary mesh does.
 
-    Raises
-    ------
-    OSError
-        It cannot be read.
+    Raises OSError if it cannot be read.
     """
     with path.open("rb") as file:
         return file.read(4) in MAGIC

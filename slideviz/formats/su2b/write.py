@@ -57,10 +57,7 @@ class ZoneContent:
 def write_su2b(path: Path, mesh: Mesh, options: WriteOptions) -> None:
     """Write a mesh as SU2 binary.
 
-    Raises
-    ------
-    MeshError
-        As by `su2b_blocks`, or the file cannot be written.
+    Raises MeshError as `su2b_blocks` does, or if the file cannot be written.
     """
     write_blocks(path, su2b_blocks(mesh), options)
 
@@ -68,12 +65,8 @@ def write_su2b(path: Path, mesh: Mesh, options: WriteOptions) -> None:
 def su2b_blocks(*meshes: Mesh) -> Iterator[bytes]:
     """Yield the SU2 binary file of a mesh, or of several as its zones, block by block.
 
-    For a single mesh that is one zone of a ``.su2b`` file, the other zones are written, too.
-
-    Raises
-    ------
-    MeshError
-        A mesh cannot be used, has a halo, or has a name that cannot stand in such a file.
+    For a single mesh that is one zone of a ``.su2b`` file, the other zones are written, too. Raises
+    MeshError if a mesh cannot be used, has a halo, or has a name that cannot stand in such a file.
     """
     for mesh in meshes:
         check_mesh(mesh)
@@ -96,10 +89,7 @@ def su2b_blocks(*meshes: Mesh) -> Iterator[bytes]:
 def require_binary(mesh: Mesh, _path: Path | None = None) -> None:
     """Raise if an SU2 binary file cannot hold a mesh.
 
-    Raises
-    ------
-    MeshError
-        It has a halo, or a boundary has a name that cannot stand in such a file.
+    Raises MeshError if it has a halo, or a boundary has a name that cannot stand in such a file.
     """
     if mesh.halo is not None or (isinstance(mesh.origin, Document) and mesh.origin.sends):
         raise halo_error(mesh.name)
@@ -117,10 +107,7 @@ def halo_error(name: str) -> MeshError:
 def require_binary_names(mesh: str, names: Iterable[str]) -> None:
     """Raise if a name of a boundary of the mesh called ``mesh`` cannot be in an SU2 binary file.
 
-    Raises
-    ------
-    MeshError
-        A name is empty, not printable, too long, or ``SEND_RECEIVE``.
+    Raises MeshError if a name is empty, not printable, too long, or ``SEND_RECEIVE``.
     """
     for name in names:
         size = len(name.encode("utf-8", "replace"))

@@ -37,10 +37,7 @@ _OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
 def typed_number(text: str) -> float:
     """Return the value of a text such as ``2.5``, ``2,5`` or ``360/7 + 1``.
 
-    Raises
-    ------
-    ValueError
-        The text is not a number or an expression of ``+ - * / ( )``.
+    Raises ValueError if the text is not a number or an expression of ``+ - * / ( )``.
     """
     plain = text.strip().replace(",", ".")
     try:

@@ -228,10 +228,7 @@ def words_label() -> QLabel:
 def write_plot(path: Path, draw_on: Draw) -> None:
     """Write a plot as a figure for paper: PNG, SVG or PDF by the file's suffix.
 
-    Raises
-    ------
-    SlidevizError
-        The suffix is another one, or the file cannot be written.
+    Raises SlidevizError if the suffix is another one, or the file cannot be written.
     """
     kind = path.suffix.lower().lstrip(".")
     if kind not in ("png", "svg", "pdf"):
