@@ -82,6 +82,9 @@ class SolverSurface:
     def displacement(self, given: FloatArray, now: FloatArray) -> FloatArray:
         """Return the displacement (m, d) of the moving nodes, of coordinates (N, d).
 
+        Raises CaseError if the number of nodes is wrong, copies of a node disagree, or a node that
+        is not a moving one was moved.
+
         Parameters
         ----------
         given : (N, d)
@@ -89,12 +92,6 @@ class SolverSurface:
         now : (N, d)
             Coordinates that the nodes have. Those of a node that is not a moving one must be given
             as these, or undeformed.
-
-        Raises
-        ------
-        CaseError
-            The number of nodes is wrong, copies of a node disagree, or a node that is not a moving
-            one was moved.
         """
         if len(given) != len(self.nodes):
             raise CaseError(
@@ -171,7 +168,8 @@ class USMesh:
     Nodes of a surface that the case does not move (hub and casing, when they slide) belong to it
     too, but cannot be prescribed: their coordinates are where they were or where the last
     `warpMesh` took them, and their entries in `getdXs` are 0. Of a node that the surface has
-    several times, all copies must agree; the derivative is shared among them.
+    several times, all copies must agree; the derivative is shared among them. Raises CaseError if
+    an option is missing or unknown, or there are several processes.
 
     Parameters
     ----------
@@ -185,11 +183,6 @@ class USMesh:
         Of one process.
     debug : bool
         Has no effect.
-
-    Raises
-    ------
-    CaseError
-        An option is missing or unknown, or there are several processes.
     """
 
     def __init__(

@@ -104,10 +104,7 @@ def weighted_mean(
 ) -> Array:
     """Return means (..., N, d) of values (..., n, d), as `weighted_means`.
 
-    Parameters
-    ----------
-    source_weights : (n,)
-        The weight g_j of each source.
+    ``source_weights`` (n,): the weight g_j of each source.
     """
     x, c, v = value(targets), value(sources), value(values)
 

@@ -69,6 +69,9 @@ def read_displacements(
 ) -> Displacements:
     """Return the displacements that a file lists for ``nodes``, zero for those not in it.
 
+    Raises CaseError if the file cannot be read, or has mistakes: a line ``file:line: sentence`` for
+    each.
+
     Parameters
     ----------
     path : Path
@@ -79,11 +82,6 @@ def read_displacements(
         Shape of the points of the mesh: number of nodes and dimension.
     of : str
         What the nodes lie on, for messages: ``a moving marker``, ``marker 'BLADE'``.
-
-    Raises
-    ------
-    CaseError
-        The file cannot be read, or has mistakes: a line ``file:line: sentence`` for each.
     """
     text, warnings = read_text(path, "displacement file")
     read = parse_displacements(text, path, nodes, shape, of)

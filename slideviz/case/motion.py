@@ -166,7 +166,6 @@ def moved_together(
 
     Parameters
     ----------
-    motions : iterable of Motion
     points : (n, d) float64
         Undeformed positions of all nodes.
     on : mapping of str to (k,) int64

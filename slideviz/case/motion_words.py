@@ -41,7 +41,6 @@ def describe(motion: Motion, dim: int = 2, extent: float = 0.0) -> str:
 
     Parameters
     ----------
-    motion : Motion
     dim : int
         Dimensions of the mesh; in 3D a rotation has an axis.
     extent : float

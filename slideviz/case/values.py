@@ -148,15 +148,8 @@ def _read_path(text: str) -> Path | None:
 def path_text(path: Path, plain: re.Pattern[str] = _PLAIN_PATH) -> str:
     """Return a path as it is written in a case file: with slashes, in quotes where needed.
 
-    Parameters
-    ----------
-    plain : pattern
-        Paths that it matches need no quotes.
-
-    Raises
-    ------
-    CaseError
-        A case file cannot have it: it is empty, or has a line break or a backslash.
+    Raises CaseError if a case file cannot have it: it is empty, or has a line break or a backslash.
+    ``plain``: paths that it matches need no quotes.
     """
     text = path.as_posix()
     check_writable(text)

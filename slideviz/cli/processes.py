@@ -34,6 +34,8 @@ def launched() -> str:
 def run_shared(argv: Sequence[str], variable: str, run: Callable[[Ranks], int]) -> int:
     """Run a command that several processes share, and return its exit code.
 
+    Raises SlidevizError if processes cannot share this command, or MPI does not connect them.
+
     Parameters
     ----------
     argv : sequence of str
@@ -42,11 +44,6 @@ def run_shared(argv: Sequence[str], variable: str, run: Callable[[Ranks], int]) 
         The variable with the number of processes, of `launched`.
     run : callable
         Runs the command; called on rank 0 only, while the others serve it.
-
-    Raises
-    ------
-    SlidevizError
-        Processes cannot share this command, or MPI does not connect them.
     """
     count, rank = _number(variable), _number(dict(_LAUNCHERS)[variable])
     if rank:

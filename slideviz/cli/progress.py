@@ -64,7 +64,6 @@ class Bar:
 
     Parameters
     ----------
-    enabled : bool
     head : str
         Text before the words of the bar.
     expected : float, optional

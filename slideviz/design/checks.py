@@ -136,18 +136,15 @@ class Checks:
     def errors(self, targets: FloatArray, states: list[StepState]) -> FloatArray:
         """Return the largest error of each design, (...,), in the mesh's length unit.
 
+        Raises DeformError if coordinates are infinite, nodes move much farther than the boundary,
+        or periodic images moved differently.
+
         Parameters
         ----------
         targets : (..., a, d)
             Displacements of the known nodes, in the frame.
         states
             After each step.
-
-        Raises
-        ------
-        DeformError
-            Coordinates are infinite, nodes move much farther than the boundary, or periodic images
-            moved differently.
         """
         errors = self.off_track(value(states[-1].coords))
         for index, (step, state) in enumerate(zip(self.steps, states, strict=True), start=1):

@@ -36,16 +36,8 @@ def choose_steps(
 
     The points are (n, d), deformed by the first displacement, which also chooses the number of
     steps. The selection for each further displacement begins with the control nodes of all before.
-
-    Parameters
-    ----------
-    targets : sequence of (a, d)
-        Displacements of the known nodes, in the frame.
-
-    Raises
-    ------
-    DeformError
-        A step cannot be solved, or its result cannot be right.
+    Raises DeformError if a step cannot be solved, or its result cannot be right. ``targets``:
+    displacements of the known nodes, in the frame.
     """
     require_memory(setup, case, lasting=True)
     kept = setup

@@ -156,8 +156,6 @@ def render_frames(
     ----------
     frames : int
         Number of the undeformed mesh and all steps.
-    file : Path
-    film_options : Reel
     draw : callable
         Given a position (the number of a step, or a number between two), returns a generator that
         draws the image in pieces and returns it.
@@ -221,7 +219,9 @@ def film(
     """Write a film of one run, or of two side by side, and yield its progress after each image.
 
     A film of two runs has the steps of the run with more of them. Of the other run it shows the
-    step that is as far deformed, or, with images in between, a mesh between two steps.
+    step that is as far deformed, or, with images in between, a mesh between two steps. Raises
+    SlidevizError if there are no steps, the film cannot be made like that, or the file cannot be
+    written.
 
     Parameters
     ----------
@@ -235,11 +235,6 @@ def film(
         What part of the mesh is seen; "auto" is the whole, unless what moved is tiny in it.
     overwrite : bool
         Allow files that exist.
-
-    Raises
-    ------
-    SlidevizError
-        There are no steps, the film cannot be made like that, or the file cannot be written.
     """
     path = Path(file)
     options = image_options(film_options.pixels(path), both=session.view.beside is not None)
@@ -269,6 +264,9 @@ def film_steps(
 ) -> Generator[object, Any, None]:
     """Write a film drawn by a renderer; yield `FilmProgress` after each image, and between pieces.
 
+    Raises SlidevizError if there are no steps, the film cannot be made like that, or the file
+    cannot be written.
+
     Parameters
     ----------
     renderer : OffscreenRenderer
@@ -283,11 +281,6 @@ def film_steps(
         Returns the titles of the images; by default run, step and quality.
     overwrite : bool
         Allow files that exist.
-
-    Raises
-    ------
-    SlidevizError
-        There are no steps, the film cannot be made like that, or the file cannot be written.
     """
     runs = renderer.shown(renderer.session, options)
     for one in runs:

@@ -75,9 +75,6 @@ def write_title(
 
     Parameters
     ----------
-    plotter : pyvista.BasePlotter
-    words : str
-    scheme : ColorScheme
     letters : float
         Size of the letters.
     height : float

@@ -157,7 +157,6 @@ class OffscreenRenderer:
 
         Parameters
         ----------
-        options : PictureOptions
         aim : bool
             Whether to aim the camera; if not, it is that of the last picture.
         frame : int, optional

@@ -42,6 +42,8 @@ _ORDER = {RIM: 1.3, BAND: 1.4, NAME: 1.5}
 def write_vector(renderer: OffscreenRenderer, options: PictureOptions, file: Path) -> None:
     """Write the picture of a 2D mesh as SVG or PDF, whole or not at all.
 
+    Raises SlidevizError if the mesh is 3D or has too many cells, or the file cannot be written.
+
     Parameters
     ----------
     renderer : OffscreenRenderer
@@ -50,11 +52,6 @@ def write_vector(renderer: OffscreenRenderer, options: PictureOptions, file: Pat
         The options of the picture; its background is white or transparent.
     file : Path
         A name ending with .svg or .pdf.
-
-    Raises
-    ------
-    SlidevizError
-        The mesh is 3D or has too many cells, or the file cannot be written.
     """
     require_vector(renderer.session, file)
     drawn = draw_vector(renderer, options)

@@ -34,7 +34,6 @@ def parametric(box: Box, points: FloatArray) -> tuple[FloatArray, np.ndarray]:
 
     Parameters
     ----------
-    box : Box
     points : (m, 3) or (m, 2) float64
         In 2D, points of the plane z = 0.
 

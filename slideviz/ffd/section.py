@@ -322,7 +322,6 @@ def with_boxes(
 
     Parameters
     ----------
-    mesh : Mesh
     boxes : sequence of Box
         Changed boxes, matched by name, and new ones; the mesh's other boxes stay.
     anew : bool

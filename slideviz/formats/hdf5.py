@@ -114,6 +114,8 @@ def hdf5_write(
 ) -> Iterator[Hdf5Draft]:
     """Context with an HDF5 file to write, which replaces ``path`` at the end if nothing was raised.
 
+    Raises MeshError if it cannot be written; what was at ``path`` is as before.
+
     Parameters
     ----------
     path : Path
@@ -122,11 +124,6 @@ def hdf5_write(
         The input that may be overwritten.
     source : Path, optional
         A file whose copy the new one is at first; when left out it is empty.
-
-    Raises
-    ------
-    MeshError
-        It cannot be written; what was at ``path`` is as before.
     """
     import h5py
 

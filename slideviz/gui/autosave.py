@@ -155,7 +155,6 @@ class Autosave(QObject):
 
     Parameters
     ----------
-    store : Store
     folder : Path
         The folder of all windows' session files; made when needed.
     camera : callable

@@ -93,17 +93,12 @@ class SectionReader(BackgroundJob):
     """Reads the cells that shown sections cut, of a mesh that stays in its file.
 
     A job whose section has changed is cancelled.
-
-    Signals
-    -------
-    finished()
-        The cells of a section have been read.
-    progressed(str)
-        A message for the status bar.
     """
 
     finished = Signal()
+    """The cells of a section have been read."""
     progressed = Signal(str)
+    """A message for the status bar."""
 
     def __init__(self, store: Store, parent: QObject | None = None) -> None:
         super().__init__(store, parent)

@@ -47,14 +47,8 @@ class DockTabs(QObject):
     """Watches the tab bars that Qt makes for docks: double click, right click, and title bars.
 
     A double click makes a dock a window of its own; a right click opens its menu. A dock whose
-    name is on a tab has no title bar.
-
-    Parameters
-    ----------
-    window : QMainWindow
-    docks : iterable of QDockWidget
-    bare : set of QDockWidget
-        The docks that have no title bar even without a tab.
+    name is on a tab has no title bar. ``bare``: the docks that have no title bar even without a
+    tab.
     """
 
     def __init__(

@@ -33,26 +33,19 @@ log = logging.getLogger("slideviz")
 
 
 class Running(QObject):
-    """Starts the jobs and runs of a window, and passes their steps and ends to the session.
-
-    Signals
-    -------
-    began(str), doing(Doing), ended()
-        A job has started, with its name; reports progress; has ended, in whatever way.
-    cancelling()
-        The running job was asked to stop.
-    status_changed(str)
-        A message for the status bar.
-    worst_wanted()
-        The user wants to see the worst cell.
-    """
+    """Starts the jobs and runs of a window, and passes their steps and ends to the session."""
 
     began = Signal(str)
-    progressed = Signal(object)
+    progressed = Signal(object)  # JobProgress
     ended = Signal()
+    """`began`, `progressed`, `ended`: a job has started, with its name; reports progress; has
+    ended, in whatever way."""
     cancelling = Signal()
+    """The running job was asked to stop."""
     status_changed = Signal(str)
+    """A message for the status bar."""
     worst_wanted = Signal()
+    """The user wants to see the worst cell."""
 
     def __init__(self, store: Store, banner: Banner, parent: QObject | None = None) -> None:
         super().__init__(parent)

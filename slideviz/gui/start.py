@@ -55,19 +55,14 @@ TRY = "Try it: deform a blade passage"
 
 
 class StartPage(QScrollArea):
-    """The start page: buttons to try a sample and to open a file, recent files, sample cases.
-
-    Signals
-    -------
-    try_wanted(str), sample_wanted(str)
-        The user wants to open and deform a sample; only to open it.
-    file_wanted(Path)
-        The user wants to open a recent file.
-    """
+    """The start page: buttons to try a sample and to open a file, recent files, sample cases."""
 
     try_wanted = Signal(str)
-    file_wanted = Signal(object)
+    file_wanted = Signal(object)  # Path
+    """The user wants to open a recent file."""
     sample_wanted = Signal(str)
+    """`try_wanted`, `sample_wanted`: the user wants to open and deform a sample; only to open
+    it."""
 
     def __init__(self, samples: dict[str, str], parent: QWidget | None = None) -> None:
         super().__init__(parent)

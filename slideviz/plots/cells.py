@@ -181,13 +181,7 @@ def window(cut: Box, around: Polygons, ratio: float) -> Box:
 def draw_around(axes: Any, around: Polygons, section: Section, box: Box) -> None:
     """Draw the cells within a box faintly, and the line or circle of a section.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    around : Polygons
-    section : Section
-    box : (2,), (2,) float64
-        Lower and upper corner of what the axes show.
+    ``box`` (2,): lower and upper corner of what the axes show.
     """
     from matplotlib.collections import LineCollection
 
@@ -243,7 +237,6 @@ def color_bar(
         The axes for the bar; see `bar_beside` and `bar_below`.
     scale : matplotlib.cm.ScalarMappable
         See `slideviz.plots.cells.color_scale`.
-    label : str
     letters : float
         Size of the numbers in points; the label's is one point more.
     inverted : bool

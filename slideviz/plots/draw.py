@@ -132,13 +132,8 @@ def against_steps(
 ) -> None:
     """Draw results of runs against their number of steps, a line for each label.
 
-    Parameters
-    ----------
-    axes : Axes
-    rows : sequence of Outcome
-        In any order. Qualities of runs with inverted cells are crosses, not joined by the line.
-    what : {"minimum", "mean", "seconds", "control_nodes", "max_error"}
-    style : Style
+    ``rows``: in any order. Qualities of runs with inverted cells are crosses, not joined by the
+    line.
     """
     style_axes(axes, style, "deformation steps [-]", LABELS[what])
     labels = list(dict.fromkeys(row.label for row in rows))

@@ -84,8 +84,6 @@ def figure_bytes(figure: Any, kind: str, dpi: float = 300.0, transparent: bool =
 
     Parameters
     ----------
-    figure : matplotlib.figure.Figure
-    kind : "png", "svg" or "pdf"
     dpi : float
         Pixels per inch; in PDF and SVG of the parts that are drawn as pixels.
     transparent : bool

@@ -39,15 +39,12 @@ def histogram(
 
     Parameters
     ----------
-    axes : Axes
-    runs : sequence of QualityRun
     metric : str
         Name of the value, for the axis.
     edges : (k + 1,) float64, optional
         Limits of equal intervals; by default 25 intervals from 0 to 1.
     log : bool
         Whether the counts' axis is logarithmic, which shows a few bad cells among many.
-    style : Style
     """
     edges = np.linspace(0.0, 1.0, 26) if edges is None else edges
     outlines = []
@@ -73,15 +70,12 @@ def draw_distribution(
 
     Parameters
     ----------
-    axes : Axes
-    bars : Bars or None
     outlines : sequence of Outline
         All have the same intervals as the bars.
     metric : str
         Label of the values' axis.
     log : bool
         Whether the counts' axis is logarithmic, which shows a few bad cells among many.
-    style : Style
     """
     style_axes(axes, style, metric, "cells [-]")
     foot = 0.5 if log else 0.0

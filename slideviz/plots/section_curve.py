@@ -54,7 +54,6 @@ def curve_of(lines: Polygons, section: Section, values: FloatArray, inverted: np
     ----------
     lines : Polygons
         The cut: lines of two corners each (see `slideviz.sections.cut.Cutter.cut`).
-    section : Section
     values, inverted : (m,)
         The value of every cell of the mesh, and whether it is inverted.
     """
@@ -98,12 +97,10 @@ def draw_curves(
 
     Parameters
     ----------
-    axes : matplotlib.axes.Axes
     rows : sequence of CurveRow
         The last one is the main one: its inverted cells are marked, and areas are below it.
     labels : (str, str)
         Labels of the positions and of the values.
-    style : Style
     colors : Colors, optional
         Colors of the areas; without them no areas are drawn.
     """

@@ -79,21 +79,17 @@ class Paint:
 def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = None) -> Paint:
     """Return the paint of a mesh: a quantity of every cell, with its usual limits.
 
+    Raises CaseError if the quantity is unknown, or the displacement is wanted without the mesh that
+    it is measured from, or with another.
+
     Parameters
     ----------
-    mesh : Mesh
     quality : Quality
         That of the mesh.
     by : Quantity
         The displacement of a cell is the mean of the lengths by which its nodes moved.
     reference : Mesh, optional
         The undeformed mesh; the displacement needs it.
-
-    Raises
-    ------
-    CaseError
-        The quantity is unknown, or the displacement is wanted without the mesh that it is measured
-        from, or with another.
     """
     if by not in QUANTITIES:
         raise CaseError(f"color: {not_one_of(by, QUANTITIES)}")

@@ -84,7 +84,6 @@ def laid_flat(
     ----------
     pieces : mapping of int to Polygons
         The cuts of each passage, by number; 0 is the mesh itself.
-    section : Section
     space : bool
         Whether they are shown in space, where the axes have no labels (None).
     beside : float, optional
@@ -274,19 +273,15 @@ def section_picture(
 ) -> None:
     """Write the picture of a section; of a cut through a 2D mesh, the curve along it.
 
+    Raises CaseError if there is nothing to draw, the name has another suffix, or the file cannot be
+    written.
+
     Parameters
     ----------
     shown : sequence of SectionInRun
         One run, or two: the first is left or above, the second right or below.
-    section : Section
     file : str or Path
         A name ending with .png, .svg or .pdf.
-    style : SectionStyle, optional
-
-    Raises
-    ------
-    CaseError
-        There is nothing to draw, the name has another suffix, or the file cannot be written.
     """
     target = Path(file)
     require_picture_name(target)

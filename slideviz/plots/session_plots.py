@@ -152,13 +152,8 @@ class CurveRows:
         """Return the curve of the undeformed mesh, then one per session, the first session's last.
 
         Meshes that the section does not cut are left out, and so is the undeformed mesh if
-        displacements are drawn.
-
-        Parameters
-        ----------
-        shown : sequence of (Session, Cuts)
-            The session of each view, the first view first, with the view's cached cuts.
-        section : Section
+        displacements are drawn. ``shown``: the session of each view, the first view first, with the
+        view's cached cuts.
         """
         line = _line(section)
         states = [(session, cuts) for session, cuts in reversed(shown) if session.view.frame]
@@ -276,10 +271,6 @@ def draw_histogram(
 
     Parameters
     ----------
-    counts : FrameCounts
-    session : Session
-    figure : Figure
-    style : Style
     log : bool
         Whether the axis of the counts is logarithmic.
     full_range : bool

@@ -73,7 +73,6 @@ def along_radius(
         Direction of the axis, of any length but zero, and a point on it.
     layers : int, optional
         At least 1; when left out, one for each layer of cells of usual height, 40 at most.
-    label : str
 
     Raises
     ------
@@ -171,14 +170,10 @@ def spanwise(
 
     Parameters
     ----------
-    axes : Axes
-    profiles : sequence of Profile
-    what : {"minimum", "mean"}
     fraction : bool
         Whether the vertical axis is relative to the span, instead of the coordinate.
     unit : str
         Unit of the coordinate, for the label.
-    style : Style
     """
     coordinate = profiles[0].coordinate if profiles else "r"
     label = "span fraction [-]" if fraction else f"{coordinate} [{unit}]"

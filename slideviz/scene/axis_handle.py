@@ -72,7 +72,6 @@ def pixel_and_slope(
     ----------
     pixels_of : callable
         Returns display coordinates.
-    section : Section
     place : (float, float)
         Angle in radians, and position along the axis.
     size : float

@@ -36,11 +36,7 @@ SIDES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] 
 class Camera:
     """Places the VTK camera of a stage: fits, aims, zooms, and says what it sees.
 
-    Parameters
-    ----------
-    stage : Stage
-    shapes : callable
-        Returns the data sets that a fitted camera shows.
+    ``shapes``: returns the data sets that a fitted camera shows.
     """
 
     def __init__(self, stage: Stage, shapes: Callable[[], list[Any]]) -> None:

@@ -28,12 +28,7 @@ Rect = tuple[float, float, float, float]
 class LegendPlate:
     """A half-transparent rectangle in the background's colors, between legend and mesh.
 
-    Parameters
-    ----------
-    plotter : pyvista.BasePlotter
-    name : str
-        The name of the actor. 2D actors added later are drawn over it.
-    scheme : ColorScheme
+    ``name``: the name of the actor. 2D actors added later are drawn over it.
     """
 
     def __init__(self, plotter: Any, name: str, scheme: ColorScheme) -> None:

@@ -45,7 +45,6 @@ class FlatScene:
         Where to draw.
     cuts : Cuts
         The cuts of the 3D scene, shared with it.
-    scheme : ColorScheme
     """
 
     def __init__(self, plotter: Any, cuts: Cuts, scheme: ColorScheme = LIGHT) -> None:

@@ -105,12 +105,7 @@ class InvertedLayer(Layer):
     """The rings, in front of everything, at the middle of inverted cells.
 
     If sections cut a 3D mesh, only the cells they cut have rings: others would seem to be on them.
-
-    Parameters
-    ----------
-    stage : Stage
-    sections : SectionLayer
-        Says which cells are cut; updated before this layer.
+    ``sections``: says which cells are cut; updated before this layer.
     """
 
     def __init__(self, stage: Stage, sections: SectionLayer) -> None:

@@ -273,7 +273,6 @@ class ThresholdLayer(Layer):
 
     Parameters
     ----------
-    stage : Stage
     others : CellLayer
         Draws all cells; made faint while there is a threshold.
 
@@ -359,7 +358,6 @@ class CoarseLayer(Layer):
 
     Parameters
     ----------
-    stage : Stage
     boundaries : BoundaryLayer
         Draws the boundaries in full detail; their properties are copied.
     sections : SectionLayer

@@ -89,7 +89,6 @@ class PassageLayer(KeyedLayer):
 
     Parameters
     ----------
-    stage : Stage
     cells, boundaries, threshold
         The layers whose data sets are drawn again.
     """

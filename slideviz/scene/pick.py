@@ -96,7 +96,6 @@ def front_cell(
 
     Parameters
     ----------
-    plotter : pyvista.BasePlotter
     x, y : float
         Pixels from the lower left.
     shown : sequence of (actor, (f,) int64)

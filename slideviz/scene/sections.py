@@ -237,12 +237,7 @@ below a band in the cells' colors."""
 
 
 class CutLines:
-    """The thin lines of a 2D mesh's sections, which continue in holes and beside the mesh.
-
-    Parameters
-    ----------
-    stage : Stage
-    """
+    """The thin lines of a 2D mesh's sections, which continue in holes and beside the mesh."""
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
@@ -293,7 +288,6 @@ class PolygonActor:
 
     Parameters
     ----------
-    stage : Stage
     name : str
         The name of the actor.
     pickable : bool
@@ -349,11 +343,7 @@ def polygon_shape(polygons: Polygons, lift: float = 0.0) -> Any:
 class Instances:
     """Instances of one actor at other places, which share its data set, mapper and property.
 
-    Parameters
-    ----------
-    stage : Stage
-    base : PolygonActor
-        The actor that is repeated; its name and a number are the name of an instance.
+    ``base``: the actor that is repeated; its name and a number are the name of an instance.
     """
 
     def __init__(self, stage: Stage, base: PolygonActor) -> None:

@@ -30,10 +30,7 @@ class _Block:
 class Cutter:
     """Cuts the cells of a mesh at any positions of its nodes; made once for a mesh.
 
-    Parameters
-    ----------
-    cells : Cells
-        The cells of the mesh.
+    ``cells``: the cells of the mesh.
     """
 
     def __init__(self, cells: Cells) -> None:
@@ -54,6 +51,9 @@ class Cutter:
     def cut(self, points: FloatArray, section: Section) -> Polygons:
         """Return the polygons in which the section cuts the cells; none where all are missed.
 
+        Raises CaseError if the mesh is 2D, and the section is neither a plane nor a cylinder about
+        z.
+
         Parameters
         ----------
         points : (n, d) float64
@@ -69,11 +69,6 @@ class Cutter:
             lies in the section belongs to the cell where the distance from the section is
             negative; where no cell is cut so, to the other, since the section is at the rim of
             the mesh.
-
-        Raises
-        ------
-        CaseError
-            The mesh is 2D, and the section is neither a plane nor a cylinder about z.
         """
         level = self._level(points, section)
         owners, low, high = self._corners(level)

@@ -34,11 +34,8 @@ _WORDS: dict[Callable[..., Any], Words] = {}
 def undoable(words: Words) -> Callable[[Change], Change]:
     """Return a decorator that lets `slideviz.session.store.Store` undo a change.
 
-    Parameters
-    ----------
-    words : str or callable
-        The words after "Undo" in the menu; or a function that returns them for the change's
-        keyword arguments, or None if such a change is not to be undone.
+    ``words``: the words after "Undo" in the menu; or a function that returns them for the change's
+    keyword arguments, or None if such a change is not to be undone.
     """
 
     def mark(change: Change) -> Change:

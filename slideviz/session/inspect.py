@@ -174,7 +174,6 @@ def cell_at(mesh: Mesh, x: float, y: float, values: FloatArray) -> int | None:
 
     Parameters
     ----------
-    mesh : Mesh
     x, y : float
         The point, in the mesh's length unit.
     values : (m,) float64

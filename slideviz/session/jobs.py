@@ -102,7 +102,8 @@ def save_steps(
 ) -> list[Path]:
     """Write the mesh of every step, whole files only, and return their paths.
 
-    A VTKHDF file has all steps, and before them the undeformed mesh ``first``.
+    A VTKHDF file has all steps, and before them the undeformed mesh ``first``. Raises SlidevizError
+    if a file cannot be written; those before it stay.
 
     Parameters
     ----------
@@ -110,11 +111,6 @@ def save_steps(
         The name to put numbers into (see `step_paths`).
     frames : sequence of StepFrame
         The steps, without the undeformed mesh.
-
-    Raises
-    ------
-    SlidevizError
-        A file cannot be written; those before it stay.
     """
     paths = step_paths(path, len(frames))
     if format_for(path).series:

@@ -58,10 +58,7 @@ class Unsaved:
     def question(self, before: str) -> str:
         """Return the question to the user, with what else to know in further lines.
 
-        Parameters
-        ----------
-        before : str
-            The action that would lose the work, such as "closing".
+        ``before``: the action that would lose the work, such as "closing".
         """
         number = self.session.shown
         if "table" in self.lost:
@@ -152,10 +149,7 @@ def view_to_case(session: Session, camera: Camera | None = None) -> Case:
 def view_from_case(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
     """Return the view that a case has; what it leaves out is taken from ``view``.
 
-    Parameters
-    ----------
-    names : tuple of str
-        The boundaries of the mesh; other names of hidden boundaries are ignored.
+    ``names``: the boundaries of the mesh; other names of hidden boundaries are ignored.
     """
     kept, values = case.view, dict[str, Any]()
     for key, field in (

@@ -158,7 +158,8 @@ def open_for_run(
 ) -> Iterator[StreamInput]:
     """Context with a mesh to be deformed; the binary copy of a text is beside the output.
 
-    The copy is removed at the end, but kept where the run is stopped, to go on with.
+    The copy is removed at the end, but kept where the run is stopped, to go on with. Raises
+    MeshError if it is of no format that can be streamed, or has a mistake; the disk has no room.
 
     Parameters
     ----------
@@ -172,11 +173,6 @@ def open_for_run(
         Called with a sentence on what of the mesh the output will lack; with "" if nothing.
     later : int
         Bytes for each cell that the caller writes beside the output afterwards.
-
-    Raises
-    ------
-    MeshError
-        It is of no format that can be streamed, or has a mistake; the disk has no room.
     """
     if require_su2(path, file_format) == "su2b":
         if is_text:

@@ -354,7 +354,6 @@ def announcement(
 
     Parameters
     ----------
-    wanted : sequence of Combination
     cannot : mapping of Combination to str
         Those that are left out, with the reason; see `refused`.
     more : mapping of str to sequence of str

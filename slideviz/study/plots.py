@@ -82,7 +82,6 @@ def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | Non
 
     Parameters
     ----------
-    case : Case
     mesh : Mesh
         The undeformed mesh. Cells are assigned to places along the span by it, so that a layer of
         cells stays together when it bends.

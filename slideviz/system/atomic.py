@@ -40,7 +40,9 @@ def atomic_write(
     """Context with a binary file to write, which replaces ``path`` at the end.
 
     When the block raises, whatever was at ``path`` stays as it was and the temporary file is
-    removed. A symbolic link stays a link, and an existing file keeps its permissions.
+    removed. A symbolic link stays a link, and an existing file keeps its permissions. Raises
+    SlidevizError if it cannot be written: missing folder, no permission, full disk; or it is an
+    input. The message has the path, the reason and the remedy.
 
     Parameters
     ----------
@@ -50,12 +52,6 @@ def atomic_write(
         The class of error to raise: ``MeshError`` unless another is given.
     replaces : Path, optional
         The input that may be written over; see `slideviz.system.file_checks`.
-
-    Raises
-    ------
-    SlidevizError
-        It cannot be written: missing folder, no permission, full disk; or it is an input. The
-        message has the path, the reason and the remedy.
     """
     target = Path(path)
     require_no_input(target, error, replaces)

@@ -66,7 +66,8 @@ _partial: dict[Path, str] = {}
 def draft(folder: Path, is_folder: bool = False) -> Iterator[Path]:
     """Context with a new path in a folder for a draft; what is at that path is removed at the end.
 
-    At the beginning, drafts of dead processes of this machine are removed from the folder.
+    At the beginning, drafts of dead processes of this machine are removed from the folder. Raises
+    OSError if the draft is a folder, and cannot be made.
 
     Parameters
     ----------
@@ -74,11 +75,6 @@ def draft(folder: Path, is_folder: bool = False) -> Iterator[Path]:
         Where the draft is to be.
     is_folder : bool
         Whether the draft is a folder, which is made then.
-
-    Raises
-    ------
-    OSError
-        The draft is a folder, and cannot be made.
     """
     _sweep(folder)
     path = folder / f"{_owned(os.getpid())}{os.urandom(8).hex()}{_SUFFIX}"

@@ -41,6 +41,8 @@ def require_no_input(
 ) -> None:
     """Raise if a file that is to be written is an input, declared by `protected`.
 
+    Raises SlidevizError if it is an input other than ``replaces``.
+
     Parameters
     ----------
     path : Path
@@ -51,11 +53,6 @@ def require_no_input(
         The input that may be overwritten.
     remedy : str
         The remedy in the message; to choose another name when left out.
-
-    Raises
-    ------
-    SlidevizError
-        It is an input other than ``replaces``.
     """
     if replaces is not None and same_file(path, replaces):
         return

@@ -136,10 +136,8 @@ class FrozenStep:
     def run(self, before: StepState, target: Array) -> StepState:
         """Return the state after this step.
 
-        Parameters
-        ----------
-        target : (..., a, d)
-            The whole displacement of the known nodes, after the last step, in the frame.
+        ``target`` (..., a, d): the whole displacement of the known nodes, after the last step, in
+        the frame.
         """
         state = self.moved(before, target)
         coords, at = self._with_points(state.coords)
@@ -148,10 +146,7 @@ class FrozenStep:
     def moved(self, before: StepState, target: Array, out: FloatArray | None = None) -> StepState:
         """Return the state after this step, without points, and with copies in a halo not moved.
 
-        Parameters
-        ----------
-        out : (..., n, d), optional
-            Where the coordinates are written, if nothing is a variable.
+        ``out`` (..., n, d): where the coordinates are written, if nothing is a variable.
         """
         setup = self.setup
         goal = _shifted(setup.coords[setup.known], multiply(target, np.array([[self.part]])))

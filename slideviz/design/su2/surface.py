@@ -51,18 +51,14 @@ def convex_part(
 ) -> tuple[float, Attempt, Sequence[str]]:
     """Reduce the design by CONVEXITY_CHECK; return its factor, the deformation, and warnings.
 
+    Raises CaseError or DeformError if not even the smallest part that is tried can be done.
+
     Parameters
     ----------
-    config : Su2Config
     mesh : Mesh
         The undeformed mesh.
     attempt, deformed : callable
         Deforms the mesh by a configuration; returns the mesh of what that returned.
-
-    Raises
-    ------
-    CaseError, DeformError
-        Not even the smallest part that is tried can be done.
     """
     if config.words["CONVEXITY_CHECK"].upper() != "YES":
         return 1.0, attempt(config), ()
@@ -161,7 +157,8 @@ def read_positions(
 
     Lines are ``index x y [z]`` in any order, with blanks, tabs or commas between; a plane mesh may
     have a z of 0. As in SU2, nodes that are on none of the moving boundaries are ignored, but with
-    a warning.
+    a warning. Raises CaseError if the file cannot be read, has mistakes (a line ``file:line:
+    sentence`` for each), or none of these nodes.
 
     Parameters
     ----------
@@ -169,15 +166,8 @@ def read_positions(
         The file.
     nodes : (m,) int64
         Of the moving boundaries, ascending.
-    mesh : Mesh
     of : str
         Key and moving boundaries for messages: ``DV_MARKER= (low)``.
-
-    Raises
-    ------
-    CaseError
-        The file cannot be read, has mistakes (a line ``file:line: sentence`` for each), or none of
-        these nodes.
     """
     text, warnings = read_text(path, "surface file")
     every = np.arange(len(mesh.points))

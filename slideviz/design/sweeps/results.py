@@ -50,12 +50,7 @@ _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 class SweepResults:
     """The results of a sweep in a folder, which no other sweep writes to until `close`.
 
-    Parameters
-    ----------
-    folder : Path
-    designs : Designs
-    sources : mapping of str to str
-        What the results depend on, as `sources_of` returns it.
+    ``sources``: what the results depend on, as `sources_of` returns it.
     """
 
     def __init__(self, folder: Path, designs: Designs, sources: Mapping[str, str]) -> None:

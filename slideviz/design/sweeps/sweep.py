@@ -151,12 +151,7 @@ def _rows(
 class _Tasks:
     """Makes the tasks that workers are sent: the case of each design, and the mesh once.
 
-    Parameters
-    ----------
-    mesh : Mesh
-    designs : sequence of Design
-    folder : Path or None
-        Where the workers write deformed meshes; None: they write none.
+    ``folder``: where the workers write deformed meshes; None: they write none.
     """
 
     def __init__(self, mesh: Mesh, designs: Sequence[Design], folder: Path | None) -> None:

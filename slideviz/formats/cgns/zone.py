@@ -139,13 +139,9 @@ def _points(zone: Node, shape: tuple[int, ...], count: int) -> tuple[FloatArray,
 def region_of(zone: CgnsZone, node: Node) -> Cells | IntArray:
     """Return the facets, or the vertices (k,), that a boundary condition or interface is on.
 
-    Raises MeshError if the node is wrong.
-
-    Parameters
-    ----------
-    node : Node
-        One with ``PointRange``, ``PointList``, ``ElementRange`` or ``ElementList``, and perhaps a
-        ``GridLocation``: vertices (as without one) or faces (edges in 2D).
+    Raises MeshError if the node is wrong. ``node``: one with ``PointRange``, ``PointList``,
+    ``ElementRange`` or ``ElementList``, and perhaps a ``GridLocation``: vertices (as without one)
+    or faces (edges in 2D).
     """
     where = node.word("GridLocation_t", _BY_NODES, "GridLocation")
     children = node.children(*_LABELS)

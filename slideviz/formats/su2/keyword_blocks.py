@@ -70,15 +70,8 @@ def find_blocks(lines: Lines) -> list[KeywordBlock]:
 def find_bounds(lines: Lines, sections: list[KeywordBlock], number: int | None) -> Bounds:
     """Return the lines of a zone.
 
-    Parameters
-    ----------
-    number : int or None
-        The zone, from 1; None for the first.
-
-    Raises
-    ------
-    MeshError
-        This is no SU2 mesh, there is no such zone, or the zones are not numbered 1, 2, and so on.
+    Raises MeshError if this is no SU2 mesh, there is no such zone, or the zones are not numbered 1,
+    2, and so on. ``number``: the zone, from 1; None for the first.
     """
     if not any(section.key in KNOWN for section in sections):
         raise MeshError(

@@ -32,6 +32,8 @@ _EXTRA_POINT_WORDS = 2
 def parse_cells(lines: Lines, rows: Rows, dim: int, n_points: int, progress: Tick) -> Cells:
     """Parse elements, one per row: type, nodes, and an optional index, which is ignored.
 
+    Raises MeshError if an element has a wrong type, dimension or nodes; the message has its line.
+
     Parameters
     ----------
     rows : tuple of Piece
@@ -42,11 +44,6 @@ def parse_cells(lines: Lines, rows: Rows, dim: int, n_points: int, progress: Tic
         Node indices must be below this.
     progress : callable
         Called with the fraction done after each block; may raise to stop.
-
-    Raises
-    ------
-    MeshError
-        An element has a wrong type, dimension or nodes; the message has its line.
     """
     types = np.empty(number_of(rows), np.uint8)
     nodes = np.empty(rows[-1].node + rows[-1].nodes if rows else 0, np.int64)

@@ -227,6 +227,8 @@ def read_su2_file(path: Path, zone: int | None, progress: Tick) -> Mesh:
 def read_su2(raw: Source, zone: int | None, progress: Tick) -> Mesh:
     """Return one zone of an SU2 file.
 
+    Raises MeshError if the file has a mistake; the message has the line.
+
     Parameters
     ----------
     raw : Source
@@ -235,11 +237,6 @@ def read_su2(raw: Source, zone: int | None, progress: Tick) -> Mesh:
         The zone, from 1; None for the first.
     progress : callable
         Called with the fraction done; may raise to stop.
-
-    Raises
-    ------
-    MeshError
-        The file has a mistake; the message has the line.
     """
     lines = scan(raw, lambda done: progress(_SCANNED * done))
     sections = find_blocks(lines)

@@ -112,17 +112,14 @@ def _boundaries_of(
 def scan(raw: Source, progress: Tick) -> Lines:
     """Return the lines of an SU2 file.
 
+    Raises MeshError if the file is empty or not text.
+
     Parameters
     ----------
     raw : Source
         The file.
     progress : callable
         Called with the fraction done after each block; may raise to stop.
-
-    Raises
-    ------
-    MeshError
-        The file is empty or not text.
     """
     from slideviz.formats.su2.loops import RUN_COLUMNS, scan_block
 

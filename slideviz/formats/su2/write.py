@@ -167,15 +167,12 @@ def _ranges(begin: int, end: int) -> list[tuple[int, int]]:
 def moved_rows(raw: Source, piece: Piece, before: FloatArray, now: FloatArray) -> bytes:
     """Return the text of a piece of points with the coordinates that changed replaced.
 
+    Raises MeshError if the file was changed.
+
     Parameters
     ----------
     before, now : (m, d) float64
         The points of these rows, as read and as they are to be written.
-
-    Raises
-    ------
-    MeshError
-        The file was changed.
     """
     from slideviz.formats.su2.digits import print_changed
 

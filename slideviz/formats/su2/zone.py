@@ -52,17 +52,14 @@ class SectionRows:
     def counted(self, section: KeywordBlock, what: str) -> Rows:
         """Return the rows of numbers of a section, as many as its keyword line says.
 
+        Raises MeshError if there are more or fewer rows, or other text among them.
+
         Parameters
         ----------
         section : KeywordBlock
             The section.
         what : str
             What is on the rows, for messages: ``points``.
-
-        Raises
-        ------
-        MeshError
-            There are more or fewer rows, or other text among them.
         """
         count = count_of(self.lines, section)
         rows = self.lines.pieces(section.line, section.stop)

@@ -261,6 +261,7 @@ def partial_file(
 
     An error in the block removes the file. If the program is stopped, the file stays if a part is
     recorded as done, so that ``resume`` can continue. Otherwise the caller removes or renames it.
+    Raises MeshError if it cannot be written, or another process is writing it.
 
     Parameters
     ----------
@@ -274,11 +275,6 @@ def partial_file(
         Whether to continue with the file of a stopped process, if there is one.
     more : str
         End of its name, where a target has several partial files.
-
-    Raises
-    ------
-    MeshError
-        It cannot be written, or another process is writing it.
     """
     ours, note = names_of(path, more)
     try:
@@ -319,6 +315,7 @@ def partial_copy(
     """Context with a partial file that is a copy of ``source``, which replaces ``path`` at the end.
 
     Of a copy that a stopped process has left, all that is not ``changed`` is made equal again.
+    Raises MeshError if it cannot be written, or another process is writing it.
 
     Parameters
     ----------
@@ -332,11 +329,6 @@ def partial_copy(
         The first of the bytes that the caller changes, and the one after the last.
     ranks : SerialPool or Ranks
         The processes that copy.
-
-    Raises
-    ------
-    MeshError
-        It cannot be written, or another process is writing it.
     """
     require_no_input(path, MeshError, replaces)
     size = source.stat().st_size

@@ -57,18 +57,11 @@ SIZE_WORDS = {
 class FilmForm(QWidget):
     """The fields for the options of a film.
 
-    Parameters
-    ----------
-    renderer : OffscreenRenderer
-        Holds the session whose steps are filmed.
-
-    Signals
-    -------
-    changed()
-        An option has changed.
+    ``renderer``: holds the session whose steps are filmed.
     """
 
     changed = Signal()
+    """An option has changed."""
 
     def __init__(self, renderer: OffscreenRenderer) -> None:
         super().__init__()
@@ -218,22 +211,17 @@ class FilmDialog(QDialog):
 
     Parameters
     ----------
-    parent : QWidget
     renderer : OffscreenRenderer
         Draws the steps of its session, whatever the window shows meanwhile.
     ask : callable
         Asks the user for the file, given a kind of `slideviz.gui.dialogs.film.KINDS`; returns
         None if there is none.
-
-    Signals
-    -------
-    made(Path), failed(Exception), stopped()
-        A film was written; failed; was stopped by the user.
     """
 
-    made = Signal(object)
-    failed = Signal(object)
+    made = Signal(object)  # Path
+    failed = Signal(object)  # Exception
     stopped = Signal()
+    """`made`, `failed`, `stopped`: a film was written; failed; was stopped by the user."""
 
     def __init__(
         self, parent: QWidget, renderer: OffscreenRenderer, ask: Callable[[str], Path | None]

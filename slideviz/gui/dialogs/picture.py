@@ -85,7 +85,6 @@ class PictureDialog(QDialog):
 
     Parameters
     ----------
-    parent : QWidget
     renderer : OffscreenRenderer
         Draws the picture.
     view_size : (int, int)

@@ -37,17 +37,12 @@ NARROW = 290
 
 
 class BoundariesTable(QTableWidget):
-    """The table of the boundaries; the tab key leaves it instead of going through the cells.
-
-    Signals
-    -------
-    menu_wanted(int, QPoint), role_wanted(int)
-        The user asks for the menu of a row, at a position on the screen; for the list of its
-        roles (F2, Return, Alt+Down).
-    """
+    """The table of the boundaries; the tab key leaves it instead of going through the cells."""
 
     menu_wanted = Signal(int, QPoint)
     role_wanted = Signal(int)
+    """`menu_wanted`, `role_wanted`: the user asks for the menu of a row, at a position on the
+    screen; for the list of its roles (F2, Return, Alt+Down)."""
 
     def __init__(self) -> None:
         super().__init__(0, 3)

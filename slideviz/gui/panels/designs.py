@@ -38,21 +38,13 @@ from slideviz.session.state import Session
 class DesignsJob(QObject):
     """The job that runs the designs of a table in a thread.
 
-    Parameters
-    ----------
-    ended : callable
-        Called with a sentence, empty if all designs were run, and whether it is an error.
-
-    Signals
-    -------
-    results_arrived(list of Row)
-        Results since the last emission: not one by one, as each repaints the whole window.
-    progressed(str, float)
-        The progress, in words and from 0 to 1.
+    ``ended``: called with a sentence, empty if all designs were run, and whether it is an error.
     """
 
-    results_arrived = Signal(list)
+    results_arrived = Signal(list)  # list of Row
+    """Results since the last emission: not one by one, as each repaints the whole window."""
     progressed = Signal(str, float)
+    """The progress, in words and from 0 to 1."""
 
     def __init__(self, ended: Callable[[str, bool], None], parent: QObject) -> None:
         super().__init__(parent)
@@ -99,15 +91,10 @@ RUN = "Run the designs that have no result yet, or failed."
 
 
 class DesignsPanel(Panel):
-    """The table of designs, and their results as curves.
-
-    Signals
-    -------
-    changed()
-        The table or its results have changed.
-    """
+    """The table of designs, and their results as curves."""
 
     changed = Signal()
+    """The table or its results have changed."""
 
     def __init__(self, services: Services) -> None:
         super().__init__(services.store)

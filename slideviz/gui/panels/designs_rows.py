@@ -132,10 +132,7 @@ RANGE = "-8 to 0 in 9, or 1, 2, 5"
 class DesignRows(QWidget):
     """The table of designs, and above it the fields for the number that varies and its values.
 
-    Parameters
-    ----------
-    add : callable
-        Called when the user clicks “Add” or presses Return.
+    ``add``: called when the user clicks “Add” or presses Return.
     """
 
     def __init__(self, add: Slot) -> None:

@@ -35,18 +35,12 @@ Range = tuple[float, float]
 
 
 class BrushCanvas(PlotCanvas):
-    """A histogram on which the mouse selects a range of values.
-
-    Signals
-    -------
-    brushed(object)
-        The selected range (low, high); None for a click or double click, which ends it.
-    dragging(bool)
-        True when the mouse button is pressed, False when it is released.
-    """
+    """A histogram on which the mouse selects a range of values."""
 
     brushed = Signal(object)
+    """The selected range (low, high); None for a click or double click, which ends it."""
     dragging = Signal(bool)
+    """True when the mouse button is pressed, False when it is released."""
 
     def __init__(self, drawing: Callable[[], Draw]) -> None:
         super().__init__(drawing)

@@ -45,18 +45,12 @@ RAISED = {
 
 
 class MotionEditor(MotionForm):
-    """The editor of a motion, which emits each valid change.
+    """The editor of a motion, which emits each valid change."""
 
-    Signals
-    -------
-    changed(Motion)
-        The motion as edited, in place of the one that was shown.
-    table_wanted()
-        The user wants to edit the rows of the motion's displacement file.
-    """
-
-    changed = Signal(object)
+    changed = Signal(object)  # Motion
+    """The motion as edited, in place of the one that was shown."""
     table_wanted = Signal()
+    """The user wants to edit the rows of the motion's displacement file."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

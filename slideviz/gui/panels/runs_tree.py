@@ -43,15 +43,10 @@ TIPS = (
 
 
 class _FirstLine(QStyledItemDelegate):
-    """The delegate that draws an item in the upper half of its row, and edits a run's name.
-
-    Signals
-    -------
-    renamed(int, str)
-        The number of a run, and its new name.
-    """
+    """The delegate that draws an item in the upper half of its row, and edits a run's name."""
 
     renamed = Signal(int, str)
+    """The number of a run, and its new name."""
 
     def sizeHint(self, option: QStyleOptionViewItem, index: ModelIndex) -> QSize:
         item = QStyleOptionViewItem(option)
@@ -120,18 +115,12 @@ class ShownRun(NamedTuple):
 
 
 class RunTree(QTreeWidget):
-    """The list of runs: per row numbers in columns, and below them a line over the whole width.
-
-    Signals
-    -------
-    beside_wanted(int)
-        The number of a run that was clicked with Ctrl.
-    renamed(int, str)
-        The number of a run, and its new name.
-    """
+    """The list of runs: per row numbers in columns, and below them a line over the whole width."""
 
     beside_wanted = Signal(int)
+    """The number of a run that was clicked with Ctrl."""
     renamed = Signal(int, str)
+    """The number of a run, and its new name."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -32,17 +32,12 @@ class SectionEditor(QWidget):
 
     While the slider is dragged, at most one section is emitted per turn of the event loop, so that
     drawing never falls behind the mouse.
-
-    Signals
-    -------
-    changed(Section)
-        The section as edited.
-    dragging(bool)
-        The slider was pressed (True) or released (False).
     """
 
-    changed = Signal(object)
+    changed = Signal(object)  # Section
+    """The section as edited."""
     dragging = Signal(bool)
+    """The slider was pressed (True) or released (False)."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -62,18 +62,11 @@ SIZES = {
 class SectionsPanel(Panel):
     """The panel of the sections: their list, and the editor of the selected one.
 
-    Parameters
-    ----------
-    section_views : SectionViews
-        The handles and the flat views of the selected section.
-
-    Signals
-    -------
-    picture_wanted(Paper)
-        The user wants a picture of the selected section, on this paper.
+    ``section_views``: the handles and the flat views of the selected section.
     """
 
-    picture_wanted = Signal(object)
+    picture_wanted = Signal(object)  # PageFormat
+    """The user wants a picture of the selected section, on this paper."""
 
     def __init__(self, section_views: SectionViews) -> None:
         super().__init__(section_views.store)

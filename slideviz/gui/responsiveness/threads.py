@@ -58,16 +58,11 @@ def prepare_drawing(view: Any, stage: Stage) -> None:
 
 
 class WarmupThread(QObject):
-    """The daemon thread that runs `slideviz.session.jit_warmup.warm_up` once.
-
-    Signals
-    -------
-    compiling(bool)
-        True when the first compilation begins, False when all are done; not emitted if everything
-        was compiled before.
-    """
+    """The daemon thread that runs `slideviz.session.jit_warmup.warm_up` once."""
 
     compiling = Signal(bool)
+    """True when the first compilation begins, False when all are done; not emitted if everything
+    was compiled before."""
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -169,11 +164,7 @@ def lower_priority(thread: int | None = None) -> None:
     """Lower the priority of a thread (default: this one), and of those that it starts.
 
     Without a graphics card, the GUI thread draws on the processors that compute. Only on Linux.
-
-    Parameters
-    ----------
-    thread : int, optional
-        Its native id (see `threading.get_native_id`).
+    ``thread``: its native id (see `threading.get_native_id`).
     """
     if sys.platform == "linux":  # elsewhere a priority is that of the whole process
         thread = get_native_id() if thread is None else thread

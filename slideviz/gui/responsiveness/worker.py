@@ -28,20 +28,14 @@ class PieceRunner(QObject):
     """Advances a generator (see `slideviz.session.pieces`) by one piece per turn of the event loop.
 
     A piece that it yields as a `InThread` is run in a thread first, and its result sent back.
-
-    Signals
-    -------
-    yielded(object)
-        A value that the generator yielded, if neither None nor a `InThread`.
-    done(object)
-        The generator's return value. Nothing is emitted for one that was stopped.
-    failed(Exception)
-        The error that it raised.
     """
 
     yielded = Signal(object)
+    """A value that the generator yielded, if neither None nor a `InThread`."""
     done = Signal(object)
-    failed = Signal(object)
+    """The generator's return value. Nothing is emitted for one that was stopped."""
+    failed = Signal(object)  # Exception
+    """The error that it raised."""
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -113,23 +107,17 @@ class JobRunner(QObject):
     """Runs jobs, ``function(*values, report, stopped)``, in a thread, one at a time.
 
     A job calls ``report(item)`` for its signals, and ``stopped()``, which is True after `cancel`.
-
-    Signals
-    -------
-    progressed(Doing)
-        The newest progress that the job reported.
-    yielded(list)
-        All other items reported since the last emission, in order.
-    finished(object), cancelled(), failed(Exception)
-        The job returned a value; raised `Cancelled`; raised another error. Exactly one is emitted
-        per job, after all its reports.
     """
 
-    progressed = Signal(object)
+    progressed = Signal(object)  # JobProgress
+    """The newest progress that the job reported."""
     yielded = Signal(list)
+    """All other items reported since the last emission, in order."""
     finished = Signal(object)
     cancelled = Signal()
-    failed = Signal(object)
+    failed = Signal(object)  # Exception
+    """`finished`, `cancelled`, `failed`: the job returned a value; raised `Cancelled`; raised
+    another error. Exactly one is emitted per job, after all its reports."""
     _wake = Signal()
 
     def __init__(self, parent: QObject | None = None) -> None:

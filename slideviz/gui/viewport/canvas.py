@@ -79,29 +79,23 @@ def one_light() -> pv.Light:
 
 
 class ViewSignals(QObject):
-    """The signals of a `View3D`, in an object of their own: the view inherits hundreds of names.
-
-    Signals
-    -------
-    clicked(QPoint, KeyboardModifier), cell_clicked(QPoint), menu_wanted(QPoint)
-        A left click, at a position in pixels of the widget; a double click or one with Alt, which
-        is about a cell; a right click.
-    zoomed(QPoint, float)
-        The wheel was turned: the position of the mouse, and the factor to zoom by.
-    resized(), unveiled()
-        The size of the view changed; the last new actor was drawn (see `View3D.unveil`).
-    moving(), released()
-        The mouse or its wheel moves the camera, or a handle; the mouse button was released.
-    """
+    """The signals of a `View3D`, in an object of their own: the view inherits hundreds of names."""
 
     clicked = Signal(QPoint, Qt.KeyboardModifier)
     cell_clicked = Signal(QPoint)
     menu_wanted = Signal(QPoint)
+    """`clicked`, `cell_clicked`, `menu_wanted`: a left click, at a position in pixels of the
+    widget; a double click or one with Alt, which is about a cell; a right click."""
     zoomed = Signal(QPoint, float)
+    """The wheel was turned: the position of the mouse, and the factor to zoom by."""
     resized = Signal()
     unveiled = Signal()
+    """`resized`, `unveiled`: the size of the view changed; the last new actor was drawn (see
+    `View3D.unveil`)."""
     moving = Signal()
     released = Signal()
+    """`moving`, `released`: the mouse or its wheel moves the camera, or a handle; the mouse button
+    was released."""
 
 
 class View3D(QtInteractor):

@@ -43,7 +43,6 @@ class FlatViews(QWidget):
     ----------
     viewing : Viewing
         The 3D views, whose cuts are shown here too.
-    scheme : ColorScheme
     multi_samples : int
         Samples per pixel for antialiasing; 0 for none.
     """
@@ -184,13 +183,7 @@ NOTHING = "The section cuts no cell."
 
 
 class CurveView(QWidget):
-    """The plot of the curves along a section of a 2D mesh, one per mesh that is compared.
-
-    Parameters
-    ----------
-    store : Store
-    scheme : ColorScheme
-    """
+    """The plot of the curves along a section of a 2D mesh, one per mesh that is compared."""
 
     closed = Signal()
 
@@ -267,10 +260,8 @@ class FlatView(QWidget):
 
     Parameters
     ----------
-    store : Store
     cuts : Cuts
         The cuts of the 3D view, shared with it.
-    scheme : ColorScheme
     multi_samples : int
         Samples per pixel for antialiasing; 0 for none.
     """

@@ -60,10 +60,8 @@ class Handles:
         ----------
         views : list of (View3D, Scene, Mesh)
             Each view, its scene, and the mesh as deformed in the step it shows.
-        section : Section
         mesh : Mesh
             The undeformed mesh.
-        scheme : ColorScheme
         """
         kind = kind_of(section, mesh)
         for view, scene, deformed in views:
@@ -91,8 +89,6 @@ class PlaneHandle:
 
     Parameters
     ----------
-    view : View3D
-    scene : Scene
     moved, dragging : callable
         See `Moved` and `Dragging`.
     """

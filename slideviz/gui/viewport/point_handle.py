@@ -59,8 +59,6 @@ class PointHandle(QObject, Generic[Grasp]):
 
     Parameters
     ----------
-    view : View3D
-    scene : Scene
     moved, dragging : callable
         See `Moved` and `Dragging`.
     """
@@ -399,12 +397,7 @@ _ARROW = (
 
 
 class Overlay:
-    """Actors that draw points with rims and arrows in pixels over the scene: rims, points, held.
-
-    Parameters
-    ----------
-    view : View3D
-    """
+    """Actors that draw points with rims and arrows in pixels over the scene: rims, points, held."""
 
     def __init__(self, view: View3D) -> None:
         self.view = view

@@ -24,13 +24,8 @@ from slideviz.session.store import Store
 class CoarseWhileMoving(QObject):
     """Switches a slow scene to coarse boundaries while something is moved, and back afterwards.
 
-    The mouse may move the camera or, for example, the handle of a section.
-
-    Parameters
-    ----------
-    view : View3D
-    scene : Scene
-        The scene drawn in the view.
+    The mouse may move the camera or, for example, the handle of a section. ``scene``: the scene
+    drawn in the view.
     """
 
     def __init__(self, view: View3D, scene: Scene) -> None:
@@ -56,12 +51,7 @@ class CoarseWhileMoving(QObject):
 class CellMouse(QObject):
     """The mouse over the cells of one view: shows tooltips, and marks the cell that is clicked.
 
-    Parameters
-    ----------
-    view : View3D
-    scene : Scene
-        What it draws.
-    store : Store
+    ``scene``: what it draws.
     """
 
     def __init__(self, view: View3D, scene: Scene | FlatScene, store: Store) -> None:
@@ -107,12 +97,7 @@ class CellMouse(QObject):
 class BoundaryMouse(QObject):
     """The mouse over the boundaries of one view: a click selects one, a right click opens its menu.
 
-    Parameters
-    ----------
-    view : View3D
-    scene : Scene
-        What it draws.
-    store : Store
+    ``scene``: what it draws.
     """
 
     def __init__(self, view: View3D, scene: Scene, store: Store) -> None:

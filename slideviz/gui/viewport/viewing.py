@@ -26,16 +26,11 @@ from slideviz.session.store import Store
 
 
 class Viewing(QWidget):
-    """The 3D views: one, or two side by side with linked cameras and the same range of colors.
-
-    Signals
-    -------
-    second_made(), second_leaves()
-        The second view was made; it is about to be closed.
-    """
+    """The 3D views: one, or two side by side with linked cameras and the same range of colors."""
 
     second_made = Signal()
     second_leaves = Signal()
+    """`second_made`, `second_leaves`: the second view was made; it is about to be closed."""
 
     def __init__(self, store: Store, multi_samples: int = 4, parent: QWidget | None = None) -> None:
         super().__init__(parent)

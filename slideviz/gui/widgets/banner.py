@@ -58,15 +58,10 @@ class DetailsDialog(QDialog):
 
 
 class Banner(QFrame):
-    """A message across the top of the view that stays until it is closed.
-
-    Signals
-    -------
-    shown(str)
-        The text of a message, when it is shown.
-    """
+    """A message across the top of the view that stays until it is closed."""
 
     shown = Signal(str)
+    """The text of a message, when it is shown."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -99,7 +99,6 @@ class WrappingRow(QWidget):
 
     Parameters
     ----------
-    left, right : sequence of QWidget
     spacing : int
         Space between the parts in pixels; negative: the style's.
     apart : bool

@@ -19,15 +19,10 @@ MARGIN = 4
 
 
 class Choice(QComboBox):
-    """A drop-down list of values, each shown by a text; the wheel does not change the value.
-
-    Signals
-    -------
-    chosen(object)
-        The value that the user has chosen; not emitted by `show_value`.
-    """
+    """A drop-down list of values, each shown by a text; the wheel does not change the value."""
 
     chosen = Signal(object)
+    """The value that the user has chosen; not emitted by `show_value`."""
 
     def __init__(self, words: Mapping[Value, str], tip: str = "", name: str = "") -> None:
         super().__init__()

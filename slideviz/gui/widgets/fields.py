@@ -147,10 +147,8 @@ class NumberField(TextField):
 
     Parameters
     ----------
-    value : float
     allowed : callable, optional
         Returns why a value is not allowed; empty if it is.
-    tip : str
     words : mapping of float to str, optional
         Texts for some values; the first letters of one are enough to type it.
 
@@ -160,17 +158,12 @@ class NumberField(TextField):
         Why the field is marked as invalid; empty if it is not.
     together : str
         Why it is invalid together with the fields beside it, set by these.
-
-    Signals
-    -------
-    changed(float)
-        The new number after each valid edit.
-    marked()
-        ``fault`` has changed.
     """
 
     changed = Signal(float)
+    """The new number after each valid edit."""
     marked = Signal()
+    """``fault`` has changed."""
 
     def __init__(
         self,

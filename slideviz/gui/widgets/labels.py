@@ -99,11 +99,7 @@ ModelIndex: TypeAlias = QModelIndex | QPersistentModelIndex
 class ElidedLabel(QLabel):
     """A label whose text is cut with an ellipsis where it is too long; its width is free.
 
-    Parameters
-    ----------
-    text : str
-    mode : Qt.TextElideMode
-        Where the ellipsis is.
+    ``mode``: where the ellipsis is.
     """
 
     def __init__(
@@ -138,10 +134,7 @@ class ElidedLabel(QLabel):
 class WideLabel(QScrollArea):
     """A word-wrapped label as wide as its container, which scrolls a text of too many lines.
 
-    Parameters
-    ----------
-    lines : int
-        Most lines that are visible at once.
+    ``lines``: most lines that are visible at once.
     """
 
     def __init__(self, lines: int) -> None:

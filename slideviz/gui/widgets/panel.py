@@ -76,10 +76,6 @@ class Panel(QWidget):
     """The base of the widgets in the docks, which show the session and change it.
 
     A subclass makes its widgets, then calls `follow`; only functions given to it fill them.
-
-    Parameters
-    ----------
-    store : Store
     """
 
     def __init__(self, store: Store) -> None:

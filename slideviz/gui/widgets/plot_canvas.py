@@ -45,14 +45,10 @@ class PlotCanvas(QWidget):
     ----------
     figure : Figure
         The figure that is shown; its axes convert between data and pixels.
-
-    Signals
-    -------
-    drawn()
-        Another image is shown.
     """
 
     drawn = Signal()
+    """Another image is shown."""
 
     def __init__(self, drawing: Callable[[], Draw]) -> None:
         super().__init__()

@@ -16,10 +16,7 @@ from slideviz.plots.ticks import ticks
 class Ruler(QWidget):
     """The ruler of one axis of a flat view.
 
-    Parameters
-    ----------
-    upright : bool
-        True: vertical, left of the view; False: horizontal, below it.
+    ``upright``: vertical, left of the view; otherwise horizontal, below it.
     """
 
     def __init__(self, upright: bool) -> None:
