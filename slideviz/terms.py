@@ -317,8 +317,8 @@ PERIODIC_DIRECTIONS: dict[str, tuple[int, PeriodicKind | None]] = {
 
 # Quality -----------------------------------------------------------------------------------
 
-Metric = Literal["knupp", "rbf-slide"]
-METRICS: dict[Metric, Term] = {
+SkewMetric = Literal["knupp", "rbf-slide"]
+SKEW_METRICS: dict[SkewMetric, Term] = {
     "knupp": Term("Knupp"),
     "rbf-slide": Term("as RBF-SliDe"),
 }

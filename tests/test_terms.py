@@ -18,7 +18,7 @@ TABLES = {
     terms.LevelCriterion: terms.LEVEL_CRITERIA,
     terms.PeriodicMode: terms.PERIODIC_MODES,
     terms.PeriodicType: terms.PERIODIC_TYPES,
-    terms.Metric: terms.METRICS,
+    terms.SkewMetric: terms.SKEW_METRICS,
     terms.CellState: dict.fromkeys(terms.CELL_STATES, terms.Term("state")),
     terms.Quantity: terms.QUANTITIES,
     terms.ColorBy: terms.COLOR_BY,
@@ -57,12 +57,12 @@ def test_only_what_has_a_tip_is_explained():
 def test_each_value_has_what_computes_or_draws_it():
     from matplotlib import colormaps
 
-    from slideviz.mesh import metrics
+    from slideviz.mesh import skew
     from slideviz.rbf import kernels, methods
     from slideviz.study.combinations import COMPARED_METHODS
 
     assert methods.SLIDING_METHODS.keys() == terms.SLIDING.keys()
-    assert metrics.METRICS.keys() == terms.METRICS.keys()
+    assert skew.SKEW_METRICS.keys() == terms.SKEW_METRICS.keys()
     assert kernels.KERNELS.keys() == terms.KERNELS.keys()
     assert set(terms.COLOR_MAPS) <= set(colormaps)
     assert set(COMPARED_METHODS) == {*terms.SLIDING, *terms.METHODS} - {"rbf"}

@@ -18,7 +18,7 @@ from slideviz.case.values import AXIS, NAMES, PAIRS, PATH, POINT, YES_NO, choice
 from slideviz.case.view_keys import VIEW_ROWS
 from slideviz.errors import CaseError
 from slideviz.formats.table import FILE_FORMATS
-from slideviz.terms import METRICS, PERIODIC_DIRECTIONS, PERIODIC_MODES, PERIODIC_TYPES
+from slideviz.terms import PERIODIC_DIRECTIONS, PERIODIC_MODES, PERIODIC_TYPES, SKEW_METRICS
 
 
 def no_pair(case: Case) -> str:
@@ -219,7 +219,7 @@ _ROWS = (
     setting(
         "QUALITY_METRIC",
         QUALITY,
-        one_of(METRICS),
+        one_of(SKEW_METRICS),
         "quality_metric",
         "Size-skew as published, or as RBF-SliDe computes it (differs for hexahedra).",
         label="Quality",

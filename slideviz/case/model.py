@@ -20,21 +20,21 @@ from slideviz.terms import (
     FFD_SYSTEMS,
     KERNELS,
     METHODS,
-    METRICS,
     PERIODIC_MODES,
     PERIODIC_TYPES,
     ROLES,
     SIDES,
+    SKEW_METRICS,
     SLIDING,
     FfdBlending,
     FfdSystem,
     FileFormat,
     Method,
-    Metric,
     PeriodicMode,
     PeriodicType,
     Role,
     Side,
+    SkewMetric,
     Sliding,
 )
 
@@ -315,7 +315,7 @@ class Case(CheckedFields):
     reduction: Reduction | None = AUTO
     idw_power: float | None = None
     idw_fixed_weight: float = 1.0
-    quality_metric: Metric = field(default="knupp", metadata=METRICS)
+    quality_metric: SkewMetric = field(default="knupp", metadata=SKEW_METRICS)
     generate_quality: bool = True
     source: Path | None = None
     view: Mapping[str, Any] = field(default_factory=dict)

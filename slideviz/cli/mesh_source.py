@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from slideviz.streaming.quality import CellCounts
     from slideviz.streaming.source import MeshSource
     from slideviz.streaming.stream_input import StreamInput
-    from slideviz.terms import FileFormat, Metric
+    from slideviz.terms import FileFormat, SkewMetric
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class OpenMesh:
         from slideviz.streaming.quality import measure_mesh
 
         folder = Path(tempfile.gettempdir())
-        metric: Metric = getattr(arguments, "metric", "knupp")
+        metric: SkewMetric = getattr(arguments, "metric", "knupp")
         with progress_of(arguments, "quality") as tick:
             return measure_mesh(
                 self.stack, folder, self.source, metric=metric, counts=counts, tick=tick

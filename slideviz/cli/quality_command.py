@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from slideviz.cli.options import add_reference, add_shared, optional_case, reference_words
 from slideviz.formats.table import own_endings
-from slideviz.terms import METRICS
+from slideviz.terms import SKEW_METRICS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +23,7 @@ def add_quality(calls: argparse._SubParsersAction) -> None:
     add_reference(call, "case that made it: its MESH_FILENAME is the reference")
     call.add_argument(
         "--metric",
-        choices=tuple(METRICS),
+        choices=tuple(SKEW_METRICS),
         default="knupp",
         help="rbf-slide: hexahedra as that program measures them (default: knupp)",
     )

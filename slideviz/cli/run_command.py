@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import Mesh
     from slideviz.solver.deform import Step
     from slideviz.solver.steps import RunResult
-    from slideviz.terms import FileFormat, Metric
+    from slideviz.terms import FileFormat, SkewMetric
 
 KEPT_BYTES = 1_000_000_000
 """Most bytes of meshes of steps in memory; they are kept to find when cells were inverted."""
@@ -367,7 +367,9 @@ def run_steps(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Ste
 
 
 @contextmanager
-def _series(path: Path | None, mesh: Mesh, metric: Metric) -> Iterator[Callable[[Mesh], object]]:
+def _series(
+    path: Path | None, mesh: Mesh, metric: SkewMetric
+) -> Iterator[Callable[[Mesh], object]]:
     """Context with a function that adds the mesh of a step to the file of all steps.
 
     The undeformed mesh is in it already. Each mesh has the quality of its cells and the

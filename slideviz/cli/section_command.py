@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.cli.options import add_reference, add_shared, optional_case, reference_words
 from slideviz.cli.section_options import limits, neighbours, pixels, section_reader
-from slideviz.terms import COLOR_MAPS, METRICS, QUANTITIES
+from slideviz.terms import COLOR_MAPS, QUANTITIES, SKEW_METRICS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -84,7 +84,7 @@ def add_section(calls: argparse._SubParsersAction) -> None:
     add("--no-edges", action="store_false", dest="edges", help="leave out the mesh lines")
     add("--no-title", action="store_false", dest="title", help="leave out the title")
     add("--no-axes", action="store_false", dest="axes", help="leave out axes and their numbers")
-    add("--metric", choices=tuple(METRICS), default="knupp", help="as for quality")
+    add("--metric", choices=tuple(SKEW_METRICS), default="knupp", help="as for quality")
     add_shared(call, "zone")
     add_shared(call, "json", help="numbers of the cut as JSON; - is the terminal")
     add_shared(call, "stream")

@@ -179,7 +179,7 @@ def corners(at, table, count, alpha):  # type: ignore[no-untyped-def]
 def spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
     """Write the spread of each corner into ``spread`` (k, ...).
 
-    The skew compares the corner Jacobian with it; `slideviz.mesh.metrics` defines it for each type,
+    The skew compares the corner Jacobian with it; `slideviz.mesh.skew` defines it for each type,
     `jacobian_slopes` has its derivatives.
     """
     for k in range(len(table)):

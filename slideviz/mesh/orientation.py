@@ -14,8 +14,8 @@ import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobians import CORNERS, write_corners
-from slideviz.mesh.metrics import ordered_sum
 from slideviz.mesh.model import Mesh, sealed
+from slideviz.mesh.skew import ordered_sum
 from slideviz.system.threads import in_parts
 
 if TYPE_CHECKING:

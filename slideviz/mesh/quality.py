@@ -2,7 +2,7 @@
 
 ``f_ss = √f_size · f_skew`` (De Boer, Van der Schoot, Bijl 2007), all in 0 to 1, 1 is best.
 ``f_size`` compares with the undeformed cell: ``min(τ, 1/τ)``, where τ is the sum of the cell's
-corner Jacobians over that of the undeformed cell. ``f_skew`` is that of `slideviz.mesh.metrics`.
+corner Jacobians over that of the undeformed cell. ``f_skew`` is that of `slideviz.mesh.skew`.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from slideviz.mesh.jacobians import (
     measure,
     write_corners,
 )
-from slideviz.mesh.metrics import METRICS, ordered_sum
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality_derivative import QualityDerivative, derivative_of
+from slideviz.mesh.skew import SKEW_METRICS, ordered_sum
 from slideviz.system.threads import in_parts
-from slideviz.terms import Metric
+from slideviz.terms import SkewMetric
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -165,7 +165,7 @@ class Quality:
     found where it is not positive) or ``UNPROVEN`` (a hexahedron that is neither)."""
     signs: NDArray[np.int8]
     """(m,): 1, or -1 for a cell that is numbered the other way round."""
-    metric: Metric
+    metric: SkewMetric
     """``knupp``, or ``rbf-slide``: hexahedra with exponent 1 instead of 2/3 in ``f_skew``, as the
     program of the thesis has it, for comparison with its figures."""
     halo: NDArray[np.bool_] | None = None
@@ -277,7 +277,7 @@ class Quality:
 def quality(
     mesh: Mesh,
     reference: Mesh | None = None,
-    metric: Metric = "knupp",
+    metric: SkewMetric = "knupp",
     going_on: Callable[[], object] = lambda: None,
     *,
     derivative: bool = False,
@@ -331,8 +331,8 @@ def quality(
     >>> slope.of_minimum[2] > 0
     array([ True,  True])
     """
-    if metric not in METRICS:
-        raise CaseError(f"quality metric {metric!r} is unknown; use {' or '.join(METRICS)}")
+    if metric not in SKEW_METRICS:
+        raise CaseError(f"quality metric {metric!r} is unknown; use {' or '.join(SKEW_METRICS)}")
     check_cells(mesh)
     check_size(mesh)
     sums, signs = reference_of(mesh if reference is None else _checked(reference, mesh))
@@ -368,7 +368,7 @@ def _of_cells(
     nodes: IntArray,
     signs: NDArray[np.int8],
     sums: FloatArray,
-    metric: Metric,
+    metric: SkewMetric,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.uint8]]:
     """Return size, skew and status (m,) of cells of one type, ``nodes`` (m, n).
 
@@ -384,7 +384,7 @@ def _of_cells(
     with np.errstate(all="ignore"):
         size = np.where(good, _ratio(ordered_sum(alpha), sums), 0.0)
         # 1 is the bound of every formula; a value above it by rounding would be in no bin.
-        skew = np.where(good, np.minimum(METRICS[metric][vtk](spread, alpha), 1.0), 0.0)
+        skew = np.where(good, np.minimum(SKEW_METRICS[metric][vtk](spread, alpha), 1.0), 0.0)
     return size, skew, status
 
 

@@ -2,7 +2,7 @@
 
 Where all corners are positive, each metric is a constant divided by ``Σ_k t_k``, with
 ``t_k = s_kᵃ / α_kᵇ`` of the spread s and the Jacobian α of corner k
-(`slideviz.mesh.metrics.EXPONENTS`). So, with ``θ_k = t_k / Σ t``, the differential of the
+(`slideviz.mesh.skew.EXPONENTS`). So, with ``θ_k = t_k / Σ t``, the differential of the
 logarithm of size-skew (``f_ss``, `slideviz.mesh.quality`) is
 
     d ln f_ss = Σ_k θ_k (b dα_k / α_k - a ds_k / s_k) ± ½ Σ_k dα_k / Σ_k α_k
@@ -29,8 +29,8 @@ from slideviz.mesh.jacobians import (
     hexahedron_coefficients,
     prism_coefficients,
 )
-from slideviz.mesh.metrics import EXPONENTS
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, sealed
+from slideviz.mesh.skew import EXPONENTS
 from slideviz.system.threads import PART, cores, in_parts
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from slideviz.streaming.quality import measure_mesh
 from slideviz.streaming.resources import NEEDED
 from slideviz.streaming.skin import read_skin
 from slideviz.streaming.source import CellBlock, FileSource
-from slideviz.terms import Metric
+from slideviz.terms import SkewMetric
 
 LARGE_CELLS = 5_000_000
 """Of a mesh with more cells, only the boundary is opened, if its file can be read in parts."""
@@ -65,7 +65,7 @@ def read_boundary(path: Path, zone: int | None, tick: Callable[[float], object])
     return replace(skin, remarks=(*skin.remarks, remark))
 
 
-def first_frame(skin: Mesh, metric: Metric, tick: Callable[[float], object]) -> StepFrame:
+def first_frame(skin: Mesh, metric: SkewMetric, tick: Callable[[float], object]) -> StepFrame:
     """Return the undeformed frame of a mesh by its ``skin``, with the quality of all its cells.
 
     Raises
@@ -85,7 +85,9 @@ def first_frame(skin: Mesh, metric: Metric, tick: Callable[[float], object]) -> 
     return frame_of(skin, skin, skin.source, measured.totals, metric)
 
 
-def frame_of(now: Mesh, skin: Mesh, file: Path, totals: QualityTotals, metric: Metric) -> StepFrame:
+def frame_of(
+    now: Mesh, skin: Mesh, file: Path, totals: QualityTotals, metric: SkewMetric
+) -> StepFrame:
     """Return the frame of a large mesh: its boundary in memory, its cells in a file.
 
     Parameters
@@ -105,7 +107,7 @@ def frame_of(now: Mesh, skin: Mesh, file: Path, totals: QualityTotals, metric: M
     return StepFrame(now, measured, extra=block_frame(worst, skin, metric), file=file)
 
 
-def block_frame(block: CellBlock, skin: Mesh, metric: Metric) -> StepFrame:
+def block_frame(block: CellBlock, skin: Mesh, metric: SkewMetric) -> StepFrame:
     """Return some cells of a mesh as a frame, with their quality; ``skin`` is the mesh's."""
     block = block.part_of(skin)
     return StepFrame(block.mesh, quality(block.mesh, block.base, metric), base=block.base)

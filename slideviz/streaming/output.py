@@ -32,7 +32,7 @@ from slideviz.streaming.stream_input import StreamInput, text_blocks
 from slideviz.system.atomic import atomic_write
 from slideviz.system.file_checks import require_no_input
 from slideviz.system.ranks import SerialPool
-from slideviz.terms import Metric
+from slideviz.terms import SkewMetric
 
 CHUNK = 1 << 20
 """Most nodes or cells of a part: one part is in memory at a time."""
@@ -52,7 +52,7 @@ class Output:
         self,
         stack: ExitStack,
         mesh_input: StreamInput,
-        metric: Metric,
+        metric: SkewMetric,
         output: Path,
         timer: PhaseTimer,
         ranks: SerialPool,
@@ -243,7 +243,7 @@ def checksum_reader(path: Path, zone: int | None, partial: Path) -> Iterator[Cal
 
 @contextmanager
 def cell_measurer(
-    path: Path, zone: int | None, partial: Path, metric: Metric, listed: int
+    path: Path, zone: int | None, partial: Path, metric: SkewMetric, listed: int
 ) -> Iterator[Callable[[Part], MeasuredBlock]]:
     """Context with a function that measures the quality of the cells of a part."""
     with ExitStack() as stack:

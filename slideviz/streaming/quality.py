@@ -31,7 +31,7 @@ from slideviz.streaming.skin import Index, index_of
 from slideviz.streaming.source import CELLS, CellBlock, FileSource, MeshSource, Scratch
 from slideviz.system.ranks import SERIAL
 from slideviz.system.threads import Tick
-from slideviz.terms import Metric
+from slideviz.terms import SkewMetric
 
 Hashes = NDArray[np.uint64]
 
@@ -47,7 +47,7 @@ class QualityCollector:
     They are in ``folder``, 9 bytes for each cell, and are removed when ``stack`` closes.
     """
 
-    def __init__(self, stack: ExitStack, folder: Path, count: int, metric: Metric) -> None:
+    def __init__(self, stack: ExitStack, folder: Path, count: int, metric: SkewMetric) -> None:
         self._metric = metric
         self._files = [Scratch(stack, folder, count, kind) for kind in (float, np.uint8)]
         self._values, self._status = (file.array for file in self._files)
@@ -80,7 +80,7 @@ class QualityCollector:
 
 
 def quality_blocks(
-    source: MeshSource, metric: Metric, tick: Tick = lambda _: None, *, may_fold: bool = False
+    source: MeshSource, metric: SkewMetric, tick: Tick = lambda _: None, *, may_fold: bool = False
 ) -> Iterator[CellBlock]:
     """Yield all cells of a mesh with their quality, in the order of the file.
 
@@ -142,7 +142,7 @@ def measure_mesh(
     folder: Path,
     source: MeshSource,
     *,
-    metric: Metric = "knupp",
+    metric: SkewMetric = "knupp",
     worst: int = 0,
     counts: CellCounts | None = None,
     may_fold: bool = False,
@@ -211,7 +211,7 @@ class MeasuredBlock:
     """The node with the largest displacement."""
 
     @classmethod
-    def of(cls, block: CellBlock, metric: Metric, listed: int) -> MeasuredBlock:
+    def of(cls, block: CellBlock, metric: SkewMetric, listed: int) -> MeasuredBlock:
         """Return the quality of a block, with the ``listed`` inverted cells of lowest numbers."""
         base, mesh = block.base, block.mesh
         assert base is not None
@@ -234,7 +234,7 @@ class MeasuredBlock:
 class RunCollector:
     """The quality of all cells before and after a run, collected block by block."""
 
-    def __init__(self, stack: ExitStack, folder: Path, count: int, metric: Metric) -> None:
+    def __init__(self, stack: ExitStack, folder: Path, count: int, metric: SkewMetric) -> None:
         self.after, self.before = (QualityCollector(stack, folder, count, metric) for _ in range(2))
         self.reset()
 

@@ -9,9 +9,9 @@ from slideviz.errors import CaseError, MeshError
 from slideviz.formats.files import read
 from slideviz.mesh import jacobian_slopes, quality_derivative
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.metrics import EXPONENTS, METRICS
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import INVERTED, quality
+from slideviz.mesh.skew import EXPONENTS, SKEW_METRICS
 from slideviz.system import threads
 from tests.builders import grid, halo_text
 from tests.oracles import quality as oracle
@@ -108,12 +108,12 @@ def test_the_exponents_are_those_of_the_formulas(vtk):
     rng = np.random.default_rng(0)
     corners = len(ELEMENTS[vtk].corners)
     spread, alpha = rng.uniform(1, 3, (2, corners, 5))
-    for metric, rows in METRICS.items():
+    for metric, rows in SKEW_METRICS.items():
         a, b = EXPONENTS[metric][vtk]
         ideal = rows[vtk](np.ones((corners, 1)), np.ones((corners, 1))) * corners
         literal = ideal / (spread**a / alpha**b).sum(axis=0)
         np.testing.assert_allclose(rows[vtk](spread, alpha), literal, rtol=1e-13)
-    assert EXPONENTS.keys() == METRICS.keys()
+    assert EXPONENTS.keys() == SKEW_METRICS.keys()
 
 
 @pytest.mark.parametrize("folded", [False, True])

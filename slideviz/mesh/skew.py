@@ -18,7 +18,7 @@ from functools import reduce
 import numpy as np
 
 from slideviz.mesh.model import FloatArray
-from slideviz.terms import Metric
+from slideviz.terms import SkewMetric
 
 Skew = Callable[[FloatArray, FloatArray], FloatArray]
 """A function of spread and Jacobians (k, m) that returns the skew (m,)."""
@@ -82,7 +82,7 @@ KNUPP: dict[int, Skew] = {  # by VTK identifier
     13: _prism,
     14: _pyramid,
 }
-METRICS: Mapping[Metric, Mapping[int, Skew]] = {
+SKEW_METRICS: Mapping[SkewMetric, Mapping[int, Skew]] = {
     "knupp": KNUPP,
     "rbf-slide": {**KNUPP, 12: _hexahedron_rbf_slide},
 }
@@ -97,11 +97,11 @@ _EXPONENTS: dict[int, tuple[float, float]] = {  # of KNUPP
     13: (_THIRDS, _THIRDS),
     14: (1, _THIRDS),
 }
-EXPONENTS: Mapping[Metric, Mapping[int, tuple[float, float]]] = {
+EXPONENTS: Mapping[SkewMetric, Mapping[int, tuple[float, float]]] = {
     "knupp": _EXPONENTS,
     "rbf-slide": {**_EXPONENTS, 12: (1, 1)},
 }
-"""Exponents a, b of the functions in ``METRICS``, by which the skew is differentiated.
+"""Exponents a, b of the functions in ``SKEW_METRICS``, by which the skew is differentiated.
 
 Each function is a constant divided by ``Σ_k spread_kᵃ / alpha_kᵇ``
 (`slideviz.mesh.quality_derivative`).
