@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import Cells, Marker, Mesh
     from slideviz.mesh.quality import Quality, quality
     from slideviz.mesh.quality_derivative import QualityDerivative
+    from slideviz.mesh.walls import Walls, walls
     from slideviz.plots.section_picture import SectionStyle
     from slideviz.rbf.reduction import Reduction
     from slideviz.scene.overview import Detail
@@ -73,6 +74,7 @@ _HOME = {
     "Step": "solver.deform",
     "ToleranceWarning": "errors",
     "Translate": "case.model",
+    "Walls": "mesh.walls",
     "compare": "study.combinations",
     "convert": "formats.files",
     "deform": "solver.deform",
@@ -82,6 +84,7 @@ _HOME = {
     "read": "formats.files",
     "section": "export.flat_section",
     "sweep": "design.sweeps.sweep",
+    "walls": "mesh.walls",
     "write": "formats.files",
 }
 
@@ -115,6 +118,7 @@ __all__ = [
     "Step",
     "ToleranceWarning",
     "Translate",
+    "Walls",
     "__version__",
     "compare",
     "convert",
@@ -125,6 +129,7 @@ __all__ = [
     "read",
     "section",
     "sweep",
+    "walls",
     "write",
 ]
 

@@ -335,7 +335,7 @@ def quality(
         raise CaseError(f"quality metric {metric!r} is unknown; use {' or '.join(SKEW_METRICS)}")
     check_cells(mesh)
     check_size(mesh)
-    sums, signs = reference_of(mesh if reference is None else _checked(reference, mesh))
+    sums, signs = reference_of(mesh if reference is None else checked_reference(reference, mesh))
     values, size, skew = np.empty((3, len(mesh.cells)))
     status = np.empty(len(mesh.cells), np.uint8)
     for vtk, (ids, nodes) in mesh.cells.by_type.items():
@@ -388,7 +388,7 @@ def _of_cells(
     return size, skew, status
 
 
-def _checked(reference: Mesh, mesh: Mesh) -> Mesh:
+def checked_reference(reference: Mesh, mesh: Mesh) -> Mesh:
     """Return ``reference`` if it has the cells of ``mesh``, and raise MeshError otherwise."""
     same_points = reference.points.shape == mesh.points.shape
     if not (same_points and reference.cells.same_as(mesh.cells)):

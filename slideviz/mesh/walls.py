@@ -1,0 +1,423 @@
+"""Walls: the layers of cells at boundaries, in the terms of the drag prediction workshops.
+
+From each facet of a boundary a stack of cells leaves it, from a side to the opposite one, while
+cells are quadrilaterals, hexahedra, or prisms entered by a triangle; another cell ends it. The
+edges that lead from the corners of the facet through the stack are its *columns*: nodes
+p0 (on the boundary), p1, p2 ... A column belongs to all facets whose stacks begin with the edge
+p0 p1 (both sides of a sharp trailing edge of an O-mesh; of a C-mesh each side has its own), and
+its normal n is the mean of the inward normals of these facets, weighted with their areas.
+
+==================  ==============================================================================
+first height        (p1 - p0)·n: the distance of the first node from the wall, on which y+ depends.
+                    Of a facet without columns (of a triangle, tetrahedron, pyramid, or prism on its
+                    side): the distance of its plane from the mean of the cell's other nodes.
+                    Negative where the cell is turned over.
+growth              largest ratio of the lengths of two successive edges, the longer one over the
+                    shorter one, of the first five edges of a column. Workshops ask for below 1.25.
+equal layers        number of first edges, at most five, whose lengths differ from that of the first
+                    by less than 1 %. Workshops ask for two.
+wall angle          angle between the first edge and the boundary in degrees: 90 along the normal n,
+                    negative where the edge leads out of the mesh; 90 minus the angle to n.
+height ratio        first height after over before.
+angle change        absolute difference of the wall angles after and before.
+==================  ==============================================================================
+
+At a periodic side only the facets of this side count. A halo's cells are no part of a stack.
+Sources: AIAA drag prediction workshops 4 to 7, gridding guidelines (growth, equal layers).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from slideviz.argument_types import check_types
+from slideviz.mesh.cached_boundary import boundary_of
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
+from slideviz.mesh.quality import checked_reference
+from slideviz.mesh.topology import Boundary, facet_vectors, unit
+from slideviz.system.jit_cache import njit
+
+LAYERS = 5
+"""Layers that growth and equal layers are found from."""
+EQUAL = 0.01
+"""Largest difference of the lengths of edges, as a part of the first one's, that are equal."""
+FLAT = 1 / 3
+"""Largest height of a cell of the stack, as a part of its length."""
+
+_EDGES = np.full((15, 12, 2), -1)
+"""Local nodes of the edges of each element type, by VTK identifier."""
+for _row in ELEMENTS.values():
+    _EDGES[_row.vtk, : len(_row.edges)] = np.reshape(_row.edges, (-1, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """The columns of nodes that leave the boundaries of a mesh, and facets that have none."""
+
+    boundary: Boundary
+    nodes: IntArray
+    """(c, k + 1): the nodes of each column, the first one on the boundary; -1 beyond its end."""
+    corner: IntArray
+    """(f, 2 or 4): the column at each corner of each facet. Of a facet without columns: c + g, if
+    it is number g of ``bare``."""
+    depth: IntArray
+    """(f,): number of layers of the stack of each facet, at most k."""
+    bare: IntArray
+    """(g,): the facets without columns."""
+    off: IntArray
+    """(g, 2): the nodes of the cells of ``bare`` that are not on the facet (one or two)."""
+
+    def places(self, marker: str) -> IntArray:
+        """Return the places of a boundary, ascending: columns, then c + g for facets without."""
+        return np.unique(self.corner[self.boundary.marker == self.boundary.names.index(marker)])
+
+    def stack_thickness(self, points: FloatArray) -> FloatArray:
+        """Return the thickness (f,) of the stack of flat cells on each facet, at ``points`` (n, d).
+
+        That is the sum of the heights of the first layers whose height (mean length of the edges
+        that lead through it) is below a third of their length (of the side nearer to the wall: the
+        length of a line, else the square root of the area); 0 where there are none.
+        """
+        facets, width = self.boundary.facets, self.boundary.facets.shape[1]
+        thickness, flat = np.zeros(len(facets)), self.depth > 0
+        for layer in range(self.nodes.shape[1] - 1):
+            some = np.flatnonzero(flat & (self.depth > layer))
+            below, above = (self.nodes[self.corner[some], layer + k] for k in (0, 1))
+            edges = np.linalg.norm(points[above] - points[below], axis=2)
+            if width == 4:  # of a triangle, which repeats its last corner, the first three
+                edges[below[:, 2] == below[:, 3], 3] = np.nan
+            height = np.nanmean(edges, axis=1)
+            size = np.linalg.norm(facet_vectors(points, below), axis=1)
+            good = height < FLAT * (size if width == 2 else np.sqrt(size / 2))
+            thickness[some[good]] += height[good]
+            flat[some[~good]] = False
+        return thickness
+
+
+@check_types
+def find_columns(mesh: Mesh, layers: int = LAYERS) -> Columns:
+    """Return the columns of at most ``layers`` layers that leave all boundaries of a mesh.
+
+    Raises
+    ------
+    MeshError
+        A marker element is no side of any cell.
+    """
+    boundary, cells = boundary_of(mesh), mesh.cells
+    facets, owner = boundary.facets, boundary.owner
+    use = np.ones(len(cells), bool) if mesh.halo is None else ~mesh.halo.cells
+    begin, cells_at = _cells_at_nodes(cells.offsets, cells.connectivity, use, len(mesh.points))
+    chain = np.full((*facets.shape, layers + 1), -1)
+    off, depth = np.full((len(facets), 2), -1), np.zeros(len(facets), np.int64)
+    table = cells.types, cells.offsets, cells.connectivity
+    _climb(facets, owner, *table, begin, cells_at, _EDGES, chain, depth, off)
+    deep = depth > 0
+    if facets.shape[1] == 4:
+        triangle = facets[:, 2] == facets[:, 3]
+        chain[triangle, 3] = chain[triangle, 2]
+    chains = chain[deep].reshape(-1, layers + 1)
+    length = np.repeat(depth[deep], facets.shape[1])
+    # Of the chains with one first edge the longest, and of these the first, is the column.
+    order = np.lexsort((-length, chains[:, 1], chains[:, 0]))
+    edges = chains[order, :2]
+    new = np.r_[True, (edges[1:] != edges[:-1]).any(axis=1)][: len(edges)]
+    number = np.empty(len(order), np.int64)
+    number[order] = np.cumsum(new) - 1
+    nodes, bare = chains[order[new]], np.flatnonzero(~deep)
+    corner = np.empty(facets.shape, np.int64)
+    corner[deep] = number.reshape(-1, facets.shape[1])
+    corner[bare] = len(nodes) + np.arange(len(bare))[:, None]
+    return Columns(boundary, *(sealed(x) for x in (nodes, corner, depth, bare, off[bare])))
+
+
+@njit(nogil=True, cache=True)
+def _cells_at_nodes(offsets, connectivity, use, count):  # type: ignore[no-untyped-def]
+    """Return begins (count + 1,) and, from there on for each node, the cells that have it.
+
+    Only cells of the mask ``use`` (m,) are listed.
+    """
+    begin = np.zeros(count + 2, np.int64)
+    for cell in range(len(use)):
+        if use[cell]:
+            for k in range(offsets[cell], offsets[cell + 1]):
+                begin[connectivity[k] + 2] += 1
+    for node in range(count):
+        begin[node + 2] += begin[node + 1]
+    cells = np.empty(begin[count + 1], np.int32)
+    for cell in range(len(use)):
+        if use[cell]:
+            for k in range(offsets[cell], offsets[cell + 1]):
+                node = connectivity[k]
+                cells[begin[node + 1]] = cell
+                begin[node + 1] += 1
+    return begin[:-1], cells
+
+
+@njit(nogil=True, cache=True)
+def _climb(facets, owner, types, offsets, connectivity, begin, cells_at, edges, chain, depth, off):  # type: ignore[no-untyped-def]
+    """Write the nodes of the columns at the corners (f, w, k + 1) of facets, and the depths (f,).
+
+    Also the nodes ``off`` (f, 2) the facet of cells in which no column begins: one or two.
+    """
+    for f in range(len(facets)):
+        width = facets.shape[1]
+        if width == 4 and facets[f, 2] == facets[f, 3]:
+            width = 3
+        cell = owner[f]
+        chain[f, :width, 0] = facets[f, :width]
+        for layer in range(chain.shape[2] - 1):
+            nodes = connectivity[offsets[cell] : offsets[cell + 1]]
+            if not _cross(chain[f], width, layer, nodes, edges[types[cell]]):
+                break
+            depth[f] = layer + 1
+            side = chain[f, :width, layer + 1]
+            cell = _neighbour(side, cell, offsets, connectivity, begin, cells_at)
+            if cell < 0:
+                break
+        if depth[f] == 0:
+            count = 0
+            for k in range(offsets[owner[f]], offsets[owner[f] + 1]):
+                if count < 2 and not np.any(facets[f] == connectivity[k]):
+                    off[f, count:] = connectivity[k]
+                    count += 1
+
+
+@njit(nogil=True, cache=True)
+def _cross(chain, width, layer, nodes, edges):  # type: ignore[no-untyped-def]
+    """Write the side opposite to ``chain[:width, layer]`` of a cell; return whether it has one."""
+    if len(nodes) != 2 * width:
+        return False
+    for i in range(width):
+        end = -1
+        for e in range(len(edges)):
+            if edges[e, 0] < 0:
+                break
+            one, two = nodes[edges[e, 0]], nodes[edges[e, 1]]
+            other = two if one == chain[i, layer] else one if two == chain[i, layer] else -1
+            if other >= 0 and not np.any(chain[:width, layer] == other):
+                end = other
+        chain[i, layer + 1] = end
+    if np.any(chain[:width, layer + 1] < 0):  # a cell that has a node twice
+        chain[:width, layer + 1] = -1
+        return False
+    return True
+
+
+@njit(nogil=True, cache=True)
+def _neighbour(side, cell, offsets, connectivity, begin, cells_at):  # type: ignore[no-untyped-def]
+    """Return the cell beyond a side (w,) of ``cell``, -1 if there is none."""
+    for at in range(begin[side[0]], begin[side[0] + 1]):
+        other = cells_at[at]
+        if other != cell:
+            shared = 0
+            for k in range(offsets[other], offsets[other + 1]):
+                shared += 1 if np.any(side == connectivity[k]) else 0
+            if shared == len(side):
+                return np.int64(other)
+    return np.int64(-1)
+
+
+VALUES = ("first_height", "growth", "equal_layers", "wall_angle")
+"""The numbers of the walls of one mesh."""
+CHANGES = ("height_ratio", "angle_change")
+"""The numbers that compare the walls of two meshes."""
+
+
+def measure_walls(columns: Columns, points: FloatArray) -> dict[str, FloatArray]:
+    """Return the `VALUES` (c + g,) at each place, its nodes at ``points`` (n, d).
+
+    Where there is no column only the first height is a number, and growth needs two layers: else
+    they are nan.
+    """
+    facets, nodes = columns.boundary.facets, columns.nodes
+    width, inward = _widths(facets), -facet_vectors(points, facets)
+    total = np.zeros((len(nodes) + len(columns.bare), points.shape[1]))
+    for k in range(facets.shape[1]):  # a facet counts once in each of its columns
+        some = k < width
+        np.add.at(total, columns.corner[some, k], inward[some])
+    normal = unit(total)
+    x = points[nodes[:, : LAYERS + 1]]
+    edges = x[:, 1:] - x[:, :-1]
+    edges[nodes[:, 1 : LAYERS + 1] < 0] = np.nan
+    length = np.linalg.norm(edges, axis=2)
+    first = np.einsum("cd,cd->c", edges[:, 0], normal[: len(nodes)])
+    along = np.linalg.norm(edges[:, 0] - first[:, None] * normal[: len(nodes)], axis=1)
+    angle = np.degrees(np.arctan2(first, along))
+    with np.errstate(all="ignore"):
+        steps = np.exp(np.abs(np.log(length[:, 1:] / length[:, :-1])))
+        growth = np.fmax.reduce(steps, axis=1, initial=np.nan)
+        alike = np.abs(length / length[:, :1] - 1) < EQUAL
+    equal = np.cumprod(alike, axis=1).sum(axis=1).astype(float)
+    away = points[columns.off].mean(axis=1) - _middles(points, facets[columns.bare])
+    height = np.einsum("gd,gd->g", away, normal[len(nodes) :])
+    none = np.full(len(columns.bare), np.nan)
+    parts = np.r_[first, height], *(np.r_[value, none] for value in (growth, equal, angle))
+    return {name: sealed(part) for name, part in zip(VALUES, parts, strict=True)}
+
+
+def _widths(facets: IntArray) -> IntArray:
+    """Return the number of nodes (f,) of facets (f, 2 or 4)."""
+    return facets.shape[1] - (facets[:, -2] == facets[:, -1]).astype(int)
+
+
+def _middles(points: FloatArray, facets: IntArray) -> FloatArray:
+    """Return the mean (f, d) of the nodes of facets (f, 2 or 4), each once."""
+    width = _widths(facets)[:, None, None]
+    real = np.arange(facets.shape[1])[:, None] < width
+    return np.sum(points[facets] * real / width, axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """The layers of cells at the boundaries of a mesh, and how they changed."""
+
+    columns: Columns
+    values: dict[str, FloatArray]
+    """At each place of ``columns``, (c + g,): the `VALUES` of the mesh and, with a reference, the
+    `CHANGES`. See `slideviz.mesh.walls` for what they are."""
+    before: dict[str, FloatArray] | None
+    """The `VALUES` of the reference."""
+    layered: frozenset[str]
+    """The boundaries with layers: most of their facets have a stack of flat cells."""
+    markers: tuple[str, ...]
+    """The boundaries that `summary` reports."""
+    n_cells: int
+    """Number of cells of the mesh."""
+
+    def summary(self) -> dict[str, dict]:
+        """Return what the report says, by boundary.
+
+        ``layered`` (bool); ``after``, and with a reference ``before``, with the smallest, mean and
+        largest of each of `VALUES` over the columns (of the first height also over the facets
+        without): ``{"min": ..., "mean": ..., "max": ...}``, None where there is none. With a
+        reference also of each of the `CHANGES`.
+        """
+        return {marker: self._summary(marker) for marker in self.markers}
+
+    def _summary(self, marker: str) -> dict:
+        at = self.columns.places(marker)
+        now = {name: _statistics(value[at]) for name, value in self.values.items()}
+        after = {name: now.pop(name) for name in VALUES}
+        if self.before is None:
+            return {"layered": marker in self.layered, "after": after}
+        before = {name: _statistics(value[at]) for name, value in self.before.items()}
+        return {"layered": marker in self.layered, "before": before, "after": after, **now}
+
+    def at_cells(self, name: str, before: bool = False) -> FloatArray:
+        """Return one of the values at the cells (m,): nan where a cell has no side in ``markers``.
+
+        Of several values the worst: the lowest height, angle and number of equal layers, the
+        highest growth and change, the ratio farthest from 1.
+        """
+        values = (self.before or {})[name] if before else self.values[name]
+        columns, out = self.columns, np.full(self.n_cells, np.nan)
+        names = columns.boundary.names
+        chosen = np.isin(columns.boundary.marker, [names.index(m) for m in self.markers])
+        corner = columns.corner[chosen]
+        cell = np.repeat(columns.boundary.owner[chosen], corner.shape[1])
+        value = values[corner.ravel()]
+        some = ~np.isnan(value)
+        with np.errstate(all="ignore"):
+            order = np.argsort(_BADNESS[name](value[some]), kind="stable")
+        out[cell[some][order]] = value[some][order]  # of equal cells the last one stays
+        return out
+
+
+def _ratio_badness(ratio: FloatArray) -> FloatArray:
+    """Return how far ratios (k,) are from 1; those of a height that changed its sign most."""
+    return np.where(ratio > 0, np.abs(np.log(np.abs(ratio))), np.inf)
+
+
+_BADNESS: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "first_height": np.negative,
+    "growth": np.positive,
+    "equal_layers": np.negative,
+    "wall_angle": np.negative,
+    "height_ratio": _ratio_badness,
+    "angle_change": np.positive,
+}
+"""A function of each value that is larger where it is worse."""
+
+
+def _statistics(values: FloatArray) -> dict[str, float | None]:
+    """Return smallest, mean and largest of the numbers among values (k,); None without any."""
+    values = values[~np.isnan(values)]
+    if not len(values):
+        return {"min": None, "mean": None, "max": None}
+    low, mean, high = values.min(), values.mean(), values.max()
+    return {"min": float(low), "mean": float(mean), "max": float(high)}
+
+
+_COLUMNS: WeakKeyDictionary[Mesh, tuple[Columns, frozenset[str]]] = WeakKeyDictionary()
+"""The columns of a mesh and its boundaries with layers, cached as long as the mesh lives."""
+
+
+def _columns_of(mesh: Mesh) -> tuple[Columns, frozenset[str]]:
+    """Return the columns of a mesh, and the boundaries with layers."""
+    known = _COLUMNS.get(mesh)
+    if known is None:
+        columns = find_columns(mesh)
+        boundary, flat = columns.boundary, columns.stack_thickness(mesh.points) > 0
+        names = (
+            name
+            for k, name in enumerate(boundary.names)
+            if 2 * np.count_nonzero(flat[boundary.marker == k]) > (boundary.marker == k).sum()
+        )
+        known = _COLUMNS[mesh] = columns, frozenset(names)
+    return known
+
+
+@check_types
+def walls(mesh: Mesh, reference: Mesh | None = None, markers: Sequence[str] | None = None) -> Walls:
+    """Return the layers of cells at the boundaries of a mesh: see `slideviz.mesh.walls`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The deformed mesh.
+    reference : Mesh, optional
+        The undeformed mesh, with the same cells, to compare with.
+    markers : sequence of str, optional
+        The boundaries that are reported; all by default.
+
+    Raises
+    ------
+    MeshError
+        A boundary is not there, an element of one is no side of a cell, or the reference is another
+        mesh.
+
+    Examples
+    --------
+    A channel of three layers, the first two of height 0.1, and the same with its lower nodes moved:
+
+    >>> import slideviz as sv
+    >>> y = [0, 0.1, 0.2, 0.35]
+    >>> points = [[x, height] for height in y for x in (0, 1)]
+    >>> cells = sv.Cells.from_blocks([(9, [[2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2]
+    ...     for k in range(3)])])
+    >>> lower = sv.Marker("lower", sv.Cells.from_blocks([(3, [[0, 1]])]))
+    >>> mesh = sv.Mesh(points, cells, (lower,))
+    >>> sv.walls(mesh).summary()["lower"]["after"]["equal_layers"]["min"]
+    2.0
+    >>> moved = mesh.with_points([[0, 0.05], [1, 0.05], *points[2:]])
+    >>> sv.walls(moved, reference=mesh).summary()["lower"]["height_ratio"]["mean"]
+    0.5
+    """
+    columns, layered = _columns_of(
+        mesh if reference is None else checked_reference(reference, mesh)
+    )
+    for name in markers or ():
+        mesh.marker(name)
+    after, before = measure_walls(columns, mesh.points), None
+    if reference is not None:
+        before = measure_walls(columns, reference.points)
+        with np.errstate(all="ignore"):
+            after["height_ratio"] = sealed(after["first_height"] / before["first_height"])
+        after["angle_change"] = sealed(np.abs(after["wall_angle"] - before["wall_angle"]))
+    chosen = mesh.marker_names if markers is None else tuple(markers)
+    return Walls(columns, after, before, layered, chosen, len(mesh.cells))
