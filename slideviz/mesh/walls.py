@@ -159,6 +159,15 @@ def _cells_at_nodes(offsets, connectivity, use, count):  # type: ignore[no-untyp
 
 
 @njit(nogil=True, cache=True)
+def _has(nodes, node):  # type: ignore[no-untyped-def]
+    """Return 1 if ``node`` is one of ``nodes`` (w,), else 0."""
+    for other in nodes:
+        if other == node:
+            return 1
+    return 0
+
+
+@njit(nogil=True, cache=True)
 def _climb(facets, owner, types, offsets, connectivity, begin, cells_at, edges, chain, depth, off):  # type: ignore[no-untyped-def]
     """Write the nodes of the columns at the corners (f, w, k + 1) of facets, and the depths (f,).
 
@@ -182,7 +191,7 @@ def _climb(facets, owner, types, offsets, connectivity, begin, cells_at, edges, 
         if depth[f] == 0:
             count = 0
             for k in range(offsets[owner[f]], offsets[owner[f] + 1]):
-                if count < 2 and not np.any(facets[f] == connectivity[k]):
+                if count < 2 and not _has(facets[f], connectivity[k]):
                     off[f, count:] = connectivity[k]
                     count += 1
 
@@ -199,10 +208,10 @@ def _cross(chain, width, layer, nodes, edges):  # type: ignore[no-untyped-def]
                 break
             one, two = nodes[edges[e, 0]], nodes[edges[e, 1]]
             other = two if one == chain[i, layer] else one if two == chain[i, layer] else -1
-            if other >= 0 and not np.any(chain[:width, layer] == other):
+            if other >= 0 and not _has(chain[:width, layer], other):
                 end = other
         chain[i, layer + 1] = end
-    if np.any(chain[:width, layer + 1] < 0):  # a cell that has a node twice
+    if _has(chain[:width, layer + 1], -1):  # a cell that has a node twice
         chain[:width, layer + 1] = -1
         return False
     return True
@@ -216,7 +225,7 @@ def _neighbour(side, cell, offsets, connectivity, begin, cells_at):  # type: ign
         if other != cell:
             shared = 0
             for k in range(offsets[other], offsets[other + 1]):
-                shared += 1 if np.any(side == connectivity[k]) else 0
+                shared += _has(side, connectivity[k])
             if shared == len(side):
                 return np.int64(other)
     return np.int64(-1)
