@@ -15,23 +15,14 @@ and the modulus E, the inverse of the cell's volume, changes by -E dV / V.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from slideviz.elastic.stiffness import (
-    OPTIONS,
-    POISSON,
-    ShapeBlock,
-    _gather,
-    _jacobian,
-    cell_volumes,
-)
+from slideviz.elastic.corotated import LAM, MU, Corotated
+from slideviz.elastic.stiffness import OPTIONS, ShapeBlock, _gather, _jacobian, cell_volumes
 from slideviz.mesh.model import FloatArray, IntArray, sealed
 from slideviz.system.jit_cache import njit
-
-MU = 1.0 / (2.0 * (1.0 + POISSON))
-LAM = POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))
-"""Lamé's constants for a modulus of 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +43,12 @@ class Forces:
 
     def of(self, moved: FloatArray) -> FloatArray:
         """Return the forces (n, d) of a displacement (n, d)."""
-        out, moved = np.zeros_like(self.points), np.ascontiguousarray(moved)
-        for part in self.parts:
-            add_forces(self._elements(part), self._modulus(part), moved, out)
-        return out
+        return self._body.product(None, moved)
+
+    @cached_property
+    def _body(self) -> Corotated:
+        moduli = tuple(sealed(self._modulus(part)) for part in self.parts)
+        return Corotated(self.points, self.parts, moduli)
 
     def pushed(self, moved: FloatArray, by: FloatArray) -> FloatArray:
         """Return the change (n, d) of the forces of ``moved`` as positions change by ``by``."""
@@ -145,19 +138,6 @@ def _spread(nodes, e, slopes, size, what, out):  # type: ignore[no-untyped-def]
             for j in range(d):
                 total += what[i, j] * slopes[a, j]
             out[nodes[e, a], i] += size * total
-
-
-@njit(**OPTIONS)
-def add_forces(elements, modulus, moved, out):  # type: ignore[no-untyped-def]
-    """Add the forces of elements at displacement ``moved`` (n, d) to ``out`` (n, d)."""
-    nodes, d = elements[1], elements[0].shape[1]
-    x, slopes = np.empty((nodes.shape[1], d)), np.empty((nodes.shape[1], d))
-    inverse, g, s = np.empty((3, 3)), np.empty((d, d)), np.empty((d, d))
-    for e in range(len(nodes)):
-        for q in range(len(elements[3])):
-            size = _at(elements, e, q, x, inverse, slopes) * modulus[e]
-            _stress(g, _gradient(nodes, e, moved, slopes, g), s)
-            _spread(nodes, e, slopes, size, s, out)
 
 
 @njit(**OPTIONS)

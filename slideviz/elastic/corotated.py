@@ -1,0 +1,445 @@
+"""Corotated forces of an elastic body, and their derivatives; no matrix is stored.
+
+With R the rotation of a cell, the polar part of the least-squares map from its undeformed corners X
+to its corners x, and K its stiffness (`slideviz.elastic.stiffness`),
+
+    f = sum R u', u' = K u,     u = R^T x - X,
+
+so cells that are only turned have no forces. With K constant and R changing by R [omega]x, the
+forces of a cell change, as x does by t, by
+
+    R (omega x K u + K (R^T t - omega x u)),     (tr(S) I - S) omega = axial(R^T T - T^T R),
+
+with S = R^T F, F the least-squares map and T its change (`slideviz.rbf.polar`); K has no forces for
+small rotations. Loops run over `LANES` elements at a time, in vectors of the processor, and write
+the forces at each corner; those of a node are then added in the order of its elements: the same
+bits for any number of threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+
+from slideviz.elastic.stiffness import (
+    OPTIONS,
+    POISSON,
+    ReferenceShape,
+    ShapeBlock,
+    _gather,
+    cell_volumes,
+)
+from slideviz.mesh.model import FloatArray, IntArray, frozen_array, sealed
+from slideviz.rbf.polar import rotation, spin
+from slideviz.system.jit_cache import njit
+from slideviz.system.threads import in_parts
+
+MU = 1.0 / (2.0 * (1.0 + POISSON))
+LAM = POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))
+"""Lamé's constants for a modulus of 1."""
+
+LANES = 8
+"""Elements that are computed together."""
+
+Elements = tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray]
+"""Points, nodes, gradients and weights of the shape, and moduli."""
+
+
+@dataclass(frozen=True, eq=False)
+class Corotated:
+    """An elastic body whose cells turn. Elements are numbered through all ``parts``."""
+
+    points: FloatArray
+    """(n, d): undeformed positions X."""
+    parts: list[ShapeBlock]
+    """The elements."""
+    moduli: tuple[FloatArray, ...]
+    """(m,) of each part: Young's modulus times the share of each element."""
+
+    @classmethod
+    def of(cls, points: FloatArray, parts: list[ShapeBlock]) -> Corotated:
+        """Return the body with undeformed ``points`` (n, d), as stiff as its cells are small."""
+        volume = cell_volumes(points, parts)
+        moduli = tuple(sealed(part.share / volume[part.cell]) for part in parts)
+        return cls(frozen_array(points, np.float64), parts, moduli)
+
+    def rotations(self, x: FloatArray) -> FloatArray:
+        """Return the rotations R (c, d, d) of the elements at positions x (n, d)."""
+        d = x.shape[1]
+        out = np.empty((sum(len(part.nodes) for part in self.parts), d, d))
+        x = _plain(x)
+        for rows, part, _ in self._slices():
+            one = partial(_turn_part, _plain(self.points), sealed(part.nodes), x, out[rows])
+            in_parts(one, len(part.nodes))
+        return out
+
+    def forces(self, x: FloatArray, rotations: FloatArray | None = None) -> FloatArray:
+        """Return the forces f (n, d) at positions x (n, d), by default with its own rotations."""
+        return self._summed(x, self.rotations(x) if rotations is None else rotations, 1.0)
+
+    def product(self, rotations: FloatArray | None, p: FloatArray) -> FloatArray:
+        """Return the sum of R K R^T p (n, d); None for cells that are not turned."""
+        if rotations is None:
+            count = sum(len(part.nodes) for part in self.parts)
+            rotations = np.tile(np.eye(p.shape[1]), (count, 1, 1))
+        return self._summed(p, rotations, 0.0)
+
+    def pushed(self, x: FloatArray, t: FloatArray) -> FloatArray:
+        """Return the change (n, d) of the forces as positions x (n, d) change by t (n, d)."""
+        return self._changed(x, t, reverse=False)
+
+    def pulled(self, x: FloatArray, g: FloatArray) -> FloatArray:
+        """Return the gradient (n, d) of ``(g * forces).sum()`` with respect to positions x."""
+        return self._changed(x, g, reverse=True)
+
+    def _slices(self) -> list[tuple[slice, ShapeBlock, FloatArray]]:
+        """Return the elements, block and moduli of each part."""
+        stops = np.cumsum([len(part.nodes) for part in self.parts]).tolist()
+        return [
+            (slice(stop - len(part.nodes), stop), part, modulus)
+            for stop, part, modulus in zip(stops, self.parts, self.moduli, strict=True)
+        ]
+
+    def _summed(self, field: FloatArray, rotations: FloatArray, shapes: float) -> FloatArray:
+        """Return the sum of R K (R^T field - shapes X)."""
+        turn, y = _plain(rotations), _plain(field)
+
+        def add(elements: Elements, rows: slice, out: FloatArray) -> None:
+            turned(elements, turn[rows], y, shapes, out)
+
+        return self._gathered(add)
+
+    def _changed(self, x: FloatArray, along: FloatArray, *, reverse: bool) -> FloatArray:
+        turn, at, t = _plain(self.rotations(x)), _plain(x), _plain(along)
+
+        def add(elements: Elements, rows: slice, out: FloatArray) -> None:
+            changed(elements, turn[rows], at, t, reverse, out)
+
+        return self._gathered(add)
+
+    def _gathered(self, add: Callable[[Elements, slice, FloatArray], None]) -> FloatArray:
+        """Return the sums (n, d) of what ``add`` writes for the corners (m, a, d) of elements."""
+        n, d = self.points.shape
+        each = np.empty((sum(part.nodes.size for part in self.parts), d))
+        first = 0
+        for rows, part, modulus in self._slices():
+            m, a = part.nodes.shape
+            corners = each[first : first + m * a].reshape(m, a, d)
+            first += m * a
+
+            body = _plain(self.points), sealed(part.nodes), part.shape, sealed(modulus)
+            in_parts(partial(_add_part, add, body, rows.start, corners), m)
+        out, (indptr, entries) = np.empty((n, d)), self._corners
+        in_parts(lambda s: gather(indptr[s.start : s.stop + 1], entries, each, out[s]), n)
+        return out
+
+    @cached_property
+    def _corners(self) -> tuple[IntArray, IntArray]:
+        """Return indptr (n + 1,) and the corners of all elements that are each node, in order."""
+        nodes = np.concatenate([part.nodes.ravel() for part in self.parts])
+        indptr = np.zeros(len(self.points) + 1, np.int64)
+        np.cumsum(np.bincount(nodes, minlength=len(self.points)), out=indptr[1:])
+        out: IntArray = np.empty(len(nodes), np.int32 if len(nodes) < 2**31 else np.int64)
+        invert(nodes, indptr[:-1].copy(), out)
+        return indptr, out
+
+
+def _turn_part(
+    points: FloatArray, nodes: IntArray, x: FloatArray, out: FloatArray, s: slice
+) -> None:
+    turns(points, nodes[s], x, out[s])
+
+
+def _add_part(
+    add: Callable[[Elements, slice, FloatArray], None],
+    body: tuple[FloatArray, IntArray, ReferenceShape, FloatArray],
+    start: int,
+    corners: FloatArray,
+    s: slice,
+) -> None:
+    points, nodes, shape, modulus = body
+    elements = points, nodes[s], shape.gradients, shape.weights, modulus[s]
+    add(elements, slice(start + s.start, start + s.stop), corners[s])
+
+
+def _plain(values: FloatArray) -> FloatArray:
+    """Return the values as those of a mesh are, so that the loops are compiled once."""
+    return sealed(np.ascontiguousarray(values))
+
+
+@njit(**OPTIONS)
+def invert(nodes, at, out):  # type: ignore[no-untyped-def]
+    """Write the places of each node in ``nodes`` (m,) to out (m,), from ``at`` (n,) on."""
+    for k in range(len(nodes)):
+        out[at[nodes[k]]] = k
+        at[nodes[k]] += 1
+
+
+@njit(**OPTIONS)
+def gather(indptr, entries, each, out):  # type: ignore[no-untyped-def]
+    """Write the sums of rows ``entries`` of each (m, d) to out (n, d)."""
+    for row in range(len(out)):
+        for i in range(out.shape[1]):
+            total = 0.0
+            for k in range(indptr[row], indptr[row + 1]):
+                total += each[entries[k], i]
+            out[row, i] = total
+
+
+@njit(**OPTIONS)
+def _map_weights(x, w):  # type: ignore[no-untyped-def]
+    """Write the weights w (a, d) of the least-squares map F = sum_a x_a w_a^T from corners X.
+
+    By an orthogonal basis of the columns: normal equations lose all digits of flat cells.
+    """
+    n, d = x.shape
+    r = np.zeros((d, d))
+    for j in range(d):
+        mean = 0.0
+        for a in range(n):
+            mean += x[a, j]
+        mean /= n
+        for a in range(n):
+            w[a, j] = x[a, j] - mean
+    for j in range(d):
+        for i in range(j):
+            for a in range(n):
+                r[i, j] += w[a, i] * w[a, j]
+            for a in range(n):
+                w[a, j] -= r[i, j] * w[a, i]
+        for a in range(n):
+            r[j, j] += w[a, j] * w[a, j]
+        r[j, j] = np.sqrt(r[j, j])
+        for a in range(n):
+            w[a, j] /= r[j, j]
+    for j in range(d - 1, -1, -1):
+        for a in range(n):
+            for k in range(j + 1, d):
+                w[a, j] -= w[a, k] * r[j, k]
+            w[a, j] /= r[j, j]
+
+
+@njit(**OPTIONS)
+def turns(points, nodes, x, out):  # type: ignore[no-untyped-def]
+    """Write the rotations of elements at positions x (n, d) to out (m, d, d)."""
+    n, d = nodes.shape[1], points.shape[1]
+    corners, w, f = np.empty((n, d)), np.empty((n, d)), np.empty((d, d))
+    work, vectors = np.empty((4, 4)), np.empty((4, 4))
+    for e in range(len(nodes)):
+        _gather(points, nodes, e, corners)
+        _map_weights(corners, w)
+        _gather(x, nodes, e, corners)
+        _outer(corners, w, f)
+        rotation(f, out[e], work, vectors)
+
+
+@njit(**OPTIONS)
+def _outer(x, w, f):  # type: ignore[no-untyped-def]
+    """Write the sum of x_a w_a^T to f (d, d)."""
+    for i in range(x.shape[1]):
+        for j in range(x.shape[1]):
+            f[i, j] = 0.0
+            for a in range(len(x)):
+                f[i, j] += x[a, i] * w[a, j]
+
+
+@njit(**OPTIONS)
+def _lanes(elements, first, turn, field, shapes, y):  # type: ignore[no-untyped-def]
+    """Write R^T field - shapes X of the elements from ``first`` on to y (a, d, LANES).
+
+    The last element fills the lanes that are left over.
+    """
+    points, nodes = elements[0], elements[1]
+    n, d = nodes.shape[1], points.shape[1]
+    for lane in range(LANES):
+        e = min(first + lane, len(nodes) - 1)
+        for a in range(n):
+            node = nodes[e, a]
+            for i in range(d):
+                total = -shapes * points[node, i]
+                for j in range(d):
+                    total += turn[e, j, i] * field[node, j]
+                y[a, i, lane] = total
+
+
+@njit(**OPTIONS)
+def _placed(elements, first, turn, f, out):  # type: ignore[no-untyped-def]
+    """Write R f of the elements from ``first`` on, f (a, d, LANES), to out (m, a, d)."""
+    n, d = f.shape[0], f.shape[1]
+    for lane in range(min(LANES, len(elements[1]) - first)):
+        for a in range(n):
+            for i in range(d):
+                total = 0.0
+                for j in range(d):
+                    total += turn[first + lane, i, j] * f[a, j, lane]
+                out[first + lane, a, i] = total
+
+
+@njit(**OPTIONS)
+def _corners(elements, first, x, modulus):  # type: ignore[no-untyped-def]
+    """Write undeformed corners to x (a, d, LANES) and moduli to modulus (LANES,)."""
+    points, nodes = elements[0], elements[1]
+    for lane in range(LANES):
+        e = min(first + lane, len(nodes) - 1)
+        modulus[lane] = elements[4][e]
+        for a in range(nodes.shape[1]):
+            for i in range(points.shape[1]):
+                x[a, i, lane] = points[nodes[e, a], i]
+
+
+@njit(**OPTIONS)
+def _stiffness_times(elements, modulus, x, y, f, jacobian, slopes):  # type: ignore[no-untyped-def]
+    """Write K y of elements with corners x to f; x, y and f are (a, d, LANES).
+
+    ``jacobian`` and ``slopes`` (3, 3, LANES) are scratch; loops over lanes become vectors.
+    """
+    gradients, weights = elements[2], elements[3]
+    n, d = x.shape[0], x.shape[1]
+    f[:] = 0.0
+    for q in range(len(weights)):
+        jacobian[:] = 0.0
+        slopes[:] = 0.0
+        if d == 2:
+            jacobian[2, 2, :] = 1.0
+        for a in range(n):
+            for j in range(d):
+                c = gradients[q, a, j]
+                for i in range(d):
+                    for k in range(LANES):
+                        jacobian[j, i, k] += c * x[a, i, k]
+                    for k in range(LANES):
+                        slopes[i, j, k] += c * y[a, i, k]
+        for k in range(LANES):
+            j00, j01, j02 = jacobian[0, 0, k], jacobian[0, 1, k], jacobian[0, 2, k]
+            j10, j11, j12 = jacobian[1, 0, k], jacobian[1, 1, k], jacobian[1, 2, k]
+            j20, j21, j22 = jacobian[2, 0, k], jacobian[2, 1, k], jacobian[2, 2, k]
+            a00, a10, a20 = j11 * j22 - j12 * j21, j12 * j20 - j10 * j22, j10 * j21 - j11 * j20
+            a01, a11, a21 = j02 * j21 - j01 * j22, j00 * j22 - j02 * j20, j01 * j20 - j00 * j21
+            a02, a12, a22 = j01 * j12 - j02 * j11, j02 * j10 - j00 * j12, j00 * j11 - j01 * j10
+            det = j00 * a00 + j01 * a10 + j02 * a20
+            # The cofactors are det J^-1: the gradients are divided by det here, the forces there.
+            size = modulus[k] * weights[q] / abs(det)
+            h0, h1, h2 = slopes[0, 0, k], slopes[0, 1, k], slopes[0, 2, k]
+            g00 = h0 * a00 + h1 * a01 + h2 * a02
+            g01 = h0 * a10 + h1 * a11 + h2 * a12
+            g02 = h0 * a20 + h1 * a21 + h2 * a22
+            h0, h1, h2 = slopes[1, 0, k], slopes[1, 1, k], slopes[1, 2, k]
+            g10 = h0 * a00 + h1 * a01 + h2 * a02
+            g11 = h0 * a10 + h1 * a11 + h2 * a12
+            g12 = h0 * a20 + h1 * a21 + h2 * a22
+            h0, h1, h2 = slopes[2, 0, k], slopes[2, 1, k], slopes[2, 2, k]
+            g20 = h0 * a00 + h1 * a01 + h2 * a02
+            g21 = h0 * a10 + h1 * a11 + h2 * a12
+            g22 = h0 * a20 + h1 * a21 + h2 * a22
+            trace = LAM * (g00 + g11 + g22)
+            s00 = size * (trace + 2.0 * MU * g00)
+            s11 = size * (trace + 2.0 * MU * g11)
+            s22 = size * (trace + 2.0 * MU * g22)
+            s01, s02, s12 = (
+                size * (MU * (g01 + g10)),
+                size * (MU * (g02 + g20)),
+                size * (MU * (g12 + g21)),
+            )
+            slopes[0, 0, k] = s00 * a00 + s01 * a10 + s02 * a20
+            slopes[0, 1, k] = s00 * a01 + s01 * a11 + s02 * a21
+            slopes[0, 2, k] = s00 * a02 + s01 * a12 + s02 * a22
+            slopes[1, 0, k] = s01 * a00 + s11 * a10 + s12 * a20
+            slopes[1, 1, k] = s01 * a01 + s11 * a11 + s12 * a21
+            slopes[1, 2, k] = s01 * a02 + s11 * a12 + s12 * a22
+            slopes[2, 0, k] = s02 * a00 + s12 * a10 + s22 * a20
+            slopes[2, 1, k] = s02 * a01 + s12 * a11 + s22 * a21
+            slopes[2, 2, k] = s02 * a02 + s12 * a12 + s22 * a22
+        for a in range(n):
+            for j in range(d):
+                c = gradients[q, a, j]
+                for i in range(d):
+                    for k in range(LANES):
+                        f[a, i, k] += c * slopes[i, j, k]
+
+
+@njit(**OPTIONS)
+def turned(elements, turn, field, shapes, out):  # type: ignore[no-untyped-def]
+    """Write the forces R K (R^T field - shapes X) at the corners of elements to out (m, a, d).
+
+    ``elements``: points, nodes, gradients and weights of the shape, and moduli (m,).
+    """
+    n, d = out.shape[1], out.shape[2]
+    x, y, f = np.empty((n, d, LANES)), np.empty((n, d, LANES)), np.empty((n, d, LANES))
+    modulus, one, two = np.empty(LANES), np.empty((3, 3, LANES)), np.empty((3, 3, LANES))
+    for first in range(0, len(out), LANES):
+        _corners(elements, first, x, modulus)
+        _lanes(elements, first, turn, field, shapes, y)
+        _stiffness_times(elements, modulus, x, y, f, one, two)
+        _placed(elements, first, turn, f, out)
+
+
+@njit(**OPTIONS)
+def _add_crossed(u, v, lane, sign, out):  # type: ignore[no-untyped-def]
+    """Add ``sign`` times the sum of u_a x v_a, of a lane of (a, d, LANES), to out (3,)."""
+    n, d = u.shape[0], u.shape[1]
+    for a in range(n):
+        for k in range(2 if d == 2 else 0, 3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            out[k] += sign * (u[a, i, lane] * v[a, j, lane] - u[a, j, lane] * v[a, i, lane])
+
+
+@njit(**OPTIONS)
+def _add_spun(omega, u, lane, sign, out):  # type: ignore[no-untyped-def]
+    """Add ``sign`` times omega x u_a, of a lane of u (a, d, LANES), to that of out."""
+    n, d = u.shape[0], u.shape[1]
+    for a in range(n):
+        if d == 2:
+            out[a, 0, lane] -= sign * omega[2] * u[a, 1, lane]
+            out[a, 1, lane] += sign * omega[2] * u[a, 0, lane]
+        else:
+            for k in range(3):
+                i, j = (k + 1) % 3, (k + 2) % 3
+                out[a, k, lane] += sign * (omega[i] * u[a, j, lane] - omega[j] * u[a, i, lane])
+
+
+@njit(**OPTIONS)
+def changed(elements, turn, at, along, reverse, out):  # type: ignore[no-untyped-def]
+    """Write the derivative of the forces at positions ``at`` (n, d), or its transpose.
+
+    Parts (m, a, d) of the corners of elements, as ``turned``; ``along`` (n, d) is the change of the
+    positions or, with ``reverse``, the adjoint of the forces.
+    """
+    n, d = out.shape[1], out.shape[2]
+    x, u, y = np.empty((n, d, LANES)), np.empty((n, d, LANES)), np.empty((n, d, LANES))
+    k_u, k_y, w = np.empty((n, d, LANES)), np.empty((n, d, LANES)), np.empty((n, d, LANES))
+    modulus, one, two = np.empty(LANES), np.empty((3, 3, LANES)), np.empty((3, 3, LANES))
+    s, weights, omega = np.empty((d, d)), np.empty((n, d)), np.empty((LANES, 3))
+    moment = np.empty((LANES, 3))
+    for first in range(0, len(out), LANES):
+        _corners(elements, first, x, modulus)
+        _lanes(elements, first, turn, at, 1.0, u)
+        _lanes(elements, first, turn, along, 0.0, y)
+        _stiffness_times(elements, modulus, x, u, k_u, one, two)
+        if reverse:
+            _stiffness_times(elements, modulus, x, y, k_y, one, two)
+        for lane in range(LANES):
+            _map_weights(x[:, :, lane], weights)
+            w[:, :, lane] = weights
+            # S = R^T F = I + sum_a u_a w_a^T
+            _outer(u[:, :, lane], weights, s)
+            for i in range(d):
+                s[i, i] += 1.0
+            moment[lane] = 0.0
+            if reverse:
+                _add_crossed(k_u, y, lane, 1.0, moment[lane])
+                _add_crossed(u, k_y, lane, -1.0, moment[lane])
+            else:
+                _add_crossed(w, y, lane, 1.0, moment[lane])
+            spin(s, moment[lane], omega[lane])
+            if reverse:
+                _add_spun(omega[lane], w, lane, 1.0, k_y)
+            else:
+                _add_spun(omega[lane], u, lane, -1.0, y)
+        if not reverse:
+            _stiffness_times(elements, modulus, x, y, k_y, one, two)
+            for lane in range(LANES):
+                _add_spun(omega[lane], k_u, lane, 1.0, k_y)
+        _placed(elements, first, turn, k_y, out)
