@@ -580,3 +580,47 @@ def test_a_list_of_markers_that_takes_what_a_motion_names_is_blamed():
         changed(case, ["MARKER_FIXED=(a)"])
     moved = changed(case, ["MARKER_FIXED=(a)", "MOTION=(b, translate, 1, 0)"])
     assert moved.roles == {"a": "fixed", "b": "moving"}
+
+
+def test_a_limit_that_is_not_met_gives_code_4_and_its_cells(square, tmp_path, capsys):
+    report = tmp_path / "report.json"
+    limits = "LIMITS=( min > 0.39, inverted = 0 )"
+    call = ["run", str(square / "square.cfg"), "-q", "--set", limits, "-o", str(tmp_path / "o.su2")]
+    for streamed in ([], ["--stream", "--resume"], ["--stream", "--resume"]):
+        assert run([*call, "--json", str(report), *streamed]) == 4
+        low, folded = json.loads(report.read_text())["limits"]
+        assert low["limit"] == "min > 0.39"
+        assert (low["name"], low["op"], low["value"]) == ("min", ">", 0.39)
+        assert low["actual"] == pytest.approx(0.389560, abs=1e-6)
+        assert (low["passed"], low["failing"], low["cells"]) == (False, 1, [505])
+        assert (folded["passed"], folded["actual"], folded["cells"]) == (True, 0, [])
+        err = capsys.readouterr().err
+        assert "the limit min > 0.39 is not met, in 1 cell (505): 0.38956\n" in err
+        assert "what may help: more STEPS" in err
+    assert run([*call[:4], "LIMITS=( min > 0.38 )", *call[5:]]) == 0
+    limited = ["--set", "LIMITS=( size > 0.1 )", "--stream"]
+    assert run([*call[:3], *limited, "-o", str(tmp_path / "o.su2")]) == 1
+    assert "needs the mesh in memory" in capsys.readouterr().err
+
+
+def test_inverted_cells_come_before_limits(square, tmp_path, capsys):
+    words = ["--set", "STEPS=1", "--set", "SLIDING_MODE=none", "--set", "PERIODIC_MODE=none"]
+    words += ["--set", "LIMITS=( min > 0.1, inverted < 1000 )", "-o", str(tmp_path / "o.su2")]
+    assert run(["run", str(square / "square.cfg"), "-q", *words]) == 3
+    err = capsys.readouterr().err
+    assert "the limit min > 0.1 is not met" in err
+    assert "inverted < 1000" not in err
+    assert err.count("what may help") == 1
+
+
+def test_quality_checks_limits(square, tmp_path, capsys):
+    mesh = str(square / "mesh.su2")
+    assert run(["quality", mesh, "--limits", "min > 0.9, skew > 0.9"]) == 0
+    assert "skew > 0.9  1  met" in capsys.readouterr().out
+    assert run(["quality", mesh, "--limits", "min > 1", "--json", "-"]) == 4
+    (entry,) = json.loads(capsys.readouterr().out)["limits"]
+    assert entry["failing"] == 620
+    assert len(entry["cells"]) == 100
+    assert run(["quality", mesh, "--stream", "--limits", "skew > 1"]) == 1
+    assert run(["quality", mesh, "--limits", "mni > 1"]) == 2
+    assert "did you mean min?" in capsys.readouterr().err

@@ -103,7 +103,8 @@ def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return a sentence for each marker of the case that the mesh lacks, and if no marker moves."""
     nothing = "no marker moves; name one in MARKER_MOVING"
     named = {name: ROLES[role].key for name, role in case.roles.items()}
-    return (*unknown_markers(mesh, named), *[nothing] * (not case.markers_with("moving")))
+    limited = {limit.marker: "LIMITS" for limit in case.limits if limit.marker}
+    return (*unknown_markers(mesh, named | limited), *[nothing] * (not case.markers_with("moving")))
 
 
 def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:

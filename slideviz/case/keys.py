@@ -11,6 +11,7 @@ from pathlib import Path
 
 from slideviz.case.ffd_keys import FFD_ROWS
 from slideviz.case.key import BOUNDARIES, FILES, MOTION, PERIODICITY, QUALITY, Key, role, setting
+from slideviz.case.limits import LIMITS
 from slideviz.case.method_keys import METHOD_ROWS, REDUCTION_ROWS
 from slideviz.case.model import Case, FromFile, Motion
 from slideviz.case.motion_text import MOTIONS
@@ -226,6 +227,18 @@ _ROWS = (
         form="more",
         tip="How the quality of cells is measured: Knupp's published size-skew, or as the program "
         "RBF-SliDe computes it for hexahedra.",
+    ),
+    Key(
+        "LIMITS",
+        QUALITY,
+        LIMITS,
+        "What the deformed mesh must meet; if it does not, `run` ends with exit code 4. A number "
+        "that each cell has must be within its limit in every cell.",
+        lambda case, limits: case.change(limits=limits),
+        lambda case: case.limits or None,
+        field="limits",
+        label="Limits",
+        run_label="",
     ),
     *VIEW_ROWS,
 )

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.argument_types import CheckedFields, check_types
+from slideviz.case.limits import Limit, read_limits
 from slideviz.errors import CaseError, nearest, not_one_of
 from slideviz.formats.table import FILE_FORMATS
 from slideviz.mesh.model import DEFAULT_FEATURE_ANGLE_DEG, frozen_array
@@ -263,6 +264,7 @@ class Case(CheckedFields):
       to the motion. ``support_radius``, if not None, is used instead: a length.
     * ``reduction``: None: all boundary nodes are control nodes, however many.
     * ``idw_power``: None: the number of dimensions.
+    * ``limits``: what the deformed mesh must meet; changes no mesh.
     * ``view``: how the window showed the case, by key; changes no result.
     * ``ffd_boxes``: boxes for free-form deformation that are not in the mesh file: name and 8
       corners (24 numbers; in 2D the first 4 corners count). ``ffd_degrees`` are their degrees,
@@ -317,6 +319,7 @@ class Case(CheckedFields):
     idw_fixed_weight: float = 1.0
     quality_metric: SkewMetric = field(default="knupp", metadata=SKEW_METRICS)
     generate_quality: bool = True
+    limits: Annotated[tuple[Limit, ...], 'limits, or a text as "min > 0.3, inverted = 0"'] = ()
     source: Path | None = None
     view: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
@@ -325,6 +328,8 @@ class Case(CheckedFields):
         for name in ("steps", "influence_factor"):
             if str(getattr(self, name)).lower() == "auto":  # as in a case file
                 object.__setattr__(self, name, 0)
+        if isinstance(self.limits, str):
+            object.__setattr__(self, "limits", read_limits(self.limits))
         super().__post_init__()
         for marker, role in self.roles.items():
             if role not in ROLES:

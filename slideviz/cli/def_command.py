@@ -141,7 +141,7 @@ def _run_def(arguments: argparse.Namespace) -> int:
     report = run_report(
         case, mesh, steps, seconds, quality=measured, undeformed=before, folded=folded
     )
-    advice = advice_for(case, steps[-1].layers, mesh, measured)
+    advice = advice_for(case, steps[-1].layers, mesh, measured, report["limits"])
     report["design"] = {
         "variables": variable_rows(surface),
         "boxes": surface.displacer.inside,

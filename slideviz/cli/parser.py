@@ -58,7 +58,7 @@ Deform CFD meshes with radial basis functions.
 
 _EPILOG = """\
 exit codes: 0 done; 1 the mesh or case is wrong; 2 wrong usage; 3 done, but cells are inverted;
-130 cancelled; 143 ended by SIGTERM.
+4 done, but a limit of the case is not met; 130 cancelled; 143 ended by SIGTERM.
 
 a first try:  slideviz sample passage -o try && slideviz run try/passage.cfg
 """

@@ -13,6 +13,7 @@ from slideviz.terms import SKEW_METRICS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from slideviz.case.limits import Limit, MeasuredMesh
     from slideviz.mesh.quality import Quality
 
 
@@ -27,6 +28,14 @@ def add_quality(calls: argparse._SubParsersAction) -> None:
         default="knupp",
         help="rbf-slide: hexahedra as that program measures them (default: knupp)",
     )
+    call.add_argument(
+        "--limits",
+        type=limits,
+        default=(),
+        metavar="LIMITS",
+        help='limits as of the key LIMITS, as "min > 0.3, inverted = 0": exit code 4 if one is '
+        "not met",
+    )
     add_shared(call, "zone")
     add_shared(call, "json")
     call.add_argument(
@@ -40,12 +49,24 @@ def add_quality(calls: argparse._SubParsersAction) -> None:
     call.set_defaults(command=quality)
 
 
+def limits(text: str) -> tuple[Limit, ...]:
+    """Return the limits of a text."""
+    from slideviz.case.limits import read_limits
+    from slideviz.errors import CaseError
+
+    try:
+        return read_limits(text)
+    except CaseError as problem:
+        raise argparse.ArgumentTypeError("; ".join(str(problem).splitlines())) from None
+
+
 def quality(arguments: argparse.Namespace) -> int:
     """Print or write the quality of a mesh, relative to the undeformed one if it is given.
 
     Returns the exit code.
     """
     from slideviz import write
+    from slideviz.case.limits import MeasuredMesh, require_streamed
     from slideviz.cli.mesh_source import open_mesh
     from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.cli.report import WORST
@@ -55,6 +76,8 @@ def quality(arguments: argparse.Namespace) -> int:
     output = arguments.output
     if arguments.stream and output is not None:
         raise CaseError("-o needs the mesh in memory; leave it out, or --stream")
+    if arguments.stream:
+        require_streamed(arguments.limits)
     is_table = output is not None and output.suffix.lower() == ".csv"
     case = optional_case(arguments)
     require_output_paths(
@@ -70,13 +93,14 @@ def quality(arguments: argparse.Namespace) -> int:
             write(output, mesh, cell_data=quality_data(output, found))
         worst = found.worst(WORST)
         rows = list(zip(worst.tolist(), opened.source.types(worst).tolist(), strict=True))
-        return _report(arguments, mesh.name, found, rows, opened.reference)
+        measured = MeasuredMesh(found, mesh, opened.read_base())
+        return _report(arguments, mesh.name, measured, rows, opened.reference)
 
 
 def _report(
     arguments: argparse.Namespace,
     name: str,
-    found: Quality,
+    measured: MeasuredMesh,
     worst: Sequence[tuple[int, int]],
     reference: Path | None,
 ) -> int:
@@ -84,11 +108,22 @@ def _report(
 
     ``worst`` are numbers and VTK types of the worst cells, ``reference`` is the undeformed mesh.
     """
-    from slideviz.cli.report import histogram_lines, quality_lines, quality_report, save_json, table
-    from slideviz.cli.terminal import DONE, INVERTED
+    from slideviz.cli.report import (
+        histogram_lines,
+        limit_lines,
+        limits_report,
+        quality_lines,
+        quality_report,
+        save_json,
+        table,
+    )
+    from slideviz.cli.run_outcome import report_limits
+    from slideviz.cli.terminal import INVERTED
 
+    found = measured.quality
     report = quality_report(name, found, worst)
     report |= {"reference": str(reference) if reference else None}
+    report["limits"] = limits_report(arguments.limits, measured)
     if not save_json(arguments.json, report):
         print(f"{arguments.mesh}: size-skew, metric {found.metric}")
         print(f"  {reference_words(reference)}")
@@ -97,7 +132,10 @@ def _report(
         print(table([(w["cell"], w["type"], f"{w['quality']:.6f}") for w in report["worst"]]))
         print("cells by quality:")
         print(histogram_lines(found))
-    return INVERTED if found.inverted else DONE
+        if report["limits"]:
+            print(f"limits:\n{limit_lines(report['limits'])}")
+    code = report_limits(report["limits"])
+    return INVERTED if found.inverted else code
 
 
 def _write_csv(path: Path, found: Quality) -> None:

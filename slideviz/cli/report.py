@@ -9,8 +9,10 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from slideviz.case.limits import Limit, MeasuredMesh, check_limits
 from slideviz.case.method_keys import automatic_radius, get_reduction
 from slideviz.case.model import Case
+from slideviz.case.words import counted
 from slideviz.errors import CaseError, Note
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Mesh
@@ -76,6 +78,7 @@ def run_report(
             "inverted_at_step": [step for _, step in folded.values()],
             "undeformed": {"min": undeformed.min, "mean": undeformed.mean},
         },
+        "limits": limits_report(case.limits, MeasuredMesh(quality, last.mesh, mesh)),
         "tried": [_fields(trial, TRIAL_KEYS) for trial in last.tried],
         "control_nodes": [step.control_nodes for step in steps],
         "control_candidates": last.candidates,
@@ -103,6 +106,36 @@ def run_report(
             for cycle in step.history
         ],
     }
+
+
+def limits_report(limits: Iterable[Limit], measured: MeasuredMesh) -> list[dict[str, Any]]:
+    """Return the JSON array of limits: each with its number, and the worst cells that fail."""
+    return [
+        {
+            "limit": str(result.limit),
+            "name": result.limit.name,
+            "marker": result.limit.marker or None,
+            "op": result.limit.sign,
+            "value": result.limit.value,
+            "actual": float(result.actual) if isfinite(result.actual) else None,
+            "passed": result.passed,
+            "failing": len(result.cells),
+            "cells": result.cells[:LISTED].tolist(),
+        }
+        for result in check_limits(limits, measured)
+    ]
+
+
+def limit_lines(report: Sequence[Mapping[str, Any]]) -> str:
+    """Return the limits of a report as a text table."""
+    return table([(entry["limit"], *limit_words(entry)) for entry in report])
+
+
+def limit_words(entry: Mapping[str, Any]) -> tuple[str, str]:
+    """Return number and outcome of a limit of a report, as ``0.21``, ``not met, in 5 cells``."""
+    value = "no value" if entry["actual"] is None else f"{entry['actual']:.6g}"
+    cells = f", in {counted(entry['failing'], 'cell')}" if entry["failing"] else ""
+    return value, "met" if entry["passed"] else f"not met{cells}"
 
 
 def folded_cells(steps: Sequence[Step], mesh: Mesh, quality: Quality) -> dict[int, tuple[int, int]]:

@@ -138,7 +138,8 @@ def _run(arguments: argparse.Namespace) -> int:
     report = run_report(
         case, done.mesh, done.steps, seconds, quality=found, undeformed=before, folded=folded
     )
-    advice = advice_for(case, done.steps[-1].layers, None if streamed else done.mesh, found)
+    in_memory = None if streamed else done.mesh
+    advice = advice_for(case, done.steps[-1].layers, in_memory, found, report["limits"])
     if streamed:
         note_finished(about, results, report, folded, advice)
     files = {"mesh": output, CELLS: qualities}

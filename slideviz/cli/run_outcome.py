@@ -6,7 +6,7 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from hashlib import blake2b
 from pathlib import Path
@@ -36,7 +36,7 @@ def note_finished(about: str, files: list[Path], report: dict, folded: Folded, a
     """Write the note of a finished run beside the first of its files, if it can be written.
 
     ``about`` is the hash of case, mesh and version (`slideviz.streaming.run.about_run`),
-    ``advice`` what may help against inverted cells (`advice_for`).
+    ``advice`` what may help against inverted cells or missed limits (`advice_for`).
     """
     note: dict[str, Any] = {
         "about": about,
@@ -105,7 +105,7 @@ def report_outcome(
     folded : mapping of int to (int, int)
         VTK type and first inverted step of the inverted cells with the lowest numbers.
     advice : str
-        What may help against inverted cells, from `advice_for`.
+        What may help against inverted cells or missed limits, from `advice_for`.
     """
     if not save_report(arguments, report) and not arguments.quiet:
         files |= {"report": arguments.json, "picture": arguments.picture}
@@ -135,13 +135,30 @@ def report_warnings(report: dict, folded: Folded, advice: str, *, quiet: bool) -
         Leave out notes; warnings stay.
     """
     from slideviz.cli.report import print_remarks
-    from slideviz.cli.terminal import DONE, INVERTED
+    from slideviz.cli.terminal import INVERTED
 
     print_remarks(report["warnings"], quiet=quiet)
     if report["quality"]["inverted"]:
+        report_limits(report["limits"])
         print(f"slideviz: {_inverted_sentence(report, folded, advice)}", file=sys.stderr)
         return INVERTED
-    return DONE
+    return report_limits(report["limits"], advice)
+
+
+def report_limits(limits: Sequence[Mapping[str, Any]], advice: str = "") -> int:
+    """Print the limits of a report that are not met to stderr, and advice; return the exit code."""
+    from slideviz.cli.report import limit_words
+    from slideviz.cli.terminal import DONE, LIMIT_MISSED
+
+    missed = [entry for entry in limits if not entry["passed"]]
+    for entry in missed:
+        named = ", ".join(map(str, entry["cells"][:5])) + " ..." * (entry["failing"] > 5)
+        value, outcome = limit_words(entry)
+        sentence = f"the limit {entry['limit']} is {outcome}{f' ({named})' * bool(named)}: {value}"
+        print(f"slideviz: {sentence}", file=sys.stderr)
+    if missed and advice:
+        print(f"slideviz: {advice}", file=sys.stderr)
+    return LIMIT_MISSED if missed else DONE
 
 
 def write_qualities(path: Path, found: Quality) -> None:
@@ -163,7 +180,7 @@ def _print_run(
 ) -> None:
     """Print the summary of a run; ``found`` and ``before`` are its quality after and before."""
     from slideviz.case.words import counted
-    from slideviz.cli.report import quality_lines, table
+    from slideviz.cli.report import limit_lines, quality_lines, table
 
     counts, spent = report["node_counts"], report["seconds"]
     method = "" if report["method"] == "rbf" else f"method {report['method']}, "
@@ -187,6 +204,8 @@ def _print_run(
     if report["periodic_misfit"] is not None:
         rows.append(("periodic misfit", report["periodic_misfit"]))
     print(table(rows))
+    if report["limits"]:
+        print(f"limits:\n{limit_lines(report['limits'])}")
     if report["tried"]:
         print(f"  steps tried: {', '.join(map(_trial_words, report['tried']))}")
     parts = {k: v for k, v in spent.items() if k != "total"}
@@ -206,21 +225,32 @@ def _trial_words(trial: Mapping[str, Any]) -> str:
 
 
 def advice_for(
-    case: Case, layers: float, mesh: Mesh | None = None, found: Quality | None = None
+    case: Case,
+    layers: float,
+    mesh: Mesh | None = None,
+    found: Quality | None = None,
+    limits: Sequence[Mapping[str, Any]] = (),
 ) -> str:
-    """Return what may help against inverted cells: the remedies of the window, with keys.
+    """Return what may help against inverted cells or missed limits: remedies, with keys.
 
-    ``layers`` is that of the last ``Step``. Without a mesh in memory, with its quality ``found``
-    after the run, neither the pitch nor boundaries beside the cells are named.
+    ``layers`` is that of the last ``Step``, ``limits`` those of the report. Without a mesh in
+    memory, with its quality ``found`` after the run, neither the pitch nor boundaries beside the
+    cells are named.
     """
-    if found is not None and not found.inverted:
+    missed = [entry for entry in limits if not entry["passed"]]
+    if found is not None and not found.inverted and not missed:
         return ""
+    import numpy as np
+
     from slideviz.solver.remedies import beyond_pitch, fixed_beside, remedies
 
     beside: tuple[str, ...] = ()
     pitch = ""
     if mesh is not None and found is not None:
-        beside = fixed_beside(case, mesh, found.inverted_cells())
+        cells = found.inverted_cells()
+        if not found.inverted:
+            cells = np.array([cell for entry in missed for cell in entry["cells"]], np.int64)
+        beside = fixed_beside(case, mesh, cells)
         pitch = beyond_pitch(case, mesh)
     ideas = "; ".join(remedy.keys for remedy in remedies(case, beside, pitch, layers))
     return f"{pitch[:1].lower()}{pitch[1:]}; what may help: {ideas}".removeprefix("; ")

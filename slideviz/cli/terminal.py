@@ -23,6 +23,8 @@ WRONG_USAGE = 2
 """The arguments are wrong; argparse itself exits with this code."""
 INVERTED = 3
 """Done, but cells are inverted."""
+LIMIT_MISSED = 4
+"""Done, without inverted cells, but a limit of the case is not met."""
 CANCELLED = 130
 
 

@@ -18,6 +18,7 @@ from time import monotonic
 import numpy as np
 
 from slideviz import __version__
+from slideviz.case.limits import require_streamed
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, NodeError
 from slideviz.formats.su2b.partial import keep_earlier
@@ -271,7 +272,7 @@ def require_stream(case: Case) -> None:
     Raises
     ------
     CaseError
-        Its method, linear elasticity, needs the whole mesh at once.
+        Its method, linear elasticity, or one of its limits needs the whole mesh at once.
     MeshError
         Its mesh is of no format that can be streamed.
     """
@@ -282,6 +283,7 @@ def require_stream(case: Case) -> None:
             "METHOD= elastic needs the whole mesh at once and cannot be streamed; use METHOD= rbf "
             "or idw, or run it without --stream"
         )
+    require_streamed(case.limits)
     require_su2(path, case.mesh_format)
 
 

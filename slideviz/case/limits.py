@@ -1,0 +1,233 @@
+"""Limits on numbers of a deformed mesh, as ``min > 0.3``: their text, and the cells that fail them.
+
+A limit is ``NAME > VALUE``, with ``>``, ``>=``, ``<``, ``<=`` or ``=``. ``NAME`` is a row of
+`NUMBERS`. A number that each cell has must be within the limit in every cell.
+"""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from slideviz.argument_types import CheckedFields
+from slideviz.case.values import Kind
+from slideviz.case.words import name_text, number
+from slideviz.errors import CaseError, not_one_of, shown
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.quality import INVERTED, PIECE, UNPROVEN, Quality
+
+OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
+    ">": operator.gt,
+    ">=": operator.ge,
+    "<": operator.lt,
+    "<=": operator.le,
+    "=": operator.eq,
+}
+_LIMIT = re.compile(
+    r'(?P<name>[\w-]+)(?:@(?:"(?P<quoted>(?:[^"]|"")+)"|(?P<plain>[^\s<>="]+)))?'
+    r"\s*(?P<sign>[<>=]+)\s*(?P<value>\S+)\Z"
+)
+_ITEM = re.compile(r'(?:"[^"]*"|[^",])+')
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredMesh:
+    """A deformed mesh with its quality, whose limits are checked."""
+
+    quality: Quality
+    mesh: Mesh | None = None
+    reference: Mesh | None = None
+    """`mesh`, `reference`: the mesh, and the undeformed one; None where they are in files."""
+
+
+Values = tuple[FloatArray, IntArray | None]
+"""Values (k,) of cells, NaN where one has none, and the numbers (k,) of the cells; None: all."""
+
+
+@dataclass(frozen=True)
+class LimitNumber:
+    """A number that can be limited: one of the whole mesh (``total``), or one of each cell."""
+
+    meaning: str
+    signs: str
+    """The first characters of the operators that make sense."""
+    values: Callable[[MeasuredMesh, str], Values] | None = None
+    """Returns the values of cells; the text is the boundary after ``@``, or "" for all."""
+    total: Callable[[Quality], float] | None = None
+    """Returns the number of the whole mesh."""
+    status: int | None = None
+    """The status of the cells that ``total`` counts."""
+    on_boundary: bool = False
+    """Whether it is measured at boundaries, so that one can be named after ``@``."""
+    streamed: bool = False
+    """Whether it is known of a mesh in a file."""
+
+
+def _of_quality(name: str) -> Callable[[MeasuredMesh, str], Values]:
+    return lambda measured, _: (getattr(measured.quality, name), None)
+
+
+NUMBERS: Mapping[str, LimitNumber] = {
+    "min": LimitNumber("lowest quality", ">", _of_quality("values"), streamed=True),
+    "mean": LimitNumber("mean quality", ">", total=lambda q: q.mean, streamed=True),
+    "inverted": LimitNumber(
+        "inverted cells", "<=", total=lambda q: q.inverted, status=INVERTED, streamed=True
+    ),
+    "unproven": LimitNumber(
+        "cells neither proved valid nor found inverted",
+        "<=",
+        total=lambda q: q.unproven,
+        status=UNPROVEN,
+        streamed=True,
+    ),
+    "size": LimitNumber("size of cells beside the undeformed ones", ">", _of_quality("size")),
+    "skew": LimitNumber("shape of cells", ">", _of_quality("skew")),
+}
+"""The numbers that can be limited, by name."""
+
+
+@dataclass(frozen=True)
+class Limit(CheckedFields):
+    """A limit on a number of `NUMBERS`, everywhere or at the boundary ``marker``."""
+
+    name: str
+    sign: str
+    value: float
+    marker: str = ""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        row = NUMBERS.get(self.name)
+        if row is None:
+            raise CaseError(not_one_of(self.name, NUMBERS))
+        if self.sign not in OPERATORS:
+            raise CaseError(f"{self}: {not_one_of(self.sign, OPERATORS)}")
+        if self.sign[0] not in row.signs:
+            signs = " and ".join(row.signs)
+            raise CaseError(f"{self}: the limits of {self.name} ({row.meaning}) are with {signs}")
+        if self.marker and not row.on_boundary:
+            raise CaseError(f"{self}: {self.name} is of the whole mesh; leave out @{self.marker}")
+        if not np.isfinite(self.value):
+            raise CaseError(f"{self}: expected a finite number as the limit")
+
+    def __str__(self) -> str:
+        place = f"@{name_text(self.marker)}" if self.marker else ""
+        return f"{self.name}{place} {self.sign} {repr(float(self.value)).removesuffix('.0')}"
+
+    def holds(self, values: Any) -> Any:
+        """Return whether values, or each of an array, are within the limit; NaN is not."""
+        return OPERATORS[self.sign](values, self.value)
+
+
+@dataclass(frozen=True, eq=False)
+class LimitResult:
+    """Whether a mesh meets a limit."""
+
+    limit: Limit
+    actual: float
+    """The number; of one of each cell, the value farthest beyond the limit, or nearest to it. NaN
+    where no cell has a value."""
+    cells: IntArray
+    """(k,): the cells that fail, the worst first; none for a mean."""
+
+    @property
+    def passed(self) -> bool:
+        """Return whether the limit is met; it is not where no cell has a value."""
+        return bool(self.limit.holds(self.actual))
+
+
+def check_limits(limits: Iterable[Limit], measured: MeasuredMesh) -> tuple[LimitResult, ...]:
+    """Return for each limit whether a mesh meets it."""
+    return tuple(_result(limit, measured) for limit in limits)
+
+
+def _result(limit: Limit, measured: MeasuredMesh) -> LimitResult:
+    row, quality = NUMBERS[limit.name], measured.quality
+    if row.total is not None:
+        actual, cells = float(row.total(quality)), np.empty(0, np.int64)
+        if row.status is not None and not limit.holds(actual):
+            mask = quality.status == row.status
+            cells = np.flatnonzero(mask if quality.halo is None else mask & ~quality.halo)
+        return LimitResult(limit, actual, cells)
+    assert row.values is not None
+    values, ids = row.values(measured, limit.marker)
+    low, actual = limit.sign[0] == ">", np.nan
+    failing, by_how_much = [np.empty(0, np.int64)], [np.empty(0)]
+    for first in range(0, len(values), PIECE):  # they may be in a file, and not fit into memory
+        some = values[first : first + PIECE]
+        cells = np.arange(first, first + len(some)) if ids is None else ids[first : first + PIECE]
+        counts = ~np.isnan(some) & (True if quality.halo is None else ~quality.halo[cells])
+        if counts.any():
+            worst = some[counts].min() if low else some[counts].max()
+            actual = float(np.fmin(actual, worst) if low else np.fmax(actual, worst))
+        bad = counts & ~limit.holds(some)
+        failing.append(cells[bad])
+        by_how_much.append(some[bad] if low else -some[bad])
+    found = np.concatenate(failing)[np.argsort(np.concatenate(by_how_much), kind="stable")]
+    places = np.sort(np.unique(found, return_index=True)[1])  # a cell may have several walls
+    return LimitResult(limit, actual, found[places])
+
+
+def require_streamed(limits: Iterable[Limit]) -> None:
+    """Raise CaseError for a limit on a number that is not known of a mesh in a file."""
+    for limit in limits:
+        if not NUMBERS[limit.name].streamed:
+            known = ", ".join(name for name, row in NUMBERS.items() if row.streamed)
+            raise CaseError(
+                f"LIMITS: {limit} needs the mesh in memory, for a streamed run measures only "
+                f"{known}; leave this limit out, or --stream"
+            )
+
+
+def read_limits(text: str) -> tuple[Limit, ...]:
+    """Return the limits of a text like ``( min > 0.3, inverted = 0 )``; () for ``( )`` or NONE.
+
+    Raises
+    ------
+    CaseError
+        Some have mistakes; the message has a line for each.
+    """
+    inside = text.strip()
+    if inside.count('"') % 2:
+        raise CaseError(f"the quotation mark in {shown(text)} is not closed; close it")
+    if inside.startswith("(") != inside.endswith(")"):
+        raise CaseError(f"a bracket of {shown(text)} is missing; write ( min > 0.3, inverted = 0 )")
+    inside = inside.removeprefix("(").removesuffix(")").strip()
+    if not inside or inside.upper() == "NONE":
+        return ()
+    limits, problems = [], []
+    for item in _ITEM.findall(inside):
+        try:
+            limits.append(_read_limit(item.strip()))
+        except CaseError as problem:
+            problems.append(str(problem))
+    if problems:
+        raise CaseError("\n".join(problems))
+    return tuple(limits)
+
+
+def _read_limit(text: str) -> Limit:
+    match = _LIMIT.match(text)
+    if match is None:
+        raise CaseError(f"{shown(text)} is no limit; expected NAME > NUMBER, as min > 0.3")
+    quoted = match["quoted"]
+    marker = match["plain"] or "" if quoted is None else quoted.replace('""', '"')
+    return Limit(match["name"], match["sign"], number(match["value"]), marker)
+
+
+def write_limits(limits: tuple[Limit, ...]) -> str:
+    """Return the text of limits, which `read_limits` reads back without loss."""
+    return f"( {', '.join(map(str, limits))} )" if limits else "( )"
+
+
+LIMITS = Kind(
+    "( NAME > NUMBER, ... ), also with >=, <, <=, =",
+    read_limits,
+    write_limits,
+    details=tuple(f"{name:<20}{row.meaning}" for name, row in NUMBERS.items()),
+)

@@ -1,0 +1,147 @@
+"""Limits: their text, and which cells of a mesh fail them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from slideviz.case.check import check_case
+from slideviz.case.limits import (
+    NUMBERS,
+    OPERATORS,
+    Limit,
+    MeasuredMesh,
+    check_limits,
+    read_limits,
+    require_streamed,
+    write_limits,
+)
+from slideviz.case.model import Case
+from slideviz.errors import CaseError
+from slideviz.mesh.quality import quality
+from tests.builders import grid
+
+
+@st.composite
+def limits(draw):
+    name = draw(st.sampled_from(sorted(NUMBERS)))
+    row = NUMBERS[name]
+    sign = draw(st.sampled_from([one for one in OPERATORS if one[0] in row.signs]))
+    marker = draw(st.text('a," <(@é', max_size=4)) if row.on_boundary else ""
+    return Limit(name, sign, draw(st.floats(allow_nan=False, allow_infinity=False)), marker)
+
+
+@given(st.lists(limits(), max_size=4))
+def test_written_limits_are_read_back(some):
+    assert read_limits(write_limits(tuple(some))) == tuple(some)
+
+
+@pytest.mark.parametrize("text", ["min>.3,inverted=0", " ( min > 0.3 , inverted = 0.0 ) "])
+def test_spaces_and_brackets_may_be_left_out(text):
+    assert read_limits(text) == (Limit("min", ">", 0.3), Limit("inverted", "=", 0.0))
+    assert Case(limits=text).limits == read_limits(text)
+
+
+@pytest.mark.parametrize("text", ["( )", "NONE", ""])
+def test_no_limits(text):
+    assert read_limits(text) == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("mni > 0.3", r"'mni' is not one of min \| .*; did you mean min\?"),
+        ("min", r"'min' is no limit; expected NAME > NUMBER, as min > 0.3"),
+        ("min > 0,3", r"'3' is no limit"),
+        ("min > high", r"'high' is not a number"),
+        ("min < 0.3", r"min < 0.3: the limits of min \(lowest quality\) are with >"),
+        ("inverted >= 1", r"inverted >= 1: the limits of inverted .* are with < and ="),
+        ("min => 0.3", r"min => 0.3: '=>' is not one of > \| >="),
+        ("min@blade > 0.3", r"min@blade > 0.3: min is of the whole mesh; leave out @blade"),
+        ("( min > 0.3", r"a bracket of '\( min > 0.3' is missing"),
+        ('min@"a > 3', r"the quotation mark in .* is not closed"),
+    ],
+)
+def test_mistakes_are_told(text, words):
+    with pytest.raises(CaseError, match=words):
+        read_limits(text)
+
+
+def test_all_mistakes_are_told_at_once():
+    with pytest.raises(CaseError, match=r"(?s)'a' is not one of.*'b' is no limit"):
+        read_limits("a > 1, b")
+    with pytest.raises(CaseError, match="expected a finite number"):
+        Limit("min", ">", float("nan"))
+
+
+def test_a_case_keeps_its_limits_in_a_file(tmp_path):
+    case = Case(roles={"BLOCK": "moving"}, limits="min > 0.25, inverted = 0")
+    case.write(tmp_path / "case.cfg")
+    assert "LIMITS= ( min > 0.25, inverted = 0 )" in (tmp_path / "case.cfg").read_text()
+    assert Case.read(tmp_path / "case.cfg").limits == case.limits
+    case.change(limits=()).write(tmp_path / "none.cfg")
+    assert "LIMITS" not in (tmp_path / "none.cfg").read_text()
+
+
+@pytest.fixture
+def measured():
+    """Return 3 x 3 squares; the lower left node is drawn in, and one of the right side beyond."""
+    mesh = grid((4, 4))
+    points = mesh.points.copy()
+    points[0] += 0.1
+    points[7] -= (0.4, 0.0)
+    moved = mesh.with_points(points)
+    return MeasuredMesh(quality(moved, mesh), moved, mesh)
+
+
+def test_the_cells_that_fail_are_the_worst_first(measured):
+    values = measured.quality.values
+    (result,) = check_limits(read_limits("min > 0.9"), measured)
+    assert not result.passed
+    assert result.actual == values.min() == 0
+    np.testing.assert_array_equal(np.sort(result.cells), np.flatnonzero(~(values > 0.9)))
+    assert (np.diff(values[result.cells]) >= 0).all()
+    assert len(result.cells) > 2
+    (at,) = check_limits([Limit("size", ">=", float(measured.quality.size.min()))], measured)
+    assert at.passed
+    assert not len(at.cells)
+    (above,) = check_limits([Limit("size", ">", float(measured.quality.size.min()))], measured)
+    assert not above.passed
+
+
+def test_counts_and_the_mean(measured):
+    texts = "inverted = 0, inverted <= 2, unproven = 0, mean > 0.99, mean > 0.1"
+    results = check_limits(read_limits(texts), measured)
+    assert [result.passed for result in results] == [False, True, True, False, True]
+    np.testing.assert_array_equal(results[0].cells, measured.quality.inverted_cells())
+    assert results[0].actual == measured.quality.inverted == 2
+    assert results[3].actual == measured.quality.mean
+    assert not len(results[3].cells)
+
+
+def test_cells_of_a_halo_do_not_count(measured):
+    halo = measured.quality.values < 0.9
+    masked = replace(measured, quality=replace(measured.quality, halo=halo))
+    low, folded = check_limits(read_limits("min > 0.9, inverted = 0"), masked)
+    assert low.passed
+    assert low.actual == measured.quality.values[~halo].min()
+    assert folded.passed
+
+
+def test_a_boundary_that_the_mesh_lacks_is_told(monkeypatch):
+    row = replace(NUMBERS["size"], on_boundary=True)
+    monkeypatch.setitem(NUMBERS, "size", row)
+    case = Case(roles={"BLOCK": "moving"}, limits="size@BLOK > 0.5")
+    (problem,) = [
+        text for text in check_case(case, grid((4, 4), hole=((1, 2), (1, 2)))) if "LIM" in text
+    ]
+    assert "LIMITS" in problem
+    assert "has no marker 'BLOK'; did you mean BLOCK?" in problem
+
+
+def test_a_streamed_run_knows_some_numbers_only():
+    require_streamed(read_limits("min > 0.3, mean > 0.3, inverted = 0, unproven = 0"))
+    with pytest.raises(CaseError, match=r"size > 0.5 needs the mesh in memory.* min, mean, inv"):
+        require_streamed(read_limits("min > 0.3, size > 0.5"))
