@@ -23,6 +23,7 @@ from slideviz.errors import CaseError
 from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import write_sample
 from slideviz.solver.steps import Trial
+from tests.builders import layered
 
 SECONDS = {
     *("read", "classify", "select", "solve", "evaluate", "project", "quality", "write", "total"),
@@ -624,3 +625,25 @@ def test_quality_checks_limits(square, tmp_path, capsys):
     assert run(["quality", mesh, "--stream", "--limits", "skew > 1"]) == 1
     assert run(["quality", mesh, "--limits", "mni > 1"]) == 2
     assert "did you mean min?" in capsys.readouterr().err
+
+
+def test_layers_are_in_reports_and_summaries(tmp_path, capsys):
+    mesh = layered(8, 0.001)
+    case = sv.Case(roles={"y_m": "moving", "x_m": "internal", "x_p": "sliding"}, sliding="ps")
+    case = case.change(motions=(sv.Translate("y_m", (0, 1e-4)),), mesh_file=tmp_path / "mesh.su2")
+    sv.write(tmp_path / "mesh.su2", mesh)
+    case.write(tmp_path / "case.cfg")
+    out, report = tmp_path / "out.su2", tmp_path / "report.json"
+    assert run(["run", f"{tmp_path}/case.cfg", "-o", str(out), "--json", str(report)]) == 0
+    line = next(x for x in capsys.readouterr().out.splitlines() if "layers at" in x)
+    walls = json.loads(report.read_text())["walls"]
+    assert list(walls) == ["y_m", "y_p", "x_p"]
+    assert walls == sv.walls(sv.read(out), mesh, list(walls)).summary()
+    low = walls["y_m"]["height_ratio"]["min"]
+    assert line.startswith(f"  layers at y_m  first heights {low:.3f} to ")
+    assert run(["quality", str(out), "--case", f"{tmp_path}/case.cfg"]) == 0
+    assert line in capsys.readouterr().out
+    assert run(["quality", str(out), "--json", "-"]) == 0
+    alone = json.loads(capsys.readouterr().out)["walls"]
+    assert alone["y_m"] == {key: walls["y_m"][key] for key in ("layered", "after")}
+    assert "x_m" in alone

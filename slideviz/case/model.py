@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -357,6 +357,15 @@ class Case(CheckedFields):
     def markers_with(self, role: Role) -> tuple[str, ...]:
         """Return the names of the markers with a role, in the order of ``roles``."""
         return tuple(name for name, given in self.roles.items() if given == role)
+
+    def walls(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Return those of the boundaries ``names`` that are neither periodic nor internal.
+
+        Moving ones are first, then fixed ones, then sliding ones.
+        """
+        roles = {name: self.roles.get(name, "fixed") for name in names}
+        order = ("moving", "fixed", "sliding")
+        return tuple(name for role in order for name in names if roles[name] == role)
 
     def inputs(self) -> dict[Path, str]:
         """Return the files that the case is read from or names, with words for what each is."""

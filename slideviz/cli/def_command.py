@@ -82,7 +82,7 @@ def run_def(arguments: argparse.Namespace) -> int:
 
 
 def _run_def(arguments: argparse.Namespace) -> int:
-    from slideviz import quality, write
+    from slideviz import quality, walls, write
     from slideviz.cli.output_paths import OutputPath, qualities_path, require_output_paths
     from slideviz.cli.report import folded_cells, run_report
     from slideviz.cli.run_command import run_steps
@@ -129,6 +129,7 @@ def _run_def(arguments: argparse.Namespace) -> int:
     seconds["quality"] = -time.perf_counter()
     measured = quality(steps[-1].mesh, reference=mesh, metric=case.quality_metric)
     before = quality(mesh, metric=case.quality_metric)
+    layers = walls(steps[-1].mesh, mesh, case.walls(mesh.marker_names))
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
     deformed = surface.displacer.boxed(steps[-1].mesh)
@@ -139,7 +140,14 @@ def _run_def(arguments: argparse.Namespace) -> int:
     seconds["total"] = time.perf_counter() - begin
     folded = folded_cells(steps, mesh, measured)
     report = run_report(
-        case, mesh, steps, seconds, quality=measured, undeformed=before, folded=folded
+        case,
+        mesh,
+        steps,
+        seconds,
+        quality=measured,
+        undeformed=before,
+        folded=folded,
+        walls=layers,
     )
     advice = advice_for(case, steps[-1].layers, mesh, measured, report["limits"])
     report["design"] = {

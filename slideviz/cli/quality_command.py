@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from slideviz.case.limits import Limit, MeasuredMesh
+    from slideviz.case.model import Case
+    from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
 
 
@@ -93,8 +95,9 @@ def quality(arguments: argparse.Namespace) -> int:
             write(output, mesh, cell_data=quality_data(output, found))
         worst = found.worst(WORST)
         rows = list(zip(worst.tolist(), opened.source.types(worst).tolist(), strict=True))
-        measured = MeasuredMesh(found, mesh, opened.read_base())
-        return _report(arguments, mesh.name, measured, rows, opened.reference)
+        base = opened.read_base()
+        measured, layers = MeasuredMesh(found, mesh, base), _walls(mesh, base, case)
+        return _report(arguments, mesh.name, measured, rows, opened.reference, layers)
 
 
 def _report(
@@ -103,10 +106,12 @@ def _report(
     measured: MeasuredMesh,
     worst: Sequence[tuple[int, int]],
     reference: Path | None,
+    walls: dict[str, dict],
 ) -> int:
     """Print the quality of a mesh or write it as JSON, and return the exit code.
 
-    ``worst`` are numbers and VTK types of the worst cells, ``reference`` is the undeformed mesh.
+    ``worst`` are numbers and VTK types of the worst cells, ``reference`` is the undeformed mesh,
+    ``walls`` a summary of `Walls`.
     """
     from slideviz.cli.report import (
         histogram_lines,
@@ -116,18 +121,19 @@ def _report(
         quality_report,
         save_json,
         table,
+        wall_lines,
     )
     from slideviz.cli.run_outcome import report_limits
     from slideviz.cli.terminal import INVERTED
 
     found = measured.quality
     report = quality_report(name, found, worst)
-    report |= {"reference": str(reference) if reference else None}
+    report |= {"walls": walls, "reference": str(reference) if reference else None}
     report["limits"] = limits_report(arguments.limits, measured)
     if not save_json(arguments.json, report):
         print(f"{arguments.mesh}: size-skew, metric {found.metric}")
         print(f"  {reference_words(reference)}")
-        print(quality_lines(found))
+        print(quality_lines(found) + wall_lines(walls))
         print("worst cells:")
         print(table([(w["cell"], w["type"], f"{w['quality']:.6f}") for w in report["worst"]]))
         print("cells by quality:")
@@ -136,6 +142,20 @@ def _report(
             print(f"limits:\n{limit_lines(report['limits'])}")
     code = report_limits(report["limits"])
     return INVERTED if found.inverted else code
+
+
+def _walls(mesh: Mesh, reference: Mesh | None, case: Case | None) -> dict[str, dict]:
+    """Return a summary of the layers at the boundaries of a mesh in memory."""
+    from slideviz import walls
+    from slideviz.errors import MeshError
+
+    if mesh.part is not None:
+        return {}
+    try:
+        found = walls(mesh, reference, case.walls(mesh.marker_names) if case else None)
+    except MeshError:  # of a mesh with a mistake the quality is of use still
+        return {}
+    return found.summary()
 
 
 def _write_csv(path: Path, found: Quality) -> None:

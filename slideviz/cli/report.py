@@ -17,12 +17,15 @@ from slideviz.errors import CaseError, Note
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
+from slideviz.mesh.walls import Walls, wall_words
 from slideviz.solver.deform import Step, folded_at
 from slideviz.streaming.quality import CellCounts
 from slideviz.system.atomic import atomic_write
 
 LISTED = 100
 """Most inverted cells listed in a report."""
+MOST_WALLS = 6
+"""Most boundaries whose layers a summary has."""
 WORST = 10
 """Cells of lowest quality listed in a report."""
 
@@ -45,6 +48,7 @@ def run_report(
     quality: Quality,
     undeformed: Quality,
     folded: Mapping[int, tuple[int, int]],
+    walls: Walls | None = None,
 ) -> dict[str, Any]:
     """Return the JSON object of ``run --json``.
 
@@ -56,6 +60,8 @@ def run_report(
         Quality after the last step, and before the run.
     folded : mapping of int to (int, int)
         VTK type and first inverted step of the inverted cells with the lowest numbers.
+    walls : Walls, optional
+        The layers at the boundaries; None where the mesh is in a file.
     """
     last = steps[-1]
     spent = dict.fromkeys(PHASES, 0.0) | dict(seconds)
@@ -79,6 +85,7 @@ def run_report(
             "undeformed": {"min": undeformed.min, "mean": undeformed.mean},
         },
         "limits": limits_report(case.limits, MeasuredMesh(quality, last.mesh, mesh)),
+        "walls": {} if walls is None else walls.summary(),
         "tried": [_fields(trial, TRIAL_KEYS) for trial in last.tried],
         "control_nodes": [step.control_nodes for step in steps],
         "control_candidates": last.candidates,
@@ -255,6 +262,15 @@ def table(rows: Sequence[Sequence[object]], indent: int = 2) -> str:
 
 def _cell(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def wall_lines(walls: Mapping[str, dict]) -> str:
+    """Return a line for each boundary with layers of ``walls``, a summary of `Walls`, or ""."""
+    layered = {name: row for name, row in walls.items() if row["layered"]}
+    rows = [(f"layers at {name}", wall_words(row)) for name, row in layered.items()]
+    more = len(rows) - MOST_WALLS
+    rows[MOST_WALLS:] = [(f"and at {more} more boundaries", "")] if more > 0 else []
+    return f"\n{table(rows)}" if rows else ""
 
 
 def histogram_lines(quality: Quality, bins: int = 10, width: int = 40) -> str:

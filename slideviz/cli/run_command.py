@@ -136,7 +136,14 @@ def _run(arguments: argparse.Namespace) -> int:
     seconds["total"] = time.perf_counter() - begin
     folded = done.folded
     report = run_report(
-        case, done.mesh, done.steps, seconds, quality=found, undeformed=before, folded=folded
+        case,
+        done.mesh,
+        done.steps,
+        seconds,
+        quality=found,
+        undeformed=before,
+        folded=folded,
+        walls=done.walls,
     )
     in_memory = None if streamed else done.mesh
     advice = advice_for(case, done.steps[-1].layers, in_memory, found, report["limits"])
@@ -156,7 +163,7 @@ def _deform(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> RunResult:
     """Deform a mesh in memory, and write it."""
-    from slideviz import quality, read, write
+    from slideviz import quality, read, walls, write
     from slideviz.cli.report import folded_cells
     from slideviz.formats.files import quality_data
     from slideviz.formats.losses import warning_of_losses
@@ -175,6 +182,7 @@ def _deform(
     seconds["quality"] = -time.perf_counter()
     measured = quality(last.mesh, reference=mesh, metric=case.quality_metric)
     before = quality(mesh, metric=case.quality_metric)
+    layers = walls(last.mesh, mesh, case.walls(mesh.marker_names))
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
     data = quality_data(output, measured)
@@ -182,7 +190,7 @@ def _deform(
     write(output, last.mesh, overwrite=force, cell_data=data, base=mesh, file_format=kind)
     seconds["write"] += time.perf_counter()
     folded = folded_cells(steps, mesh, measured)
-    return RunResult(mesh, tuple(steps), measured, before, folded, seconds)
+    return RunResult(mesh, tuple(steps), measured, before, folded, seconds, layers)
 
 
 def _stream(

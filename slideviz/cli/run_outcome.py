@@ -180,7 +180,7 @@ def _print_run(
 ) -> None:
     """Print the summary of a run; ``found`` and ``before`` are its quality after and before."""
     from slideviz.case.words import counted
-    from slideviz.cli.report import limit_lines, quality_lines, table
+    from slideviz.cli.report import limit_lines, quality_lines, table, wall_lines
 
     counts, spent = report["node_counts"], report["seconds"]
     method = "" if report["method"] == "rbf" else f"method {report['method']}, "
@@ -190,7 +190,7 @@ def _print_run(
     slides = counts["sliding_edge"] + counts["sliding_surface"]
     sliding = report["sliding"] if slides else "none"
     print(f"sliding {sliding}, periodic {report['periodic']}{zone}")
-    print(quality_lines(found, before))
+    print(quality_lines(found, before) + wall_lines(report["walls"]))
     rows = [(name.replace("_", " ") + " nodes", count) for name, count in counts.items()]
     rows.append(("control nodes", report["control_nodes"][-1]))
     rows.append(("control candidates", report["control_candidates"]))

@@ -353,9 +353,25 @@ _BADNESS: dict[str, Callable[[FloatArray], FloatArray]] = {
 """A function of each value that is larger where it is worse."""
 
 
+def wall_words(row: dict) -> str:
+    """Return the layers at a boundary in words; ``row`` is its entry of `Walls.summary`."""
+    if "before" not in row:
+        after = row["after"]
+        height, growth, equal = (after[name] for name in VALUES[:3])
+        turned = f"edges at {after['wall_angle']['min']:.3g}° or more"
+        growing = f", growth up to {growth['max']:.3g}" if growth["max"] is not None else ""
+        layers = f", {equal['min']:.0f} equal"
+        return (
+            f"first heights {height['min']:.4g} to {height['max']:.4g}{growing}{layers}, {turned}"
+        )
+    ratio, change = row["height_ratio"], row["angle_change"]
+    heights = f"first heights {ratio['min']:.3f} to {ratio['max']:.3f} times those before"
+    return f"{heights}, edges within {change['max']:.2g}°"
+
+
 def _statistics(values: FloatArray) -> dict[str, float | None]:
     """Return smallest, mean and largest of the numbers among values (k,); None without any."""
-    values = values[~np.isnan(values)]
+    values = values[np.isfinite(values)]
     if not len(values):
         return {"min": None, "mean": None, "max": None}
     low, mean, high = values.min(), values.mean(), values.max()

@@ -12,6 +12,7 @@ from slideviz.errors import Cancelled, SlidevizError
 from slideviz.formats.source import Source
 from slideviz.formats.su2.read import read_su2
 from slideviz.formats.su2.write import su2_blocks
+from slideviz.mesh.walls import walls
 from slideviz.samples.table import sample
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
@@ -61,10 +62,11 @@ def _write_and_read() -> None:
 
 
 def _look() -> None:
-    """Cut a mesh, and color it by its displacement."""
+    """Cut a mesh, color it by its displacement, and measure its walls."""
     mesh = sample("cylindrical", size=4).mesh
     Cutter.of(mesh).cut(mesh.points, Section("plane", tuple(mesh.points.mean(axis=0)), (0, 0, 1)))
     cell_displacement(mesh.with_points(mesh.points / 3.0), mesh)
+    walls(mesh)
 
 
 def _deform(name: str, settings: Mapping[str, Any], stopped: Stopped) -> None:

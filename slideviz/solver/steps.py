@@ -18,6 +18,7 @@ from slideviz.rbf.problem import Cycle
 
 if TYPE_CHECKING:
     from slideviz.mesh.quality import Quality
+    from slideviz.mesh.walls import Walls
 
 
 @dataclass(frozen=True)
@@ -117,3 +118,5 @@ class RunResult:
     first inverted, by cell number; at most ``listed``, those with the lowest numbers."""
     seconds: dict[str, float]
     """Spent by phase, besides those of the steps."""
+    walls: Walls | None = None
+    """The layers at the boundaries, compared with those of ``mesh``; None of one in a file."""
