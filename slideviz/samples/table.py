@@ -16,7 +16,7 @@ from slideviz.samples.airfoil import airfoil_case, airfoil_mesh
 from slideviz.samples.passage import passage_case, passage_mesh
 from slideviz.samples.stator import stator_case, stator_displacement, stator_mesh, stator_zone
 from slideviz.samples.thesis import FILE, thesis_case, thesis_zone
-from slideviz.samples.turbine_row import row_case, row_mesh
+from slideviz.samples.turbine_row import extruded_case, extruded_row, row_case, row_mesh
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import FileFormat
 
@@ -91,6 +91,11 @@ def _turbine_row(name: str, size: int, _variant: str) -> Sample:
     return Sample(name, row_mesh(size), row_case(size))
 
 
+def _extruded_row(name: str, size: int, _variant: str) -> Sample:
+    """Return the sample ``turbine-row-3d``, which has one variant only."""
+    return Sample(name, extruded_row(size), extruded_case(size))
+
+
 def _stator(name: str, size: int, _variant: str) -> Sample:
     """Return the sample ``stator``, which has one variant only."""
     mesh = stator_mesh(size)
@@ -149,6 +154,12 @@ SAMPLES: Mapping[str, SampleKind] = {
         224_180,
         _turbine_row,
     ),
+    "turbine-row-3d": SampleKind(
+        "3D: the vane of turbine-row from hub to shroud, twisted; prisms, hexahedra at the wall; "
+        "size: cells (25000)",
+        25_000,
+        _extruded_row,
+    ),
     "stator": SampleKind(
         "3D: stator passage, 41 around, hexahedra (thesis 4.2.3); size: cells (240000)",
         240_000,
@@ -169,7 +180,7 @@ def sample(name: str, size: int | None = None, variant: str | None = None) -> Sa
         One of ``SAMPLES``.
     size : int, optional
         Cells in each direction; of the passage: cells along its inflow; of the airfoil: cells
-        around it; of turbine row and stator: all cells. The usual size when left out.
+        around it; of turbine rows and stator: all cells. The usual size when left out.
     variant : str, optional
         One of ``SAMPLES[name].variants``; the first when left out.
 

@@ -1,4 +1,4 @@
-"""The sample ``turbine-row``: a linear supersonic cascade (thesis section 4.1.3).
+"""The sample ``turbine-row``, a linear supersonic cascade (thesis section 4.1.3), flat and in 3D.
 
 A layer of quadrilaterals lies around the vane, and triangles fill the rest of the channel. At
 the default size the numbers of cells are those of thesis Table 4.7, to a few per cent.
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 from scipy.spatial import Delaunay, cKDTree
 
-from slideviz.case.model import Case, Scale, Translate
+from slideviz.case.model import Case, FfdTwist, Scale, Translate
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.rbf.reduction import Reduction
@@ -180,7 +180,7 @@ def _distance(points: FloatArray, rim: FloatArray) -> FloatArray:
     return best
 
 
-LINE, TRIANGLE, QUADRILATERAL = 3, 5, 9
+LINE, TRIANGLE, QUADRILATERAL, HEXAHEDRON, PRISM = 3, 5, 9, 12, 13
 """VTK identifiers."""
 CELLS, AROUND, LAYERS = 224_180, 1315, 25
 """Cells of the mesh, nodes around the vane, and layers of quadrilaterals at the default size.
@@ -189,6 +189,12 @@ The first two are those of thesis Tables 4.7 and 4.8; the third follows by Euler
 """
 SIZES = (5_000, 5_000_000)
 """Least and largest number of cells."""
+SPAN, TWIST_DEG = 0.5 * CHORD, 10.0
+"""Length of the vane from hub to shroud in 3D, and by how much its case turns the shroud's end."""
+VANE_BOX, VANE_AXIS = ((-0.002, -0.034), (0.03, 0.006)), (0.016, -0.012)
+"""Corners of a rectangle around the vane; where the axis of the twist meets it."""
+SIZES_3D, LEVELS, TYPICAL = (10_000, 5_000_000), 4, 25_000
+"""Least and largest number of cells in 3D, and the cells along the span of a mesh of that many."""
 CALIBRATION = 1.035
 """Number of equilateral triangles to ask for, divided by that which the front then makes."""
 TOLERANCE = 1e-6
@@ -255,6 +261,69 @@ def row_case(size: int) -> Case:
         periodic_type="translational",
         steps=2,
         reduction=Reduction(tolerance=TOLERANCE) if size > MANY else None,
+    )
+
+
+def extruded_row(size: int) -> Mesh:
+    """Return the mesh of the sample ``turbine-row-3d``: `row_mesh` from hub to shroud, along z.
+
+    It has about ``size`` cells: hexahedra at the vane, prisms outside.
+
+    Raises
+    ------
+    CaseError
+        ``size`` is not within ``SIZES_3D``.
+    """
+    low, high = SIZES_3D
+    if not low <= size <= high:
+        raise CaseError(f"size {size} is out of range; a turbine row in 3D has {low} to {high}")
+    levels = min(round(LEVELS * (size / TYPICAL) ** (1 / 3)), size // SIZES[0])
+    flat = row_mesh(size // levels)
+    count, z = len(flat.points), np.linspace(0.0, SPAN, levels + 1)
+    points = np.column_stack([np.tile(flat.points, (levels + 1, 1)), np.repeat(z, count)])
+    shift = count * np.arange(levels)[:, None, None]
+
+    def stacked(nodes: IntArray, order: slice) -> IntArray:
+        column = np.concatenate([nodes, nodes[:, order] + count], axis=1)
+        return (column + shift).reshape(-1, column.shape[1])
+
+    plane = {vtk: nodes for vtk, (_, nodes) in flat.cells.by_type.items()}
+    solids = {QUADRILATERAL: HEXAHEDRON, TRIANGLE: PRISM}
+    blocks = [(solids[vtk], stacked(nodes, slice(None))) for vtk, nodes in plane.items()]
+    ends = {
+        "HUB": [(vtk, nodes[:, ::-1]) for vtk, nodes in plane.items()],
+        "SHROUD": [(vtk, nodes + levels * count) for vtk, nodes in plane.items()],
+    }
+    strips = {
+        marker.name: [
+            (QUADRILATERAL, stacked(marker.cells.by_type[LINE][1], slice(None, None, -1)))
+        ]
+        for marker in flat.markers
+    }
+    markers = [Marker(name, Cells.from_blocks(b)) for name, b in (strips | ends).items()]
+    return Mesh(points, Cells.from_blocks(blocks), tuple(markers), name="turbine-row-3d")
+
+
+def extruded_case(size: int) -> Case:
+    """Return the case that twists the vane by `TWIST_DEG` from hub to shroud, which slide.
+
+    A box for free-form deformation does it: the middle of its three planes of control points turns
+    half as far as the last.
+    """
+    flat = row_case(size)
+    (x0, y0), (x1, y1) = VANE_BOX
+    rectangle = ((x0, y0, 0.0), (x0, y1, 0.0), (x0, y1, SPAN), (x0, y0, SPAN))
+    corners = [*rectangle, *((x1, y, z) for _, y, z in rectangle)]
+    return flat.change(
+        roles={**flat.roles, "HUB": "sliding", "SHROUD": "sliding"},
+        ffd_boxes=(("VANE", tuple(value for corner in corners for value in corner)),),
+        ffd_degrees=((1, 2, 1),),
+        motions=tuple(
+            FfdTwist("BLADE", "VANE", plane, angle, (*VANE_AXIS, 0.0), (0.0, 0.0, 1.0))
+            for plane, angle in ((1, TWIST_DEG / 2), (2, TWIST_DEG))
+        ),
+        steps=1,
+        reduction=Reduction(tolerance=TOLERANCE),
     )
 
 

@@ -1,0 +1,412 @@
+"""``python -m tools.study.contest``: relaxation and layers beside linear elasticity, row by row.
+
+Each row is a mesh and a motion, and each method gives its mean and lowest quality, its inverted
+cells, first heights at the moving walls (after over before, least and largest), the largest change
+of the angle between first edges and the wall's normal, and its time. Rows of real meshes are left
+out without ``--meshes DIR``: the folder TestCases of SU2's repository, or one with the same files
+whose names have ``_`` for ``/``. ``--list`` prints the names of the rows.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import re
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import slideviz as sv
+from slideviz.case.model import Motion
+from slideviz.errors import SlidevizError
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.reduction import Reduction
+from slideviz.samples.table import sample
+from tools.study.flows import SHAPES, c_mesh, o_mesh, triangle_mesh
+
+METHODS: Mapping[str, Mapping[str, Any]] = {
+    "rbf": {"relax": "no", "layers": "no"},
+    "layers": {"relax": "no", "layers": "auto"},
+    "relax": {"relax": "yes", "layers": "no"},
+    "auto": {"relax": "auto", "layers": "auto"},
+    "elastic": {"method": "elastic", "relax": "no", "layers": "no", "steps": 1},
+    "elastic-10": {"method": "elastic", "relax": "no", "layers": "no", "steps": 10},
+}
+"""Settings of each method. Those of the first four keep the number of steps of the row."""
+
+LAYERED, BARE = (
+    ("rbf", "layers", "relax", "auto", "elastic", "elastic-10"),
+    ("rbf", "relax", "elastic"),
+)
+"""Methods for rows with boundary layers, and without."""
+
+
+class Contest(NamedTuple):
+    """A row: a name, a mesh with its case, and whether the mesh has boundary layers."""
+
+    name: str
+    make: Callable[[], tuple[sv.Mesh, sv.Case]]
+    layered: bool = True
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a method makes of a row; nan where it is refused, or where there are no layers."""
+
+    row: str
+    method: str
+    mean: float
+    lowest: float
+    inverted: int
+    unproven: int
+    height_min: float
+    height_max: float
+    angle_deg: float
+    seconds: float
+    problem: str = ""
+
+
+def _part_motions(size: float) -> dict[str, Motion]:
+    """Return the motions of bodies without layers, by name, for a body of a size."""
+    return {
+        "turned": sv.Rotate("", 20.0),
+        "moved": sv.Translate("", (0.0, 0.5 * size)),
+        "stretched": sv.Scale("", (1.2,)),
+    }
+
+
+def _reshaped(mesh: sv.Mesh, body: str, kind: str) -> Motion:
+    """Return a change of the shape of an airfoil, along and across the axes of its section.
+
+    ``bump``: 4 % of the chord on the upper side; ``bent``: a parabola with 8 % at the trailing
+    edge; ``thicker N``: N % thicker.
+    """
+    nodes = np.unique(mesh.marker(body).nodes)
+    points = mesh.points[nodes, :2]
+    middle = points.mean(axis=0)
+    along = np.linalg.svd(points - middle, full_matrices=False)[2][0]
+    along = along if along[0] > 0 else -along
+    across = np.array([-along[1], along[0]])
+    s, t = (points - middle) @ along, (points - middle) @ across
+    chord = np.ptp(s)
+    u = (s - s.min()) / chord
+    if kind == "bump":
+        upper = t > _camber(u, t)
+        moved = 0.04 * chord * np.exp(-(((u - 0.4) / 0.12) ** 2)) * upper
+    elif kind == "bent":
+        moved = 0.08 * chord * u**2
+    else:
+        moved = (t - _camber(u, t)) * float(kind.split()[1]) / 100.0
+    return sv.Prescribed(nodes, moved[:, None] * across)
+
+
+def _camber(u: FloatArray, t: FloatArray) -> FloatArray:
+    """Return the camber line at ``u``: a polynomial fitted to the mean of both sides."""
+    bins = np.clip((u * 20).astype(int), 0, 19)
+    at = np.unique(bins)
+    middle = [0.5 * (t[bins == b].min() + t[bins == b].max()) for b in at]
+    return np.polyval(np.polyfit((at + 0.5) / 20, middle, 5), u)
+
+
+@cache
+def _real(folder: Path, file: str) -> sv.Mesh:
+    path = folder / file
+    return sv.read(path if path.exists() else folder / file.replace("/", "_"))
+
+
+def _passage(mesh: sv.Mesh, body: str, motion: str) -> sv.Case:
+    """Return the case of a blade in its passage: inflow and outflow slide, periodic sides move."""
+    roles = {
+        name: "moving" if name == body else "periodic" if "per" in name.lower() else "sliding"
+        for name in mesh.marker_names
+    }
+    return sv.Case(
+        roles=roles,  # type: ignore[arg-type]
+        motions=(_motion(mesh, body, motion),),
+        sliding="ps",
+        periodic="moving",
+        periodic_type="translational",
+    )
+
+
+def _outer(mesh: sv.Mesh, body: str, motion: str) -> sv.Case:
+    return sv.Case(roles={body: "moving"}, motions=(_motion(mesh, body, motion),))
+
+
+def _motion(mesh: sv.Mesh, body: str, name: str) -> Motion:
+    if name.startswith("turned by"):
+        return sv.Rotate(body, float(name.split()[2]))
+    if name in ("turned", "moved", "stretched"):
+        points = mesh.points[np.unique(mesh.marker(body).nodes)]
+        return _part_motions(float(np.ptp(points, axis=0).max()))[name]
+    return _reshaped(mesh, body, name)
+
+
+Case = Callable[[sv.Mesh, str, str], sv.Case]
+
+
+def _combined(mesh: Callable[[], sv.Mesh], case: Case, body: str, motion: str) -> Any:
+    found = mesh()
+    return found, case(found, body, motion)
+
+
+@cache
+def _sample(name: str, size: int | None = None, variant: str | None = None) -> Any:
+    return sample(name, size, variant)
+
+
+def _own(name: str, size: int | None, variant: str, **changes: Any) -> Any:
+    """Return mesh and case of a sample, its motion as displacements, not as a file."""
+    made = _sample(name, size, variant)
+    if made.displacement is not None:
+        moved = made.displacement
+        changes["motions"] = (sv.Prescribed(moved.nodes, moved.vectors),)
+    return made.mesh, made.case.change(**changes)
+
+
+def contests(folder: Path | None) -> Iterator[Contest]:
+    """Yield all rows; those of real meshes only with their ``folder``."""
+    row = partial(_layered_rows, cases=_passage)
+    yield from row(
+        "turbine-row", lambda: _sample("turbine-row", 20_000).mesh, "BLADE", ("turned by 10",)
+    )
+    shapes = ("bump", "bent", "thicker 10", "thicker 30")
+    if folder is not None:
+        read = partial(_real, folder)
+        ls89 = partial(read, "nicf/LS89/mesh_vki_turbine_prepbc.su2")
+        stator = partial(read, "turbomachinery/transonic_stator_2D/su2mesh_per.su2")
+        naca = partial(read, "optimization_rans/naca0012_FFD.su2")
+        yield from row("LS89", ls89, "airfoil", ("turned by 15", *shapes))
+        yield from row("stator", stator, "airfoil", ("turned by 10", "turned by 15", *shapes))
+        yield from _layered_rows("NACA 0012", naca, "AIRFOIL", ("turned by 30", *shapes), _outer)
+    o_layers = lambda: _sample("airfoil", 96, "layers").mesh  # noqa: E731
+    yield from _layered_rows("O-mesh", o_layers, "airfoil", ("turned by 30", *shapes), _outer)
+    yield from _layered_rows("C-mesh", cache(c_mesh), "airfoil", ("turned by 30", *shapes), _outer)
+    yield Contest("turbine-row-3d twisted by 10", partial(_own, "turbine-row-3d", None, "motion"))
+    yield from _bare_rows()
+
+
+def _layered_rows(
+    name: str, mesh: Callable[[], sv.Mesh], body: str, motions: Sequence[str], cases: Case
+) -> Iterator[Contest]:
+    for motion in motions:
+        yield Contest(f"{name} {motion}", partial(_combined, mesh, cases, body, motion))
+
+
+GREEDY = Reduction(tolerance=1e-3, selection="double")
+MODES = [("none", "none"), ("none", "periodic"), ("none", "fixed")] + [
+    (sliding, periodic)
+    for sliding in ("ps", "ds")
+    for periodic in ("none", "periodic", "fixed", "moving")
+]
+"""Sliding and periodic modes of RBF-SliDe's reference table."""
+
+
+def _bare_rows() -> Iterator[Contest]:
+    """Yield samples, RBF-SliDe's reference table with five steps, and bodies in outer flows."""
+    for name, size in (("passage", None), ("stator", 20_000), ("airfoil", None)):
+        make = partial(_own, name, size, "file" if name == "stator" else "motion")
+        yield Contest(name, make, False)
+    for sliding, periodic in MODES:
+        modes = {"sliding": sliding, "periodic": periodic, "steps": 5}
+        for name in ("square", "polar", "hexahedron", "cylindrical"):
+            more = {"reduction": GREEDY} if name in ("hexahedron", "cylindrical") else {}
+            make = partial(_own, name, 25, "file", **modes, **more)
+            yield Contest(f"{name} {sliding} {periodic}", make, False)
+    bodies: dict[str, tuple[Callable[[], sv.Mesh], str]] = {
+        "airfoil in quadrilaterals": (lambda: _sample("airfoil", None).mesh, "airfoil"),
+        "circle in quadrilaterals": (cache(o_mesh), "body"),
+        **{
+            f"{shape} in triangles": (cache(partial(triangle_mesh, shape)), "body")
+            for shape in SHAPES
+        },
+    }
+    for name, (mesh, body) in bodies.items():
+        for motion in _part_motions(1.0):
+            yield Contest(f"{name} {motion}", partial(_combined, mesh, _outer, body, motion), False)
+
+
+def first_edges(mesh: sv.Mesh, names: Sequence[str]) -> tuple[IntArray, IntArray, list[IntArray]]:
+    """Return wall nodes (k,), the nodes above them (k,), and facets of the walls (m, n) by kind.
+
+    Edges are those of quadrilaterals, hexahedra and prisms that stand on a facet of the walls.
+    """
+    on = np.zeros(len(mesh.points), bool)
+    facets = [
+        nodes
+        for name in names
+        for _, nodes in mesh.marker(name).cells.by_type.values()
+        if nodes.shape[1] > 1
+    ]
+    for nodes in facets:
+        on[nodes] = True
+    pairs = []
+    for vtk, (_, nodes) in mesh.cells.by_type.items():
+        for side in ELEMENTS[vtk].facets if vtk in (9, 12, 13) else ():
+            if vtk == 13 and len(side) == 4:
+                continue
+            others = [a for a in range(nodes.shape[1]) if a not in side]
+            stands = on[nodes[:, side]].all(axis=1) & ~on[nodes[:, others]].any(axis=1)
+            for edge in ELEMENTS[vtk].edges:
+                ends = sorted(edge, key=lambda a: a not in side)
+                if ends[0] in side and ends[1] in others:
+                    pairs.append(nodes[stands][:, ends])
+    if not pairs:
+        return np.empty(0, np.int64), np.empty(0, np.int64), facets
+    found = np.unique(np.concatenate(pairs), axis=0)
+    return found[:, 0], found[:, 1], facets
+
+
+def edges_at(
+    points: FloatArray, below: IntArray, above: IntArray, facets: list[IntArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Return heights (k,) of first edges above their wall, and angles (k,) to its normal."""
+    normal = np.zeros_like(points)
+    for nodes in facets:
+        corners = points[nodes]
+        if points.shape[1] == 2:
+            along = corners[:, 1] - corners[:, 0]
+            area = np.column_stack([along[:, 1], -along[:, 0]])
+        else:
+            area = sum(
+                np.cross(corners[:, k] - corners[:, 0], corners[:, k + 1] - corners[:, 0])
+                for k in range(1, nodes.shape[1] - 1)
+            )
+        for column in nodes.T:
+            np.add.at(normal, column, area)
+    edge = points[above] - points[below]
+    across = normal[below] / np.linalg.norm(normal[below], axis=1)[:, None]
+    height = np.abs(np.einsum("ij,ij->i", edge, across))
+    cosine = np.clip(height / np.linalg.norm(edge, axis=1), -1.0, 1.0)
+    return height, np.degrees(np.arccos(cosine))
+
+
+def run_row(row: Contest, methods: Sequence[str]) -> Iterator[Outcome]:
+    """Yield the outcome of each method."""
+    mesh, case = row.make()
+    moving = case.markers_with("moving")
+    below, above, facets = (
+        first_edges(mesh, moving) if row.layered else (np.empty(0, int),) * 2 + ([],)
+    )
+    known = {field.name for field in fields(sv.Case)}
+    before = edges_at(mesh.points, below, above, facets)
+    for method in methods:
+        settings = {key: value for key, value in METHODS[method].items() if key in known}
+        if method in ("layers", "relax", "auto") and len(settings) < len(METHODS[method]):
+            continue
+        begin = time.perf_counter()
+        try:
+            *_, last = sv.deform(case.change(**settings), mesh)
+        except SlidevizError as problem:
+            nan = float("nan")
+            yield Outcome(row.name, method, nan, nan, 0, 0, nan, nan, nan, nan, str(problem))
+            continue
+        seconds = time.perf_counter() - begin
+        found = sv.quality(last.mesh, mesh)
+        after = edges_at(last.mesh.points, below, above, facets)
+        ratio = after[0] / before[0] if len(below) else np.full(1, np.nan)
+        turned = np.abs(after[1] - before[1]) if len(below) else np.full(1, np.nan)
+        numbers = ratio.min(), ratio.max(), turned.max(), seconds
+        yield Outcome(
+            row.name,
+            method,
+            found.mean,
+            found.min,
+            found.inverted,
+            found.unproven,
+            *map(float, numbers),
+        )
+
+
+HEAD = "| mesh and motion | method | mean | lowest | first heights | angle | seconds |"
+
+
+def line(outcome: Outcome) -> str:
+    """Return an outcome as a line of a table in Markdown."""
+    o = outcome
+    if o.problem:
+        return f"| {o.row} | {o.method} | refused: {o.problem} | | | | |"
+    lowest = f"{o.inverted} inverted" if o.inverted else f"{o.lowest:.3f}"
+    heights = "" if np.isnan(o.height_min) else f"{o.height_min:.3f} to {o.height_max:.3f}"
+    angle = "" if np.isnan(o.angle_deg) else f"{o.angle_deg:.1f}°"
+    cells = o.row, o.method, f"{o.mean:.3f}", lowest, heights, angle, f"{o.seconds:.2f}"
+    return f"| {' | '.join(cells)} |"
+
+
+def faults(row: Contest, found: Mapping[str, Outcome]) -> Iterator[str]:
+    """Yield the laws of relaxation and layers that the outcomes of a row break, in words."""
+    rbf, elastic, ten = (found.get(name) for name in ("rbf", "elastic", "elastic-10"))
+    ours = found.get("auto" if row.layered else "relax")
+    if ours is None or ours.problem:
+        return
+    if row.layered and not 0.99 <= ours.height_min <= ours.height_max <= 1.01:
+        yield f"first heights {ours.height_min:.3f} to {ours.height_max:.3f}, expected 0.99 to 1.01"
+    if row.layered and ours.angle_deg > 1.0:
+        yield f"first edges turn by {ours.angle_deg:.1f} degrees, expected at most 1"
+    if row.layered and ours.inverted:
+        yield f"{ours.inverted} cells are inverted, expected none"
+    if rbf is not None and not rbf.problem:
+        if ours.inverted > rbf.inverted or ours.lowest < min(0.9 * rbf.lowest, 0.3):
+            yield f"lowest {ours.lowest:.3f}, {ours.inverted} inverted, from {rbf.lowest:.3f}"
+        if ours.mean < rbf.mean or (rbf.lowest > 0.4 and ours.mean <= rbf.mean):
+            yield f"mean {ours.mean:.4f}, of radial basis functions {rbf.mean:.4f}"
+    for other, most in ((elastic, 0.003 if row.layered else 0.0), (ten, 0.0)):
+        if other is not None and not other.problem and ours.mean < other.mean - most:
+            yield f"mean {ours.mean:.4f}, of {other.method} {other.mean:.4f}"
+    if row.layered and elastic is not None and ours.lowest < 0.9 * elastic.lowest:
+        yield f"lowest {ours.lowest:.3f}, of elasticity {elastic.lowest:.3f}"
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run the rows that are asked for; print their table, and the laws that they break."""
+    parser = argparse.ArgumentParser(prog="python -m tools.study.contest", description=__doc__)
+    parser.add_argument("--meshes", type=Path, metavar="DIR", help="SU2's folder TestCases")
+    parser.add_argument("--rows", default="", metavar="REGEX", help="only rows with such a name")
+    parser.add_argument("--methods", metavar="LIST", help=f"of {', '.join(METHODS)}")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write CSV")
+    parser.add_argument("--list", action="store_true", help="print names of rows, and run nothing")
+    arguments = parser.parse_args(argv)
+    rows = [row for row in contests(arguments.meshes) if re.search(arguments.rows, row.name)]
+    if arguments.list:
+        say("\n".join(row.name for row in rows))
+        return 0
+    say(HEAD + "\n" + "| --- " * HEAD.count(" | ") + "| --- |")
+    outcomes, broken = [], []
+    for row in rows:
+        usual = LAYERED if row.layered else BARE
+        methods = arguments.methods.split(",") if arguments.methods else usual
+        found = {}
+        for outcome in run_row(row, methods):
+            say(line(outcome))
+            found[outcome.method] = outcome
+        outcomes += found.values()
+        broken += [f"{row.name}: {fault}" for fault in faults(row, found)]
+        if arguments.output:
+            write(arguments.output, outcomes)
+    say("\n" + ("\n".join(broken) or "no law is broken"))
+    return 1 if broken else 0
+
+
+def write(path: Path, outcomes: Sequence[Outcome]) -> None:
+    """Write outcomes as CSV."""
+    with path.open("w", encoding="utf-8") as file:
+        table = csv.DictWriter(file, [f.name for f in fields(Outcome)], lineterminator="\n")
+        table.writeheader()
+        table.writerows(asdict(outcome) for outcome in outcomes)
+
+
+def say(text: str) -> None:
+    """Write a line to the terminal."""
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
