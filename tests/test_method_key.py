@@ -94,6 +94,7 @@ SIZES = {
     "cylindrical": 6,
     "passage": 12,
     "turbine-row": 5_000,
+    "turbine-row-3d": 10_000,
     "stator": 5_000,
     "airfoil": 24,
 }

@@ -11,10 +11,16 @@ import slideviz as sv
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.periodic import pair_up
+from slideviz.mesh.topology import facet_vectors, find_boundary
 from slideviz.samples.table import SAMPLES, sample
 from slideviz.samples.turbine_row import (
     NEAREST,
+    SPAN,
+    TWIST_DEG,
+    VANE_AXIS,
     Sizing,
+    extruded_case,
+    extruded_row,
     find_sizing,
     front_points,
     inside,
@@ -260,3 +266,46 @@ def test_sample_meshes_folder_holds_a_small_row():
     case, now = sv.Case.read(KEPT / "turbine-row.cfg"), row_case(5_000)
     paths = {"mesh_file": None, "mesh_out": None, "source": None}
     assert case.change(**paths) == now.change(**paths)
+
+
+def test_extruded_row_has_hexahedra_at_the_vane_and_facets_with_outward_normals():
+    mesh = extruded_row(10_000)
+    assert len(mesh.cells) == pytest.approx(10_000, rel=0.05)
+    assert set(mesh.cells.by_type) == {12, 13}
+    assert sv.quality(mesh, reference=mesh).inverted == 0
+    assert np.ptp(mesh.points[:, 2]) == SPAN
+    areas = {
+        marker.name: np.concatenate(
+            [
+                facet_vectors(mesh.points, nodes[:, [0, 1, 2, -1]])
+                for _, nodes in marker.cells.by_type.values()
+            ]
+        )
+        for marker in mesh.markers
+    }
+    for name, z in {"HUB": -1.0, "SHROUD": 1.0}.items():
+        assert (z * areas[name][:, 2] > 0).all()
+    total = sum(area.sum(axis=0) for area in areas.values())
+    np.testing.assert_allclose(total, 0.0, atol=1e-12)
+    assert sum(map(len, areas.values())) == len(find_boundary(mesh).facets)
+
+
+def test_extruded_row_twists_from_hub_to_shroud_which_slide():
+    mesh, case = extruded_row(10_000), extruded_case(10_000)
+    *_, last = sv.deform(case, mesh)
+    assert sv.quality(last.mesh, reference=mesh).inverted == 0
+    vane = mesh.marker("BLADE").nodes
+    z = mesh.points[vane, 2]
+    before, after = (
+        p[vane, :2] @ [1, 1j] - complex(*VANE_AXIS) for p in (mesh.points, last.mesh.points)
+    )
+    angle = np.degrees(np.angle(after / before))
+    np.testing.assert_allclose(angle, TWIST_DEG * z / SPAN, atol=0.01)
+    np.testing.assert_allclose(np.abs(after / before), 1.0, atol=0.002)
+    for name in ("HUB", "SHROUD"):
+        nodes = mesh.marker(name).nodes
+        moved = (last.mesh.points - mesh.points)[np.setdiff1d(nodes, vane)]
+        assert np.abs(moved[:, 2]).max() == 0.0
+        assert name == "HUB" or np.abs(moved[:, :2]).max() > 1e-4
+    with pytest.raises(CaseError, match="size 9999 is out of range; a turbine row in 3D has 10000"):
+        extruded_row(9_999)

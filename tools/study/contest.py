@@ -25,8 +25,7 @@ import numpy as np
 import slideviz as sv
 from slideviz.case.model import Motion
 from slideviz.errors import SlidevizError
-from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray
 from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import sample
 from tools.study.flows import SHAPES, c_mesh, o_mesh, triangle_mesh
@@ -233,70 +232,11 @@ def _bare_rows() -> Iterator[Contest]:
             yield Contest(f"{name} {motion}", partial(_combined, mesh, _outer, body, motion), False)
 
 
-def first_edges(mesh: sv.Mesh, names: Sequence[str]) -> tuple[IntArray, IntArray, list[IntArray]]:
-    """Return wall nodes (k,), the nodes above them (k,), and facets of the walls (m, n) by kind.
-
-    Edges are those of quadrilaterals, hexahedra and prisms that stand on a facet of the walls.
-    """
-    on = np.zeros(len(mesh.points), bool)
-    facets = [
-        nodes
-        for name in names
-        for _, nodes in mesh.marker(name).cells.by_type.values()
-        if nodes.shape[1] > 1
-    ]
-    for nodes in facets:
-        on[nodes] = True
-    pairs = []
-    for vtk, (_, nodes) in mesh.cells.by_type.items():
-        for side in ELEMENTS[vtk].facets if vtk in (9, 12, 13) else ():
-            if vtk == 13 and len(side) == 4:
-                continue
-            others = [a for a in range(nodes.shape[1]) if a not in side]
-            stands = on[nodes[:, side]].all(axis=1) & ~on[nodes[:, others]].any(axis=1)
-            for edge in ELEMENTS[vtk].edges:
-                ends = sorted(edge, key=lambda a: a not in side)
-                if ends[0] in side and ends[1] in others:
-                    pairs.append(nodes[stands][:, ends])
-    if not pairs:
-        return np.empty(0, np.int64), np.empty(0, np.int64), facets
-    found = np.unique(np.concatenate(pairs), axis=0)
-    return found[:, 0], found[:, 1], facets
-
-
-def edges_at(
-    points: FloatArray, below: IntArray, above: IntArray, facets: list[IntArray]
-) -> tuple[FloatArray, FloatArray]:
-    """Return heights (k,) of first edges above their wall, and angles (k,) to its normal."""
-    normal = np.zeros_like(points)
-    for nodes in facets:
-        corners = points[nodes]
-        if points.shape[1] == 2:
-            along = corners[:, 1] - corners[:, 0]
-            area = np.column_stack([along[:, 1], -along[:, 0]])
-        else:
-            area = sum(
-                np.cross(corners[:, k] - corners[:, 0], corners[:, k + 1] - corners[:, 0])
-                for k in range(1, nodes.shape[1] - 1)
-            )
-        for column in nodes.T:
-            np.add.at(normal, column, area)
-    edge = points[above] - points[below]
-    across = normal[below] / np.linalg.norm(normal[below], axis=1)[:, None]
-    height = np.abs(np.einsum("ij,ij->i", edge, across))
-    cosine = np.clip(height / np.linalg.norm(edge, axis=1), -1.0, 1.0)
-    return height, np.degrees(np.arccos(cosine))
-
-
 def run_row(row: Contest, methods: Sequence[str]) -> Iterator[Outcome]:
     """Yield the outcome of each method."""
     mesh, case = row.make()
-    moving = case.markers_with("moving")
-    below, above, facets = (
-        first_edges(mesh, moving) if row.layered else (np.empty(0, int),) * 2 + ([],)
-    )
     known = {field.name for field in fields(sv.Case)}
-    before = edges_at(mesh.points, below, above, facets)
+    nan = float("nan")
     for method in methods:
         settings = {key: value for key, value in METHODS[method].items() if key in known}
         if method in ("layers", "relax", "auto") and len(settings) < len(METHODS[method]):
@@ -305,24 +245,18 @@ def run_row(row: Contest, methods: Sequence[str]) -> Iterator[Outcome]:
         try:
             *_, last = sv.deform(case.change(**settings), mesh)
         except SlidevizError as problem:
-            nan = float("nan")
             yield Outcome(row.name, method, nan, nan, 0, 0, nan, nan, nan, nan, str(problem))
             continue
         seconds = time.perf_counter() - begin
         found = sv.quality(last.mesh, mesh)
-        after = edges_at(last.mesh.points, below, above, facets)
-        ratio = after[0] / before[0] if len(below) else np.full(1, np.nan)
-        turned = np.abs(after[1] - before[1]) if len(below) else np.full(1, np.nan)
-        numbers = ratio.min(), ratio.max(), turned.max(), seconds
-        yield Outcome(
-            row.name,
-            method,
-            found.mean,
-            found.min,
-            found.inverted,
-            found.unproven,
-            *map(float, numbers),
-        )
+        heights = (nan, nan, nan)
+        if row.layered:
+            walls = sv.walls(last.mesh, mesh, case.markers_with("moving")).summary()
+            ratios = [wall["height_ratio"] for wall in walls.values()]
+            turned = max(wall["angle_change"]["max"] for wall in walls.values())
+            heights = min(r["min"] for r in ratios), max(r["max"] for r in ratios), turned
+        counts = found.inverted, found.unproven
+        yield Outcome(row.name, method, found.mean, found.min, *counts, *heights, seconds)
 
 
 HEAD = "| mesh and motion | method | mean | lowest | first heights | angle | seconds |"

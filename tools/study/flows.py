@@ -44,7 +44,7 @@ def c_mesh(around: int = 120, wake: int = 24) -> sv.Mesh:
     number = np.arange(z.size).reshape(z.shape)
     number[-wake - 1 :, 0] = number[wake::-1, 0]  # both sides of the wake are one
     quads = _quads(number)
-    body, far = number[wake:-wake, 0], np.r_[number[0, ::-1], number[1:-1, -1], number[-1]]
+    body, far = number[wake:-wake, 0], np.r_[number[0], number[1:-1, -1], number[-1, ::-1]]
     return _mesh(z, [(QUADRILATERAL, quads)], {"airfoil": body[::-1], "farfield": far[::-1]})
 
 

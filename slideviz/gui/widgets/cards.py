@@ -155,6 +155,22 @@ def _row() -> str:
     return ghosts + _grid(_cascade, 16, 6) + _blade(_cascade, 0.2, 0.75, 5)
 
 
+def _row_3d() -> str:
+    """Return the SVG of a vane between hub, with its mesh, and shroud, faint."""
+
+    def at(span: float) -> Map:
+        def to(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            x, y = _cascade(u, v)
+            return 0.88 * x + 1 + 16 * span, 0.84 * y + 24 - 26 * span
+
+        return to
+
+    vane = "".join(_blade(at(span), 0.2, 0.75, 4) for span in np.linspace(0, 1, 40))
+    ends = _blade(at(0.0), 0.2, 0.75, 4) + _blade(at(1.0), 0.2, 0.75, 4)
+    shroud = f'<g opacity="0.35">{_grid(at(1.0), 16, 6)}</g>'
+    return f'{shroud}{_grid(at(0.0), 16, 6)}<g opacity="0.4">{vane}</g>{ends}'
+
+
 def _annulus(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Map to a part of a casing seen from ahead, u around and v outwards."""
     radius, angle = 82 + 46 * v, np.radians(-122 + 64 * u)
@@ -204,6 +220,7 @@ _DRAWINGS: dict[str, Callable[[], str]] = {
     "passage": lambda: _grid(_channel, 18, 8) + _blade(_channel, 0.16, 0.84, 11),
     "airfoil": _airfoil,
     "turbine-row": _row,
+    "turbine-row-3d": _row_3d,
     "stator": _stator,
 }
 """The function that draws each sample; others get a plain square mesh."""
