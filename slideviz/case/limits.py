@@ -51,7 +51,7 @@ Values = tuple[FloatArray, IntArray | None]
 
 @dataclass(frozen=True)
 class LimitNumber:
-    """A number that can be limited: one of the whole mesh (``total``), or one of each cell."""
+    """A number that can be limited: of the whole mesh (``total``), of each cell, or both."""
 
     meaning: str
     signs: str
@@ -73,7 +73,9 @@ def _of_quality(name: str) -> Callable[[MeasuredMesh, str], Values]:
 
 
 NUMBERS: Mapping[str, LimitNumber] = {
-    "min": LimitNumber("lowest quality", ">", _of_quality("values"), streamed=True),
+    "min": LimitNumber(
+        "lowest quality", ">", _of_quality("values"), total=lambda q: q.min, streamed=True
+    ),
     "mean": LimitNumber("mean quality", ">", total=lambda q: q.mean, streamed=True),
     "inverted": LimitNumber(
         "inverted cells", "<=", total=lambda q: q.inverted, status=INVERTED, streamed=True
@@ -148,21 +150,24 @@ def check_limits(limits: Iterable[Limit], measured: MeasuredMesh) -> tuple[Limit
 
 def _result(limit: Limit, measured: MeasuredMesh) -> LimitResult:
     row, quality = NUMBERS[limit.name], measured.quality
+    actual, total = np.nan, row.total is not None
     if row.total is not None:
-        actual, cells = float(row.total(quality)), np.empty(0, np.int64)
-        if row.status is not None and not limit.holds(actual):
-            mask = quality.status == row.status
-            cells = np.flatnonzero(mask if quality.halo is None else mask & ~quality.halo)
-        return LimitResult(limit, actual, cells)
+        actual = float(row.total(quality))
+        if row.values is None:
+            cells = np.empty(0, np.int64)
+            if row.status is not None and not limit.holds(actual):
+                mask = quality.status == row.status
+                cells = np.flatnonzero(mask if quality.halo is None else mask & ~quality.halo)
+            return LimitResult(limit, actual, cells)
     assert row.values is not None
     values, ids = row.values(measured, limit.marker)
-    low, actual = limit.sign[0] == ">", np.nan
+    low = limit.sign[0] == ">"
     failing, by_how_much = [np.empty(0, np.int64)], [np.empty(0)]
     for first in range(0, len(values), PIECE):  # they may be in a file, and not fit into memory
         some = values[first : first + PIECE]
         cells = np.arange(first, first + len(some)) if ids is None else ids[first : first + PIECE]
         counts = ~np.isnan(some) & (True if quality.halo is None else ~quality.halo[cells])
-        if counts.any():
+        if counts.any() and not total:
             worst = some[counts].min() if low else some[counts].max()
             actual = float(np.fmin(actual, worst) if low else np.fmax(actual, worst))
         bad = counts & ~limit.holds(some)

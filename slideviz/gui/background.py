@@ -16,7 +16,9 @@ from slideviz.mesh.model import Mesh
 from slideviz.sections.model import Section
 from slideviz.session import jobs
 from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
+from slideviz.session.limits import check_frame, set_checked
 from slideviz.session.panes import shown_views
+from slideviz.session.results import CheckedLimits
 from slideviz.session.section_cuts import cut_key, is_awaited, keep_slab, read_slab
 from slideviz.session.state import Session, StepFrame
 from slideviz.session.store import Store
@@ -87,6 +89,34 @@ class IntersectionCheck(BackgroundJob):
     def _failed(self, error: Exception) -> None:
         log.error("the intersection check failed: %s", error)
         self._checked_key = self._running_key
+
+
+class LimitCheck(BackgroundJob):
+    """Keeps ``Session.checked`` up to date: the limits of the case on the frame that is shown."""
+
+    def __init__(self, store: Store, parent: QObject | None = None) -> None:
+        super().__init__(store, parent, INTERSECTION_MS)
+        self._runner.finished.connect(self._finished)
+        self._runner.cancelled.connect(self._schedule)
+        self._runner.failed.connect(lambda error: log.error("limits: %s", error))
+        store.listen(lambda _old, _new: self._schedule())
+
+    def _schedule(self) -> None:
+        session = self.store.session
+        running = session.runs and not session.runs[-1].end
+        if session.frame is not None and session.limit_results is None and not running:
+            self._timer.start()
+
+    def _start(self) -> None:
+        session = self.store.session
+        if self._runner.busy:
+            self._timer.start()
+        elif session.frame is not None and session.mesh is not None:
+            self._runner.start(check_frame, session.frame, session.mesh, session.case)
+
+    def _finished(self, checked: CheckedLimits) -> None:
+        self.store.change(set_checked, checked)
+        self._schedule()
 
 
 class SectionReader(BackgroundJob):

@@ -17,7 +17,7 @@ from slideviz.case.motion_words import mesh_words
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.actions import Actions
 from slideviz.gui.autosave import Autosave, SessionRecovery
-from slideviz.gui.background import READING, IntersectionCheck, SectionReader
+from slideviz.gui.background import READING, IntersectionCheck, LimitCheck, SectionReader
 from slideviz.gui.dialogs.exports import Exports
 from slideviz.gui.dialogs.help import Help
 from slideviz.gui.docks import Docks, available_area
@@ -109,6 +109,7 @@ class MainWindow(Services):
         self.store.listen(self.viewing.sync)
         self.store.listen(lambda *_: self.sync_actions())
         self.intersection_check = IntersectionCheck(self.store, self)
+        self.limit_check = LimitCheck(self.store, self)
         self.section_reader = SectionReader(self.store, self)
         self.section_reader.finished.connect(self.section_views.redraw)
         self.section_reader.progressed.connect(self._say_reading)
@@ -373,6 +374,7 @@ class MainWindow(Services):
             self.dock_manager.panel(DesignsPanel).runner.close()
             self.warmup.close()
             self.intersection_check.close()
+            self.limit_check.close()
             self.section_reader.close()
             self.left_behind = not self.running.close()
             if self.autosave is not None:

@@ -1,4 +1,7 @@
-"""Cells drawn in front of everything: the marked one outlined, rings around inverted ones."""
+"""Cells drawn in front of everything: the marked one outlined, rings around inverted ones.
+
+If a limit is chosen, the rings are around the cells that fail it instead.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
+from slideviz.case.limits import LimitResult
 from slideviz.color_scheme import INVERTED_COLOR, SELECTED_COLOR
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import IntArray, Mesh
@@ -121,7 +125,8 @@ class InvertedLayer(Layer):
 
     def update(self, _old: Session | None, new: Session) -> None:
         """Draw another state of the session."""
-        key, cut = (new.frame, _wanted(new), self.stage.pixel_scale), self._cut_cells(new)
+        key = (new.frame, _wanted(new), new.limit_chosen, self.stage.pixel_scale)
+        cut = self._cut_cells(new)
         same = len(cut) == len(self._cut) and all(map(operator.is_, cut, self._cut))
         if key == self._key and same:
             return
@@ -130,7 +135,7 @@ class InvertedLayer(Layer):
         self.stage.ring_words = ()
         if _wanted(new):
             assert new.frame is not None
-            self._draw(new.frame, cut)
+            self._draw(new.frame, new.limit_chosen, cut)
 
     def _cut_cells(self, session: Session) -> list[IntArray]:
         """Return, per section of a 3D mesh in memory, the cells (k,) of its polygons."""
@@ -138,15 +143,22 @@ class InvertedLayer(Layer):
             return []
         return [cells for _, cells in self.sections.pickable()]
 
-    def _draw(self, frame: StepFrame, cut: list[IntArray]) -> None:
-        """Draw the rings of a frame's inverted cells, only of those in ``cut`` if there is any."""
+    def _draw(self, frame: StepFrame, limit: LimitResult | None, cut: list[IntArray]) -> None:
+        """Draw the rings of a frame's cells, only of those in ``cut`` if there is any.
+
+        They are the cells that fail a ``limit``, else the inverted ones.
+        """
         in_memory, count = frame.extra or frame, frame.quality.inverted
-        cells = in_memory.quality.inverted_cells()
+        cells, word, color = in_memory.quality.inverted_cells(), "inv.", INVERTED_COLOR
+        if limit is not None:
+            first = len(frame.mesh.cells) if frame.extra is not None else 0
+            cells = np.sort(limit.cells[limit.cells >= first]) - first
+            count, word, color = len(limit.cells), f"not {limit.limit}", SELECTED_COLOR
         if cut:
             cells = cells[np.isin(cells, np.concatenate(cut))]
             count = len(cells)
         if count:
-            self.stage.ring_words = ((f"{count:,} inv.", INVERTED_COLOR),)
+            self.stage.ring_words = ((f"{count:,} {word}", color),)
         if len(cells) > MOST:
             cells = cells[np.linspace(0, len(cells) - 1, MOST).astype(np.int64)]
         if not len(cells):
@@ -156,7 +168,7 @@ class InvertedLayer(Layer):
         )
         actor = self.stage.add(self._shape, NAME, lighting=False, pickable=False)
         size = next(size for least, size in reversed(SIZES) if len(cells) >= least)
-        actor.prop.color = INVERTED_COLOR
+        actor.prop.color = color
         actor.prop.point_size = size * self.stage.pixel_scale
         actor.prop.render_points_as_spheres = True
         actor.GetShaderProperty().AddFragmentShaderReplacement(_DISC, False, _RING, False)
@@ -164,8 +176,13 @@ class InvertedLayer(Layer):
 
 
 def _wanted(session: Session) -> bool:
-    """Return whether rings are drawn: inverted cells exist, within the threshold, and toggle on."""
+    """Return whether rings are drawn: inverted cells exist, within the threshold, and toggle on.
+
+    Or a limit is chosen that cells fail.
+    """
     view, frame = session.view, session.frame
+    if frame is not None and session.limit_chosen is not None:
+        return len(session.limit_chosen.cells) > 0
     if frame is None or not frame.quality.inverted or "inverted" not in view.drawn:
         return False
     return view.threshold is None or view.threshold[0] <= 0.0

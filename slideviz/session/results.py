@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from slideviz.case.limits import Limit, LimitResult
 from slideviz.case.model import Case
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
@@ -76,6 +77,19 @@ class StepFrame:
     def largest_displacement(self, undeformed: Mesh) -> float:
         """Return the largest displacement of a node, in the mesh's length unit."""
         return largest_displacement(self.mesh.points, undeformed.points)
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedLimits:
+    """The limits of a case, checked on a frame."""
+
+    frame: StepFrame
+    limits: tuple[Limit, ...]
+    results: tuple[LimitResult, ...]
+    """Of those of ``limits`` that could be checked, in their order. Their cells are numbers of
+    cells of the frame."""
+    problem: str = ""
+    """Why others could not."""
 
 
 @dataclass(frozen=True, eq=False)

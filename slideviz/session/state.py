@@ -14,10 +14,11 @@ from slideviz.case.check import effective
 from slideviz.case.model import Case
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
-from slideviz.session.results import Run, StepFrame, cell_displacement
+from slideviz.session.results import CheckedLimits, Run, StepFrame, cell_displacement
 from slideviz.terms import SHOWN, ColorBy, PointsShown, Role, Shown
 
 if TYPE_CHECKING:
+    from slideviz.case.limits import LimitResult
     from slideviz.sections.model import Section
 
 
@@ -156,6 +157,10 @@ class Session:
     saved_sections: tuple[Section, ...] = ()
     """The sections in the view of that case."""
     view: ViewState = field(default_factory=ViewState)
+    checked: CheckedLimits | None = None
+    """The limits as they were checked last (`slideviz.session.limits`)."""
+    limit: int | None = None
+    """The place in its results of the one whose failing cells are marked with rings."""
     intersection: str = ""
     """A sentence on boundaries that the motions put through each other, which keeps a run from
     starting; empty if none are known."""
@@ -243,6 +248,22 @@ class Session:
         )
 
     @property
+    def limit_results(self) -> tuple[LimitResult, ...] | None:
+        """Return the limits of the case on the frame that is shown; None before they are known."""
+        if not self.case.limits:
+            return ()
+        now = self.checked
+        known = now is not None and now.frame is self.frame and now.limits == self.case.limits
+        return now.results if known and now is not None else None
+
+    @property
+    def limit_chosen(self) -> LimitResult | None:
+        """Return the limit whose failing cells are marked, or None."""
+        results = self.limit_results or ()
+        there = self.limit is not None and self.limit < len(results)
+        return results[self.limit] if there and self.limit is not None else None
+
+    @property
     def color_range(self) -> tuple[float, float]:
         """Return the values at the ends of the color bar."""
         if self.view.color_range is not None:
@@ -279,4 +300,6 @@ def round_up(value: float) -> float:
 def result_settings(case: Case) -> Case:
     """Return the case with defaults for all that does not change the result, and sorted roles."""
     roles = {name: role for name, role in sorted(case.roles.items()) if role != "fixed"}
-    return replace(effective(case), roles=roles, mesh_out=None, source=None, warnings=(), view={})
+    return replace(
+        effective(case), roles=roles, mesh_out=None, source=None, warnings=(), view={}, limits=()
+    )

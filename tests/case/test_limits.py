@@ -87,7 +87,7 @@ def test_a_case_keeps_its_limits_in_a_file(tmp_path):
 
 @pytest.fixture
 def measured():
-    """Return 3 x 3 squares; the lower left node is drawn in, and one of the right side beyond."""
+    """Return 4 x 4 squares; node 0 is drawn in, and node 7 so far that cells fold."""
     mesh = grid((4, 4))
     points = mesh.points.copy()
     points[0] += 0.1
