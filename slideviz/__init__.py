@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from slideviz.export.flat_section import section
     from slideviz.export.verbs import film, picture
     from slideviz.formats.files import convert, read, write
+    from slideviz.mesh.metrics import MetricValues, metrics
     from slideviz.mesh.model import Cells, Marker, Mesh
     from slideviz.mesh.quality import Quality, quality
     from slideviz.mesh.quality_derivative import QualityDerivative
@@ -61,6 +62,7 @@ _HOME = {
     "HicksHenne": "case.model",
     "Marker": "mesh.model",
     "Mesh": "mesh.model",
+    "MetricValues": "mesh.metrics",
     "Prescribed": "case.model",
     "Quality": "mesh.quality",
     "QualityDerivative": "mesh.quality_derivative",
@@ -79,6 +81,7 @@ _HOME = {
     "convert": "formats.files",
     "deform": "solver.deform",
     "film": "export.verbs",
+    "metrics": "mesh.metrics",
     "picture": "export.verbs",
     "quality": "mesh.quality",
     "read": "formats.files",
@@ -105,6 +108,7 @@ __all__ = [
     "HicksHenne",
     "Marker",
     "Mesh",
+    "MetricValues",
     "Prescribed",
     "Quality",
     "QualityDerivative",
@@ -124,6 +128,7 @@ __all__ = [
     "convert",
     "deform",
     "film",
+    "metrics",
     "picture",
     "quality",
     "read",

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from math import inf
+from typing import Any, Literal
 
 
 @dataclass(frozen=True)
@@ -331,10 +332,26 @@ NO_REFERENCE = "no reference: relative to itself"
 """The remark, in pictures too, where there is no undeformed mesh to compare cells with: size is
 rated 1 then."""
 
-# View --------------------------------------------------------------------------------------
+# Metrics and other quantities ----------------------------------------------------------------
 
-Quantity = Literal["size-skew", "size", "skew", "displacement"]
-ColorBy = Literal["role", "size-skew", "size", "skew", "displacement"]
+Metric = Literal[
+    "size-skew",
+    "size",
+    "skew",
+    "orthogonality",
+    "area-ratio",
+    "volume-ratio",
+    "non-orthogonality",
+    "skewness",
+    "expansion",
+    "scaled-jacobian",
+    "equiangle-skew",
+    "smallest-angle",
+    "largest-angle",
+    "aspect-ratio",
+]
+Quantity = Literal[Metric, "displacement"]
+ColorBy = Literal["role", Quantity]
 
 
 @dataclass(frozen=True)
@@ -349,23 +366,140 @@ class ColorByTerm(Term):
         return f"{self.label} {self.unit or '[-]'}"
 
 
-COLOR_BY: dict[ColorBy, ColorByTerm] = {
-    "role": ColorByTerm("role"),
-    "size-skew": ColorByTerm("size-skew"),
-    "size": ColorByTerm("size"),
-    "skew": ColorByTerm("skew"),
-    "displacement": ColorByTerm("displacement", unit="[mesh units]"),
-}
-"""The quantities to color by; a mesh just opened has the first."""
+@dataclass(frozen=True)
+class MetricTerm(ColorByTerm):
+    """The facts about a number that rates the cells or nodes of a mesh."""
 
-QUANTITIES: dict[Quantity, ColorByTerm] = {value: COLOR_BY[value] for value in get_args(Quantity)}
-"""The quantities of `COLOR_BY` that are values of cells; the first is the default."""
+    range: tuple[float, float] = (0.0, 1.0)
+    """The values that are possible."""
+    best: Literal["high", "low"] = "high"
+    """Which end of the range is good."""
+    limit: float | None = None
+    """The value beyond which solvers or their manuals call it poor; None where none is usual."""
+    where: Literal["cells", "nodes"] = "cells"
+    """Whether it belongs to cells, or to nodes: a cell then has the worst of its nodes."""
+    alone: bool = True
+    """Whether the nodes of a cell, deformed and undeformed, are enough to compute its value."""
+    colors: tuple[float, float] | None = None
+    """The default ends of the color bar; None: those of ``range``, or of the mesh if infinite."""
+
+
+METRICS: dict[Metric, MetricTerm] = {
+    "size-skew": MetricTerm("size-skew", "Knupp's: √size · skew. 1 is best."),
+    "size": MetricTerm(
+        "size", "The cell's size over the undeformed one's, or its inverse if larger than 1."
+    ),
+    "skew": MetricTerm("skew", "How near its corners are to those of the ideal cell. 1 is best."),
+    "orthogonality": MetricTerm(
+        "orthogonality (SU2)",
+        "Of the edges at a node and the faces of its control volume, as SU2 prints it. 90 is best.",
+        unit="[°]",
+        range=(-90.0, 90.0),
+        limit=20.0,
+        where="nodes",
+        alone=False,
+        colors=(0.0, 90.0),
+    ),
+    "area-ratio": MetricTerm(
+        "face area ratio (SU2)",
+        "Largest over smallest face of a node's control volume, as SU2 prints it. 1 is best.",
+        range=(1.0, inf),
+        best="low",
+        where="nodes",
+        alone=False,
+    ),
+    "volume-ratio": MetricTerm(
+        "sub-volume ratio (SU2)",
+        "Largest over smallest part of a node's control volume, as SU2 prints it. 1 is best.",
+        range=(1.0, inf),
+        best="low",
+        where="nodes",
+        alone=False,
+    ),
+    "non-orthogonality": MetricTerm(
+        "non-orthogonality (OpenFOAM)",
+        "Angle between a face and the line from cell to cell, the cell's worst. 0 is best.",
+        unit="[°]",
+        range=(0.0, 180.0),
+        best="low",
+        limit=70.0,
+        alone=False,
+        colors=(0.0, 90.0),
+    ),
+    "skewness": MetricTerm(
+        "skewness (OpenFOAM)",
+        "How far the line from cell to cell passes the face's center, the cell's worst. 0 is best.",
+        range=(0.0, inf),
+        best="low",
+        limit=4.0,
+        alone=False,
+        colors=(0.0, 4.0),
+    ),
+    "expansion": MetricTerm(
+        "expansion",
+        "Largest ratio of the volumes of the cell and a neighbor. 1 is best.",
+        range=(1.0, inf),
+        best="low",
+        limit=20.0,
+        alone=False,
+    ),
+    "scaled-jacobian": MetricTerm(
+        "scaled Jacobian",
+        "The least, over the corners, of the Jacobian over the edges' lengths. 1 is best.",
+        range=(-1.0, 1.0),
+        limit=0.0,
+        colors=(0.0, 1.0),
+    ),
+    "equiangle-skew": MetricTerm(
+        "equiangle skew",
+        "How far the angles of the cell's faces are from 60° or 90°. 0 is best.",
+        best="low",
+        limit=0.95,
+    ),
+    "smallest-angle": MetricTerm(
+        "smallest angle",
+        "The smallest angle between two edges of a face of the cell.",
+        unit="[°]",
+        range=(0.0, 90.0),
+        limit=15.0,
+    ),
+    "largest-angle": MetricTerm(
+        "largest angle",
+        "The largest angle between two edges of a face of the cell.",
+        unit="[°]",
+        range=(60.0, 360.0),
+        best="low",
+        limit=165.0,
+        colors=(60.0, 180.0),
+    ),
+    "aspect-ratio": MetricTerm(
+        "aspect ratio", "Longest over shortest edge of the cell.", range=(1.0, inf), best="low"
+    ),
+}
+"""The metrics: numbers that rate cells or nodes. `slideviz.mesh.metrics` computes them."""
+
+SIZE_SKEW: tuple[Metric, ...] = ("size-skew", "size", "skew")
+"""Those of `slideviz.mesh.quality`: 0 to 1, relative to the undeformed cell."""
+
+QUANTITIES: dict[Quantity, ColorByTerm] = dict(METRICS.items())
+"""The quantities that are values of cells; the first is the default."""
+QUANTITIES["displacement"] = ColorByTerm("displacement", unit="[mesh units]")
+COLOR_BY: dict[ColorBy, ColorByTerm] = {"role": ColorByTerm("role")}
+"""The quantities to color by; a mesh just opened has the first."""
+COLOR_BY.update(QUANTITIES.items())
 
 
 def quantity_of(color_by: ColorBy) -> Quantity:
     """Return the quantity that is colored by, or size-skew for roles."""
     return "size-skew" if color_by == "role" else color_by
 
+
+def field_of(metric: str) -> str:
+    """Return the name of a metric in files, reports and limits: ``scaled_jacobian``."""
+    return metric.replace("-", "_")
+
+
+# View --------------------------------------------------------------------------------------
 
 ColorMap = Literal["viridis", "cividis", "plasma", "inferno", "gray"]
 COLOR_MAPS: dict[ColorMap, Term] = {

@@ -18,6 +18,7 @@ TABLES = {
     terms.LevelCriterion: terms.LEVEL_CRITERIA,
     terms.PeriodicMode: terms.PERIODIC_MODES,
     terms.PeriodicType: terms.PERIODIC_TYPES,
+    terms.Metric: terms.METRICS,
     terms.SkewMetric: terms.SKEW_METRICS,
     terms.CellState: dict.fromkeys(terms.CELL_STATES, terms.Term("state")),
     terms.Quantity: terms.QUANTITIES,

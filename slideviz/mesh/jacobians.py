@@ -154,6 +154,18 @@ def half_sum(a, b):  # type: ignore[no-untyped-def]
     return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])
 
 
+@njit(inline="always", **OPTIONS)
+def add3(a, b):  # type: ignore[no-untyped-def]
+    """Return the sum of two triples."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@njit(inline="always", **OPTIONS)
+def minus3(a, b):  # type: ignore[no-untyped-def]
+    """Return the difference of two triples."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
 @njit(**OPTIONS)
 def corners(at, table, count, alpha):  # type: ignore[no-untyped-def]
     """Write the corner Jacobians (thesis Eq. 2.39 to 2.42, Table 2.3) into ``alpha`` (k, ...).

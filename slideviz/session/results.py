@@ -10,11 +10,12 @@ import numpy as np
 
 from slideviz.case.limits import Limit, LimitResult
 from slideviz.case.model import Case
+from slideviz.mesh.metrics import metric
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
-from slideviz.terms import ColorBy
+from slideviz.terms import METRICS, SIZE_SKEW, ColorBy
 
 if TYPE_CHECKING:
     from slideviz.solver.deform import Step
@@ -58,13 +59,16 @@ class StepFrame:
     ) -> FloatArray:
         """Return the values of a quantity ``what`` in all cells (m,), or in ``cells`` (k,).
 
-        Quality is in 0 to 1. The displacement of a cell is the mean distance of its nodes from
-        where they are in ``undeformed``, in the mesh's length unit.
+        A metric of nodes has the worst of each cell's nodes. The displacement of a cell is the mean
+        distance of its nodes from where they are in ``undeformed``, in the mesh's length unit.
         """
         if what == "displacement":
             return cell_displacement(self.mesh, self.base or undeformed or self.mesh, cells)
         names = {"size": self.quality.size, "skew": self.quality.skew}
-        every = names.get(what, self.quality.values)
+        if what in METRICS and what not in SIZE_SKEW:
+            every = metric(self.mesh, what, self.base or undeformed).of_cells
+        else:
+            every = names.get(what, self.quality.values)
         return every if cells is None else every[cells]
 
     def shown_values(

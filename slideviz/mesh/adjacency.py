@@ -1,0 +1,149 @@
+"""Adjacency: the cell on the other side of each side of a cell, and the cells around each node.
+
+Sides of cells are numbered cell by cell, in the order of `ElementType.facets`: the side ``k`` of
+cell ``c`` has the number ``first[c] + k``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import Cells, IntArray, sealed
+from slideviz.system.jit_cache import njit
+from slideviz.system.threads import in_parts
+
+NONE, SEVERAL = -1, -2
+"""In place of a neighbour: there is no other cell, or more than one (a non-manifold mesh)."""
+
+SIDES = np.zeros(256, np.int64)
+"""Number of sides of an element type, by VTK identifier."""
+SIDE_NODES = np.full((256, 6, 4), -1)
+"""Local nodes of each side, filled up with -1, by VTK identifier."""
+for _row in ELEMENTS.values():
+    SIDES[_row.vtk] = len(_row.facets)
+    for _k, _local in enumerate(_row.facets):
+        SIDE_NODES[_row.vtk, _k, : len(_local)] = _local
+
+_SIDES: WeakKeyDictionary[Cells, Sides] = WeakKeyDictionary()
+"""Results of `sides_of`."""
+_AROUND: WeakKeyDictionary[Cells, CellsAround] = WeakKeyDictionary()
+"""Results of `cells_around`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """The sides of all cells."""
+
+    first: IntArray
+    """(m + 1,): number of the first side of each cell."""
+    neighbour: IntArray
+    """(s,): the cell that shares the side, or `NONE` or `SEVERAL`."""
+
+
+@dataclass(frozen=True, eq=False)
+class CellsAround:
+    """The cells that each node belongs to, in ascending order."""
+
+    offsets: IntArray
+    """(n + 1,): the entries of node ``i`` are ``offsets[i]`` to ``offsets[i + 1]``."""
+    cells: IntArray
+    """(k,): the cell of each entry."""
+    local: IntArray
+    """(k,): the local number of the node in that cell."""
+
+
+def sides_of(cells: Cells) -> Sides:
+    """Return the sides of cells with their neighbours, cached as long as the cells live."""
+    if cells not in _SIDES:
+        first = np.concatenate(([0], np.cumsum(SIDES[cells.types])))
+        n_nodes = int(cells.connectivity.max(initial=-1)) + 1
+        owner = np.repeat(np.arange(len(cells)), np.diff(first))
+        table = cells.types, cells.offsets, cells.connectivity, SIDE_NODES, first, owner
+        least = np.empty(first[-1], np.int64)
+        in_parts(lambda part: _write_least(*table, part.start, part.stop, least), len(least))
+        begins, order = np.zeros(n_nodes + 1, np.int64), np.empty(first[-1], np.int64)
+        _sort(least, begins, order)
+        neighbour = np.full(first[-1], NONE)
+        in_parts(
+            lambda part: _match(*table, begins, order, part.start, part.stop, neighbour), n_nodes
+        )
+        _SIDES[cells] = Sides(sealed(first), sealed(neighbour))
+    return _SIDES[cells]
+
+
+def cells_around(cells: Cells, n_points: int) -> CellsAround:
+    """Return the cells of each of ``n_points`` nodes, cached as long as the cells live."""
+    known = _AROUND.get(cells)
+    if known is None or len(known.offsets) != n_points + 1:
+        offsets = np.zeros(n_points + 1, np.int64)
+        order = np.empty(len(cells.connectivity), np.int64)
+        _sort(cells.connectivity, offsets, order)
+        owner = np.repeat(np.arange(len(cells)), np.diff(cells.offsets))[order]
+        local = order - cells.offsets[owner]
+        known = _AROUND[cells] = CellsAround(sealed(offsets), sealed(owner), sealed(local))
+    return known
+
+
+@njit(nogil=True, cache=True)
+def _sort(keys, begins, order):  # type: ignore[no-untyped-def]
+    """Write the stable order (k,) of integers ``keys`` (k,), and where each begins, (n + 1,)."""
+    for key in keys:
+        begins[key + 1] += 1
+    for key in range(len(begins) - 1):
+        begins[key + 1] += begins[key]
+    for k in range(len(keys)):
+        order[begins[keys[k]]] = k
+        begins[keys[k]] += 1
+    for key in range(len(begins) - 1, 0, -1):
+        begins[key] = begins[key - 1]
+    begins[0] = 0
+
+
+@njit(inline="always", nogil=True, cache=True)
+def _nodes_of(types, offsets, connectivity, locals_, first, owner, side):  # type: ignore[no-untyped-def]
+    """Return the nodes of a side, ascending; before those of a line or a triangle are -1."""
+    cell = owner[side]
+    row, begin = locals_[types[cell], side - first[cell]], offsets[cell]
+    a, b = connectivity[begin + row[0]], connectivity[begin + row[1]]
+    c = connectivity[begin + row[2]] if row[2] >= 0 else -1
+    d = connectivity[begin + row[3]] if row[3] >= 0 else -1
+    a, b = min(a, b), max(a, b)
+    c, d = min(c, d), max(c, d)
+    a, c = min(a, c), max(a, c)
+    b, d = min(b, d), max(b, d)
+    return a, min(b, c), max(b, c), d
+
+
+@njit(nogil=True, cache=True)
+def _write_least(types, offsets, connectivity, locals_, first, owner, begin, end, least):  # type: ignore[no-untyped-def]
+    """Write the least node of each side from ``begin`` to ``end`` into ``least`` (s,)."""
+    for side in range(begin, end):
+        a, b, c, _ = _nodes_of(types, offsets, connectivity, locals_, first, owner, side)
+        least[side] = a if a >= 0 else b if b >= 0 else c
+
+
+@njit(nogil=True, cache=True)
+def _match(types, offsets, connectivity, locals_, first, owner, begins, order, begin, end, found):  # type: ignore[no-untyped-def]
+    """Write the neighbours ``found`` (s,) of all sides whose least node is in a range."""
+    most = 0
+    for node in range(begin, end):
+        most = max(most, begins[node + 1] - begins[node])
+    keys = np.empty((most, 4), np.int64)
+    for node in range(begin, end):
+        start = begins[node]
+        count = begins[node + 1] - start
+        for i in range(count):
+            keys[i] = _nodes_of(
+                types, offsets, connectivity, locals_, first, owner, order[start + i]
+            )
+        for i in range(count):
+            for j in range(count):
+                same = i != j and keys[i, 0] == keys[j, 0] and keys[i, 1] == keys[j, 1]
+                if same and keys[i, 2] == keys[j, 2] and keys[i, 3] == keys[j, 3]:
+                    side = order[start + i]
+                    other = owner[order[start + j]]
+                    found[side] = other if found[side] == NONE else SEVERAL

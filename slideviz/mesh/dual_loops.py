@@ -1,0 +1,159 @@
+"""SU2's metrics of the median dual mesh, in compiled loops over nodes.
+
+Source: SU2, CPhysicalGeometry::ComputeMeshQualityStatistics and CDualGrid. The face between the
+control volumes of two nodes consists, in each cell at their edge, of triangles (2D: a line) from
+the edge's middle to the means of the nodes of a side and of the cell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.jacobians import OPTIONS, add3, cross3, dot3, minus3
+from slideviz.system.jit_cache import njit
+
+
+def _around_nodes(vtk: int) -> list[list[tuple[int, int, int]]]:
+    """Return for each local node its edges: the other node, and the faces right and left of it.
+
+    The right face of an edge is the left face of the next. In 2D, the second number is 1 or -1: the
+    direction of the edge on the way around the cell.
+    """
+    row = ELEMENTS[vtk]
+    if row.dim == 2:
+        n = row.n_nodes
+        return [[((k + 1) % n, 1, 0), ((k - 1) % n, -1, 0)] for k in range(n)]
+    right = {(f[k - 1], f[k]): at for at, f in enumerate(row.facets) for k in range(len(f))}
+    edges = []
+    for k in range(row.n_nodes):
+        face, ring = next(at for (here, _), at in right.items() if here == k), []
+        for _ in [here for here, _ in right if here == k]:
+            other = next(b for (a, b), at in right.items() if a == k and at == face)
+            ring.append((other, face, right[other, k]))
+            face = right[other, k]
+        edges.append(ring)
+    return edges
+
+
+AROUND = np.full((256, 8, 4, 3), -1)
+"""Edges at each local node of an element type, by VTK identifier: see `_around_nodes`."""
+for _vtk, _row in ELEMENTS.items():
+    for _k, _ring in enumerate(_around_nodes(_vtk) if _row.dim > 1 else ()):
+        AROUND[_vtk, _k, : len(_ring)] = _ring
+
+
+@njit(**OPTIONS)
+def write_middles(points, offsets, connectivity, begin, middles):  # type: ignore[no-untyped-def]
+    """Write the means (m, d) of the nodes of cells, from number ``begin`` on."""
+    for i in range(len(middles)):
+        first, last = offsets[begin + i], offsets[begin + i + 1]
+        for axis in range(points.shape[1]):
+            total = 0.0
+            for k in range(first, last):
+                total += points[connectivity[k], axis]
+            middles[i, axis] = total / (last - first)
+
+
+@njit(inline="always", **OPTIONS)
+def _point(points, k):  # type: ignore[no-untyped-def]
+    """Return a point, a triple; in 2D with a third coordinate of zero."""
+    return points[k, 0], points[k, 1], points[k, 2] if points.shape[1] == 3 else 0.0
+
+
+@njit(inline="always", **OPTIONS)
+def _middle_of(points, connectivity, begin, row):  # type: ignore[no-untyped-def]
+    """Return the mean, a triple, of the nodes of a side of the cell that begins at ``begin``."""
+    total = add3(
+        _point(points, connectivity[begin + row[0]]), _point(points, connectivity[begin + row[1]])
+    )
+    total = add3(total, _point(points, connectivity[begin + row[2]]))
+    if row[3] < 0:
+        return total[0] / 3.0, total[1] / 3.0, total[2] / 3.0
+    total = add3(total, _point(points, connectivity[begin + row[3]]))
+    return 0.25 * total[0], 0.25 * total[1], 0.25 * total[2]
+
+
+@njit(**OPTIONS)
+def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ignore[no-untyped-def]
+    """Write SU2's three metrics of nodes from number ``begin`` on into ``found`` (3, k).
+
+    Orthogonality in degrees, area ratio and volume ratio; NaN for nodes of no cell.
+
+    Parameters
+    ----------
+    mesh
+        Types, offsets, connectivity, signs, and means of nodes (by `write_middles`) of all cells.
+    tables
+        `AROUND` and `slideviz.mesh.adjacency.SIDE_NODES`.
+    nodes
+        The arrays of `slideviz.mesh.adjacency.CellsAround`.
+    limits : (N, 2)
+        Smallest and largest area of a boundary at each node; inf and 0 without one.
+    """
+    types, offsets, connectivity, signs, middles = mesh
+    (around, side_nodes), (starts, cells, local) = tables, nodes
+    most = 0
+    for i in range(found.shape[1]):
+        most = max(most, starts[begin + i + 1] - starts[begin + i])
+    others, normals = np.empty(4 * most, np.int64), np.empty((4 * most, 3))
+    for i in range(found.shape[1]):
+        k = begin + i
+        x, count, small, large = _point(points, k), 0, np.inf, 0.0
+        for entry in range(starts[k], starts[k + 1]):
+            cell, at = cells[entry], local[entry]
+            first, vtk = offsets[cell], types[cell]
+            sign, to_middle = float(signs[cell]), minus3(_point(middles, cell), x)
+            face = x
+            if points.shape[1] == 3:
+                side = side_nodes[vtk, around[vtk, at, 0, 1]]
+                face = minus3(_middle_of(points, connectivity, first, side), x)
+            for row in around[vtk, at]:
+                if row[0] < 0:
+                    break
+                other = connectivity[first + row[0]]
+                half = minus3(_point(points, other), x)
+                half = 0.5 * half[0], 0.5 * half[1], 0.5 * half[2]
+                inward = minus3(to_middle, half)
+                if points.shape[1] == 2:
+                    normal = row[1] * inward[1], -row[1] * inward[0], 0.0
+                    size = 0.5 * abs(half[0] * to_middle[1] - half[1] * to_middle[0])
+                    small, large = min(small, size), max(large, size)
+                else:
+                    after = minus3(
+                        _middle_of(points, connectivity, first, side_nodes[vtk, row[2]]), x
+                    )
+                    normal = cross3(inward, minus3(face, after))
+                    normal = 0.5 * normal[0], 0.5 * normal[1], 0.5 * normal[2]
+                    for one in (face, after):
+                        size = abs(dot3(half, cross3(one, to_middle))) / 6.0
+                        small, large = min(small, size), max(large, size)
+                    face = after
+                place = 0
+                while place < count and others[place] != other:
+                    place += 1
+                if place == count:
+                    others[place], count = other, count + 1
+                    normals[place] = 0.0
+                for axis in range(3):
+                    normals[place, axis] += sign * normal[axis]
+        found[0, i], found[1, i] = _of_edges(points, x, others[:count], normals, limits[k])
+        found[2, i] = large / small if count else np.nan
+
+
+@njit(**OPTIONS)
+def _of_edges(points, x, others, normals, limits):  # type: ignore[no-untyped-def]
+    """Return orthogonality and area ratio of a node at ``x`` with edges to ``others``."""
+    total, weighted, small, large = 0.0, 0.0, limits[0], limits[1]
+    for place in range(len(others)):
+        normal = normals[place, 0], normals[place, 1], normals[place, 2]
+        along = minus3(_point(points, others[place]), x)
+        size = np.sqrt(dot3(normal, normal))
+        scale = size * np.sqrt(dot3(along, along))
+        cosine = min(max(dot3(normal, along) / scale, -1.0), 1.0) if scale > 0.0 else 0.0
+        total += size
+        weighted += size * (90.0 - np.degrees(np.arccos(cosine)))
+        small, large = min(small, size), max(large, size)
+    if len(others) == 0:
+        return np.nan, np.nan
+    return weighted / total if total > 0.0 else 0.0, large / small if small > 0.0 else np.inf

@@ -1,0 +1,315 @@
+"""Metrics: the numbers that solvers' limits are written in, for cells or nodes of a mesh.
+
+`slideviz.terms.METRICS` lists them with unit, range and limit; docs/reference/metrics.md has the
+definitions. A cell's value of a metric of nodes is the worst of its nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from slideviz.argument_types import check_types
+from slideviz.errors import CaseError, not_one_of
+from slideviz.mesh import dual_loops, face_loops, shape_loops
+from slideviz.mesh.adjacency import SIDE_NODES, SIDES, cells_around, sides_of
+from slideviz.mesh.check import check_size
+from slideviz.mesh.jacobians import check_cells
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, sealed
+from slideviz.mesh.orientation import reference_of
+from slideviz.mesh.quality import quality
+from slideviz.mesh.topology import find_boundary, vertex_normals
+from slideviz.system.jit_cache import njit
+from slideviz.system.threads import in_parts
+from slideviz.terms import METRICS, SIZE_SKEW, Metric, MetricTerm
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_CACHE: WeakKeyDictionary[Mesh, dict[object, FloatArray]] = WeakKeyDictionary()
+"""Values of metrics computed last, by mesh, metric and signs."""
+_OUTER: WeakKeyDictionary[Cells, tuple[tuple[Marker, ...], list[IntArray]]] = WeakKeyDictionary()
+"""Results of `_outer_facets`, with the markers they belong to."""
+_CACHED = 1 << 26
+"""Most numbers in the cache, besides those of the mesh used last."""
+
+
+@dataclass(frozen=True, eq=False)
+class MetricValues:
+    """The values of one metric for a mesh."""
+
+    metric: Metric
+    values: FloatArray
+    """(m,) or (n,): of the cells, or of the nodes if ``METRICS[metric].where`` is nodes; NaN for
+    nodes of no cell."""
+    of_cells: FloatArray
+    """(m,): of the cells: the same, or the worst of each cell's nodes."""
+    counted: NDArray[np.bool_] | slice
+    """An index (slice or mask) into ``values`` that leaves out the halo and unused nodes."""
+
+    @property
+    def term(self) -> MetricTerm:
+        """Return the facts about the metric: unit, range, limit."""
+        return METRICS[self.metric]
+
+    @property
+    def min(self) -> float:
+        """Return the smallest value."""
+        return float(self.values[self.counted].min(initial=np.inf))
+
+    @property
+    def mean(self) -> float:
+        """Return the arithmetic mean of the values."""
+        return float(np.mean(self.values[self.counted]))
+
+    @property
+    def max(self) -> float:
+        """Return the largest value."""
+        return float(self.values[self.counted].max(initial=-np.inf))
+
+    @property
+    def worst(self) -> float:
+        """Return the worst value: the smallest or the largest."""
+        return self.min if self.term.best == "high" else self.max
+
+    def beyond(self, limit: float) -> IntArray:
+        """Return the ids (k,), ascending, of cells or nodes whose value is worse than ``limit``."""
+        worse = self.values < limit if self.term.best == "high" else self.values > limit
+        mask = np.zeros(len(worse), bool)
+        mask[self.counted] = worse[self.counted]
+        return np.flatnonzero(mask)
+
+    def summary(self) -> dict[str, object]:
+        """Return the numbers for a report, as plain Python values; None for an infinite one."""
+        limit = self.term.limit
+        numbers: dict[str, object] = {
+            name: value if np.isfinite(value := getattr(self, name)) else None
+            for name in ("min", "mean", "max")
+        }
+        numbers |= {"unit": self.term.unit.strip("[]"), "of": self.term.where, "limit": limit}
+        if limit is not None:
+            numbers["beyond"] = len(self.beyond(limit))
+        return numbers
+
+
+@check_types
+def metrics(
+    mesh: Mesh, names: Iterable[Metric] | None = None, reference: Mesh | None = None
+) -> dict[Metric, MetricValues]:
+    """Return the values of some metrics of a mesh, or of all.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    names : iterable of str, optional
+        Names of `slideviz.terms.METRICS`; None: all.
+    reference : Mesh, optional
+        The undeformed mesh, as of `slideviz.quality`. Only size-skew and its factors depend on its
+        shape. Of the others, cells that are numbered the other way round there have the same
+        values as if they were numbered the right way.
+
+    Raises
+    ------
+    MeshError
+        The mesh has no cells or unusable ones, coordinates too large, or the reference is another
+        mesh.
+    CaseError
+        There is no such metric.
+
+    Examples
+    --------
+    >>> import slideviz as sv
+    >>> square = sv.Mesh([[0, 0], [1, 0], [2, 1], [0, 1]], sv.Cells.from_types([9], [0, 1, 2, 3]))
+    >>> found = sv.metrics(square, ["smallest-angle", "aspect-ratio"])
+    >>> round(found["smallest-angle"].min, 6), found["aspect-ratio"].max
+    (45.0, 2.0)
+    """
+    return {name: metric(mesh, name, reference) for name in (METRICS if names is None else names)}
+
+
+@check_types
+def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricValues:
+    """Return the values of one metric; parameters and errors are those of `metrics`."""
+    if name not in METRICS:
+        raise CaseError(f"metric: {not_one_of(name, METRICS)}")
+    if name in SIZE_SKEW:
+        found = quality(mesh, reference)
+        values = {"size": found.size, "skew": found.skew}.get(name, found.values)
+        return MetricValues(name, values, values, found.counted)
+    check_cells(mesh)
+    check_size(mesh)
+    signs = reference_of(mesh if reference is None else reference)[1]
+    turned = hash(signs.tobytes()) if (signs < 0).any() else 0
+    cache = _CACHE.pop(mesh, {})
+    if (name, turned) not in cache:
+        _make_room()
+        made = _FAMILIES[name](mesh, signs)
+        cache |= {(each, turned): sealed(values) for each, values in made.items()}
+    _CACHE[mesh] = cache  # the last one
+    values = cache[name, turned]
+    if METRICS[name].where == "cells":
+        return MetricValues(
+            name, values, values, slice(None) if mesh.halo is None else ~mesh.halo.cells
+        )
+    if ("cells", name, turned) not in cache:
+        cache["cells", name, turned] = sealed(_worst_of_nodes(mesh, values, METRICS[name].best))
+    counted = np.isfinite(values) | np.isinf(values)
+    if mesh.halo is not None:
+        counted[mesh.halo.outer] = False
+    return MetricValues(name, values, cache["cells", name, turned], counted)
+
+
+def _make_room() -> None:
+    """Remove the results of the meshes used longest ago from the cache, if it is full."""
+    while sum(len(v) for cache in _CACHE.values() for v in cache.values()) > _CACHED:
+        del _CACHE[next(iter(_CACHE))]
+
+
+def _worst_of_nodes(mesh: Mesh, values: FloatArray, best: str) -> FloatArray:
+    """Return the worst value (m,) of the nodes of each cell, of ``values`` (n,)."""
+    found = np.empty(len(mesh.cells))
+    cells = mesh.cells
+    in_parts(
+        lambda part: _take_worst(
+            cells.connectivity, cells.offsets, values, best == "high", part.start, found[part]
+        ),
+        len(cells),
+    )
+    return found
+
+
+@njit(nogil=True, cache=True)
+def _take_worst(nodes, offsets, values, least, first, found):  # type: ignore[no-untyped-def]
+    """Write the smallest (``least``) or largest value of the nodes of cells into ``found``."""
+    for i in range(len(found)):
+        begin, end = offsets[first + i], offsets[first + i + 1]
+        worst = values[nodes[begin]]
+        for k in range(begin + 1, end):
+            value = values[nodes[k]]
+            worst = min(worst, value) if least else max(worst, value)
+        found[i] = worst
+
+
+Made = Mapping[Metric, FloatArray]
+"""Metrics that are computed together, with their values."""
+
+
+def _shapes(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
+    """Return the metrics of `shape_loops.SHAPES`, which need one cell only."""
+    found = np.empty((len(shape_loops.SHAPES), len(mesh.cells)))
+    for vtk, (ids, nodes) in mesh.cells.by_type.items():
+
+        def of_part(part: slice, vtk: int, ids: IntArray, nodes: IntArray) -> None:
+            values = np.empty((len(found), part.stop - part.start))
+            tables = shape_loops.CORNERS[vtk], shape_loops.EDGES[vtk], shape_loops.POLYGONS[vtk]
+            shape_loops.write_shapes(
+                vtk, mesh.points, nodes[part], signs[ids[part]], *tables, values
+            )
+            found[:, ids[part]] = values
+
+        in_parts(partial(of_part, vtk=vtk, ids=ids, nodes=nodes), len(ids))
+    return dict(zip(shape_loops.SHAPES, found, strict=True))
+
+
+def _faces(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
+    """Return the metrics that compare a cell with its neighbours."""
+    cells, sides = mesh.cells, sides_of(mesh.cells)
+    centres, volumes = np.empty((len(cells), 3)), np.empty(len(cells))
+    found = np.empty((3, len(cells)))
+    blocks = [(vtk, *block) for vtk, block in cells.by_type.items()]
+    for vtk, ids, nodes in blocks:
+
+        def find_centres(part: slice, vtk: int, ids: IntArray, nodes: IntArray) -> None:
+            centre, volume = np.empty((part.stop - part.start, 3)), np.empty(part.stop - part.start)
+            polygons, turns = shape_loops.POLYGONS[vtk], signs[ids[part]]
+            face_loops.write_centres(mesh.points, nodes[part], turns, polygons, centre, volume)
+            centres[ids[part]], volumes[ids[part]] = centre, volume
+
+        in_parts(partial(find_centres, vtk=vtk, ids=ids, nodes=nodes), len(ids))
+    for vtk, ids, nodes in blocks:
+
+        def rate_faces(part: slice, vtk: int, ids: IntArray, nodes: IntArray) -> None:
+            here, local = ids[part], SIDE_NODES[vtk, : SIDES[vtk]]
+            around = (sides.first, sides.neighbour), (centres, volumes)
+            cells = mesh.points, nodes[part], here, signs[here], local
+            face_loops.write_faces(*cells, *around, *found)
+
+        in_parts(partial(rate_faces, vtk=vtk, ids=ids, nodes=nodes), len(ids))
+    return {"non-orthogonality": found[0], "skewness": found[1], "expansion": found[2]}
+
+
+def _nodes(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
+    """Return SU2's three metrics of the median dual mesh."""
+    cells, found = mesh.cells, np.empty((3, len(mesh.points)))
+    around, limits = cells_around(cells, len(mesh.points)), _boundary_areas(mesh)
+    arrays = cells.offsets, cells.connectivity
+    middles = np.empty((len(cells), mesh.dim))
+    in_parts(
+        lambda part: dual_loops.write_middles(mesh.points, *arrays, part.start, middles[part]),
+        len(cells),
+    )
+
+    def of_part(part: slice) -> None:
+        of_cells = cells.types, *arrays, signs, middles
+        tables = dual_loops.AROUND, SIDE_NODES
+        of_nodes = around.offsets, around.cells, around.local
+        last = limits, part.start, found[:, part]
+        dual_loops.write_nodes(mesh.points, of_cells, tables, of_nodes, *last)
+
+    in_parts(of_part, len(mesh.points))
+    return {"orthogonality": found[0], "area-ratio": found[1], "volume-ratio": found[2]}
+
+
+def _boundary_areas(mesh: Mesh) -> FloatArray:
+    """Return the smallest and the largest area (n, 2) of the markers at each node; inf, 0 for none.
+
+    A marker's area at a node is the length of the sum of its facets' normals there. Facets between
+    two cells (internal boundaries) are no boundary of a control volume, nor is a halo's.
+    """
+    limits = np.empty((len(mesh.points), 2))
+    limits[:] = np.inf, 0.0
+    for facets in _outer_facets(mesh):
+        nodes, normals = vertex_normals(mesh.points, facets)
+        areas = np.linalg.norm(normals, axis=1)
+        limits[nodes, 0] = np.minimum(limits[nodes, 0], areas)
+        limits[nodes, 1] = np.maximum(limits[nodes, 1], areas)
+    return limits
+
+
+def _outer_facets(mesh: Mesh) -> list[IntArray]:
+    """Return the facets (f, 2 or 4) of each marker that only one cell has; cached for its cells."""
+    known = _OUTER.get(mesh.cells)
+    if known is None or known[0] is not mesh.markers:
+        boundary, sides = find_boundary(mesh), sides_of(mesh.cells)
+        inner = np.zeros(len(boundary.facets), bool)
+        types, first = mesh.cells.types[boundary.owner], sides.first[boundary.owner]
+        begin = mesh.cells.offsets[boundary.owner]
+        for k in range(SIDE_NODES.shape[1]):
+            some = np.flatnonzero(k < SIDES[types])
+            local = SIDE_NODES[types[some], k]
+            nodes = mesh.cells.connectivity[begin[some, None] + local]
+            facets = boundary.facets[some, None, :]
+            same = ((nodes[:, :, None] == facets).any(axis=2) | (local < 0)).all(axis=1)
+            inner[some] |= same & (sides.neighbour[first[some] + k] >= 0)
+        each = [
+            boundary.facets[(boundary.marker == at) & ~inner] for at in range(len(boundary.names))
+        ]
+        known = _OUTER[mesh.cells] = mesh.markers, each
+    return known[1]
+
+
+_FAMILIES: dict[Metric, Callable[[Mesh, NDArray[np.int8]], Made]] = {
+    **dict.fromkeys(shape_loops.SHAPES, _shapes),
+    "non-orthogonality": _faces,
+    "skewness": _faces,
+    "expansion": _faces,
+    "orthogonality": _nodes,
+    "area-ratio": _nodes,
+    "volume-ratio": _nodes,
+}
+"""What computes a metric, and others at the same time."""

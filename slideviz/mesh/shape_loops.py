@@ -1,0 +1,188 @@
+"""Metrics that need one cell only: scaled Jacobian, angles, aspect ratio, in compiled loops.
+
+As in `slideviz.mesh.jacobians`, loops work on ``LANES`` cells at a time, cells last. 2D cells get a
+third coordinate of zero.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.jacobians import LANES, OPTIONS, add3, cross3, dot3, edge
+from slideviz.mesh.model import IntArray
+from slideviz.system.jit_cache import njit
+from slideviz.terms import Metric
+
+SHAPES: tuple[Metric, ...] = (
+    "scaled-jacobian",
+    "equiangle-skew",
+    "smallest-angle",
+    "largest-angle",
+    "aspect-ratio",
+)
+"""The metrics that `write_shapes` writes, in that order."""
+
+
+def _filled(rows: tuple[tuple[int, ...], ...], width: int) -> IntArray:
+    return np.array([[*row, *[-1] * (width - len(row))] for row in rows])
+
+
+CORNERS = {vtk: _filled(row.corners, 4) for vtk, row in ELEMENTS.items() if row.corners}
+"""(k, 4): a corner and its two or three neighbours, by VTK identifier."""
+EDGES = {vtk: np.array(row.edges) for vtk, row in ELEMENTS.items() if row.edges}
+"""(e, 2): the local nodes of the edges, by VTK identifier."""
+POLYGONS = {
+    vtk: _filled((tuple(range(row.n_nodes)),) if row.dim == 2 else row.facets, 4)
+    for vtk, row in ELEMENTS.items()
+    if row.dim > 1
+}
+"""(f, 4): the local nodes of the faces of a cell, in 2D of the cell itself, by VTK identifier."""
+
+
+@njit(**OPTIONS)
+def gather3(points, nodes, first, count, at):  # type: ignore[no-untyped-def]
+    """Write the coordinates of ``count`` cells, from number ``first`` on, into ``at`` (3, n, …)."""
+    at[2] = 0.0
+    for c in range(count):
+        for j in range(nodes.shape[1]):
+            for axis in range(points.shape[1]):
+                at[axis, j, c] = points[nodes[first + c, j], axis]
+
+
+@njit(**OPTIONS)
+def write_shapes(vtk, points, nodes, signs, corners, edges, polygons, found):  # type: ignore[no-untyped-def]
+    """Write the metrics of `SHAPES` of cells of one type into ``found`` (5, m).
+
+    ``nodes`` are (m, n), ``signs`` (m,) are -1 for cells that are numbered the other way round; the
+    tables are those of this module.
+    """
+    at = np.empty((3, nodes.shape[1], LANES))
+    lengths = np.empty((nodes.shape[1], nodes.shape[1], LANES))
+    angles, ends = np.empty((4, LANES)), np.empty((2, LANES))
+    for start in range(0, len(nodes), LANES):
+        count = min(LANES, len(nodes) - start)
+        here = slice(start, start + count)
+        gather3(points, nodes, start, count, at)
+        _lengths(at, edges, count, lengths, ends)
+        _scaled_jacobians(vtk, at, corners, count, lengths, found[0, here])
+        _angles(at, polygons, count, angles)
+        for c in range(count):
+            found[0, start + c] *= signs[start + c]
+            found[1, start + c] = _equiangle_skew(angles, c)
+            found[2, start + c] = _degrees(min(angles[0, c], angles[2, c]))
+            found[3, start + c] = _degrees(max(angles[1, c], angles[3, c]))
+            found[4, start + c] = ends[1, c] / ends[0, c] if ends[0, c] > 0.0 else np.inf
+
+
+@njit(**OPTIONS)
+def _lengths(at, edges, count, lengths, ends):  # type: ignore[no-untyped-def]
+    """Write the lengths of edges, between any two nodes, and their ``ends`` (min, max)."""
+    ends[0], ends[1] = np.inf, 0.0
+    for a, b in edges:
+        for c in range(count):
+            along = edge(at, a, b, c)
+            length = np.sqrt(dot3(along, along))
+            lengths[a, b, c] = lengths[b, a, c] = length
+            ends[0, c], ends[1, c] = min(ends[0, c], length), max(ends[1, c], length)
+
+
+@njit(**OPTIONS)
+def _scaled_jacobians(vtk, at, corners, count, lengths, found):  # type: ignore[no-untyped-def]
+    """Write Verdict's scaled Jacobians (count,); 0 where an edge has no length.
+
+    The least, over the corners, of the Jacobian over the lengths of the edges there; triangles and
+    tetrahedra have one Jacobian, over the largest such product. A pyramid is rated by the
+    tetrahedra at the corners of its base, a hexahedron at its middle, too.
+    """
+    found[:] = np.inf
+    for row in corners:
+        o, i, j, h = row
+        for c in range(count):
+            x, y = edge(at, o, i, c), edge(at, o, j, c)
+            normal = cross3(x, y)
+            if h < 0:
+                jacobian = normal[2]
+                scale = lengths[o, i, c] * lengths[o, j, c]
+                if vtk == 5:
+                    scale = max(scale, lengths[i, j, c] * max(lengths[o, i, c], lengths[o, j, c]))
+            else:
+                jacobian = dot3(normal, edge(at, o, h, c))
+                a, b, d = lengths[o, i, c], lengths[o, j, c], lengths[o, h, c]
+                scale = a * b * d
+                if vtk == 10 or vtk == 14:
+                    across = edge(at, i, j, c)
+                    p, q = lengths[i, h, c], lengths[j, h, c]
+                    r = np.sqrt(dot3(across, across))
+                    scale = max(scale, a * p * r, b * q * r, d * p * q)
+            found[c] = min(found[c], jacobian / scale if scale > 0.0 else 0.0)
+    ideal = 1.0
+    if vtk == 5 or vtk == 13:
+        ideal = np.sqrt(3.0) / 2.0
+    elif vtk == 10:
+        ideal = np.sqrt(0.5)
+    elif vtk == 14:
+        ideal = 0.5
+    elif vtk == 12:
+        _scaled_in_the_middle(at, count, found)
+    for c in range(count):
+        found[c] = min(found[c] / ideal, 1.0)
+
+
+@njit(**OPTIONS)
+def _scaled_in_the_middle(at, count, found):  # type: ignore[no-untyped-def]
+    """Lower ``found`` (count,) to the scaled Jacobian in the middle of hexahedra, if smaller."""
+    for c in range(count):
+        x, y, z = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        for k in range(4):
+            e, f = (
+                edge(at, (0, 3, 4, 7)[k], (1, 2, 5, 6)[k], c),
+                edge(at, (0, 1, 4, 5)[k], (3, 2, 7, 6)[k], c),
+            )
+            g = edge(at, k, k + 4, c)
+            x, y, z = add3(x, e), add3(y, f), add3(z, g)
+        scale = np.sqrt(dot3(x, x) * dot3(y, y) * dot3(z, z))
+        found[c] = min(found[c], dot3(cross3(x, y), z) / scale if scale > 0.0 else 0.0)
+
+
+@njit(**OPTIONS)
+def _angles(at, polygons, count, angles):  # type: ignore[no-untyped-def]
+    """Write least and largest angle of triangles, then of quadrilaterals, into ``angles`` (4, …).
+
+    An angle is given by a number that rises with it, from 0 for 0° to 4 for 360° (`_degrees`), to
+    spare the arc cosines. An edge without length makes angles of 0.
+    """
+    angles[0], angles[1], angles[2], angles[3] = np.inf, -np.inf, np.inf, -np.inf
+    for row in polygons:
+        n = 4 if row[3] >= 0 else 3
+        low = 0 if n == 3 else 2
+        for k in range(n):
+            o, i, j = row[k], row[(k + 1) % n], row[k - 1 if k else n - 1]
+            for c in range(count):
+                x, y = edge(at, o, i, c), edge(at, o, j, c)
+                scale = np.sqrt(dot3(x, x) * dot3(y, y))
+                cosine = dot3(x, y) / scale if scale > 0.0 else 1.0
+                angle = min(max(1.0 - cosine, 0.0), 2.0)
+                if n == 4:
+                    normal = cross3(edge(at, row[0], row[2], c), edge(at, row[1], row[3], c))
+                    angle = angle if dot3(normal, cross3(x, y)) >= 0.0 else 4.0 - angle
+                angles[low, c] = min(angles[low, c], angle)
+                angles[low + 1, c] = max(angles[low + 1, c], angle)
+
+
+@njit(inline="always", **OPTIONS)
+def _degrees(angle):  # type: ignore[no-untyped-def]
+    """Return the angle in degrees that a number of `_angles` stands for."""
+    half = np.degrees(np.arccos(1.0 - (angle if angle <= 2.0 else 4.0 - angle)))
+    return half if angle <= 2.0 else 360.0 - half
+
+
+@njit(inline="always", **OPTIONS)
+def _equiangle_skew(angles, c):  # type: ignore[no-untyped-def]
+    """Return the equiangle skew, at most 1, of cell ``c`` with angles as of `_angles`."""
+    worst = 0.0
+    for low, ideal in ((0, 60.0), (2, 90.0)):
+        if angles[low, c] <= angles[low + 1, c]:
+            least, most = _degrees(angles[low, c]), _degrees(angles[low + 1, c])
+            worst = max(worst, (most - ideal) / (180.0 - ideal), (ideal - least) / ideal)
+    return min(worst, 1.0)
