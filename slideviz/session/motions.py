@@ -13,7 +13,25 @@ import numpy as np
 from slideviz.case.boxes import box_definition, boxes_for
 from slideviz.case.displacement import Displacements, parse_displacements, read_displacements
 from slideviz.case.lines import read_text
-from slideviz.case.model import Case, FromFile, Target, applies_to, named
+from slideviz.case.model import (
+    Bump,
+    Case,
+    Cst,
+    Ffd,
+    FfdCamber,
+    FfdThickness,
+    FfdTwist,
+    FromFile,
+    HicksHenne,
+    Motion,
+    Radial,
+    Rotate,
+    Scale,
+    Target,
+    Translate,
+    applies_to,
+    named,
+)
 from slideviz.case.motion import displacements, key_of, moved_together, placed_displacements
 from slideviz.case.motion_words import direction_words
 from slideviz.errors import CaseError, SlidevizError
@@ -156,6 +174,40 @@ def new_target(session: Session) -> Target:
     if len(names) == 1:
         return names[0]
     return names if names and names != moving else "" if len(moving) > 1 else "".join(moving)
+
+
+def new_motion(
+    kind: type,
+    marker: Target,
+    dim: int,
+    machine: Axis | None = None,
+    boxes: Sequence[str] = (),
+    chord: tuple[float, float] = (0.0, 1.0),
+) -> Motion:
+    """Return a motion of a kind with zero displacement, to be edited.
+
+    Rotations and radial motions are about ``machine``, the axis about which the mesh repeats, if
+    there is one; a free-form deformation moves a control point of the first of ``boxes``, a bump
+    is one of an airfoil along ``chord``.
+    """
+    if kind in (HicksHenne, Cst, Bump):
+        return kind(marker, 0.0, chord=chord)
+    axis, origin = machine or ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    if kind is Translate:
+        return Translate(marker, (0.0,) * dim)
+    if kind is Rotate:
+        return Rotate(marker, 0.0, "centroid" if machine is None else origin[:dim], axis)
+    if kind is Radial:
+        return Radial(marker, 1.0, 0.0, axis, origin[:dim])
+    if kind is Scale:
+        return Scale(marker, (1.0,) * dim)
+    if kind is Ffd:
+        return Ffd(marker, (*boxes, "")[0], (0, 0, 0 if dim == 3 else -1), (0.0, 0.0, 0.0))
+    if kind in (FfdCamber, FfdThickness):
+        return kind(marker, (*boxes, "")[0], (0, 0 if dim == 3 else -1), 0.0)
+    if kind is FfdTwist:
+        return FfdTwist(marker, (*boxes, "")[0], 0, 0.0)
+    return FromFile(Path(), marker)
 
 
 def targets(session: Session) -> tuple[Target, ...]:

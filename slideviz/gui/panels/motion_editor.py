@@ -1,14 +1,14 @@
-"""The editor of a motion: boundary, kind, numbers."""
+"""The editor of a motion: boundary, kind, and rows for the numbers of all kinds."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, NamedTuple
 
 from qtpy.QtCore import Signal
-from qtpy.QtWidgets import QFileDialog, QLabel, QWidget
+from qtpy.QtWidgets import QFileDialog, QFormLayout, QLabel, QPushButton, QSizePolicy, QWidget
 
 from slideviz.case.model import (
     BoxMotion,
@@ -29,11 +29,23 @@ from slideviz.case.model import (
     Translate,
     named,
 )
+from slideviz.case.motion_text import VERB_OF
 from slideviz.case.motion_words import direction_words, target_words
-from slideviz.gui.panels.motion_form import ABOUT, MotionForm, new_motion
-from slideviz.gui.widgets.fields import NumberField
-from slideviz.gui.widgets.vector_field import VectorField
-from slideviz.session.motions import Axis, radial
+from slideviz.gui.widgets.build import as_widget, grow_fields, in_row
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import NumberField, TextField, not_zero
+from slideviz.gui.widgets.vector_field import VectorField, a_direction
+from slideviz.session.motions import Axis, new_motion, radial
+from slideviz.terms import MOTION_KINDS, SIDES
+
+ABOUT = {
+    "centroid": "its centroid",
+    "axis": "the machine's axis",
+    "radial": "radial through its centroid",
+    "point": "a point",
+}
+"""What a motion leaves in place, by the choice's value."""
+
 
 Z = (0.0, 0.0, 1.0)
 """Axis of rotations in 2D."""
@@ -42,9 +54,80 @@ RAISED = {
     False: ("Raised by", "towards +y"),
 }
 """Title and direction of the height of an airfoil's motion, by whether it is `HicksHenne`."""
+KINDS: dict[type, str] = {kind: MOTION_KINDS[verb].label for kind, verb in VERB_OF.items()}
+"""Labels of the kinds of motion, by class."""
 
 
-class MotionEditor(MotionForm):
+def _unchanged(value: Any) -> Any:
+    return value
+
+
+def _whole(values: Sequence[float]) -> tuple[int, ...]:
+    return tuple(int(value) for value in values)
+
+
+class FormRow(NamedTuple):
+    """A row of the form: its title, the attribute of a motion in it, and what its field shows."""
+
+    title: str
+    attribute: str
+    shown: Callable[[Any], Any] = _unchanged
+    """Returns what the field shows for a value of the attribute."""
+    read: Callable[[Any], Any] = _unchanged
+    """Returns the value of the attribute for that of the field."""
+
+
+# Rounded: 1.03 is not 3 % to the last bit.
+ROWS: dict[str, FormRow] = {
+    "box": FormRow("Box", "box"),
+    "index": FormRow("Control point", "index", read=_whole),
+    "plane": FormRow("Plane j", "plane", read=int),
+    "vector": FormRow("By", "vector"),
+    "amount": FormRow("By", "amount"),
+    "angle": FormRow("Angle (°)", "angle_deg"),
+    "factors": FormRow("Factors", "factors", lambda one: one if len(one) > 1 else one * 3),
+    "percent": FormRow(
+        "Radius by (%)",
+        "factor",
+        lambda factor: round(100.0 * (factor - 1.0), 10),
+        lambda percent: round(1.0 + percent / 100.0, 14),
+    ),
+    "distance": FormRow("and by (length)", "distance"),
+    "about": FormRow("About", "point"),
+    "point": FormRow("Point", "point"),
+    "axis": FormRow("Axis", "axis"),
+    "side": FormRow("Side", "side"),
+    "term": FormRow("Shape", "term", read=_whole),
+    "peak": FormRow(
+        "Peak at (%)",
+        "peak",
+        lambda peak: round(100.0 * peak, 10),
+        lambda percent: round(percent / 100.0, 14),
+    ),
+    "raised": FormRow("Raised by", "height"),
+    "chord": FormRow("Chord", "chord"),
+    "path": FormRow("File", "path"),
+}
+"""The rows of the form; each is named as its field in `MotionEditor`."""
+FIELDS: dict[type, tuple[str, ...]] = {
+    Translate: ("vector",),
+    Rotate: ("angle",),
+    Scale: ("factors",),
+    Radial: ("percent", "distance"),
+    HicksHenne: ("raised", "side", "peak", "chord"),
+    Cst: ("raised", "side", "term", "chord"),
+    Bump: ("raised", "peak", "chord"),
+    Ffd: ("index", "box", "vector"),
+    FfdCamber: ("index", "box", "amount"),
+    FfdThickness: ("index", "box", "amount"),
+    FfdTwist: ("plane", "box", "angle", "point", "axis"),
+    FromFile: ("path",),
+}
+"""Rows of each kind of motion, the one to be typed into first at the beginning. Those of point and
+axis of `Rotate`, `Scale` and `Radial` depend on what stays in place."""
+
+
+class MotionEditor(QWidget):
     """The editor of a motion, which emits each valid change."""
 
     changed = Signal(object)  # Motion
@@ -54,6 +137,11 @@ class MotionEditor(MotionForm):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self.form = QFormLayout(self)
+        self.form.setContentsMargins(0, 2, 0, 0)
+        grow_fields(self.form)
+        self._make_fields()
+        self._place_fields()
         self._motion: Motion | None = None
         self._dim = 3
         self._targets: tuple[Target, ...] = ()
@@ -65,12 +153,104 @@ class MotionEditor(MotionForm):
         self._connect()
         self.show_motion(None, (), 3)
 
+    def _make_fields(self) -> None:
+        self.marker = Choice(
+            {},
+            "The boundaries that move. To move some of them as one body, about their common "
+            "centroid, select them in the table of boundaries first; then you can choose them "
+            "here.",
+        )
+        self.kind = Choice(KINDS)
+        self.vector = VectorField(
+            tip="How far it moves along each axis, in the mesh's length unit."
+        )
+        self.angle = NumberField(
+            tip="Degrees; positive turns counter-clockwise seen against the axis."
+        )
+        self.factors = VectorField(
+            (1.0, 1.0, 1.0), tip="Enlargement along each axis: 1 leaves it, 2 doubles it."
+        )
+        for field in self.factors.fields:
+            field._allowed = not_zero
+        self.percent = NumberField(
+            allowed=scale_problem,
+            tip="How much larger the radius becomes, in percent: 3 is 3 % outwards.",
+        )
+        self.distance = NumberField(
+            tip="How far it also moves outwards, in the mesh's length unit."
+        )
+        first = {what: ABOUT[what] for what in ("centroid", "point")}
+        self.about = Choice(first, "What stays in place while it turns or grows.")
+        self.point = VectorField(tip="The point that stays in place.")
+        self.axis = VectorField(
+            (0.0, 0.0, 1.0), a_direction, tip="Direction of the axis; its length does not matter."
+        )
+        self.box = Choice({}, "The box whose control points move: of the mesh, or of the case.")
+        self.index = VectorField(
+            allowed=control_point_problem,
+            names="ijk",
+            tip="The control point, counted from 0 along each direction of the box; -1 is all.",
+        )
+        self.plane = NumberField(
+            0.0,
+            plane_index_problem,
+            tip="The plane of control points, counted from 0 along j; -1 is all.",
+        )
+        self.amount = NumberField(
+            tip="How far control points move, in the mesh's length unit. With the thickness, the "
+            "last ones move forwards, and the first ones as far backwards."
+        )
+        self.side = Choice({side: term.label for side, term in SIDES.items()}, "Which side moves.")
+        self.side.set_tips({side: term.tip for side, term in SIDES.items()})
+        self.term = VectorField(
+            (1.0, 1.0),
+            term_problem,
+            names=("term", "of"),
+            tip="The term of the shape function, counted from 1 at the leading edge, and how many.",
+        )
+        self.peak = NumberField(
+            50.0, peak_problem, tip="Where the bump is highest, in percent of the chord."
+        )
+        self.raised = NumberField(tip="How far it is raised, in the mesh's length unit.")
+        self.chord = VectorField(
+            (0.0, 1.0),
+            chord_problem,
+            names=("x from", "to"),
+            tip="x of the leading and of the trailing edge: the airfoil lies along x.",
+        )
+        self.path = TextField()
+        self.path.setToolTip("A line for each node: its number and its displacement.")
+        self.browse = QPushButton("…")
+        self.browse.setMaximumWidth(30)
+        self.browse.setToolTip("Choose the file.")
+        self.table = QPushButton("Table…")
+        self.table.setObjectName("motion_table")
+        self.table.setToolTip("Type or paste the rows, or change them, and save them as the file.")
+
+    def _place_fields(self) -> None:
+        both = (self.kind, self.marker)
+        line = in_row(*both, wide=both, spacing=6)
+        line.setStretch(0, 4)  # room for the longest kind, where the window is 1280 pixels wide
+        line.setStretch(1, 3)
+        self.form.addRow("Motion", as_widget(line))
+        file = as_widget(in_row(self.path, self.browse, self.table, wide=[self.path], spacing=4))
+        self._rows: dict[str, QWidget] = {}
+        for name, row in ROWS.items():
+            self._rows[name] = file if name == "path" else getattr(self, name)
+            self.form.addRow(QLabel(row.title), self._rows[name])
+        # One width for all labels, so that the fields do not jump from motion to motion.
+        labels = [self.form.labelForField(widget) for widget in self._rows.values()]
+        widest = max(label.sizeHint().width() for label in labels)
+        for label in labels:
+            label.setMinimumWidth(widest)
+        for choice in (self.kind, self.marker, self.about, self.box, self.side):
+            choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+
     def _connect(self) -> None:
-        self.marker.chosen.connect(lambda _: self._emit_changed())
         self.kind.chosen.connect(self._kind_chosen)
         self.about.chosen.connect(self._about_chosen)
-        self.box.chosen.connect(lambda _: self._emit_changed())
-        self.side.chosen.connect(lambda _: self._emit_changed())
+        for choice in (self.marker, self.box, self.side):
+            choice.chosen.connect(lambda _: self._emit_changed())
         for field in self._rows.values():
             if isinstance(field, NumberField | VectorField):
                 field.changed.connect(lambda _: self._emit_changed())
@@ -87,87 +267,36 @@ class MotionEditor(MotionForm):
         self._sync_targets(motion, targets)
         self.kind.set_item_enabled(FfdTwist, dim == 3)  # a section has no span to twist along
         self.kind.show_value(type(motion))
-        shown = self._show_numbers(motion, dim)
+        for name in FIELDS.get(type(motion), ()):
+            row = ROWS[name]
+            self._show_value(name, row.shown(getattr(motion, row.attribute)))
+        shown = {*FIELDS.get(type(motion), ())}
+        if isinstance(motion, OnAirfoil):
+            self._name_height(motion)
         if isinstance(motion, Rotate | Scale | Radial):
             shown |= {"about"} | self._show_place(motion, dim)
         for vector in (self.vector, self.factors, self.point):
             vector.set_count(dim)
         self.index.set_count(dim - isinstance(motion, FfdCamber | FfdThickness))
-        self.show_rows(shown)
+        for name, widget in self._rows.items():
+            self.form.setRowVisible(widget, name in shown)
 
-    def _show_numbers(self, motion: Motion, dim: int) -> set[str]:
-        """Fill the fields with a motion's numbers, and return the names of their rows."""
-        if isinstance(motion, Translate):
-            self.vector.show_value(motion.vector)
-            return {"vector"}
-        if isinstance(motion, Rotate):
-            self.angle.show_value(motion.angle_deg)
-            return {"angle"}
-        if isinstance(motion, Scale):
-            factors = motion.factors if len(motion.factors) > 1 else motion.factors * dim
-            self.factors.show_value(factors)
-            return {"factors"}
-        if isinstance(motion, Radial):
-            # Rounded: 1.03 is not 3 % to the last bit.
-            self.percent.show_value(round(100.0 * (motion.factor - 1.0), 10))
-            self.distance.show_value(motion.distance)
-            return {"percent", "distance"}
-        if isinstance(motion, Ffd):
-            self._sync_boxes(motion.box)
-            self.index.show_value(motion.index)
-            self.vector.show_value(motion.vector)
-            return {"box", "index", "vector"}
-        if isinstance(motion, FfdCamber | FfdThickness):
-            self._sync_boxes(motion.box)
-            self.index.show_value(motion.index)
-            self.amount.show_value(motion.amount)
-            return {"box", "index", "amount"}
-        if isinstance(motion, FfdTwist):
-            self._sync_boxes(motion.box)
-            self.plane.show_value(motion.plane)
-            self.angle.show_value(motion.angle_deg)
-            self.point.show_value(motion.point)
-            self.axis.show_value(motion.axis)
-            return {"box", "plane", "angle", "point", "axis"}
-        if isinstance(motion, OnAirfoil):
-            return self._show_bump(motion)
-        if not isinstance(motion, FromFile):
-            return set()
-        if str(motion.path) != self.path.text() and not self.path.hasFocus():
-            self.path.setText("" if motion.path == Path() else str(motion.path))
-        return {"path"}
+    def _show_value(self, name: str, value: Any) -> None:
+        """Show a value in the field of a row."""
+        if name == "box":
+            self._sync_boxes(value)
+        elif name != "path":
+            getattr(self, name).show_value(value)
+        elif str(value) != self.path.text() and not self.path.hasFocus():
+            self.path.setText("" if value == Path() else str(value))
 
-    def _show_bump(self, motion: OnAirfoil) -> set[str]:
-        """Fill the fields for a bump on an airfoil; return the names of their rows."""
-        self.raised.show_value(motion.height)
+    def _name_height(self, motion: OnAirfoil) -> None:
+        """Say in the row of the height in which direction an airfoil's side moves."""
         title, way = RAISED[isinstance(motion, HicksHenne)]
         label = self.form.labelForField(self.raised)
         assert isinstance(label, QLabel)
         label.setText(title)
         self.raised.set_tip(f"How far it moves {way}, in the mesh's length unit.")
-        self.chord.show_value(motion.chord)
-        shown = {"raised", "chord"}
-        if not isinstance(motion, Bump):
-            self.side.show_value(motion.side)
-            shown.add("side")
-        if isinstance(motion, Cst):
-            self.term.show_value(motion.term)
-            return shown | {"term"}
-        self.peak.show_value(round(100.0 * motion.peak, 10))
-        return shown | {"peak"}
-
-    def _bump(self, motion: OnAirfoil) -> OnAirfoil:
-        """Return the bump on an airfoil that the fields describe, in place of ``motion``."""
-        low, high = motion.chord if self.chord.problem else self.chord.value
-        values: dict[str, Any] = {"height": self.raised.value, "chord": (low, high)}
-        if isinstance(motion, Cst):
-            k, n = motion.term if self.term.problem else self.term.value
-            values["term"] = (int(k), int(n))
-        else:
-            values["peak"] = round(self.peak.value / 100.0, 14)
-        if not isinstance(motion, Bump):
-            values["side"] = self.side.currentData()
-        return replace(motion, marker=self._targets[self.marker.currentData()], **values)
 
     def _show_place(self, motion: Rotate | Scale | Radial, dim: int) -> set[str]:
         """Fill the fields for a motion's fixed point and axis; return the names of their rows."""
@@ -272,23 +401,12 @@ class MotionEditor(MotionForm):
 
     def focus(self) -> None:
         """Put the cursor into the first number field of the shown motion, and select its text."""
-        first = {
-            Translate: self.vector.fields[0],
-            Rotate: self.angle,
-            Scale: self.factors.fields[0],
-            Radial: self.percent,
-            HicksHenne: self.raised,
-            Cst: self.raised,
-            Bump: self.raised,
-            Ffd: self.index.fields[0],
-            FfdCamber: self.index.fields[0],
-            FfdThickness: self.index.fields[0],
-            FfdTwist: self.plane,
-            FromFile: self.path,
-        }.get(type(self._motion))
-        if first is not None:
-            first.setFocus()
-            first.selectAll()
+        if self._motion is None:
+            return
+        field = getattr(self, FIELDS[type(self._motion)][0])
+        first = field.fields[0] if isinstance(field, VectorField) else field
+        first.setFocus()
+        first.selectAll()
 
     def set_centroid(self, centroid: Callable[[Target], tuple[float, ...]]) -> None:
         """Set the function that returns a target's centroid, offered as the first fixed point."""
@@ -312,50 +430,67 @@ class MotionEditor(MotionForm):
 
     def _emit_changed(self) -> None:
         """Emit the motion that the fields describe, if it differs from the shown one."""
-        marker, kind = self._targets[self.marker.currentData()], type(self._motion)
-        x, y, z = self.axis.value if self._dim == 3 else Z
-        if self.axis.problem:
-            x, y, z = getattr(self._motion, "axis", Z)
-        axis, point = (x, y, z), self.point.value
-        centred = self.about.currentData() in ("centroid", "radial")
-        about: tuple[float, ...] | Literal["centroid"] = "centroid" if centred else point
-        if kind is Translate:
-            motion: Motion = Translate(marker, self.vector.value)
-        elif kind is Rotate:
-            motion = Rotate(marker, self.angle.value, about, axis)
-        elif kind is Scale:
-            motion = Scale(marker, self.factors.value, about)
-        elif kind is Radial:
-            factor = round(1.0 + self.percent.value / 100.0, 14)
-            motion = Radial(marker, factor, self.distance.value, axis, point)
-        elif isinstance(self._motion, OnAirfoil):
-            motion = self._bump(self._motion)
-        elif isinstance(self._motion, BoxMotion):
-            motion = self._of_box(marker, self._motion, axis)
-        else:
-            motion = FromFile(Path(self.path.text().strip()), marker)
-        if motion != self._motion:
-            self.changed.emit(motion)
+        motion = self._motion
+        values = {ROWS[name].attribute: self._typed(name) for name in FIELDS[type(motion)]}
+        if isinstance(motion, Rotate | Scale | Radial):
+            centred = self.about.currentData() in ("centroid", "radial")
+            values["point"] = "centroid" if centred else self.point.value
+        if isinstance(motion, Rotate | Radial):
+            values["axis"] = self._typed("axis") if self._dim == 3 else Z
+        edited = replace(motion, marker=self._targets[self.marker.currentData()], **values)
+        if edited != motion:
+            self.changed.emit(edited)
 
-    def _of_box(
-        self, marker: Target, before: BoxMotion, axis: tuple[float, float, float]
-    ) -> BoxMotion:
-        """Return the motion of a box that the fields describe; in 2D, the last index stays."""
-        box = self.box.currentData()
-        if isinstance(before, FfdTwist):
-            angle, point = self.angle.value, self.point.value
-            return FfdTwist(marker, box, int(self.plane.value), angle, point, axis)
-        last = before.index[-1]
-        at = before.index if self.index.problem else (*self.index.value, last)
-        if not isinstance(before, Ffd):
-            i, j = (int(value) for value in at[:2])
-            return type(before)(marker, box, (i, j), self.amount.value)
-        i, j, k = (int(value) for value in at[:3])
-        dx, dy, dz = (*self.vector.value, 0.0)[:3]
-        return Ffd(marker, box, (i, j, k), (dx, dy, dz))
+    def _typed(self, name: str) -> Any:
+        """Return the value in a row; while its numbers contradict, that of the shown motion."""
+        field, row = getattr(self, name), ROWS[name]
+        if isinstance(field, Choice):
+            return field.currentData()
+        if name == "path":
+            return Path(field.text().strip())
+        before = getattr(self._motion, row.attribute)
+        if isinstance(field, VectorField) and field.problem:
+            return before
+        value = row.read(field.value)
+        # In 2D, indices and vectors of a box keep what is not shown of them.
+        boxed = isinstance(self._motion, BoxMotion) and isinstance(value, tuple)
+        return (*value, *before[len(value) :]) if boxed else value
 
     def _browse(self) -> None:
         name, _ = QFileDialog.getOpenFileName(self, "Displacement file", self.path.text())
         if name:
             self.path.setText(name)
             self._emit_changed()
+
+
+def scale_problem(value: float) -> str:
+    """Return why a radius cannot change by this many percent; empty if it can."""
+    return "" if value > -100.0 else "-100 % or less would fold the boundary"
+
+
+def control_point_problem(values: Sequence[float]) -> str:
+    """Return why numbers are no index of a control point; empty if they are."""
+    whole = all(value == int(value) and value >= -1 for value in values)
+    return "" if whole else "expected whole numbers from 0, or -1 for all"
+
+
+def plane_index_problem(value: float) -> str:
+    """Return why a number is none of a plane of control points; empty if it is."""
+    return control_point_problem((value,))
+
+
+def term_problem(values: Sequence[float]) -> str:
+    """Return why numbers are no term of a shape function; empty if they are."""
+    k, n = values
+    whole = k == int(k) and n == int(n) and 1 <= k <= n
+    return "" if whole else "expected whole numbers, and a term from 1 to how many there are"
+
+
+def peak_problem(value: float) -> str:
+    """Return why a bump cannot have its peak at this percentage of the chord; empty if it can."""
+    return "" if 0.0 < value < 100.0 else "the peak lies between 0 and 100 % of the chord"
+
+
+def chord_problem(values: Sequence[float]) -> str:
+    """Return why a chord cannot go from one x to another; empty if it can."""
+    return "" if values[0] < values[1] else "the trailing edge has the larger x"

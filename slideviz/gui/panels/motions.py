@@ -18,8 +18,7 @@ from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe
 from slideviz.errors import SlidevizError
 from slideviz.gui.dialogs.motion_table import ask_table
-from slideviz.gui.panels.motion_editor import MotionEditor
-from slideviz.gui.panels.motion_form import KINDS, new_motion
+from slideviz.gui.panels.motion_editor import KINDS, MotionEditor
 from slideviz.gui.widgets.build import hint_label, in_column, in_row, tool_button
 from slideviz.gui.widgets.labels import elide_items, wrapped
 from slideviz.gui.widgets.panel import FieldWatch, Panel
@@ -33,6 +32,7 @@ from slideviz.session.motions import (
     centroid,
     chord_of,
     machine_axis,
+    new_motion,
     new_target,
     targets,
 )
