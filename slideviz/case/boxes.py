@@ -22,7 +22,7 @@ from slideviz.ffd.box import (
     polar_corners,
     regular_box,
 )
-from slideviz.ffd.inverse import parametric
+from slideviz.ffd.deformation import parametric
 from slideviz.ffd.kinds import Turn
 from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.model import FloatArray, IntArray, Mesh

@@ -68,8 +68,14 @@ def compare(arguments: argparse.Namespace) -> int:
     from slideviz.cli.output_paths import OutputPath, make_folder, require_output_paths
     from slideviz.cli.terminal import DONE
     from slideviz.errors import CaseError
-    from slideviz.study.combinations import COMPARED_METHODS, MODES, announcement, refused, warm
-    from slideviz.study.table import terminal_head
+    from slideviz.study.combinations import (
+        COMPARED_METHODS,
+        MODES,
+        announcement,
+        refused,
+        terminal_head,
+        warm,
+    )
 
     for name in ("matplotlib",) if arguments.no_pictures else ("matplotlib", "pyvista"):
         import_module(name)  # else it would be missed only after all is computed
@@ -168,8 +174,14 @@ def _computed(
 
     ``cannot`` has the reasons for those that cannot be computed.
     """
-    from slideviz.study.combinations import bounded, compare
-    from slideviz.study.table import csv_text, history_text, save_text, terminal_line
+    from slideviz.study.combinations import (
+        bounded,
+        compare,
+        csv_text,
+        history_text,
+        save_text,
+        terminal_line,
+    )
 
     table, histories = folder / TABLE, folder / HISTORY
     files = [table]

@@ -44,8 +44,7 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     """Return the configuration, with the changes of ``--set``, and its mesh, which it must fit."""
     from slideviz import read
     from slideviz.cli.output_paths import add_case_inputs
-    from slideviz.design.su2.config import own_changes, read_config
-    from slideviz.design.su2.markers import on_mesh
+    from slideviz.design.su2.config import on_mesh, own_changes, read_config
     from slideviz.errors import CaseError
 
     own, others = own_changes(arguments.set)

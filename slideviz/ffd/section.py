@@ -24,7 +24,7 @@ from slideviz.ffd.box import (
     polar_corners,
     regular_box,
 )
-from slideviz.formats.su2.keyword_blocks import is_ffd
+from slideviz.formats.su2.lines import is_ffd
 from slideviz.formats.su2.read import Document
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 

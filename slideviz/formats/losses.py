@@ -9,9 +9,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from slideviz.formats.su2.keyword_blocks import is_ffd
+from slideviz.formats.su2.lines import is_ffd
 from slideviz.formats.su2.read import Document
-from slideviz.formats.su2.zone import SEND_RECEIVE
+from slideviz.formats.su2.text import SEND_RECEIVE
 from slideviz.formats.table import FORMATS, MeshFormat, format_for, usual_ending
 from slideviz.mesh.model import Mesh
 from slideviz.terms import FileFormat

@@ -17,9 +17,8 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface, padded
 from slideviz.scene import pick
 from slideviz.scene.actors import CELL, DrawnBoundary
-from slideviz.scene.boxes import BoxLayer
 from slideviz.scene.camera import Camera
-from slideviz.scene.ghosts import GhostLayer, SupportLayer
+from slideviz.scene.ghosts import BoxLayer, GhostLayer, SupportLayer
 from slideviz.scene.legend import LegendLayer, TriadLayer
 from slideviz.scene.marked_cells import InvertedLayer, MarkLayer
 from slideviz.scene.mesh import BoundaryLayer, CellLayer, CoarseLayer, ThresholdLayer

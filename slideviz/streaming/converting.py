@@ -14,9 +14,8 @@ from slideviz.formats.binary_copy import BinaryLayout, binary_layout, write_layo
 from slideviz.formats.losses import OTHER_ZONES, lost_of_text, sentence_of_lost
 from slideviz.formats.su2.text import Text, find_text
 from slideviz.formats.su2.write import require_text_names, text_of_parts
-from slideviz.formats.su2b.elements import element_blocks
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone, find_zones
-from slideviz.formats.su2b.read import read_markers
+from slideviz.formats.su2b.read import element_blocks, read_markers
 from slideviz.formats.su2b.write import file_head, halo_error, require_binary_names
 from slideviz.formats.table import format_of
 from slideviz.mesh.model import Cells, FloatArray, IntArray

@@ -18,12 +18,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import MeshError, printable
-from slideviz.formats.su2.keyword_blocks import boxes_elsewhere
+from slideviz.formats.su2.lines import boxes_elsewhere
 from slideviz.formats.su2.text import Text
 from slideviz.formats.su2.text import boundaries_elsewhere as text_boundaries_elsewhere
-from slideviz.formats.su2b.elements import BLOCK, ElementBlock, element_block, require_used
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zone
-from slideviz.formats.su2b.read import boundaries_elsewhere, point_block, read_markers
+from slideviz.formats.su2b.read import (
+    BLOCK,
+    ElementBlock,
+    boundaries_elsewhere,
+    element_block,
+    point_block,
+    read_markers,
+    require_used,
+)
 from slideviz.mesh.check import LARGEST, first_fault
 from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import (

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
-from slideviz.formats.su2b.elements import ElementBlock, element_block, element_blocks
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, open_zone
+from slideviz.formats.su2b.read import ElementBlock, element_block, element_blocks
 from slideviz.mesh.elements import SIZES
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part, frozen_array
 from slideviz.mesh.quality import Quality

@@ -628,7 +628,7 @@ def test_a_long_list_of_markers_is_cut(here):
     ],
 )
 def test_boundaries_of_su2s_keys_that_the_mesh_lacks_are_passed_over(row, roles, modes, here):
-    from slideviz.design.su2.markers import on_mesh
+    from slideviz.design.su2.config import on_mesh
 
     found = on_mesh(config(f"DV_KIND= SCALE\nDV_VALUE= 1.1\n{row}\n"), sv.read("mesh.su2"))
     assert dict(found.case.roles) == {"low": "moving", **roles}
@@ -657,7 +657,7 @@ def test_command_passes_over_a_boundary_and_is_that_without_it(here, capsys):
 
 
 def test_internal_boundaries_of_su2_are_passed_over_where_the_mesh_lacks_them(here):
-    from slideviz.design.su2.markers import on_mesh
+    from slideviz.design.su2.config import on_mesh
 
     text = "DV_KIND= SCALE\nDV_VALUE= 1.1\nMARKER_INTERNAL= (left, core)\n"
     found = on_mesh(config(text), sv.read("mesh.su2"))

@@ -19,8 +19,7 @@ import pytest
 import slideviz as sv
 from slideviz.design.sweeps import processes
 from slideviz.design.sweeps import sweep as sweeping
-from slideviz.design.sweeps.processes import Processes
-from slideviz.design.sweeps.worker import pack_mesh
+from slideviz.design.sweeps.processes import Processes, pack_mesh
 from slideviz.errors import DeformError
 from slideviz.samples.table import sample
 
@@ -100,7 +99,7 @@ def test_workers_end_with_their_parent_however_it_ends(tmp_path):
     script.write_text(
         "import sys, time\n"
         "from slideviz.design.sweeps.processes import Processes\n"
-        "from slideviz.design.sweeps.worker import Packed\n"
+        "from slideviz.design.sweeps.processes import Packed\n"
         "import pickle\n"
         "if __name__ == '__main__':\n"
         "    workers = Processes(1, Packed('none', pickle.dumps(None)))\n"

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from slideviz.errors import CaseError
 from slideviz.ffd.box import CORNERS, Box, blending, lattice, plane_corners, regular_box
-from slideviz.ffd.inverse import parametric
+from slideviz.ffd.deformation import parametric
 
 WARPED = CORNERS * [3.0, 2.0, 1.0] + np.random.default_rng(1).normal(size=(8, 3)) * 0.1
 BLENDINGS = {

@@ -7,8 +7,7 @@ import pytest
 
 from slideviz.errors import CaseError
 from slideviz.ffd.box import CoordinateSystem, regular_box
-from slideviz.ffd.deformation import BoxDeformation, DrivenMove, Limits
-from slideviz.ffd.inverse import parametric
+from slideviz.ffd.deformation import BoxDeformation, DrivenMove, Limits, parametric
 from slideviz.ffd.kinds import Request, moves_of
 from tests.oracles.freeform import blended, moved
 

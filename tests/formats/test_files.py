@@ -112,7 +112,7 @@ ABAQUS = """\
 def _in_this_process(monkeypatch):
     """Read in this process, where it is quick and can be patched."""
     monkeypatch.setattr(
-        "slideviz.formats.subprocess_reader.read_in_subprocess",
+        "slideviz.formats.files.read_in_subprocess",
         lambda path, _: read_with_meshio(path),
     )
 

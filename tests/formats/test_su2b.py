@@ -12,7 +12,7 @@ from slideviz.errors import MeshError
 from slideviz.formats.files import convert, read, write
 from slideviz.formats.su2b import read as su2b
 from slideviz.formats.su2b import write as su2b_write
-from slideviz.formats.su2b.elements import element_blocks
+from slideviz.formats.su2b.read import element_blocks
 from slideviz.formats.su2b.write import su2b_blocks
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.halo import Halo

@@ -13,7 +13,7 @@ from slideviz.design.sweeps import sweep as sweeping
 from slideviz.design.sweeps.table import DesignRow
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import plot_canvas
-from slideviz.gui.widgets.plot_image import AxesPlace, PlotFormat, picture
+from slideviz.gui.widgets.plot_canvas import AxesPlace, PlotFormat, picture
 from slideviz.plots.style import PRINT
 from slideviz.samples.table import write_sample
 from slideviz.session import changes

@@ -10,7 +10,7 @@ import pytest
 from qtpy.QtCore import QCoreApplication, QEvent
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.widgets.plot_image import THREAD
+from slideviz.gui.widgets.plot_canvas import THREAD
 from slideviz.gui.window import MainWindow
 from slideviz.session import changes
 

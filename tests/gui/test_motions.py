@@ -21,8 +21,8 @@ from slideviz.case.model import (
 )
 from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import with_boxes
-from slideviz.gui.dialogs.motion_table import TableDialog
 from slideviz.gui.panels.motion_editor import control_point_problem
+from slideviz.gui.panels.motions import TableDialog
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.session import changes
 from slideviz.session.motions import Ghosts, TableRows

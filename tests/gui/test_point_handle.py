@@ -6,8 +6,8 @@ from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.viewport.handles import PlaneHandle
 from slideviz.gui.viewport.point_handle import AxisHandle
+from slideviz.gui.viewport.section_views import PlaneHandle
 from slideviz.samples.table import write_sample
 from slideviz.scene.pick import to_display
 from slideviz.session import changes

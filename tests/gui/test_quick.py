@@ -17,7 +17,7 @@ from slideviz.gui.responsiveness.threads import GarbageCollector
 from slideviz.gui.responsiveness.timers import GARBAGE_OBJECTS
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.widgets import plot_image
+from slideviz.gui.widgets import plot_canvas
 from slideviz.gui.widgets.build import QuietBar
 from slideviz.plots.style import PRINT
 
@@ -235,10 +235,10 @@ def test_every_thread_stands_back_before_it_works(window, qtbot, monkeypatch):
     runner = JobRunner()
     runner.start(lambda report, stopped: order.append("job"))
     qtbot.waitUntil(lambda: not runner.busy)
-    plot_image.draw_in_thread(
+    plot_canvas.draw_in_thread(
         lambda *_: order.append("plot"),
-        plot_image.PlotFormat(50, 50, 1.0, PRINT),
-        plot_image.AxesPlace(),
+        plot_canvas.PlotFormat(50, 50, 1.0, PRINT),
+        plot_canvas.AxesPlace(),
     ).result()
     assert order == ["back", "job", "back", "plot"]
 
@@ -297,9 +297,9 @@ def test_the_last_number_along_x_is_whole_when_it_becomes_longer():
     def draw(low):
         return lambda figure, _style: figure.add_subplot().set_xlim(low, 1.0)
 
-    paper, place = plot_image.PlotFormat(300, 200, 1.0, PRINT), plot_image.AxesPlace()
+    paper, place = plot_canvas.PlotFormat(300, 200, 1.0, PRINT), plot_canvas.AxesPlace()
     for low in (0.0, 0.995):
-        found = plot_image.picture(draw(low), paper, place)
+        found = plot_canvas.picture(draw(low), paper, place)
         place = found.place
         ends = [label.get_window_extent().x1 for label in found.figure.axes[0].get_xticklabels()]
         assert max(ends) <= 300.0

@@ -10,11 +10,9 @@ from qtpy.QtCore import QEvent, QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.viewport.flat_views import is_larger_stacked
-from slideviz.gui.viewport.handles import PlaneHandle
-from slideviz.gui.viewport.section_views import arrangement_for
+from slideviz.gui.viewport.flat_views import Ruler, is_larger_stacked, nice_ticks, tick_text
+from slideviz.gui.viewport.section_views import PlaneHandle, arrangement_for
 from slideviz.gui.widgets import questions
-from slideviz.gui.widgets.ruler import Ruler, nice_ticks, tick_text
 from slideviz.samples.table import write_sample
 from slideviz.scene.pick import to_display
 from slideviz.sections.model import Section

@@ -23,7 +23,7 @@ from slideviz.rbf.reduction import AUTO, Reduction
 from slideviz.session import changes, jobs
 from slideviz.session.inspect import worst_cells
 from slideviz.session.run_messages import end_message
-from slideviz.session.runs_table import describe_run
+from slideviz.session.runs_words import describe_run
 
 
 @pytest.fixture

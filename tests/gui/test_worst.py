@@ -27,8 +27,7 @@ from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
 from slideviz.session import changes
-from slideviz.session.inspect import WorstCells, cell_info, worst_cells
-from slideviz.session.locate import nearest_boundary
+from slideviz.session.inspect import WorstCells, cell_info, nearest_boundary, worst_cells
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import StepFrame
 from slideviz.session.store import Store

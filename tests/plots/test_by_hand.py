@@ -17,7 +17,7 @@ from slideviz.session import changes
 from slideviz.session.motions import pair_text
 from slideviz.session.opening import guess_by_name, open_mesh
 from slideviz.session.run_messages import run_requirements, with_field_labels
-from slideviz.session.runs_table import best_runs
+from slideviz.session.runs_words import best_runs
 from slideviz.session.state import Run, StepFrame
 
 

@@ -19,13 +19,15 @@ from slideviz.study.combinations import (
     bounded,
     combinations,
     compare,
+    csv_text,
     reasons,
     refused,
+    terminal_head,
+    terminal_line,
     wanted_methods,
     wanted_modes,
     words_for,
 )
-from slideviz.study.table import csv_text, terminal_head, terminal_line
 
 
 @pytest.fixture(scope="module")

@@ -13,10 +13,9 @@ from slideviz.case.model import Translate
 from slideviz.errors import CaseError
 from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import sample
-from slideviz.study.combinations import COMPARED_METHODS, MODES, combinations, compare
+from slideviz.study.combinations import COMPARED_METHODS, MODES, combinations, compare, history_text
 from slideviz.study.montage import NOT_KEPT, montage
 from slideviz.study.plots import facets, figures, profiler, save_figure, steps_name
-from slideviz.study.table import history_text
 
 
 @pytest.fixture(scope="module")

@@ -18,8 +18,7 @@ from slideviz.case.boxes import (
 from slideviz.case.check import raise_all
 from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.words import list_of
-from slideviz.design.su2.config import CONTINUITIES, SU2_CONTINUITY, Su2Config
-from slideviz.design.su2.markers import problems_of_markers
+from slideviz.design.su2.config import CONTINUITIES, SU2_CONTINUITY, Su2Config, problems_of_markers
 from slideviz.design.su2.variables import DesignVariable, angle_notes
 from slideviz.errors import CaseError
 from slideviz.ffd.box import Box, Embedding

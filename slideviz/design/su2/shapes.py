@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from slideviz.case.bumps import hicks_henne, kulfan, normals_at, side_of, surface_bump
+from slideviz.case.motion import hicks_henne, kulfan, normals_at, side_of, surface_bump
 from slideviz.case.motion_text import require_peak
 from slideviz.design.su2.config import Su2Config
 from slideviz.design.su2.variables import DesignVariable, angle_notes

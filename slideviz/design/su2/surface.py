@@ -16,8 +16,7 @@ from slideviz.case.displacement import Columns, parse_rows
 from slideviz.case.lines import read_text
 from slideviz.case.model import Case, Prescribed
 from slideviz.design.su2.boxes import move_boxes, problems_of_boxes
-from slideviz.design.su2.config import Su2Config
-from slideviz.design.su2.markers import problems_of_markers
+from slideviz.design.su2.config import Su2Config, problems_of_markers
 from slideviz.design.su2.shapes import Shapes
 from slideviz.design.su2.variables import WITHOUT_VALUE, DesignVariable, Group
 from slideviz.errors import CaseError, DeformError, Note, SlidevizError

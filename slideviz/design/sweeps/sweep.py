@@ -11,10 +11,17 @@ from pathlib import Path
 
 from slideviz.argument_types import check_types
 from slideviz.case.model import BoxMotion, Case, FromFile
-from slideviz.design.sweeps.processes import Processes, usable_cores
+from slideviz.design.sweeps.processes import (
+    Packed,
+    Processes,
+    Task,
+    TaskResult,
+    pack_mesh,
+    run_task,
+    usable_cores,
+)
 from slideviz.design.sweeps.results import SweepResults, sources_of
 from slideviz.design.sweeps.table import Design, DesignRow, Table, read_designs
-from slideviz.design.sweeps.worker import Packed, Task, TaskResult, pack_mesh, run_task
 from slideviz.errors import CaseError, DeformError
 from slideviz.formats.files import read
 from slideviz.formats.table import usual_ending

@@ -12,9 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from slideviz.formats.cgns.elements import grid_nodes
 from slideviz.formats.cgns.tree import Node
-from slideviz.formats.cgns.zone import CgnsZone, faces_by_number, facets_of
+from slideviz.formats.cgns.zone import CgnsZone, faces_by_number, facets_of, grid_nodes
 from slideviz.mesh.fans import components
 from slideviz.mesh.model import Cells, FloatArray, IntArray
 

@@ -12,11 +12,16 @@ import numpy as np
 
 from slideviz.errors import printable
 from slideviz.formats.source import Source, open_source
-from slideviz.formats.su2.keyword_blocks import boxes_elsewhere, find_blocks, find_bounds
-from slideviz.formats.su2.lines import Lines, Rows, number_of
+from slideviz.formats.su2.lines import (
+    Lines,
+    Rows,
+    boxes_elsewhere,
+    find_blocks,
+    find_bounds,
+    number_of,
+)
 from slideviz.formats.su2.numbers import parse_cells, parse_points
-from slideviz.formats.su2.text import boundaries_elsewhere, scan
-from slideviz.formats.su2.zone import SendRows, TextZone, find_zone
+from slideviz.formats.su2.text import SendRows, TextZone, boundaries_elsewhere, find_zone, scan
 from slideviz.mesh.halo import FITS, Halo, RigidMotion, fit_motion, make_halo
 from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin

@@ -1,4 +1,8 @@
-"""Finding the lines of an SU2 file, and locating the parts of a zone without reading them."""
+"""Finding the lines of an SU2 file, and locating the parts of a zone without reading them.
+
+Sections that slideviz does not know (FFD boxes, periodic data, offsets) and the halo markers are
+only located, so that writing can keep them.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +14,306 @@ import numpy as np
 
 from slideviz.errors import MeshError, printable
 from slideviz.formats.source import Source, open_source
-from slideviz.formats.su2.keyword_blocks import KeywordBlock, find_blocks, find_bounds, is_ffd
-from slideviz.formats.su2.lines import Lines, line_end, number_of, text_of
+from slideviz.formats.su2 import ROWS
+from slideviz.formats.su2.lines import (
+    ALIASES,
+    KNOWN,
+    Bounds,
+    KeywordBlock,
+    Lines,
+    Rows,
+    count_of,
+    find_blocks,
+    find_bounds,
+    is_ffd,
+    line_end,
+    misspelt,
+    number_of,
+    show,
+    text_of,
+)
 from slideviz.formats.su2.numbers import fill_points, parse_cells
-from slideviz.formats.su2.zone import TextZone, find_zone
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.system.threads import Tick, ordered_map
+
+SEND_RECEIVE = "SEND_RECEIVE"
+"""Name of the markers of a halo (in `su2b.layout`, too)."""
+# Remedies in messages.
+_NAME_IT = "; name the marker"
+_COUNT_THEM = "; add it with the number of elements"
+
+
+class SectionRows:
+    """Finds the rows of sections of a file, and raises for wrong counts of them."""
+
+    def __init__(self, lines: Lines) -> None:
+        self.lines = lines
+        self.text_lines = lines.firsts[:-1][lines.kinds != ROWS]
+
+    def none(self, section: KeywordBlock) -> None:
+        """Raise if a section that should have no rows of numbers has any.
+
+        Raises MeshError if the section has rows.
+        """
+        rows = self.lines.pieces(section.line, section.stop)
+        if rows:
+            raise self.lines.error(
+                self.lines.row(rows, 0),
+                f"numbers stand here after {section.key}= {show(section.value)}, where none "
+                "belong; remove the line or restore the keyword before it",
+            )
+
+    def counted(self, section: KeywordBlock, what: str) -> Rows:
+        """Return the rows of numbers of a section, as many as its keyword line says.
+
+        Raises MeshError if there are more or fewer rows, or other text among them.
+
+        Parameters
+        ----------
+        section : KeywordBlock
+            The section.
+        what : str
+            What is on the rows, for messages: ``points``.
+        """
+        count = count_of(self.lines, section)
+        rows = self.lines.pieces(section.line, section.stop)
+        found = number_of(rows)
+        at = int(np.searchsorted(self.text_lines, section.line, "right"))
+        text = int(self.text_lines[at]) if at < len(self.text_lines) else section.stop
+        before = number_of(self.lines.pieces(section.line, text))
+        if text < section.stop and before < count:
+            word = (self.lines.line(text).split() or [b""])[0]
+            raise self.lines.error(
+                text,
+                f"'{show(word)}' stands where one of the {count} {what} should be ({section.key} "
+                f"on line {section.line + 1}); correct it",
+            )
+        if found < count:
+            raise self.lines.error(
+                min(section.stop, len(self.lines) - 1),
+                f"only {found} {what} precede this line, but {section.key}= {count} (line "
+                f"{section.line + 1}) says {count}; restore the missing lines or correct the count",
+            )
+        if found > count:
+            raise self.lines.error(
+                self.lines.row(rows, count),
+                f"more {what} stand here than {section.key}= {count} (line {section.line + 1}) "
+                f"says: {found}; correct the count",
+            )
+        return rows
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerRows:
+    """A boundary: its name, the line of its MARKER_TAG, and the rows of its elements."""
+
+    name: str
+    line: int
+    rows: Rows
+
+
+@dataclass(frozen=True, eq=False)
+class SendRows:
+    """A ``SEND_RECEIVE`` marker: its lines ``begin:end``, value of ``SEND_TO``, and its rows."""
+
+    begin: int
+    end: int
+    domain: bytes
+    rows: Rows
+
+
+@dataclass(frozen=True, eq=False)
+class TextZone:
+    """Where the parts of one zone are in the file."""
+
+    bounds: Bounds
+    """Which zone, and its lines."""
+    dim: int
+    """2 or 3."""
+    elements: Rows
+    points: Rows
+    """`elements`, `points`: the rows of the elements and of the points."""
+    markers: tuple[MarkerRows, ...]
+    """The boundaries."""
+    sends: tuple[SendRows, ...]
+    """The ``SEND_RECEIVE`` markers, which list donors and receivers of a halo."""
+    unknown: tuple[KeywordBlock, ...]
+    """The unknown sections."""
+    remarks: tuple[str, ...] = ()
+    """Sentences on what is unusual."""
+
+    @property
+    def ffd_at(self) -> tuple[range, ...]:
+        """Return the ranges of lines of the boxes for free-form deformation."""
+        boxes = (part for part in self.unknown if is_ffd(part.key.encode()))
+        return tuple(range(part.line, part.stop) for part in boxes)
+
+
+def find_zone(lines: Lines, sections: list[KeywordBlock], bounds: Bounds) -> TextZone:
+    """Return where the parts of a zone are.
+
+    Raises MeshError if a section is missing or occurs twice, a count is wrong, or the name of a
+    marker is empty, not printable or used twice.
+    """
+    inside = [
+        section
+        for section in sections
+        if bounds.begin <= section.line < bounds.end and section.key not in ("NZONE", "IZONE")
+    ]
+    return _Walk(lines, inside, bounds).zone()
+
+
+class _Walk:
+    """Goes through the sections of one zone, finds its parts and raises for mistakes."""
+
+    def __init__(self, lines: Lines, sections: list[KeywordBlock], bounds: Bounds) -> None:
+        self.lines = lines
+        self.sections = sections
+        self.bounds = bounds
+        self.rows = SectionRows(lines)
+
+    def zone(self) -> TextZone:
+        """Return where the parts are; raise MeshError for a mistake."""
+        heads = {key: self._only(key) for key in ("NDIME", "NELEM", "NPOIN", "NMARK")}
+        dim = count_of(self.lines, heads["NDIME"])
+        if dim not in (2, 3):
+            raise self.lines.error(
+                heads["NDIME"].line, f"NDIME= {dim} is not possible; write 2 or 3"
+            )
+        self.rows.none(heads["NDIME"])
+        elements = self.rows.counted(heads["NELEM"], "elements")
+        points = self.rows.counted(heads["NPOIN"], "points")
+        for key, rows in (("NELEM", elements), ("NPOIN", points)):
+            if not rows:
+                raise self.lines.error(
+                    heads[key].line, f"{key}= 0 leaves nothing to work on; export the volume mesh"
+                )
+        self.rows.none(heads["NMARK"])
+        markers, sends, unknown = self._walk()
+        self._check_markers(heads["NMARK"], markers, len(sends))
+        return TextZone(
+            bounds=self.bounds,
+            dim=dim,
+            elements=elements,
+            points=points,
+            markers=markers,
+            sends=sends,
+            unknown=unknown,
+            remarks=tuple(
+                f"line {part.line + 1} has {part.spelt}=, which is read as {part.key}="
+                for part in self.sections
+                if part.spelt in ALIASES
+            ),
+        )
+
+    def _only(self, key: str) -> KeywordBlock:
+        """Return the section of a key; raise MeshError if there is none or a second one."""
+        matches = [section for section in self.sections if section.key == key]
+        if not matches:
+            remedy = "; write NMARK= 0 if it has no boundaries" if key == "NMARK" else ""
+            meant = misspelt(self.sections, key)
+            why = "" if meant else "; perhaps the file is cut off, so write it again" + remedy
+            raise self.lines.error(
+                self.bounds.end - 1,
+                f"the mesh ends here, but has no line {key}={meant}{why}",
+            )
+        if len(matches) > 1:
+            raise self.lines.error(
+                matches[1].line,
+                f"{key}= stands a second time (first on line {matches[0].line + 1}); remove one, "
+                "or number the zones with NZONE= and IZONE=",
+            )
+        return matches[0]
+
+    def _walk(
+        self,
+    ) -> tuple[tuple[MarkerRows, ...], tuple[SendRows, ...], tuple[KeywordBlock, ...]]:
+        """Return the boundaries, the SEND_RECEIVE markers and the unknown sections."""
+        markers, sends, unknown = [], [], []
+        at = 0
+        while at < len(self.sections):
+            section = self.sections[at]
+            at += 1
+            if section.key == "MARKER_TAG":
+                name = self._name(section)
+                head, domain, at = self._marker_head(section, at, name == SEND_RECEIVE)
+                rows = self.rows.counted(head, f"elements of marker {name}")
+                if name == SEND_RECEIVE:
+                    sends.append(SendRows(section.line, head.stop, domain, rows))
+                else:
+                    markers.append(MarkerRows(name, section.line, rows))
+            elif section.key == "MARKER_ELEMS":
+                raise self.lines.error(
+                    section.line,
+                    "MARKER_ELEMS= has no MARKER_TAG= before it"
+                    + (misspelt(self.sections[at - 2 : at - 1], "MARKER_TAG") or _NAME_IT),
+                )
+            elif section.key not in KNOWN:
+                unknown.append(section)
+        return tuple(markers), tuple(sends), tuple(unknown)
+
+    def _marker_head(
+        self, tag: KeywordBlock, at: int, sends: bool
+    ) -> tuple[KeywordBlock, bytes, int]:
+        """Return the section with the elements of a marker, its SEND_TO, and the next section.
+
+        ``tag`` is its MARKER_TAG, ``at`` the index of the section after that; ``sends`` tells
+        whether it is a SEND_RECEIVE marker. SEND_TO is empty where there is none; the next section
+        is an index. Raises MeshError if MARKER_ELEMS does not follow.
+        """
+        self.rows.none(tag)
+        following = self.sections[at] if at < len(self.sections) else None
+        if following is None or following.key != "MARKER_ELEMS":
+            raise self.lines.error(
+                tag.line,
+                f"marker {show(tag.value)} is not followed by MARKER_ELEMS="
+                + (misspelt(self.sections[at : at + 1], "MARKER_ELEMS") or _COUNT_THEM),
+            )
+        at, domain = at + 1, b""
+        if sends and at < len(self.sections) and self.sections[at].key == "SEND_TO":
+            # The elements follow the SEND_TO line.
+            self.rows.none(following)
+            head = self.sections[at]
+            following = KeywordBlock(following.key, following.value, head.line, head.stop)
+            at, domain = at + 1, head.value
+        return following, domain, at
+
+    def _name(self, section: KeywordBlock) -> str:
+        """Return the name of a marker, ``SEND_RECEIVE`` in capitals; raise if it is unusable."""
+        try:
+            name = section.value.decode()
+        except UnicodeDecodeError:
+            name = ""
+        if not name or not name.isprintable():
+            what = "has control characters" if name else "is empty or not UTF-8 text"
+            remedy = "" if name else ", or save the file as UTF-8"
+            raise self.lines.error(
+                section.line,
+                f"the marker name '{show(section.value)}' {what}; rename the marker{remedy}",
+            )
+        return SEND_RECEIVE if name.upper() == SEND_RECEIVE else name
+
+    def _check_markers(
+        self, head: KeywordBlock, markers: tuple[MarkerRows, ...], sends: int
+    ) -> None:
+        """Raise MeshError if two boundaries have one name, or NMARK (``head``) is wrong."""
+        seen: dict[str, int] = {}
+        for marker in markers:
+            if marker.name in seen:
+                raise self.lines.error(
+                    marker.line,
+                    f"marker {marker.name} stands a second time (first on line "
+                    f"{seen[marker.name] + 1}); rename or merge them",
+                )
+            seen[marker.name] = marker.line
+        count = count_of(self.lines, head)
+        if count != len(markers) + sends:
+            raise self.lines.error(
+                head.line,
+                f"NMARK= {count} says {count} markers, but {len(markers) + sends} follow; correct "
+                "the count or restore the missing markers",
+            )
+
 
 BLOCK_BYTES = 1 << 20
 """About how many bytes a block has: whole lines that are scanned together."""

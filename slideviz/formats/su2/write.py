@@ -14,11 +14,9 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.formats.source import Source
-from slideviz.formats.su2.keyword_blocks import is_ffd
-from slideviz.formats.su2.lines import Piece, Rows
+from slideviz.formats.su2.lines import Piece, Rows, is_ffd
 from slideviz.formats.su2.read import Document
-from slideviz.formats.su2.text import BLOCK_BYTES
-from slideviz.formats.su2.zone import SEND_RECEIVE
+from slideviz.formats.su2.text import BLOCK_BYTES, SEND_RECEIVE
 from slideviz.formats.table import WriteOptions, write_blocks
 from slideviz.mesh.check import check_mesh, check_points
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
@@ -174,7 +172,7 @@ def moved_rows(raw: Source, piece: Piece, before: FloatArray, now: FloatArray) -
     before, now : (m, d) float64
         The points of these rows, as read and as they are to be written.
     """
-    from slideviz.formats.su2.digits import print_changed
+    from slideviz.formats.su2.loops import print_changed
 
     text = raw[piece.begin : piece.end]
     changed = now.view(np.int64) != before.view(np.int64)
@@ -271,7 +269,7 @@ def _blocks(count: int) -> list[tuple[int, int]]:
 
 def _point_rows(points: PointsOf, block: tuple[int, int]) -> bytes:
     """Return a line for each point of a block: coordinates and index."""
-    from slideviz.formats.su2.digits import print_points
+    from slideviz.formats.su2.loops import print_points
 
     mine = points(*block)
     numbers = _digits(mine)
@@ -294,7 +292,7 @@ def _elements(count: int, cells: CellsOf, *, numbered: bool) -> Iterator[bytes]:
 
 def _cell_rows(cells: CellsOf, numbered: bool, block: tuple[int, int]) -> bytes:
     """Return a line for each element of a block."""
-    from slideviz.formats.su2.digits import print_cells
+    from slideviz.formats.su2.loops import print_cells
 
     some = cells(*block)
     out = np.empty(_NUMBER_BYTES * (len(some.connectivity) + 2 * len(some)), np.uint8)

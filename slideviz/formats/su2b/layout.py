@@ -26,7 +26,7 @@ from slideviz.errors import MeshError, printable
 NAME_BYTES = 33
 """Bytes of the name of a marker, padded with zeros."""
 SEND_RECEIVE = "SEND_RECEIVE"
-"""Name of the markers of a halo (in `su2.zone`, too), which this format cannot have."""
+"""Name of the markers of a halo (in `su2.text`, too), which this format cannot have."""
 _INT = 4
 """Bytes of the integers that are no counts: numbers of zones and markers, dimension."""
 MAGIC = {

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.formats.su2.read import Document
-from slideviz.formats.su2b.elements import BLOCK
 from slideviz.formats.su2b.layout import NAME_BYTES, SEND_RECEIVE
-from slideviz.formats.su2b.read import BinaryForm
+from slideviz.formats.su2b.read import BLOCK, BinaryForm
 from slideviz.formats.table import WriteOptions, write_blocks
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.elements import SIZES

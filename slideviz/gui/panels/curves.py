@@ -19,8 +19,7 @@ from slideviz.errors import SlidevizError
 from slideviz.gui.widgets.build import as_widget, check_box, in_column, in_row, push_button
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write_plot
-from slideviz.gui.widgets.plot_image import Draw
+from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas, ask_and_write_plot
 from slideviz.mesh.model import FloatArray
 from slideviz.plots import session_plots as curves
 from slideviz.plots.draw import convergence, quality_by_step

@@ -16,8 +16,7 @@ from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.gui.responsiveness.timers import SELECTING_MS, single_shot
 from slideviz.gui.widgets.build import WrappingRow, check_box, in_column, push_button
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write_plot, is_seen
-from slideviz.gui.widgets.plot_image import Draw
+from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas, ask_and_write_plot, is_seen
 from slideviz.gui.widgets.theme import alarm
 from slideviz.plots.session_plots import FrameCounts, draw_histogram, first_value, shown_measure
 from slideviz.sections.polygons import ONLY_INVERTED, cells_in_range, range_words

@@ -1,6 +1,6 @@
-"""The motion panel: the motions of the boundaries, in sequence, and the editor of one."""
+"""The motion panel: motions of the boundaries, the editor of one, tables of displacements."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+# ruff: noqa: D102, N802  (Qt's names, and its documentation)
 
 from __future__ import annotations
 
@@ -11,16 +11,35 @@ from pathlib import Path
 
 from qtpy.QtCore import QSignalBlocker, QSize, Qt
 from qtpy.QtGui import QAction, QKeySequence
-from qtpy.QtWidgets import QApplication, QHBoxLayout, QListWidget, QMenu, QToolButton
+from qtpy.QtWidgets import (
+    QApplication,
+    QDialog,
+    QDialogButtonBox,
+    QHBoxLayout,
+    QLabel,
+    QListWidget,
+    QMenu,
+    QPlainTextEdit,
+    QToolButton,
+    QWidget,
+)
 
 from slideviz.case.model import FfdTwist, FromFile, Motion, Target, Translate, named
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe
 from slideviz.errors import SlidevizError
-from slideviz.gui.dialogs.motion_table import ask_table
 from slideviz.gui.panels.motion_editor import KINDS, MotionEditor
-from slideviz.gui.widgets.build import hint_label, in_column, in_row, tool_button
-from slideviz.gui.widgets.labels import elide_items, wrapped
+from slideviz.gui.responsiveness.timers import TABLE_MS, single_shot
+from slideviz.gui.widgets import questions
+from slideviz.gui.widgets.build import (
+    dialog_buttons,
+    hint_label,
+    in_column,
+    in_row,
+    set_style,
+    tool_button,
+)
+from slideviz.gui.widgets.labels import elide_items, fixed_font, wrapped
 from slideviz.gui.widgets.panel import FieldWatch, Panel
 from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.mesh.model import Mesh
@@ -34,11 +53,114 @@ from slideviz.session.motions import (
     machine_axis,
     new_motion,
     new_target,
+    table_text,
     targets,
+    write_table,
 )
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
 from slideviz.session.store import Store
+
+FILTERS = "Displacements (*.txt)"
+ABOUT = (
+    "A row for each node: its number, counted from 0 as in the mesh file, and its displacement in "
+    "the mesh's length unit. Columns are separated by tabs, spaces, commas or semicolons, so that "
+    "rows of a spreadsheet can be pasted. Nodes without a row stay."
+)
+
+
+class TableDialog(QDialog):
+    """The dialog for a table of displacements; a text below it shows its effect or its error.
+
+    Parameters
+    ----------
+    rows : TableRows
+        The nodes it may list; checks the text.
+    text : str
+        The initial table.
+    """
+
+    def __init__(self, parent: QWidget | None, rows: TableRows, text: str = "") -> None:
+        super().__init__(parent)
+        self.rows = rows
+        self.setWindowTitle(f"Displacements of {rows.of}")
+        self.resize(QSize(520, 560).boundedTo(self.screen().availableSize()))
+        about = QLabel(ABOUT)
+        about.setWordWrap(True)
+        self.edit = QPlainTextEdit(text)
+        self.edit.setObjectName("table")
+        self.edit.setFont(fixed_font())
+        self.edit.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        self.edit.setPlaceholderText(f"{rows.heading}\n…")
+        self.answer = QLabel()
+        self.answer.setWordWrap(True)
+        self.buttons = dialog_buttons(self)
+        kind = QDialogButtonBox.ButtonRole
+        self.fill = self.buttons.addButton("List all nodes", kind.ActionRole)
+        self.fill.setToolTip("Add a row of zeros for each node that has none yet.")
+        self.fill.setAutoDefault(False)
+        self.save = self.buttons.addButton("Save as…", kind.AcceptRole)
+        self.save.setToolTip("Save the table as a displacement file, which the case then uses.")
+        self.buttons.addButton(QDialogButtonBox.StandardButton.Cancel)
+        self.setLayout(in_column(about, self.edit, self.answer, self.buttons, wide=[self.edit]))
+        self.fill.clicked.connect(self._fill)
+        self._soon = single_shot(self, self.check, TABLE_MS)
+        self.edit.textChanged.connect(self._soon.start)
+        self.edit.setFocus()
+        self.check()
+
+    @property
+    def text(self) -> str:
+        """Return the text of the table."""
+        return self.edit.toPlainText()
+
+    def _fill(self) -> None:
+        self.edit.selectAll()
+        # Unlike `setPlainText`, this can be undone.
+        self.edit.insertPlainText(self.rows.fill(self.text))
+        self.check()
+
+    def check(self) -> None:
+        """Show the effect of the table, or its error, and enable the save button accordingly."""
+        self._soon.stop()
+        try:
+            said, wrong = self.rows.check(self.text), False
+        except SlidevizError as error:
+            said, wrong = str(error), True
+        self.answer.setText(said)
+        set_style(self.answer, "bad", wrong and bool(self.text.strip()))
+        self.save.setEnabled(not wrong)
+
+    def accept(self) -> None:
+        """Close the dialog if the table is valid."""
+        self.check()
+        if self.save.isEnabled():
+            super().accept()
+
+
+def ask_table(parent: QWidget, rows: TableRows, path: Path, default: Path) -> Path | None:
+    """Open the dialog of a table; return the file it was saved to, or None if it was not saved.
+
+    Raises SlidevizError if the file cannot be read or written.
+
+    Parameters
+    ----------
+    rows : TableRows
+        The nodes the table may list; checks the text.
+    path : Path
+        The displacement file to edit, if it exists.
+    default : Path
+        The name that is offered for a new file.
+    """
+    dialog = TableDialog(parent, rows, table_text(path))
+    there = path.is_file()
+    while dialog.exec() == QDialog.DialogCode.Accepted:
+        target = questions.ask_save(parent, "Save the table", path if there else default, FILTERS)
+        if target is not None:
+            write_table(target, dialog.text, path)
+            return target
+    return None
+
 
 HEIGHT, LEAST_HEIGHT = 300, 210
 """Preferred height of the panel, and its least height, which the longest form needs; pixels."""

@@ -20,8 +20,15 @@ from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import ask_and_write
 from slideviz.gui.widgets.services import Services, main_window
 from slideviz.session import changes
-from slideviz.session.runs_table import QUALITY, best_runs, describe_run, table_text, write_table
-from slideviz.session.runs_words import run_words, summary
+from slideviz.session.runs_words import (
+    QUALITY_FORMAT,
+    best_runs,
+    describe_run,
+    run_words,
+    summary,
+    table_text,
+    write_table,
+)
 from slideviz.session.state import Run, Session
 from slideviz.session.store import Store
 
@@ -247,8 +254,8 @@ class RunsPanel(Panel):
         if last is not None:
             quality = last.quality
             texts[1:] = (
-                format(quality.min, QUALITY),
-                format(quality.mean, QUALITY),
+                format(quality.min, QUALITY_FORMAT),
+                format(quality.mean, QUALITY_FORMAT),
                 f"{quality.inverted:,}",
             )
         beside = number == session.view.beside

@@ -22,8 +22,17 @@ from slideviz.gui.widgets.services import folder_of
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
 from slideviz.session import changes
-from slideviz.session.inspect import cell_info, measure, table_rows, worst_cells, write_table
-from slideviz.session.locate import RotationAxis, axis_of, coordinates, nearest_boundary
+from slideviz.session.inspect import (
+    RotationAxis,
+    axis_of,
+    cell_info,
+    coordinates,
+    measure,
+    nearest_boundary,
+    table_rows,
+    worst_cells,
+    write_table,
+)
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.terms import COLOR_BY

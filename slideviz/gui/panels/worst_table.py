@@ -14,8 +14,7 @@ from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 from slideviz.gui.widgets.labels import ModelIndex
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
-from slideviz.session.inspect import WorstCells
-from slideviz.session.locate import RotationAxis, coordinates, decimals
+from slideviz.session.inspect import RotationAxis, WorstCells, coordinates, decimals
 
 SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
 """Short names of cell types."""

@@ -13,7 +13,7 @@ from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import with_boxes
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
-from slideviz.scene.boxes import BASE, LABELS, MOVED
+from slideviz.scene.ghosts import BASE, LABELS, MOVED
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh

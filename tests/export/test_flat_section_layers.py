@@ -10,9 +10,9 @@ from PIL import Image
 
 from slideviz.color_scheme import INVERTED_COLOR, LIGHT
 from slideviz.errors import Cancelled, CaseError
+from slideviz.export.flat_section import PageFormat, frame_words, save_section
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
-from slideviz.export.section_job import PageFormat, frame_words, save_section
 from slideviz.export.vector import draw_vector
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality

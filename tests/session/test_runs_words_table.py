@@ -13,13 +13,17 @@ from slideviz.mesh.quality import quality
 from slideviz.rbf.reduction import Reduction
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
-from slideviz.session.runs_table import COLUMNS, best_runs, describe_run, table_text, write_table
 from slideviz.session.runs_words import (
+    COLUMNS,
+    best_runs,
+    describe_run,
     method_words,
     reduction_words,
     seconds_words,
     steps_words,
     summary,
+    table_text,
+    write_table,
 )
 from slideviz.session.state import Run, StepFrame
 from slideviz.solver.deform import deform

@@ -8,7 +8,7 @@ from matplotlib.collections import PolyCollection
 from PIL import Image
 
 from slideviz.errors import CaseError
-from slideviz.export.section_job import PageFormat, save_section
+from slideviz.export.flat_section import PageFormat, save_section
 from slideviz.mesh.quality import quality
 from slideviz.plots import section_picture
 from slideviz.plots.section_picture import arrangement

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from slideviz.mesh.model import Cells, Marker, Mesh
-from slideviz.session.locate import RotationAxis, coordinates, decimals, nearest_boundary
+from slideviz.session.inspect import RotationAxis, coordinates, decimals, nearest_boundary
 
 
 def test_places_are_told_about_an_axis():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from slideviz.errors import MeshError
-from slideviz.formats import subprocess_reader
+from slideviz.formats import files
 from slideviz.formats.files import read, write
 from slideviz.formats.meshio.bridge import read_with_meshio
 from tests.formats.su2_samples import SOLID, assert_same, save
@@ -105,7 +105,7 @@ def test_stopping_ends_the_process(vtu, started):
 
 
 def test_a_reader_that_takes_too_long(tmp_path, monkeypatch):
-    monkeypatch.setattr(subprocess_reader, "_SECONDS", 1)
+    monkeypatch.setattr(files, "_SECONDS", 1)
     path = save(tmp_path, NETGEN.format(count=10**12), "a.vol")
     with pytest.raises(
         MeshError, match=r"a.vol: cannot be read: it takes longer than a file of th"
@@ -141,17 +141,14 @@ def test_modules_beside_the_mesh_are_not_run(vtu, monkeypatch):
 
 
 def test_limits_grow_with_the_file():
-    seconds, memory = np.transpose([subprocess_reader._limits(size) for size in (0, 10**6, 10**9)])
+    seconds, memory = np.transpose([files._limits(size) for size in (0, 10**6, 10**9)])
     assert seconds.tolist() == [20, 40, 20020]
     assert memory[0] <= memory[1] <= memory[2]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has such a call")
 def test_the_reader_does_not_outlive_a_killed_program():
-    child = (
-        "import os, time; "
-        "from slideviz.formats.subprocess_reader import _die_with; _die_with(os.getppid())"
-    )
+    child = "import os, time; from slideviz.formats.files import _die_with; _die_with(os.getppid())"
     code = (
         "import subprocess, sys\n"
         f"call = [sys.executable, '-c', {child + '; print(1, flush=True); time.sleep(300)'!r}]\n"
