@@ -431,6 +431,7 @@ class MotionEditor(QWidget):
     def _emit_changed(self) -> None:
         """Emit the motion that the fields describe, if it differs from the shown one."""
         motion = self._motion
+        assert motion is not None
         values = {ROWS[name].attribute: self._typed(name) for name in FIELDS[type(motion)]}
         if isinstance(motion, Rotate | Scale | Radial):
             centred = self.about.currentData() in ("centroid", "radial")
