@@ -1,7 +1,5 @@
 """The docks around the view: the table of them, their places, and how they share the room."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence

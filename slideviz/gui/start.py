@@ -1,7 +1,5 @@
 """The start page, over the view while no mesh is open."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 import html

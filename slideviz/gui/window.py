@@ -1,7 +1,5 @@
 """The main window: the views in the middle, the panels around them, and their connections."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 import logging

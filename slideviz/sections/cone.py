@@ -4,8 +4,6 @@ The first line of a function says what it is for a cone; shapes of arrays are in
 `slideviz.sections.shape.Shape` and `slideviz.sections.around_axis.AboutAxis`.
 """
 
-# ruff: noqa: ARG002  (all shapes have functions with the same arguments)
-
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The line that a plane is in a 2D mesh: its trace, its handle, and positions along it."""
 
-# ruff: noqa: ARG002  (all shapes have functions with the same arguments)
-
 from __future__ import annotations
 
 from dataclasses import replace

@@ -4,8 +4,6 @@ The first line of a function says what it is for a plane; shapes of arrays are i
 `slideviz.sections.shape.Shape`.
 """
 
-# ruff: noqa: ARG002  (all shapes have functions with the same arguments)
-
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The manual in the window: the pages of the documentation, with a search."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 import re

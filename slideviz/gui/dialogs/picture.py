@@ -1,7 +1,5 @@
 """The dialog for pictures: their options and a preview."""
 
-# ruff: noqa: N802  (Qt's names)
-
 from __future__ import annotations
 
 import json

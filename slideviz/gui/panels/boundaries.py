@@ -1,7 +1,5 @@
 """The boundaries panel: a row per marker with visibility, elements and role."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The curves: quality by step, convergence of the selection, quality along the span."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable

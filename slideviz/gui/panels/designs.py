@@ -1,7 +1,5 @@
 """The panel of designs: a table of them, a job that runs them, and a plot of their quality."""
 
-# ruff: noqa: D102, N802  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Callable

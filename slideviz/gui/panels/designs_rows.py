@@ -1,7 +1,5 @@
 """The view of a table of designs, and the fields by which designs are added."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Callable

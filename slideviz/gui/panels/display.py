@@ -1,7 +1,5 @@
 """The display panel: colors and their range, threshold, points, passages, toggles."""
 
-# ruff: noqa: N802  (Qt's names)
-
 from __future__ import annotations
 
 import re

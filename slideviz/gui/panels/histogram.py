@@ -1,7 +1,5 @@
 """The histogram panel: cells by quality, and a brush that sets the threshold."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -62,7 +62,7 @@ def _unchanged(value: Any) -> Any:
     return value
 
 
-def _whole(values: Sequence[float]) -> tuple[int, ...]:
+def _integers(values: Sequence[float]) -> tuple[int, ...]:
     return tuple(int(value) for value in values)
 
 
@@ -80,7 +80,7 @@ class FormRow(NamedTuple):
 # Rounded: 1.03 is not 3 % to the last bit.
 ROWS: dict[str, FormRow] = {
     "box": FormRow("Box", "box"),
-    "index": FormRow("Control point", "index", read=_whole),
+    "index": FormRow("Control point", "index", read=_integers),
     "plane": FormRow("Plane j", "plane", read=int),
     "vector": FormRow("By", "vector"),
     "amount": FormRow("By", "amount"),
@@ -97,7 +97,7 @@ ROWS: dict[str, FormRow] = {
     "point": FormRow("Point", "point"),
     "axis": FormRow("Axis", "axis"),
     "side": FormRow("Side", "side"),
-    "term": FormRow("Shape", "term", read=_whole),
+    "term": FormRow("Shape", "term", read=_integers),
     "peak": FormRow(
         "Peak at (%)",
         "peak",

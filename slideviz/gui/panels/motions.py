@@ -1,7 +1,5 @@
 """The motion panel: motions of the boundaries, the editor of one, tables of displacements."""
 
-# ruff: noqa: D102, N802  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The list of the runs: a row has two lines, numbers in columns and words below them."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """The panel of the worst cells of the shown step; a click flies to a cell and marks it."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 import time

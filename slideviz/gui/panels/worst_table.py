@@ -1,7 +1,5 @@
 """The table of the worst cells: its model, which can be sorted, and its view."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The 3D view: VTK in a Qt widget, with clicks, wheel and camera keys that belong to slideviz."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 import contextlib

@@ -1,7 +1,5 @@
 """The flat views of a section beside the 3D views: unrolled, along its normal, or as a curve."""
 
-# ruff: noqa: D102, N802  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 import math

@@ -1,7 +1,5 @@
 """The step player under the view, and the numbers of the step that is shown."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 import math

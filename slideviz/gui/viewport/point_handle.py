@@ -6,8 +6,6 @@ does not follow the mouse. That of a line has only its ends, which are out of vi
 a circle in a plane there is none.
 """
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 While it moves something whose drawing is slow, boundaries are drawn coarsely.
 """
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from qtpy.QtCore import QEvent, QObject, QPoint, Qt

@@ -1,7 +1,5 @@
 """The middle of the window: the view of the mesh, and a linked second one to compare runs."""
 
-# ruff: noqa: D102, N802  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

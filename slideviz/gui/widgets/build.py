@@ -1,7 +1,5 @@
 """Layouts, buttons and labels in a line each, for panels and dialogs."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

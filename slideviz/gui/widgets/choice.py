@@ -1,7 +1,5 @@
 """A drop-down list of values, each shown by a text."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Mapping

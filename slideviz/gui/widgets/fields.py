@@ -1,7 +1,5 @@
 """Input fields for numbers, checked as they are typed, and for settings that are on or off."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 import ast

@@ -1,7 +1,5 @@
 """Labels, tooltips and lists with plain text: wrapped, or cut with an ellipsis."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 import html

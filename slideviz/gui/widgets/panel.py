@@ -1,7 +1,5 @@
 """The base class of the panels."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A plot in a panel: drawn in a thread, as matplotlib takes 60 to 300 ms; and files of plots."""
 
-# ruff: noqa: D102, N802  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 import time
