@@ -176,12 +176,8 @@ def box_changes(
 def missing_box(mesh: Mesh, name: str, boxes: Iterable[str], none: str) -> str:
     """Return the message that there is no box of a name, with those there are.
 
-    Parameters
-    ----------
-    boxes
-        The names of the boxes there are.
-    none : str
-        The end of the message where there are none.
+    ``boxes``: the names of the boxes there are. ``none``: the end of the message where there are
+    none.
     """
     zone = mesh.origin.ffd_elsewhere.get(name)
     if zone is not None:

@@ -435,12 +435,8 @@ def _disagreements(
 ) -> list[str]:
     """Return a sentence for each pair of markers that displace common nodes differently.
 
-    Parameters
-    ----------
-    nodes : (m,)
-        Nodes that two markers displace differently.
-    pairs : (m, 2)
-        These two markers, as places in ``names``.
+    ``nodes`` (m,): nodes that two markers displace differently. ``pairs`` (m, 2): these two
+    markers, as places in ``names``.
     """
     found, where = np.unique(pairs, axis=0, return_inverse=True)
     lines = []

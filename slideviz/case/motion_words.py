@@ -39,12 +39,8 @@ NOTHING = 1e-10
 def describe(motion: Motion, dim: int = 2, extent: float = 0.0) -> str:
     """Return a motion in a few words.
 
-    Parameters
-    ----------
-    dim : int
-        Dimensions of the mesh; in 3D a rotation has an axis.
-    extent : float
-        Extent of the mesh: coordinates that are only rounding beside it are written as 0.
+    ``dim``: dimensions of the mesh; in 3D a rotation has an axis. ``extent``: extent of the mesh:
+    coordinates that are only rounding beside it are written as 0.
     """
     return f"{target_words(motion.marker)}: {_in_full(motion, dim, extent)}"
 

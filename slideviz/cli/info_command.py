@@ -41,12 +41,8 @@ def info(arguments: argparse.Namespace) -> int:
 def _report(arguments: argparse.Namespace, mesh: Mesh, counts: CellCounts, found: Quality) -> int:
     """Print or write what is in a mesh, and return the exit code.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh, or only its skin.
-    counts, found
-        Counts and quality of the whole mesh.
+    ``mesh``: the mesh, or only its skin. ``counts`` and ``found``: counts and quality of the whole
+    mesh.
     """
     from slideviz.cli.report import info_report, save_json, table
     from slideviz.cli.terminal import DONE

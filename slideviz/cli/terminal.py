@@ -35,12 +35,8 @@ _SIMPLER = str.maketrans({"█": "#", "▏": "|", "…": "...", "’": "'", "“
 class Terminal:
     r"""A stream that escapes control characters, as ``\x1b``, and others that it cannot encode.
 
-    Parameters
-    ----------
-    stream : file of text
-        The stream that is written to.
-    needed : bool
-        Whether it is an error if it cannot be written to; else the output is dropped.
+    ``stream``: the stream that is written to. ``needed``: whether it is an error if it cannot be
+    written to; else the output is dropped.
     """
 
     def __init__(self, stream: TextIO, needed: bool) -> None:

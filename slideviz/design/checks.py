@@ -137,14 +137,8 @@ class Checks:
         """Return the largest error of each design, (...,), in the mesh's length unit.
 
         Raises DeformError if coordinates are infinite, nodes move much farther than the boundary,
-        or periodic images moved differently.
-
-        Parameters
-        ----------
-        targets : (..., a, d)
-            Displacements of the known nodes, in the frame.
-        states
-            After each step.
+        or periodic images moved differently. ``targets`` (..., a, d): displacements of the known
+        nodes, in the frame. ``states``: after each step.
         """
         errors = self.off_track(value(states[-1].coords))
         for index, (step, state) in enumerate(zip(self.steps, states, strict=True), start=1):
@@ -157,14 +151,9 @@ class Checks:
         """Raise DeformError where the results of a step cannot be right, as in every run.
 
         Nodes may always move as far as at the reference, or by an edge of the moving boundary: so
-        a finite difference, which moves one node by next to nothing, is not refused.
-
-        Parameters
-        ----------
-        index
-            Number of the step, from 1, for the message.
-        part
-            Part of the whole displacement after the step.
+        a finite difference, which moves one node by next to nothing, is not refused. ``index``:
+        number of the step, from 1, for the message. ``part``: part of the whole displacement after
+        the step.
         """
         shape = self.mesh.points.shape
         coords = value(state.coords).reshape(-1, *shape)

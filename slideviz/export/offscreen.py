@@ -72,13 +72,8 @@ def write_title(
     """Draw a title of one line or two at the left of the upper edge.
 
     It is left-aligned so that a film's title does not move when its number of digits changes.
-
-    Parameters
-    ----------
-    letters : float
-        Size of the letters.
-    height : float
-        Height in pixels of the strip in which the title is vertically centred.
+    ``letters``: size of the letters. ``height``: height in pixels of the strip in which the title
+    is vertically centred.
     """
     import pyvista as pv
 

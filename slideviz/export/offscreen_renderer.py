@@ -153,14 +153,9 @@ class OffscreenRenderer:
     ) -> Generator[None, None, Pixels]:
         """Draw and return a picture as `image` does, yielding between pieces of the work.
 
-        The renderer must not draw anything else meanwhile.
-
-        Parameters
-        ----------
-        aim : bool
-            Whether to aim the camera; if not, it is that of the last picture.
-        frame : int, optional
-            The number of the step to draw, by default the one that the session shows.
+        The renderer must not draw anything else meanwhile. ``aim``: whether to aim the camera; if
+        not, it is that of the last picture. ``frame``: the number of the step to draw, by default
+        the one that the session shows.
         """
         shown = self.session if frame is None else show_frame(self.session, frame)
         check_size(options.size)

@@ -137,12 +137,8 @@ def _methods_differ(runs: Sequence[Run]) -> bool:
 def pair_titles(pair: Sequence[Session], quality: bool) -> list[str]:
     """Return the titles of two pictures side by side, in the same form.
 
-    Parameters
-    ----------
-    pair : (Session, Session)
-        The sessions that they show.
-    quality : bool
-        Whether there is a second line: step, minimum, mean and inverted cells.
+    ``pair`` (Session, Session): the sessions that they show. ``quality``: whether there is a second
+    line: step, minimum, mean and inverted cells.
     """
     names = pair_names(pair)
     if not quality:

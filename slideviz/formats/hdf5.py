@@ -29,14 +29,8 @@ class Hdf5Draft:
     """An HDF5 file that is being written, and the Python file object that h5py writes it through.
 
     ``tree`` is the root of the HDF5 file. Errors of writing are kept, and raised by `require`. The
-    other methods are those of a Python file that h5py calls.
-
-    Parameters
-    ----------
-    path : Path
-        The file that the draft is to replace, for messages.
-    draft : Path
-        The existing file that is written.
+    other methods are those of a Python file that h5py calls. ``path``: the file that the draft is
+    to replace, for messages. ``draft``: the existing file that is written.
     """
 
     tree: h5py.File

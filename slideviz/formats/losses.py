@@ -85,12 +85,8 @@ def sentence_of_lost(
 ) -> str:
     """Return in words what a file will not have of a mesh; nothing where it has all.
 
-    Parameters
-    ----------
-    ending : str
-        Of a file that would have it.
-    alone : bool
-        Whether one of several zones is converted, as ``--zone`` asks for.
+    ``ending``: of a file that would have it. ``alone``: whether one of several zones is converted,
+    as ``--zone`` asks for.
     """
     if not lost:
         return ""

@@ -25,12 +25,7 @@ log = logging.getLogger("slideviz")
 def launch(path: Path | None = None, run: bool = False) -> int:
     """Show the window, open a mesh or case in it, and return the exit code when it is closed.
 
-    Parameters
-    ----------
-    path : Path, optional
-        The mesh or case to open.
-    run : bool
-        Whether to deform it at once.
+    ``path``: the mesh or case to open. ``run``: whether to deform it at once.
     """
     import_numerics()
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)

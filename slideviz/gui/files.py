@@ -153,12 +153,8 @@ class Files(QObject):
     ) -> bool:
         """Ask about unsaved work; return whether it may be dropped or was saved.
 
-        Parameters
-        ----------
-        again : callable
-            Repeats the action; called after a job has saved the mesh, for which False is returned.
-        before : str
-            What the user wants to do that would lose the changes, in words.
+        ``again``: repeats the action; called after a job has saved the mesh, for which False is
+        returned. ``before``: what the user wants to do that would lose the changes, in words.
         """
         window, designs = self.window, self.window.dock_manager.panel(DesignsPanel)
         unsaved = self._unsaved()

@@ -82,12 +82,8 @@ def fitted(words: str, inches: float, size: float) -> tuple[str, float]:
 def figure_bytes(figure: Any, kind: str, dpi: float = 300.0, transparent: bool = False) -> bytes:
     """Return the content of a file with a matplotlib figure.
 
-    Parameters
-    ----------
-    dpi : float
-        Pixels per inch; in PDF and SVG of the parts that are drawn as pixels.
-    transparent : bool
-        Whether the background is transparent.
+    ``dpi``: pixels per inch; in PDF and SVG of the parts that are drawn as pixels. ``transparent``:
+    whether the background is transparent.
     """
     from matplotlib import rc_context
 

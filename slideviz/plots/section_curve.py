@@ -50,12 +50,9 @@ class Curve:
 def curve_of(lines: Polygons, section: Section, values: FloatArray, inverted: np.ndarray) -> Curve:
     """Return the curve of a section's cut through a 2D mesh.
 
-    Parameters
-    ----------
-    lines : Polygons
-        The cut: lines of two corners each (see `slideviz.sections.cut.Cutter.cut`).
-    values, inverted : (m,)
-        The value of every cell of the mesh, and whether it is inverted.
+    ``lines``: the cut: lines of two corners each (see `slideviz.sections.cut.Cutter.cut`).
+    ``values`` and ``inverted`` (m,): the value of every cell of the mesh, and whether it is
+    inverted.
     """
     corners = lines.points[lines.connectivity, :2].reshape(-1, 2, 2)
     ends = np.sort(section.in_plane.positions(section, corners), axis=1)

@@ -274,14 +274,8 @@ def section_picture(
     """Write the picture of a section; of a cut through a 2D mesh, the curve along it.
 
     Raises CaseError if there is nothing to draw, the name has another suffix, or the file cannot be
-    written.
-
-    Parameters
-    ----------
-    shown : sequence of SectionInRun
-        One run, or two: the first is left or above, the second right or below.
-    file : str or Path
-        A name ending with .png, .svg or .pdf.
+    written. ``shown``: one run, or two: the first is left or above, the second right or below.
+    ``file``: a name ending with .png, .svg or .pdf.
     """
     target = Path(file)
     require_picture_name(target)

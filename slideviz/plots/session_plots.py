@@ -269,12 +269,8 @@ def draw_histogram(
 ) -> None:
     """Draw the histogram of a session into a figure; nothing without a mesh.
 
-    Parameters
-    ----------
-    log : bool
-        Whether the axis of the counts is logarithmic.
-    full_range : bool
-        Whether the other axis shows all possible values, not only those of the cells.
+    ``log``: whether the axis of the counts is logarithmic. ``full_range``: whether the other axis
+    shows all possible values, not only those of the cells.
     """
     if session.frame is None:
         return

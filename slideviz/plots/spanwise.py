@@ -168,12 +168,8 @@ def spanwise(
 ) -> None:
     """Draw the minimum or mean quality along the span, which is the vertical axis.
 
-    Parameters
-    ----------
-    fraction : bool
-        Whether the vertical axis is relative to the span, instead of the coordinate.
-    unit : str
-        Unit of the coordinate, for the label.
+    ``fraction``: whether the vertical axis is relative to the span, instead of the coordinate.
+    ``unit``: unit of the coordinate, for the label.
     """
     coordinate = profiles[0].coordinate if profiles else "r"
     label = "span fraction [-]" if fraction else f"{coordinate} [{unit}]"

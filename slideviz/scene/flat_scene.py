@@ -37,14 +37,8 @@ READING = "its cells are being read from the file of the mesh"
 class FlatScene:
     """One section of a session laid flat in a plotter, with those of neighbouring passages.
 
-    Both axes have the same scale.
-
-    Parameters
-    ----------
-    plotter : pyvista.BasePlotter
-        Where to draw.
-    cuts : Cuts
-        The cuts of the 3D scene, shared with it.
+    Both axes have the same scale. ``plotter``: where to draw. ``cuts``: the cuts of the 3D scene,
+    shared with it.
     """
 
     def __init__(self, plotter: Any, cuts: Cuts, scheme: ColorScheme = LIGHT) -> None:

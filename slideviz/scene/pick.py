@@ -94,12 +94,8 @@ def front_cell(
 ) -> int | None:
     """Return the index of the cell of the foremost polygon at a pixel; None if there is none.
 
-    Parameters
-    ----------
-    x, y : float
-        Pixels from the lower left.
-    shown : sequence of (actor, (f,) int64)
-        The actors to look at, each with the index of the cell that each of its polygons is of.
+    ``x`` and ``y``: pixels from the lower left. ``shown``: the actors to look at, each with the
+    index of the cell that each of its polygons is of.
     """
     from vtkmodules.vtkRenderingCore import vtkCellPicker
 

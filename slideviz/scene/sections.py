@@ -286,12 +286,7 @@ def polylines(parts: list[FloatArray], lift: float = 0.0) -> Any:
 class PolygonActor:
     """An actor that draws polygons, or lines, in the colors of the cells they belong to.
 
-    Parameters
-    ----------
-    name : str
-        The name of the actor.
-    pickable : bool
-        Whether the mouse can pick it.
+    ``name``: the name of the actor. ``pickable``: whether the mouse can pick it.
     """
 
     def __init__(self, stage: Stage, name: str, pickable: bool = True) -> None:

@@ -171,12 +171,8 @@ def crossed_cells(
 ) -> np.ndarray:
     """Return a mask (m,) of the cells with nodes on both sides of a section, or on it.
 
-    Parameters
-    ----------
-    matrices : iterable of (4, 4)
-        Transformations of the mesh: cells count that are cut after any of them.
-    near : float
-        Nodes at most so far from the section are on it.
+    ``matrices``: transformations of the mesh: cells count that are cut after any of them. ``near``:
+    nodes at most so far from the section are on it.
     """
     crossed = np.zeros(len(mesh.cells), bool)
     for matrix in matrices:

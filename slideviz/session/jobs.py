@@ -103,14 +103,8 @@ def save_steps(
     """Write the mesh of every step, whole files only, and return their paths.
 
     A VTKHDF file has all steps, and before them the undeformed mesh ``first``. Raises SlidevizError
-    if a file cannot be written; those before it stay.
-
-    Parameters
-    ----------
-    path : Path
-        The name to put numbers into (see `step_paths`).
-    frames : sequence of StepFrame
-        The steps, without the undeformed mesh.
+    if a file cannot be written; those before it stay. ``path``: the name to put numbers into (see
+    `step_paths`). ``frames``: the steps, without the undeformed mesh.
     """
     paths = step_paths(path, len(frames))
     if format_for(path).series:

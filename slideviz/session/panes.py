@@ -47,14 +47,8 @@ def show_in(session: Session, pane: int, number: int) -> Session:
     """Return the session with a run (its number, or ``UNDEFORMED``) shown in one view.
 
     If the other view shows it already, the two change places. The step shown stays about the same
-    part of the displacement.
-
-    Parameters
-    ----------
-    pane : {0, 1}
-        The left or the right view.
-    number : int
-        The number of the run, or ``UNDEFORMED``.
+    part of the displacement. ``pane``: the left or the right view. ``number``: the number of the
+    run, or ``UNDEFORMED``.
     """
     pair = list(panes(session))
     if number not in choices(session) or number == pair[pane]:

@@ -27,12 +27,8 @@ class Unsaved:
     def of(cls, session: Session, busy: bool, designs: str = "") -> Unsaved:
         """Return the unsaved work of a session.
 
-        Parameters
-        ----------
-        busy : bool
-            Whether a job is running.
-        designs : str
-            A sentence on a table of designs that would be lost; "" for none.
+        ``busy``: whether a job is running. ``designs``: a sentence on a table of designs that would
+        be lost; "" for none.
         """
         lost = {}
         cut, source = unsaved_sections(session), session.case.source

@@ -126,14 +126,8 @@ class Store:
     Listeners are called with the old and the new session, in the order in which they were added.
     Where a listener changes the session, all listeners are called for the first change before the
     second. An error in a listener does not keep the others from being called (`notify`): it goes
-    to the attribute ``failed`` or, where that is None, is raised afterwards.
-
-    Parameters
-    ----------
-    session : Session, optional
-        The first session.
-    clock : callable
-        Returns the time in seconds, by which changes are undone together.
+    to the attribute ``failed`` or, where that is None, is raised afterwards. ``session``: the first
+    session. ``clock``: returns the time in seconds, by which changes are undone together.
     """
 
     def __init__(

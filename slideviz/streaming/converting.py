@@ -112,14 +112,8 @@ def convert_streamed(
     """Convert an SU2 mesh from text to binary or back, with the bytes of `slideviz.convert`.
 
     Raises MeshError if the file has a mistake, the format cannot hold the mesh, or the disk has no
-    room.
-
-    Parameters
-    ----------
-    source, target : Path
-        One is SU2 text, the other SU2 binary (`streamed_kind`); a file at ``target`` is replaced.
-    zone : int or None
-        The zone, from 1; all of them when None.
+    room. ``source`` and ``target``: one is SU2 text, the other SU2 binary (`streamed_kind`); a file
+    at ``target`` is replaced. ``zone``: the zone, from 1; all of them when None.
     """
     if format_of(source).value == "su2":
         _to_binary(source, target, zone, warn, tick)

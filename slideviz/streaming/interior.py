@@ -98,14 +98,9 @@ class InteriorDisplacer:
     ) -> None:
         """Raise where a node is farther from the axis than the skin, or outside of its sector.
 
-        The largest radius and the sector of the whole mesh would give another frame then.
-
-        Parameters
-        ----------
-        start : (m, d)
-            Coordinates of the nodes in the frame.
-        inner : (m,) bool
-            Nodes that are not in the skin.
+        The largest radius and the sector of the whole mesh would give another frame then. ``start``
+        (m, d): coordinates of the nodes in the frame. ``inner`` (m,) bool: nodes that are not in
+        the skin.
         """
         frame = self.setup.frame
         if not frame.cylindrical:

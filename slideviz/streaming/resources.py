@@ -76,12 +76,8 @@ def text_size(place: ZonePlace) -> int:
 def bytes_of_text(layout: BinaryLayout, is_text: bool, later: int) -> int:
     """Return the most bytes on the disk at a time in the run of a text mesh.
 
-    Parameters
-    ----------
-    is_text : bool
-        Whether the output is a text.
-    later : int
-        Bytes for each cell that the caller writes afterwards.
+    ``is_text``: whether the output is a text. ``later``: bytes for each cell that the caller writes
+    afterwards.
     """
     result = layout.text.lines.raw.size if is_text else layout.size
     points = layout.markers - layout.points if is_text else 0

@@ -54,14 +54,8 @@ class RemainingTime:
     """The stages of a streamed run: passes each `Progress` on, with the seconds that are left.
 
     All stages but ``solve`` pass over all points or cells. Their pace is the time that the finished
-    ones took over their `SECONDS`. ``solve`` depends on the boundary alone.
-
-    Parameters
-    ----------
-    report : callable
-        Called with each `Progress`, its ``left`` filled in.
-    stages : str
-        Names of `SECONDS`, in order.
+    ones took over their `SECONDS`. ``solve`` depends on the boundary alone. ``report``: called with
+    each `Progress`, its ``left`` filled in. ``stages``: names of `SECONDS`, in order.
     """
 
     def __init__(self, report: Callable[[Progress], None], *stages: str) -> None:

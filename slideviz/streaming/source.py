@@ -245,12 +245,9 @@ class FileSource:
     ) -> FileSource:
         """Return the mesh in a file, which ``stack`` closes.
 
-        Parameters
-        ----------
-        reference : file and zone, optional
-            The undeformed mesh, which has the same cells (see `has_cells_of`).
-        moved : Path, optional
-            A file with the points, as ``zone`` has the undeformed ones; in place of ``reference``.
+        ``reference``: the undeformed mesh, which has the same cells (see `has_cells_of`).
+        ``moved``: a file with the points, as ``zone`` has the undeformed ones; in place of
+        ``reference``.
         """
         source, place = stack.enter_context(open_zone(*zone))
         points = PointTable(source, place)

@@ -476,13 +476,8 @@ def announcement(
 ) -> str:
     """Return lines about the work of a comparison, before it begins.
 
-    Parameters
-    ----------
-    cannot : mapping of Combination to str
-        Those that are left out, with the reason; see `refused`.
-    more : mapping of str to sequence of str
-        Further values that each option (``methods``, ``periodic``) takes; empty where the user has
-        chosen.
+    ``cannot``: those that are left out, with the reason; see `refused`. ``more``: further values
+    that each option (``methods``, ``periodic``) takes; empty where the user has chosen.
     """
     tried: dict[str, Iterable[str]] = {
         "methods": dict.fromkeys(one.method for one in wanted),

@@ -67,14 +67,8 @@ def draft(folder: Path, is_folder: bool = False) -> Iterator[Path]:
     """Context with a new path in a folder for a draft; what is at that path is removed at the end.
 
     At the beginning, drafts of dead processes of this machine are removed from the folder. Raises
-    OSError if the draft is a folder, and cannot be made.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the draft is to be.
-    is_folder : bool
-        Whether the draft is a folder, which is made then.
+    OSError if the draft is a folder, and cannot be made. ``folder``: where the draft is to be.
+    ``is_folder``: whether the draft is a folder, which is made then.
     """
     _sweep(folder)
     path = folder / f"{_owned(os.getpid())}{os.urandom(8).hex()}{_SUFFIX}"

@@ -118,14 +118,8 @@ class LeastSquares:
 
             dx = -P (dA x - db) + P P dA r + (I - P A) dA P x
 
-        (Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973, for a symmetric A).
-
-        Parameters
-        ----------
-        met
-            Returns A v on the tape, for a constant v (n, m).
-        data, found : (n, m)
-            b and x.
+        (Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973, for a symmetric A). ``met``: returns A v
+        on the tape, for a constant v (n, m). ``data`` and ``found`` (n, m): b and x.
         """
         rest = value(data) - self._along(found, self.values)
         again = self(found)

@@ -51,13 +51,8 @@ def convex_part(
     """Reduce the design by CONVEXITY_CHECK; return its factor, the deformation, and warnings.
 
     Raises CaseError or DeformError if not even the smallest part that is tried can be done.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The undeformed mesh.
-    attempt, deformed : callable
-        Deforms the mesh by a configuration; returns the mesh of what that returned.
+    ``mesh``: the undeformed mesh. ``attempt`` and ``deformed``: deforms the mesh by a
+    configuration; returns the mesh of what that returned.
     """
     if config.words["CONVEXITY_CHECK"].upper() != "YES":
         return 1.0, attempt(config), ()

@@ -209,14 +209,8 @@ class _Call(NamedTuple):
 class Processes(Executor):
     """An executor with ``count`` processes of this machine, each with one thread.
 
-    A call that was given to no process yet is never lost with one.
-
-    Parameters
-    ----------
-    count : int
-        Number of processes.
-    mesh : Packed
-        Sent to each process when it starts.
+    A call that was given to no process yet is never lost with one. ``count``: number of processes.
+    ``mesh``: sent to each process when it starts.
     """
 
     def __init__(self, count: int, mesh: Packed) -> None:

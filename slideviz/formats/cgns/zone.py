@@ -58,14 +58,8 @@ def grid_cells(shape: Sequence[int], points: FloatArray) -> Cells:
     """Return the cells of a structured zone.
 
     Blocks may be left-handed, which CGNS allows: their cells are numbered the other way round, so
-    that their volumes are positive.
-
-    Parameters
-    ----------
-    shape : sequence of int
-        Vertices along i, j (and k).
-    points : (n, d)
-        Vertices, i running fastest.
+    that their volumes are positive. ``shape``: vertices along i, j (and k). ``points`` (n, d):
+    vertices, i running fastest.
     """
     first = grid_nodes([np.arange(size - 1) for size in shape], shape)
     steps = np.cumprod([1, *shape[:-1]])

@@ -235,14 +235,9 @@ def vtu_blocks(
 
     The cells come first, in their order, then the elements of the markers. The cell data
     ``marker`` is 0 on cells and 1, 2, ... on the markers; the field data has for each marker
-    name its number and dimension.
-
-    Parameters
-    ----------
-    cell_data : mapping of str to (n_cells,) or (n_cells, k)
-        Values by name; they are NaN on the elements of the markers.
-    point_data : mapping of str to (n,) or (n, d), optional
-        Values on the points; vectors get a third component, as ParaView's arrows want.
+    name its number and dimension. ``cell_data``: values by name; they are NaN on the elements of
+    the markers. ``point_data``: values on the points; vectors get a third component, as ParaView's
+    arrows want.
     """
     groups = [mesh.cells, *(marker.cells for marker in mesh.markers)]
     lengths = [len(cells) for cells in groups]

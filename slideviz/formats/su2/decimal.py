@@ -65,14 +65,8 @@ def _product(a, b):  # type: ignore[no-untyped-def]
 def nearest_bits(digits, q):  # type: ignore[no-untyped-def]
     """Return the bits (uint64) of the float64 nearest to digits x 10^q, or all ones if undecided.
 
-    Undecided are also numbers that are subnormal or infinite.
-
-    Parameters
-    ----------
-    digits : uint64
-        Not 0.
-    q : int64
-        The power of ten.
+    Undecided are also numbers that are subnormal or infinite. ``digits``: not 0. ``q``: the power
+    of ten.
     """
     if q < _LEAST or q > _MOST:
         return _ALL

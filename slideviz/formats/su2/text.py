@@ -67,13 +67,7 @@ class SectionRows:
         """Return the rows of numbers of a section, as many as its keyword line says.
 
         Raises MeshError if there are more or fewer rows, or other text among them.
-
-        Parameters
-        ----------
-        section : KeywordBlock
-            The section.
-        what : str
-            What is on the rows, for messages: ``points``.
+        ``what``: what is on the rows, for messages: ``points``.
         """
         count = count_of(self.lines, section)
         rows = self.lines.pieces(section.line, section.stop)
@@ -410,14 +404,8 @@ def _boundaries_of(
 def scan(raw: Source, progress: Tick) -> Lines:
     """Return the lines of an SU2 file.
 
-    Raises MeshError if the file is empty or not text.
-
-    Parameters
-    ----------
-    raw : Source
-        The file.
-    progress : callable
-        Called with the fraction done after each block; may raise to stop.
+    Raises MeshError if the file is empty or not text. ``raw``: the file. ``progress``: called with
+    the fraction done after each block; may raise to stop.
     """
     from slideviz.formats.su2.loops import RUN_COLUMNS, scan_block
 

@@ -132,14 +132,8 @@ def patched_blocks(
 def box_edits(raw: Source, unknown: Sequence[tuple[int, int]], end: int, ffd: bytes) -> list[Edit]:
     """Return the edits that replace the boxes for free-form deformation of a zone by ``ffd``.
 
-    If the zone has none, ``ffd`` is put at its end.
-
-    Parameters
-    ----------
-    unknown : sequence of (int, int)
-        First byte and end of each unknown section.
-    end : int
-        The byte where the zone ends.
+    If the zone has none, ``ffd`` is put at its end. ``unknown``: first byte and end of each unknown
+    section. ``end``: the byte where the zone ends.
     """
     old = [(a, b) for a, b in unknown if is_ffd(raw[a:b])]
     if old:

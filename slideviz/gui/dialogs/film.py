@@ -209,13 +209,9 @@ PREVIEW = (360, 225)
 class FilmDialog(QDialog):
     """The dialog that makes a film, one image per turn of the event loop, so that nothing freezes.
 
-    Parameters
-    ----------
-    renderer : OffscreenRenderer
-        Draws the steps of its session, whatever the window shows meanwhile.
-    ask : callable
-        Asks the user for the file, given a kind of `slideviz.gui.dialogs.film.KINDS`; returns
-        None if there is none.
+    ``renderer``: draws the steps of its session, whatever the window shows meanwhile. ``ask``: asks
+    the user for the file, given a kind of `slideviz.gui.dialogs.film.KINDS`; returns None if there
+    is none.
     """
 
     made = Signal(object)  # Path

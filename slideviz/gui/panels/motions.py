@@ -70,12 +70,7 @@ ABOUT = (
 class TableDialog(QDialog):
     """The dialog for a table of displacements; a text below it shows its effect or its error.
 
-    Parameters
-    ----------
-    rows : TableRows
-        The nodes it may list; checks the text.
-    text : str
-        The initial table.
+    ``rows``: the nodes it may list; checks the text. ``text``: the initial table.
     """
 
     def __init__(self, parent: QWidget | None, rows: TableRows, text: str = "") -> None:

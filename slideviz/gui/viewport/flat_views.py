@@ -138,12 +138,8 @@ FRAME_PX = 110
 class FlatViews(QWidget):
     """The flat views of one section: one per 3D view, linked; of a 2D mesh, the curves along it.
 
-    Parameters
-    ----------
-    viewing : Viewing
-        The 3D views, whose cuts are shown here too.
-    multi_samples : int
-        Samples per pixel for antialiasing; 0 for none.
+    ``viewing``: the 3D views, whose cuts are shown here too. ``multi_samples``: samples per pixel
+    for antialiasing; 0 for none.
     """
 
     closed = Signal()
@@ -256,12 +252,8 @@ def pane_name(session: Session) -> str:
 def is_larger_stacked(extent: tuple[float, float], available: tuple[int, int]) -> bool:
     """Return whether two equal flat sections are drawn larger one above the other than in a row.
 
-    Parameters
-    ----------
-    extent : (float, float)
-        Width and height of one section, in the mesh's length unit.
-    available : (int, int)
-        Width and height of both views together, in pixels.
+    ``extent`` (float, float): width and height of one section, in the mesh's length unit.
+    ``available`` (int, int): width and height of both views together, in pixels.
     """
     wide, high = (max(length, 1e-300) for length in extent)
     width, height = available
@@ -357,12 +349,8 @@ def _draw(
 class FlatView(QWidget):
     """The view of a section laid flat, with rulers, a line of facts, and buttons to fit and close.
 
-    Parameters
-    ----------
-    cuts : Cuts
-        The cuts of the 3D view, shared with it.
-    multi_samples : int
-        Samples per pixel for antialiasing; 0 for none.
+    ``cuts``: the cuts of the 3D view, shared with it. ``multi_samples``: samples per pixel for
+    antialiasing; 0 for none.
     """
 
     closed = Signal()

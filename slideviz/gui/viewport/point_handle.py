@@ -120,12 +120,8 @@ class PointHandle(QObject, Generic[Grasp]):
     def dragged(self, grasp: Grasp, start: FloatArray, end: FloatArray) -> Section:
         """Return the section after a drag.
 
-        Parameters
-        ----------
-        grasp : tuple
-            What `grasp` returned when the drag began.
-        start, end : (2,) float64
-            Where the drag began and where the mouse is now, as `place_of` returns them.
+        ``grasp``: what `grasp` returned when the drag began. ``start`` and ``end`` (2,) float64:
+        where the drag began and where the mouse is now, as `place_of` returns them.
         """
         raise NotImplementedError
 

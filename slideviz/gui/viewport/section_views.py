@@ -70,12 +70,8 @@ class Handles:
     ) -> None:
         """Show a handle of a section in every view.
 
-        Parameters
-        ----------
-        views : list of (View3D, Scene, Mesh)
-            Each view, its scene, and the mesh as deformed in the step it shows.
-        mesh : Mesh
-            The undeformed mesh.
+        ``views``: each view, its scene, and the mesh as deformed in the step it shows. ``mesh``:
+        the undeformed mesh.
         """
         kind = kind_of(section, mesh)
         for view, scene, deformed in views:
@@ -382,12 +378,8 @@ class SectionViews(QSplitter):
 def arrangement_for(extent: tuple[float, float], available: tuple[int, int]) -> tuple[bool, float]:
     """Return whether a flat section goes beside the 3D view (else below), and its part of the room.
 
-    Parameters
-    ----------
-    extent : (float, float)
-        Width and height of the section, in the mesh's length unit.
-    available : (int, int)
-        Width and height of the 3D view and the flat view together, in pixels.
+    ``extent`` (float, float): width and height of the section, in the mesh's length unit.
+    ``available`` (int, int): width and height of the 3D view and the flat view together, in pixels.
     """
     (wide, high), (width, height) = np.maximum(extent, 1e-300), np.maximum(available, 1)
     beside_scale = min(_SHARE * width / wide, height / high)

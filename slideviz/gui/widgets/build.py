@@ -95,12 +95,8 @@ def grow_fields(form: QFormLayout, spacing: int = 4) -> None:
 class WrappingRow(QWidget):
     """A row with some parts at the left and some at the right, which are below where it is narrow.
 
-    Parameters
-    ----------
-    spacing : int
-        Space between the parts in pixels; negative: the style's.
-    apart : bool
-        Whether the parts at the right are at the end of the row.
+    ``spacing``: space between the parts in pixels; negative: the style's. ``apart``: whether the
+    parts at the right are at the end of the row.
     """
 
     def __init__(

@@ -87,13 +87,9 @@ class Panel(QWidget):
     ) -> None:
         """Call ``sync`` now, and after each change of what ``select`` returns of the session.
 
-        Parameters
-        ----------
-        select : callable
-            Returns the values that are shown, to be compared; default: the session, which differs
-            after each change.
-        sync : callable, optional
-            Fills widgets from the session; default: `sync` of the panel.
+        ``select``: returns the values that are shown, to be compared; default: the session, which
+        differs after each change. ``sync``: fills widgets from the session; default: `sync` of the
+        panel.
         """
         fill = sync or self.sync
         shown = select(self.store.session)
