@@ -233,7 +233,8 @@ _ROWS = (
         QUALITY,
         LIMITS,
         "What the deformed mesh must meet; if it does not, `run` ends with exit code 4. A number "
-        "that each cell has must be within its limit in every cell.",
+        "that each cell or wall has must be within its limit everywhere. Numbers of walls are "
+        "those of all boundaries with layers, or, as in growth@blade < 1.5, of one.",
         lambda case, limits: case.change(limits=limits),
         lambda case: case.limits or None,
         field="limits",

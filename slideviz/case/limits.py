@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,7 @@ from slideviz.case.words import name_text, number
 from slideviz.errors import CaseError, not_one_of, shown
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, PIECE, UNPROVEN, Quality
+from slideviz.mesh.walls import walls
 
 OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
     ">": operator.gt,
@@ -43,6 +44,9 @@ class MeasuredMesh:
     mesh: Mesh | None = None
     reference: Mesh | None = None
     """`mesh`, `reference`: the mesh, and the undeformed one; None where they are in files."""
+    boundaries: Sequence[str] | None = None
+    """Those of which walls are measured where a limit names none, if they have layers; None: all
+    with layers."""
 
 
 Values = tuple[FloatArray, IntArray | None]
@@ -72,6 +76,28 @@ def _of_quality(name: str) -> Callable[[MeasuredMesh, str], Values]:
     return lambda measured, _: (getattr(measured.quality, name), None)
 
 
+def _of_walls(name: str) -> Callable[[MeasuredMesh, str], Values]:
+    """Return the function of a number of `slideviz.mesh.walls`: at the corners of facets."""
+
+    def values(measured: MeasuredMesh, marker: str) -> Values:
+        assert measured.mesh is not None
+        names = (marker,) if marker else measured.boundaries
+        found = walls(measured.mesh, measured.reference, names)
+        boundary, corner = found.columns.boundary, found.columns.corner
+        wanted = [one for one in found.markers if marker or one in found.layered]
+        some = np.isin(boundary.marker, [boundary.names.index(one) for one in wanted])
+        if name not in found.values:  # there is no undeformed mesh to compare with
+            return np.empty(0), None
+        cells = np.repeat(boundary.owner[some], corner.shape[1])
+        return found.values[name][corner[some].ravel()], cells
+
+    return values
+
+
+def _wall(name: str, meaning: str, signs: str) -> LimitNumber:
+    return LimitNumber(meaning, signs, _of_walls(name), on_boundary=True)
+
+
 NUMBERS: Mapping[str, LimitNumber] = {
     "min": LimitNumber(
         "lowest quality", ">", _of_quality("values"), total=lambda q: q.min, streamed=True
@@ -89,8 +115,15 @@ NUMBERS: Mapping[str, LimitNumber] = {
     ),
     "size": LimitNumber("size of cells beside the undeformed ones", ">", _of_quality("size")),
     "skew": LimitNumber("shape of cells", ">", _of_quality("skew")),
+    "first_height": _wall("first_height", "distance of the first node from its wall", "<>"),
+    "height_ratio": _wall("height_ratio", "first height over that before", "<>"),
+    "growth": _wall("growth", "ratio of successive layers, the first five", "<"),
+    "equal_layers": _wall("equal_layers", "first layers of equal height, up to five", ">"),
+    "wall_angle": _wall("wall_angle", "between first edge and wall in degrees, 90 best", ">"),
+    "angle_change": _wall("angle_change", "change of that angle in degrees", "<"),
 }
-"""The numbers that can be limited, by name."""
+"""The numbers that can be limited, by name. Those of `slideviz.mesh.walls` are measured at the
+boundary after @, or at all with layers."""
 
 
 @dataclass(frozen=True)

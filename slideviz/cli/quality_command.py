@@ -96,7 +96,8 @@ def quality(arguments: argparse.Namespace) -> int:
         worst = found.worst(WORST)
         rows = list(zip(worst.tolist(), opened.source.types(worst).tolist(), strict=True))
         base = opened.read_base()
-        measured, layers = MeasuredMesh(found, mesh, base), _walls(mesh, base, case)
+        names = case.walls(mesh.marker_names) if case else None
+        measured, layers = MeasuredMesh(found, mesh, base, names), _walls(mesh, base, case)
         return _report(arguments, mesh.name, measured, rows, opened.reference, layers)
 
 

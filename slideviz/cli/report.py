@@ -64,6 +64,7 @@ def run_report(
         The layers at the boundaries; None where the mesh is in a file.
     """
     last = steps[-1]
+    measured = MeasuredMesh(quality, last.mesh, mesh, case.walls(mesh.marker_names))
     spent = dict.fromkeys(PHASES, 0.0) | dict(seconds)
     for step in steps:
         for phase, value in step.seconds.items():
@@ -84,7 +85,7 @@ def run_report(
             "inverted_at_step": [step for _, step in folded.values()],
             "undeformed": {"min": undeformed.min, "mean": undeformed.mean},
         },
-        "limits": limits_report(case.limits, MeasuredMesh(quality, last.mesh, mesh)),
+        "limits": limits_report(case.limits, measured),
         "walls": {} if walls is None else walls.summary(),
         "tried": [_fields(trial, TRIAL_KEYS) for trial in last.tried],
         "control_nodes": [step.control_nodes for step in steps],

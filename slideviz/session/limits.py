@@ -19,7 +19,8 @@ def check_frame(
 ) -> CheckedLimits:
     """Return the limits of a case, checked on a frame."""
     if frame.extra is None:
-        measured = MeasuredMesh(frame.quality, frame.mesh, frame.base or undeformed)
+        names = case.walls(frame.mesh.marker_names)
+        measured = MeasuredMesh(frame.quality, frame.mesh, frame.base or undeformed, names)
         try:
             return CheckedLimits(frame, case.limits, check_limits(case.limits, measured))
         except SlidevizError as error:

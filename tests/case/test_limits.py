@@ -20,7 +20,9 @@ from slideviz.case.limits import (
 )
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
+from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import quality
+from slideviz.mesh.walls import CHANGES, VALUES, walls
 from tests.builders import grid
 
 
@@ -130,14 +132,10 @@ def test_cells_of_a_halo_do_not_count(measured):
     assert folded.passed
 
 
-def test_a_boundary_that_the_mesh_lacks_is_told(monkeypatch):
-    row = replace(NUMBERS["size"], on_boundary=True)
-    monkeypatch.setitem(NUMBERS, "size", row)
-    case = Case(roles={"BLOCK": "moving"}, limits="size@BLOK > 0.5")
-    (problem,) = [
-        text for text in check_case(case, grid((4, 4), hole=((1, 2), (1, 2)))) if "LIM" in text
-    ]
-    assert "LIMITS" in problem
+def test_a_boundary_that_the_mesh_lacks_is_told():
+    case = Case(roles={"BLOCK": "moving"}, limits="growth@BLOK < 1.5")
+    problems = check_case(case, grid((4, 4), hole=((1, 2), (1, 2))))
+    (problem,) = [text for text in problems if "LIMITS" in text]
     assert "has no marker 'BLOK'; did you mean BLOCK?" in problem
 
 
@@ -145,3 +143,73 @@ def test_a_streamed_run_knows_some_numbers_only():
     require_streamed(read_limits("min > 0.3, mean > 0.3, inverted = 0, unproven = 0"))
     with pytest.raises(CaseError, match=r"size > 0.5 needs the mesh in memory.* min, mean, inv"):
         require_streamed(read_limits("min > 0.3, size > 0.5"))
+
+
+WALLS = {
+    "first_height": ("<", ">="),
+    "height_ratio": (">", "<"),
+    "growth": ("<",),
+    "equal_layers": (">=",),
+    "wall_angle": (">",),
+    "angle_change": ("<",),
+}
+
+
+@pytest.fixture(scope="module")
+def layered():
+    """Return 6 x 5 quadrilaterals with thin layers at LOWER, whose first nodes are moved."""
+    mesh = layered_mesh()
+    points = mesh.points.copy()
+    points[8:12] += (0.01, 0.004)
+    moved = mesh.with_points(points)
+    return MeasuredMesh(quality(moved, mesh), moved, mesh)
+
+
+def layered_mesh():
+    x, y = np.meshgrid(np.arange(7.0), np.cumsum([0, 0.05, 0.05, 0.06, 0.08, 1.0]))
+    corner = (7 * np.arange(5)[:, None] + np.arange(6)).ravel()
+    sides = {"LOWER": 0, "UPPER": 35}
+    return Mesh(
+        np.c_[x.ravel(), y.ravel()],
+        Cells.from_blocks([(9, corner[:, None] + [0, 1, 8, 7])]),
+        tuple(
+            Marker(name, Cells.from_blocks([(3, first + np.c_[:6] + [0, 1])]))
+            for name, first in sides.items()
+        ),
+    )
+
+
+@pytest.mark.parametrize(("name", "signs"), WALLS.items())
+def test_every_number_of_walls_can_be_limited(layered, name, signs):
+    assert {*WALLS} == {*VALUES, *CHANGES}
+    found = walls(layered.mesh, layered.reference, ("LOWER",))
+    at = found.values[name][found.columns.places("LOWER")]
+    for sign in signs:
+        worst = at.min() if sign[0] == ">" else at.max()
+        beyond = worst + (1e-9 if sign[0] == ">" else -1e-9)
+        (missed,) = check_limits([Limit(name, sign, beyond, "LOWER")], layered)
+        (met,) = check_limits([Limit(name, sign, worst + (worst - beyond), "LOWER")], layered)
+        assert missed.actual == met.actual == worst
+        assert met.passed
+        assert not missed.passed
+        assert len(missed.cells)
+        at_cells = found.at_cells(name)[missed.cells]
+        assert np.isfinite(at_cells).all()
+        if name != "height_ratio":  # whose worst value is the one farthest from 1
+            assert (at_cells == worst).any()
+
+
+def test_without_a_boundary_those_with_layers_count(layered):
+    everywhere, there = check_limits(read_limits("growth < 1.3, growth@LOWER < 1.3"), layered)
+    assert everywhere.actual == there.actual
+    (outer,) = check_limits(read_limits("first_height@UPPER < 0.9"), layered)
+    assert outer.actual == pytest.approx(1.0)
+    assert len(outer.cells) == 6
+    assert set(outer.cells.tolist()) == set(range(24, 30))
+    none = replace(layered, boundaries=("UPPER",))
+    (unknown,) = check_limits(read_limits("growth < 1.3"), none)
+    assert not unknown.passed
+    assert np.isnan(unknown.actual)
+    alone = replace(layered, reference=None)
+    (change,) = check_limits(read_limits("height_ratio > 0.5"), alone)
+    assert np.isnan(change.actual)
