@@ -260,6 +260,14 @@ DATA_REDUCTIONS: dict[DataReduction, Term] = {
 }
 """Whether only some of the boundary nodes are control nodes."""
 
+Relax = Literal["auto", "no", "yes"]
+RELAXES: dict[Relax, Term] = {
+    "auto": Term("automatic", "Relaxed, unless the mesh has more than a million cells."),
+    "no": Term("off", "As the radial functions leave it."),
+    "yes": Term("on", "Relaxed after each step."),
+}
+"""Whether the mesh is relaxed after each step."""
+
 LevelCriterion = Literal["size", "tol"]
 LEVEL_CRITERIA: dict[LevelCriterion, Term] = {
     "size": Term("by size"),

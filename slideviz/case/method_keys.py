@@ -19,6 +19,7 @@ from slideviz.terms import (
     KERNELS,
     LEVEL_CRITERIA,
     METHODS,
+    RELAXES,
     SELECTIONS,
     SLIDING,
     DataReduction,
@@ -281,6 +282,23 @@ METHOD_ROWS = (
         "boundary in stages (pseudo), or slide as part of the system itself (direct).",
         run_label="",
         idle_reason=nothing_slides,
+    ),
+    setting(
+        "RELAX",
+        METHOD,
+        one_of(RELAXES),
+        "relax",
+        "Relax the mesh after each step: a few iterations of an elastic body whose cells go back "
+        "to their undeformed shapes, turned as they are. Cells are better in the mean, and "
+        "boundary layers keep their heights and angles. AUTO does so up to a million cells in "
+        "memory.",
+        label="Relaxation",
+        form="main",
+        tip="Whether cells then go back towards their undeformed shapes, turned as they are, like "
+        "an elastic body: better in the mean, and boundary layers keep their heights. A safeguard "
+        "keeps the worst cells.",
+        run_label="relaxation {}",
+        method="rbf",
     ),
     setting(
         "STEPS",

@@ -23,6 +23,7 @@ from slideviz.terms import (
     METHODS,
     PERIODIC_MODES,
     PERIODIC_TYPES,
+    RELAXES,
     ROLES,
     SIDES,
     SKEW_METRICS,
@@ -33,6 +34,7 @@ from slideviz.terms import (
     Method,
     PeriodicMode,
     PeriodicType,
+    Relax,
     Role,
     Side,
     SkewMetric,
@@ -315,6 +317,7 @@ class Case(CheckedFields):
     support_radius: float | None = None
     kernel: str = field(default="wendland-c2", metadata=KERNELS)
     reduction: Reduction | None = AUTO
+    relax: Relax = field(default="no", metadata=RELAXES)
     idw_power: float | None = None
     idw_fixed_weight: float = 1.0
     quality_metric: SkewMetric = field(default="knupp", metadata=SKEW_METRICS)

@@ -20,6 +20,7 @@ _PHASES = {
     "solve": "solving",
     "evaluate": "moving nodes",
     "project": "sliding",
+    "relax": "relaxing cells",
     "read": "reading",
     "write": "writing the mesh",
     "quality": "measuring cells",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.walls import Walls, wall_words
+from slideviz.rbf.problem import Relaxed
 from slideviz.solver.deform import Step, folded_at
 from slideviz.streaming.quality import CellCounts
 from slideviz.system.atomic import atomic_write
@@ -30,7 +32,7 @@ WORST = 10
 """Cells of lowest quality listed in a report."""
 
 PHASES = (
-    *("read", "classify", "select", "solve", "evaluate", "project", "correct"),
+    *("read", "classify", "select", "solve", "evaluate", "project", "correct", "relax"),
     *("quality", "write"),
 )
 TRIAL_KEYS = ("planned", "steps", "min", "mean", "inverted")
@@ -105,6 +107,7 @@ def run_report(
             (step.periodic_misfit for step in steps if step.periodic_misfit is not None),
             default=None,
         ),
+        "relax": None if (relaxed := _relaxed(steps)) is None else asdict(relaxed),
         "seconds": {name: round(value, 6) for name, value in spent.items()},
         "node_counts": dict(last.node_counts),
         "warnings": list(last.warnings),
@@ -144,6 +147,15 @@ def limit_words(entry: Mapping[str, Any]) -> tuple[str, str]:
     value = "no value" if entry["actual"] is None else f"{entry['actual']:.6g}"
     cells = f", in {counted(entry['failing'], 'cell')}" if entry["failing"] else ""
     return value, "met" if entry["passed"] else f"not met{cells}"
+
+
+def _relaxed(steps: Sequence[Step]) -> Relaxed | None:
+    """Return how the steps were relaxed: the largest residual, and the smallest part."""
+    each = [step.relaxed for step in steps if step.relaxed is not None]
+    if not each:
+        return None
+    residual, theta = max(one.residual for one in each), min(one.theta for one in each)
+    return Relaxed(sum(one.rounds for one in each), residual, theta)
 
 
 def folded_cells(steps: Sequence[Step], mesh: Mesh, quality: Quality) -> dict[int, tuple[int, int]]:

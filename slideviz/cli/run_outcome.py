@@ -201,6 +201,11 @@ def _print_run(
     radius = report["support_radius"]
     if radius["used"] is not None:
         rows.append((f"support radius{' (AUTO)' * radius['automatic']}", radius["used"]))
+    if (relax := report["relax"]) is not None:
+        cut = "" if relax["theta"] == 1.0 else f", at least {100 * relax['theta']:.0f} % kept"
+        rows.append(
+            ("relaxation", f"{relax['rounds']} rounds, residual {relax['residual']:.2g}{cut}")
+        )
     if report["periodic_misfit"] is not None:
         rows.append(("periodic misfit", report["periodic_misfit"]))
     print(table(rows))

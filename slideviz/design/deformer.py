@@ -124,6 +124,11 @@ class Deformer:
         ConditionWarning
             The system is so badly conditioned that derivatives, or points too, have few digits.
         """
+        if case.relax == "yes":
+            raise CaseError(
+                "RELAX= YES has no derivatives; use RELAX= NO, or AUTO, which is NO here"
+            )
+        case = case.change(relax="no")
         if displacements is not None and not case.motions:
             case = case.change(motions=(Translate("", (0.0,) * mesh.dim),))
         asked = motion.displacements(case, mesh)

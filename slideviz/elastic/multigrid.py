@@ -11,7 +11,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from threading import Thread
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numba import prange
@@ -40,6 +40,8 @@ WAIT_SECONDS = 0.1
 
 MAKING = 0.3
 """The part of the progress at which the hierarchy is made."""
+
+Made = TypeVar("Made")
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "fastmath": True}
 
@@ -95,17 +97,17 @@ def solve(
     """
     if not np.any(right):
         return LinearSolution(np.zeros_like(right), 0, 0.0)
-    levels = _while_ticking(lambda: hierarchy(matrix, modes), tick)
+    levels = while_ticking(lambda: hierarchy(matrix, modes), tick)
     return conjugate_gradients(levels, right, start, tick)
 
 
-def _while_ticking(work: Callable[[], list[Level]], tick: Tick) -> list[Level]:
+def while_ticking(work: Callable[[], Made], tick: Tick) -> Made:
     """Return what ``work`` returns; call ``tick`` while it runs in a thread. ``tick`` may raise.
 
     pyamg's set-up of a large mesh takes seconds and has no callback. When ``tick`` raises, the
     thread runs to its end, but nobody waits for it.
     """
-    future: Future[list[Level]] = Future()
+    future: Future[Made] = Future()
 
     def run() -> None:
         try:

@@ -197,6 +197,18 @@ class CarriedError:
         return put(errors, outside, nothing) if len(outside) else errors
 
 
+@dataclass(frozen=True)
+class Relaxed:
+    """How a step was relaxed (`slideviz.elastic.relaxation`)."""
+
+    rounds: int
+    """Iterations."""
+    residual: float
+    """Last residual over the first, in the norm of the preconditioner."""
+    theta: float
+    """The part of the relaxation that the safeguard left, 0 to 1."""
+
+
 @dataclass(frozen=True, eq=False)
 class Solution:
     """The result of one step: displacements, control nodes and errors."""
@@ -237,6 +249,8 @@ class Solution:
     else 0."""
     field: Field | None = None
     """The field that displaced the nodes inside the mesh; None where a method has no such field."""
+    relaxed: Relaxed | None = None
+    """None where the step was not relaxed."""
     stages: tuple[Levels, ...] = ()
     """The rows of each system that was solved, in order: pseudo sliding has up to three, direct
     sliding one or two; empty where a method has no such systems."""

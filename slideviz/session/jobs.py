@@ -182,6 +182,7 @@ PHASES = {
     "solve": "solving",
     "evaluate": "moving the nodes",
     "project": "projecting onto the boundaries",
+    "relax": "relaxing the cells",
     "quality": "quality",
 }
 """Words in the window for the phases of a run (``Progress.phase``)."""

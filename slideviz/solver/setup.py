@@ -12,6 +12,7 @@ import numpy as np
 from slideviz.case.check import idle_settings, require_valid
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
+from slideviz.errors import CaseError, Note
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.rbf.classify import Classes, directions
@@ -28,6 +29,7 @@ from slideviz.solver.prescribed import fitted_radius, largest_of, prescribe, sup
 if TYPE_CHECKING:
     from slideviz.baselines.idw import Weights
     from slideviz.elastic.conditions import Body
+    from slideviz.elastic.relaxation import Relaxation
 
 EXACT_NODES = 2000
 """Most candidates with which DATA_REDUCTION= AUTO makes all of them control nodes. The text in
@@ -44,6 +46,9 @@ which no correction takes back: above half of that distance, cells between both 
 SMALLEST = 1e-7
 """Smallest tolerance of DATA_REDUCTION= AUTO, as a part of the largest displacement: below it
 nearly all candidates are chosen, at a higher cost than that of all at once."""
+
+RELAXED_CELLS = 1_000_000
+"""Most cells of a mesh that RELAX= AUTO relaxes."""
 
 LOOSE = 0.1
 """A tolerance above this part of the largest displacement gets a warning."""
@@ -157,6 +162,8 @@ class Setup(Domain):
     """Solves one step by the method of the case."""
     fitted_radius: float
     """The support radius that fits the motion, whatever the case says."""
+    relaxation: Relaxation | None = None
+    """What relaxes each step; None where RELAX has no effect."""
 
     @cached_property
     def largest(self) -> float:
@@ -262,6 +269,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
         reach=REACH * conditions.largest,
     )
     warnings = *domain.warnings, *conditions.warnings, *loose, *idle_settings(case)
+    warnings += _not_relaxed(case, mesh)
     of_domain = {each.name: getattr(domain, each.name) for each in fields(domain)}
     angle = frame.period if frame.cylindrical else 0.0
     return Setup(
@@ -275,6 +283,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
         tracks=tracks,
         solve=_method(case, mesh, frame, axis),
         fitted_radius=fitted_radius(case, mesh, conditions.moved),
+        relaxation=relaxation_of(case, mesh, frame, axis),
     )
 
 
@@ -291,6 +300,35 @@ def _method(
 
         return partial(deform_elastic, body=elastic_body(mesh, frame, axis))
     return SLIDING_METHODS[case.sliding]
+
+
+def _not_relaxed(case: Case, mesh: Mesh) -> tuple[str, ...]:
+    """Return the note that RELAX= AUTO relaxes no such mesh; CaseError if RELAX= YES cannot."""
+    if case.relax == "no" or case.method != "rbf":
+        return ()
+    if mesh.part is not None:
+        if case.relax == "yes":
+            raise CaseError(
+                "RELAX= YES needs the whole mesh in memory, but this run goes from file to file; "
+                "use RELAX= NO or AUTO, or run it in memory"
+            )
+        return (Note("RELAX= AUTO relaxes no mesh that goes from file to file"),)
+    if case.relax == "auto" and len(mesh.cells) > RELAXED_CELLS:
+        return (
+            Note(f"RELAX= AUTO relaxes no mesh of more than {RELAXED_CELLS:,} cells; YES does"),
+        )
+    return ()
+
+
+def relaxation_of(case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray) -> Relaxation | None:
+    """Return the relaxation of a case's steps; None where they are not relaxed."""
+    auto = case.relax == "auto" and mesh.part is None and len(mesh.cells) <= RELAXED_CELLS
+    if case.method != "rbf" or not (auto or case.relax == "yes"):
+        return None
+    from slideviz.elastic.relaxation import Relaxation
+
+    body = elastic_body(mesh, frame, axis)
+    return Relaxation(mesh, without_halo(mesh)[0], body, case.quality_metric)
 
 
 def elastic_body(mesh: Mesh, frame: Frame, axis: np.ndarray) -> Body:

@@ -112,6 +112,8 @@ class Stepping:
             elif not remarks:
                 remarks = _dropped_warning(setup, solution, index, total, mesh)
             warnings += [f"step {index}: {text}" for text in solution.warnings]
+            if solution.relaxed is not None and solution.relaxed.theta < 1.0:
+                warnings.append(_cut_note(solution.relaxed.theta, index))
             stray = []
             if self.rate is None and self.case.method == "rbf":
                 if setup.frame.cylindrical:
@@ -191,6 +193,7 @@ class Stepping:
             part=part,
             support_radius=self.setup.basis.radius if self.case.method == "rbf" else None,
             field=solution.field if self.rate is not None else None,
+            relaxed=solution.relaxed,
         )
 
 
@@ -223,12 +226,19 @@ def one_step(
     frozen : Frozen or None
         The choices of a step whose derivatives are wanted; None in a run.
     """
-    solution = setup.solve(problem_at(setup, coords, goal, before, frozen), timer)
+    problem = problem_at(setup, coords, goal, before, frozen)
+    solution = setup.solve(problem, timer)
     first, second = setup.images.T
-    displacement = put(
-        solution.displacement, second, take(solution.displacement, first), overwrite=True
-    )
-    return replace(solution, displacement=displacement)
+
+    def tie(displacement: Array) -> Array:
+        return put(displacement, second, take(displacement, first), overwrite=True)
+
+    displacement, relaxed = tie(solution.displacement), None
+    if setup.relaxation is not None:
+        displacement, relaxed = setup.relaxation.relaxed(
+            problem, displacement, setup.constraints, tie, timer
+        )
+    return replace(solution, displacement=displacement, relaxed=relaxed)
 
 
 def problem_at(
@@ -339,6 +349,14 @@ def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
         f"an error of {solution.max_error:.3g}, above its tolerance of "
         f"{setup.reduction.tolerance:.3g}: {solution.short}. Boundary nodes still get exactly "
         "their displacement, but the mesh near them follows by the correction only"
+    )
+
+
+def _cut_note(theta: float, index: int) -> Note:
+    kept = f"only {100 * theta:.0f} % of the relaxation was" if theta else "no relaxation was"
+    return Note(
+        f"step {index}: {kept} kept, because more would have made the worst cells worse; more "
+        "STEPS may help"
     )
 
 

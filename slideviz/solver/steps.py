@@ -14,7 +14,7 @@ import numpy as np
 
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.rbf.field import Field
-from slideviz.rbf.problem import Cycle
+from slideviz.rbf.problem import Cycle, Relaxed
 
 if TYPE_CHECKING:
     from slideviz.mesh.quality import Quality
@@ -29,8 +29,8 @@ class Progress:
     total: int
     """`step`, `total`: the number of the current step, from 1, and of all steps."""
     phase: str
-    """``classify``, ``select``, ``solve``, ``evaluate``, ``project`` or ``correct``; in a streamed
-    run also ``read``, ``quality`` and ``write``."""
+    """``classify``, ``select``, ``solve``, ``evaluate``, ``project``, ``correct`` or ``relax``;
+    in a streamed run also ``read``, ``quality`` and ``write``."""
     fraction: float
     """The part of the phase that is done, 0 to 1."""
     left: float | None = None
@@ -98,6 +98,8 @@ class Step:
     field: Field | None = None
     """The function that displaced the nodes off the boundary in this step; kept in streamed
     runs."""
+    relaxed: Relaxed | None = None
+    """How the step was relaxed; None where it was not."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -482,10 +482,10 @@ def test_a_run_can_be_stopped_while_the_hierarchy_is_made(monkeypatch):
             raise Cancelled("enough")
 
     with pytest.raises(Cancelled, match="enough"):
-        multigrid._while_ticking(slow, tick)
+        multigrid.while_ticking(slow, tick)
     end.set()
     with pytest.raises(ValueError, match="a failure in there comes out here"):
-        multigrid._while_ticking(
+        multigrid.while_ticking(
             lambda: (_ for _ in ()).throw(ValueError("a failure in there comes out here")), tick
         )
 

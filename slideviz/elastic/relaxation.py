@@ -1,0 +1,310 @@
+"""Relaxation: a few iterations of corotated elasticity after radial basis functions.
+
+Radial functions give the large scales and the boundary; what they leave is local and stiff. The
+mesh becomes an elastic body whose undeformed shape is without forces however its cells are turned
+(`slideviz.elastic.corotated`), and goes towards its equilibrium by nonlinear conjugate gradients
+(Polak and Ribiere), preconditioned by one multigrid cycle (`slideviz.elastic.laplacian`):
+
+    r = -f(x),   p = C r + beta p,   x <- x + alpha p.
+
+Moving and fixed nodes stay, sliding ones move along their boundary, periodic images as one. A
+safeguard goes back, in part, where cells would become worse. Steps alpha and beta, tangents and the
+part of the safeguard are choices, so that a frozen step is a chain of forces and linear maps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from slideviz.elastic.conditions import Body, conditions
+from slideviz.elastic.corotated import Corotated
+from slideviz.elastic.laplacian import LaplacianCycle
+from slideviz.elastic.multigrid import MAKING, while_ticking
+from slideviz.elastic.stiffness import Conditions
+from slideviz.mesh.jacobians import INVERTED, VALID
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
+from slideviz.mesh.quality import Quality, quality
+from slideviz.rbf.evaluate import Tick
+from slideviz.rbf.operations import difference_from, each_of, points
+from slideviz.rbf.problem import PhaseTimer, Problem, Relaxed
+from slideviz.rbf.tape import Array, add_at, multiply, put, recorded, take, transform, value
+from slideviz.terms import SkewMetric
+
+ITERATIONS = 6
+"""Enough to come to the mean quality of the equilibrium within 0.001 to 0.003."""
+
+PARTS = (1.0, 0.5, 0.25, 0.0)
+"""The parts of the relaxation that the safeguard tries, in this order."""
+
+WORSE, ENOUGH = 0.9, 0.3
+"""The lowest quality may become ``WORSE`` times what it was, or ``ENOUGH`` if that is less."""
+
+Constraints = Callable[[FloatArray], tuple[IntArray, FloatArray]]
+"""Takes coordinates (n, d); returns sliding nodes (q,) and the directions (q, d) that hold them."""
+
+
+@dataclass(eq=False)
+class _Kept:
+    """What is made once for a mesh: its forces, and the preconditioner of the last conditions."""
+
+    forces: Corotated
+    made_for: tuple[IntArray, np.ndarray] | None = None
+    """Unknowns (n,) of the nodes, and which of their components are held, (k, d)."""
+    cycle: LaplacianCycle | None = None
+
+
+_KEPT: WeakKeyDictionary[Mesh, _Kept] = WeakKeyDictionary()
+
+
+@dataclass(frozen=True, eq=False)
+class Relaxation:
+    """The relaxation of deformed meshes."""
+
+    mesh: Mesh
+    """Undeformed, with its halo."""
+    domain: Mesh
+    """Undeformed, without the halo."""
+    body: Body
+    metric: SkewMetric
+    """Of the quality that the safeguard keeps."""
+
+    def relaxed(
+        self,
+        problem: Problem,
+        displacement: Array,
+        constraints: Constraints,
+        tie: Callable[[Array], Array],
+        timer: PhaseTimer,
+    ) -> tuple[Array, Relaxed]:
+        """Return the displacement (..., n, d) of a step after relaxation, in the frame.
+
+        Parameters
+        ----------
+        displacement : (..., n, d)
+            Of the step, as radial functions have it.
+        tie
+            Gives periodic images the displacement of the node that represents them.
+        """
+        with timer.phase("relax") as tick:
+            at = value(problem.coords) + value(displacement)
+            given: Conditions = problem.choose(
+                "conditions", lambda: self._conditions(problem, at, constraints)
+            )
+            kept = self._kept(problem, given, constraints, tick)
+            moved, residual = self._iterated(problem, displacement, kept, given, tie, tick)
+            part = problem.choose("part", lambda: self._part(problem, displacement, moved, tie))
+            out = self._blended(problem, displacement, moved, part, tie)
+        return out, Relaxed(ITERATIONS, residual, part)
+
+    def _conditions(self, problem: Problem, at: FloatArray, constraints: Constraints) -> Conditions:
+        """Return the conditions of the body at coordinates (n, d)."""
+        nodes, normals = constraints(at)
+        there = replace(problem, coords=at, normal_nodes=nodes, normals=normals)
+        return conditions(there, self.body, problem.known, np.zeros_like(value(problem.values)))
+
+    def _kept(
+        self, problem: Problem, given: Conditions, constraints: Constraints, tick: Tick
+    ) -> _Kept:
+        """Return what is kept of this mesh, with the preconditioner for these conditions."""
+        x, frame, place = self.mesh.points, self.body.frame, given.place
+        kept = _KEPT.get(self.mesh)
+        if kept is None:
+            kept = _KEPT[self.mesh] = _Kept(Corotated.of(x, self.body.parts))
+        start = frame.coords(x)
+        free = self._conditions(problem, start, constraints).free
+        axes = np.eye(x.shape[1])
+        if frame.cylindrical:
+            owner = np.zeros(len(free), np.int64)
+            owner[place[place >= 0]] = problem.same_as[place >= 0]
+            each = [frame.turned_back(start[owner], np.tile(row, (len(free), 1))) for row in axes]
+            axes = np.stack(each, axis=2)
+        held = _held(axes @ free @ np.swapaxes(axes, -1, -2))
+        made_for = place, held
+        if kept.made_for is None or not all(map(np.array_equal, kept.made_for, made_for)):
+            make = partial(LaplacianCycle.of, x, self.body.parts, place, held, axes)
+            kept.cycle, kept.made_for = while_ticking(make, tick), made_for
+        return kept
+
+    def _iterated(
+        self,
+        problem: Problem,
+        moved: Array,
+        kept: _Kept,
+        given: Conditions,
+        tie: Callable[[Array], Array],
+        tick: Tick,
+    ) -> tuple[Array, float]:
+        """Return the relaxed displacement, and the last residual over the first."""
+        frame, forces, cycle = self.body.frame, kept.forces, kept.cycle
+        assert cycle is not None
+        unknowns = _Unknowns.of(given)
+        along: Array = np.zeros((len(given.free), self.mesh.dim))
+        energies: list[float] = []
+        force: Array = along
+        for k in range(ITERATIONS):
+            tick(MAKING + (1.0 - MAKING) * k / (ITERATIONS + 1))
+            at = points(frame, problem.coords + moved)
+            turns = forces.rotations(value(at))
+            before, force = value(force), unknowns.collected(_force(forces, at, turns))
+            steep = unknowns.within(_preconditioned(cycle, -force))
+            energies.append(-_inner(force, steep))
+            if k:
+                turned = max(0.0, (energies[-1] + _inner(before, steep)) / energies[-2])
+                steep = steep + multiply(along, problem.choose(f"beta {k}", partial(_one, turned)))
+            along = steep
+            size = partial(_size, unknowns, forces, turns, value(along), value(force))
+            step = unknowns.moved(multiply(along, problem.choose(f"alpha {k}", size)))
+            moved = moved + difference_from(frame, at, step)
+            if problem.curved or k == ITERATIONS - 1:
+                moved = _slid(problem, moved, tie)
+        return moved, float(np.sqrt(max(energies[-1], 0.0) / max(energies[0], 1e-300)))
+
+    def _blended(
+        self,
+        problem: Problem,
+        before: Array,
+        after: Array,
+        part: float,
+        tie: Callable[[Array], Array],
+    ) -> Array:
+        """Return the displacement that is a part of the way from ``before`` to ``after``."""
+        if part in (0.0, 1.0):
+            return after if part else before
+        return _slid(problem, before + (after - before) * part, tie)
+
+    def _part(
+        self, problem: Problem, before: Array, after: Array, tie: Callable[[Array], Array]
+    ) -> float:
+        """Return the largest part of the relaxation after which no cell is worse."""
+        first = self._quality(problem, before)
+        for part in PARTS[:-1]:
+            now = self._quality(problem, self._blended(problem, before, after, part, tie))
+            if not worse(first, now):
+                return part
+        return PARTS[-1]
+
+    def _quality(self, problem: Problem, displacement: Array) -> Quality:
+        at = self.body.frame.points(value(problem.coords) + value(displacement))
+        return quality(self.domain.with_points(sealed(at)), self.domain, self.metric)
+
+
+def worse(before: Quality, after: Quality) -> bool:
+    """Return whether a mesh is worse than before by the rules of the safeguard.
+
+    A cell is inverted or unproved that was not, the mean quality is lower, or the lowest one is
+    below `WORSE` times what it was and `ENOUGH`.
+    """
+    spoiled = (after.status != VALID) & (before.status == VALID)
+    spoiled |= (after.status == INVERTED) & (before.status != INVERTED)
+    low = min(WORSE * before.min, ENOUGH)
+    return bool(spoiled.any()) or after.min < low or after.mean < before.mean
+
+
+def _held(free: FloatArray) -> np.ndarray:
+    """Return which components (k, d) stay zero where unknowns are free as projections (k, d, d).
+
+    As many as are not free, those along which an unknown moves least.
+    """
+    along = np.einsum("kii->ki", free)
+    count = np.rint(along.sum(axis=1)).astype(int)
+    rank = np.argsort(np.argsort(-along, axis=1, kind="stable"), axis=1, kind="stable")
+    return np.asarray(rank >= count[:, None])
+
+
+def _slid(problem: Problem, displacement: Array, tie: Callable[[Array], Array]) -> Array:
+    """Return the displacement with sliding nodes on their boundary."""
+    sliding = np.concatenate([problem.edge, problem.surface])
+    if not len(sliding):
+        return tie(displacement)
+    on = problem.project(sliding, take(displacement, sliding))
+    return tie(put(displacement, sliding, on))
+
+
+def _force(forces: Corotated, at: Array, turns: FloatArray) -> Array:
+    """Return the forces (n, d) on all nodes."""
+    x = value(at)
+    return recorded(
+        forces.forces(x, turns),
+        (
+            at,
+            partial(each_of, lambda t: forces.pushed(x, t)),
+            partial(each_of, lambda g: forces.pulled(x, g)),
+        ),
+    )
+
+
+def _preconditioned(cycle: LaplacianCycle, right: Array) -> Array:
+    apply = partial(each_of, cycle)
+    return recorded(apply(value(right)), (right, apply, apply))
+
+
+def _inner(a: Array, b: Array) -> float:
+    return float(np.vdot(value(a), value(b)))
+
+
+def _one(number: float) -> FloatArray:
+    return np.array([[number]])
+
+
+def _size(
+    unknowns: _Unknowns,
+    forces: Corotated,
+    turns: FloatArray,
+    along: FloatArray,
+    force: FloatArray,
+) -> FloatArray:
+    """Return the step ``along`` (k, d) to the least energy, where rotations stay; (1, 1)."""
+    product = forces.product(turns, value(unknowns.moved(along)))
+    curvature = _inner(along, unknowns.collected(product))
+    return _one(-_inner(along, force) / curvature if curvature > 0.0 else 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Unknowns:
+    """Maps between unknowns (k, d) and vectors of nodes (n, d), as conditions have them."""
+
+    given: Conditions
+    inside: IntArray
+    """Nodes with unknowns."""
+    owner: IntArray
+    """(k,): a node of each block of unknowns."""
+    others: IntArray
+    """Further nodes with the same unknowns as another."""
+    turned: IntArray
+    held: IntArray
+    """`turned`, `held`: nodes whose displacement is not just their unknowns, and blocks that are
+    not free in all directions."""
+
+    @classmethod
+    def of(cls, given: Conditions) -> _Unknowns:
+        inside = np.flatnonzero(given.place >= 0)
+        owner = np.zeros(len(given.free), np.int64)
+        owner[given.place[inside[::-1]]] = inside[::-1]
+        others = inside[owner[given.place[inside]] != inside]
+        plain = np.all(given.free == np.eye(given.free.shape[1]), axis=(1, 2))
+        turned = inside[~given.plain[inside]]
+        return cls(given, inside, owner, others, turned, np.flatnonzero(~plain))
+
+    def within(self, unknown: Array) -> Array:
+        """Return unknowns (k, d) without their part in directions that are held."""
+        free = transform(self.given.free[self.held], take(unknown, self.held))
+        return put(unknown, self.held, free)
+
+    def moved(self, unknown: Array) -> Array:
+        """Return the Cartesian displacement (n, d) of unknowns (k, d); zero for known nodes."""
+        given = self.given
+        nothing = np.zeros_like(given.known)
+        out = put(nothing, self.inside, take(unknown, given.place[self.inside]), overwrite=True)
+        return put(out, self.turned, transform(given.turn[self.turned], take(out, self.turned)))
+
+    def collected(self, forces: Array) -> Array:
+        """Return the forces (k, d) on the unknowns, of forces (n, d) on nodes."""
+        given = self.given
+        back = np.swapaxes(given.turn[self.turned], 1, 2)
+        forces = put(forces, self.turned, transform(back, take(forces, self.turned)))
+        return add_at(take(forces, self.owner), given.place[self.others], take(forces, self.others))

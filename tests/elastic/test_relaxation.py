@@ -1,0 +1,153 @@
+"""Relaxation: turned cells are at rest, conditions hold, and no cell becomes worse."""
+
+from __future__ import annotations
+
+import json
+
+import numba
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.cli import run
+from slideviz.elastic import relaxation
+from slideviz.elastic.laplacian import LaplacianCycle, laplacian
+from slideviz.elastic.stiffness import blocks
+from slideviz.errors import CaseError
+from slideviz.solver.setup import RELAXED_CELLS
+from tests import builders
+
+
+def last(case, mesh):
+    *_, step = sv.deform(case, mesh)
+    return step
+
+
+def airfoil(angle=25.0, **values):
+    mesh = builders.airfoil(40, 10, 1e-3)
+    motions = (sv.Rotate("airfoil", angle, (0.5, 0.0)),)
+    return mesh, sv.Case(roles={"airfoil": "moving"}, motions=motions, **values)
+
+
+def passage(**values):
+    """A twisted blade between a sliding hub and shroud, both curved, in a rotational period."""
+    mesh = builders.passage((6, 8, 8))
+    roles = {"hub": "sliding", "shroud": "sliding", "blade": "moving"}
+    roles |= {"per1": "periodic", "per2": "periodic", "inflow": "sliding", "outflow": "sliding"}
+    case = sv.Case(roles=roles, sliding="ps", periodic="moving", **values)
+    return mesh, case.change(motions=(sv.Rotate("blade", 3.0),))
+
+
+def test_cells_go_back_to_their_shapes():
+    mesh, case = airfoil()
+    plain, relaxed = last(case, mesh), last(case.change(relax="yes"), mesh)
+    found = [sv.quality(step.mesh, mesh).mean for step in (plain, relaxed)]
+    assert found[1] > found[0] + 0.004
+    assert plain.relaxed is None
+    assert relaxed.relaxed.theta > 0.0
+    assert 0.0 < relaxed.relaxed.residual < 0.2
+
+
+def test_a_turned_mesh_is_at_rest():
+    mesh = builders.airfoil(24, 6)
+    case = sv.Case(
+        roles={"airfoil": "moving", "far": "moving"},
+        motions=(sv.Rotate("", 30.0, (0.0, 0.0)),),
+        relax="yes",
+        influence_factor=0.5,  # too short to turn the mesh by itself
+    )
+    cos, sin = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    exact = mesh.points @ np.array([[cos, sin], [-sin, cos]])
+    errors = [
+        np.abs(last(c, mesh).mesh.points - exact).max() for c in (case.change(relax="no"), case)
+    ]
+    assert errors[1] < 0.05 * errors[0]
+
+
+def test_sliding_nodes_stay_on_curved_walls_and_images_together():
+    mesh, case = passage(relax="yes")
+    step = last(case, mesh)
+    assert step.relaxed.theta > 0.0
+    r = np.linalg.norm(step.mesh.points[:, :2], axis=1)
+    start = np.linalg.norm(mesh.points[:, :2], axis=1)
+    plain = np.linalg.norm(last(case.change(relax="no"), mesh).mesh.points[:, :2], axis=1)
+    for marker in ("hub", "shroud"):
+        nodes = np.unique(mesh.marker(marker).nodes)
+        np.testing.assert_allclose(r[nodes], plain[nodes], atol=2e-3)
+        np.testing.assert_allclose(r[nodes], start[nodes], atol=1e-2)
+    assert step.periodic_misfit < 1e-12
+    for marker in ("inflow", "outflow"):
+        nodes = np.unique(mesh.marker(marker).nodes)
+        np.testing.assert_array_equal(step.mesh.points[nodes, 2], mesh.points[nodes, 2])
+    assert np.abs(step.mesh.points - last(case.change(relax="no"), mesh).mesh.points).max() > 1e-4
+
+
+def test_the_bits_do_not_depend_on_threads_nor_on_what_was_kept(monkeypatch):
+    mesh, case = airfoil(relax="yes")
+    monkeypatch.setattr("slideviz.rbf.compiled.SMALL", 0)
+    first = last(case, mesh).mesh.points
+    again = last(case, mesh).mesh.points
+    threads = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        alone = last(case, airfoil()[0]).mesh.points
+    finally:
+        numba.set_num_threads(threads)
+    np.testing.assert_array_equal(first, again)
+    np.testing.assert_array_equal(first, alone)
+
+
+def test_the_preconditioner_is_symmetric_positive_and_holds_components():
+    mesh = builders.grid((20, 20))
+    parts, place = blocks(mesh.cells), np.arange(len(mesh.points))
+    place[mesh.marker("x_m").nodes] = -1
+    place[place >= 0] = np.arange((place >= 0).sum())
+    count = int(place.max()) + 1
+    held = np.zeros((count, 2), bool)
+    held[::7, 1] = True
+    cycle = LaplacianCycle.of(mesh.points, parts, place, held, np.eye(2))
+    each = [cycle(e.reshape(count, 2)).ravel() for e in np.eye(2 * count)]
+    np.testing.assert_allclose(each, np.transpose(each), atol=1e-12 * np.abs(each).max())
+    assert np.linalg.eigvalsh(each).min() > -1e-12
+    assert np.abs(np.array(each)[:, held.ravel()]).max() < 1e-20
+    matrix = laplacian(mesh.points, parts, place, count).toarray()
+    products = np.array(each).reshape(count, 2, count, 2)[:, 0, :, 0] @ matrix
+    assert np.linalg.eigvals(products).real.min() > 0.3
+    assert np.linalg.eigvals(products).real.max() < 1.5
+
+
+def test_the_safeguard_keeps_the_worst_cells(monkeypatch):
+    mesh, case = airfoil(60.0)
+    plain = sv.quality(last(case, mesh).mesh, mesh)
+    step = last(case.change(relax="yes"), mesh)
+    assert not relaxation.worse(plain, sv.quality(step.mesh, mesh))
+    monkeypatch.setattr(relaxation, "worse", lambda *_: True)
+    step = last(case.change(relax="yes"), mesh)
+    np.testing.assert_array_equal(step.mesh.points, last(case, mesh).mesh.points)
+    assert step.relaxed.theta == 0.0
+    assert any("no relaxation was kept" in text for text in step.warnings)
+
+
+def test_auto_leaves_out_large_meshes_and_other_methods(monkeypatch):
+    mesh, case = airfoil(relax="auto")
+    assert last(case, mesh).relaxed is not None
+    assert last(case.change(method="idw"), mesh).relaxed is None
+    monkeypatch.setattr("slideviz.solver.setup.RELAXED_CELLS", 10)
+    step = last(case, mesh)
+    assert step.relaxed is None
+    assert any("RELAX= AUTO relaxes no mesh of more than" in text for text in step.warnings)
+    assert last(case.change(relax="yes"), mesh).relaxed is not None
+    assert RELAXED_CELLS == 1_000_000
+
+
+def test_the_report_says_how_the_mesh_was_relaxed(tmp_path, capsys):
+    mesh, case = airfoil(relax="yes", mesh_file=tmp_path / "m.su2", mesh_out=tmp_path / "out.su2")
+    sv.write(tmp_path / "m.su2", mesh)
+    case.write(tmp_path / "c.cfg")
+    assert "RELAX= yes" in (tmp_path / "c.cfg").read_text()
+    assert run(["run", str(tmp_path / "c.cfg"), "--json", str(tmp_path / "r.json")]) == 0
+    assert f"{relaxation.ITERATIONS} rounds, residual" in capsys.readouterr().out
+    report = json.loads((tmp_path / "r.json").read_text())["relax"]
+    assert set(report) == {"rounds", "residual", "theta"}
+    with pytest.raises(CaseError, match="RELAX= YES has no derivatives"):
+        sv.Deformer(mesh, case)
