@@ -29,7 +29,6 @@ from slideviz.elastic.stiffness import (
     POISSON,
     ReferenceShape,
     ShapeBlock,
-    _gather,
     cell_volumes,
 )
 from slideviz.mesh.model import FloatArray, IntArray, frozen_array, sealed
@@ -41,8 +40,12 @@ MU = 1.0 / (2.0 * (1.0 + POISSON))
 LAM = POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))
 """Lamé's constants for a modulus of 1."""
 
-LANES = 8
-"""Elements that are computed together."""
+LANES = 64
+"""Elements that are computed together: loops over fewer are unrolled, and become no vectors."""
+
+NEWTON, CLOSE = 6, 1e-7
+"""Newton's iterations for the polar part, and the change in the last one that proves that it
+converged (quadratically)."""
 
 Elements = tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray]
 """Points, nodes, gradients and weights of the shape, and moduli."""
@@ -190,60 +193,111 @@ def gather(indptr, entries, each, out):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _map_weights(x, w):  # type: ignore[no-untyped-def]
-    """Write the weights w (a, d) of the least-squares map F = sum_a x_a w_a^T from corners X.
+def _map_weights(x, w, r):  # type: ignore[no-untyped-def]
+    """Write the weights w of the least-squares map F = sum_a x_a w_a^T from corners x.
 
-    By an orthogonal basis of the columns: normal equations lose all digits of flat cells.
+    Both (a, d, LANES). By an orthogonal basis of the columns, with factors ``r`` (d, d, LANES):
+    normal equations lose all digits of flat cells.
     """
-    n, d = x.shape
-    r = np.zeros((d, d))
+    n, d, lanes = x.shape
+    r[:] = 0.0
     for j in range(d):
-        mean = 0.0
         for a in range(n):
-            mean += x[a, j]
-        mean /= n
+            for k in range(lanes):
+                r[j, j, k] += x[a, j, k]
         for a in range(n):
-            w[a, j] = x[a, j] - mean
+            for k in range(lanes):
+                w[a, j, k] = x[a, j, k] - r[j, j, k] / n
+        r[j, j] = 0.0
     for j in range(d):
         for i in range(j):
             for a in range(n):
-                r[i, j] += w[a, i] * w[a, j]
+                for k in range(lanes):
+                    r[i, j, k] += w[a, i, k] * w[a, j, k]
             for a in range(n):
-                w[a, j] -= r[i, j] * w[a, i]
+                for k in range(lanes):
+                    w[a, j, k] -= r[i, j, k] * w[a, i, k]
         for a in range(n):
-            r[j, j] += w[a, j] * w[a, j]
-        r[j, j] = np.sqrt(r[j, j])
+            for k in range(lanes):
+                r[j, j, k] += w[a, j, k] * w[a, j, k]
+        for k in range(lanes):
+            r[j, j, k] = 1.0 / np.sqrt(r[j, j, k])
         for a in range(n):
-            w[a, j] /= r[j, j]
+            for k in range(lanes):
+                w[a, j, k] *= r[j, j, k]
     for j in range(d - 1, -1, -1):
         for a in range(n):
-            for k in range(j + 1, d):
-                w[a, j] -= w[a, k] * r[j, k]
-            w[a, j] /= r[j, j]
+            for i in range(j + 1, d):
+                for k in range(lanes):
+                    w[a, j, k] -= w[a, i, k] * r[j, i, k]
+            for k in range(lanes):
+                w[a, j, k] *= r[j, j, k]
+
+
+@njit(**OPTIONS)
+def _map(x, w, f):  # type: ignore[no-untyped-def]
+    """Write the sum of x_a w_a^T to f (9 LANES,): element (i, j) begins at (3 i + j) LANES."""
+    n, d, lanes = x.shape
+    f[:] = 0.0
+    for i in range(d):
+        for j in range(d):
+            at = (3 * i + j) * LANES
+            for a in range(n):
+                for k in range(lanes):
+                    f[at + k] += x[a, i, k] * w[a, j, k]
+
+
+@njit(**OPTIONS)
+def _polar(m, change):  # type: ignore[no-untyped-def]
+    """Replace m (9 LANES,) by orthogonal matrices: Newton's M <- (M + M^-T) / 2 (Higham).
+
+    Write the last change to ``change`` (LANES,), and infinity for a reflection.
+    """
+    for _ in range(NEWTON):
+        for k in range(LANES):
+            m00, m01, m02 = m[k], m[LANES + k], m[2 * LANES + k]
+            m10, m11, m12 = m[3 * LANES + k], m[4 * LANES + k], m[5 * LANES + k]
+            m20, m21, m22 = m[6 * LANES + k], m[7 * LANES + k], m[8 * LANES + k]
+            c00, c01, c02 = m11 * m22 - m12 * m21, m12 * m20 - m10 * m22, m10 * m21 - m11 * m20
+            c10, c11, c12 = m02 * m21 - m01 * m22, m00 * m22 - m02 * m20, m01 * m20 - m00 * m21
+            c20, c21, c22 = m01 * m12 - m02 * m11, m02 * m10 - m00 * m12, m00 * m11 - m01 * m10
+            det = m00 * c00 + m01 * c01 + m02 * c02
+            h = 1.0 / det
+            c00, c01, c02 = 0.5 * (h * c00 - m00), 0.5 * (h * c01 - m01), 0.5 * (h * c02 - m02)
+            c10, c11, c12 = 0.5 * (h * c10 - m10), 0.5 * (h * c11 - m11), 0.5 * (h * c12 - m12)
+            c20, c21, c22 = 0.5 * (h * c20 - m20), 0.5 * (h * c21 - m21), 0.5 * (h * c22 - m22)
+            size = abs(c00) + abs(c01) + abs(c02) + abs(c10) + abs(c11) + abs(c12)
+            change[k] = size + abs(c20) + abs(c21) + abs(c22) if det > 0.0 else np.inf
+            m[k], m[LANES + k], m[2 * LANES + k] = m00 + c00, m01 + c01, m02 + c02
+            m[3 * LANES + k], m[4 * LANES + k] = m10 + c10, m11 + c11
+            m[5 * LANES + k], m[6 * LANES + k] = m12 + c12, m20 + c20
+            m[7 * LANES + k], m[8 * LANES + k] = m21 + c21, m22 + c22
 
 
 @njit(**OPTIONS)
 def turns(points, nodes, x, out):  # type: ignore[no-untyped-def]
     """Write the rotations of elements at positions x (n, d) to out (m, d, d)."""
     n, d = nodes.shape[1], points.shape[1]
-    corners, w, f = np.empty((n, d)), np.empty((n, d)), np.empty((d, d))
+    corners, w = np.empty((n, d, LANES)), np.empty((n, d, LANES))
+    r, f = np.empty((d, d, LANES)), np.empty(9 * LANES)
+    fast, change, one = np.empty(9 * LANES), np.empty(LANES), np.empty((d, d))
     work, vectors = np.empty((4, 4)), np.empty((4, 4))
-    for e in range(len(nodes)):
-        _gather(points, nodes, e, corners)
-        _map_weights(corners, w)
-        _gather(x, nodes, e, corners)
-        _outer(corners, w, f)
-        rotation(f, out[e], work, vectors)
-
-
-@njit(**OPTIONS)
-def _outer(x, w, f):  # type: ignore[no-untyped-def]
-    """Write the sum of x_a w_a^T to f (d, d)."""
-    for i in range(x.shape[1]):
-        for j in range(x.shape[1]):
-            f[i, j] = 0.0
-            for a in range(len(x)):
-                f[i, j] += x[a, i] * w[a, j]
+    change[:] = np.inf
+    for first in range(0, len(nodes), LANES):
+        _corners(points, nodes, first, corners)
+        _map_weights(corners, w, r)
+        _corners(x, nodes, first, corners)
+        _map(corners, w, f)
+        if d == 3:
+            fast[:] = f
+            _polar(fast, change)
+        for lane in range(min(LANES, len(nodes) - first)):
+            for i in range(d):
+                for j in range(d):
+                    one[i, j] = f[(3 * i + j) * LANES + lane]
+                    out[first + lane, i, j] = fast[(3 * i + j) * LANES + lane]
+            if not change[lane] <= CLOSE:
+                rotation(one, out[first + lane], work, vectors)
 
 
 @njit(**OPTIONS)
@@ -279,58 +333,68 @@ def _placed(elements, first, turn, f, out):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _corners(elements, first, x, modulus):  # type: ignore[no-untyped-def]
-    """Write undeformed corners to x (a, d, LANES) and moduli to modulus (LANES,)."""
-    points, nodes = elements[0], elements[1]
+def _corners(points, nodes, first, x):  # type: ignore[no-untyped-def]
+    """Write the corners of the elements from ``first`` on to x (a, d, LANES)."""
     for lane in range(LANES):
         e = min(first + lane, len(nodes) - 1)
-        modulus[lane] = elements[4][e]
         for a in range(nodes.shape[1]):
             for i in range(points.shape[1]):
                 x[a, i, lane] = points[nodes[e, a], i]
 
 
 @njit(**OPTIONS)
-def _stiffness_times(elements, modulus, x, y, f, jacobian, slopes):  # type: ignore[no-untyped-def]
-    """Write K y of elements with corners x to f; x, y and f are (a, d, LANES).
+def _stiffness_times(elements, first, x, y, f, scratch):  # type: ignore[no-untyped-def]
+    """Write K y of the elements from ``first`` on, with corners x, to f; all (a, d, LANES).
 
-    ``jacobian`` and ``slopes`` (3, 3, LANES) are scratch; loops over lanes become vectors.
+    Loops over lanes become vectors, which they only do with places that are known in advance.
     """
-    gradients, weights = elements[2], elements[3]
+    gradients, weights, moduli = elements[2], elements[3], elements[4]
+    jacobian, slopes, modulus = scratch
+    for k in range(LANES):
+        modulus[k] = moduli[min(first + k, len(moduli) - 1)]
     n, d = x.shape[0], x.shape[1]
     f[:] = 0.0
     for q in range(len(weights)):
         jacobian[:] = 0.0
         slopes[:] = 0.0
         if d == 2:
-            jacobian[2, 2, :] = 1.0
+            jacobian[8 * LANES :] = 1.0
         for a in range(n):
             for j in range(d):
                 c = gradients[q, a, j]
                 for i in range(d):
+                    at, there = (3 * j + i) * LANES, (3 * i + j) * LANES
                     for k in range(LANES):
-                        jacobian[j, i, k] += c * x[a, i, k]
+                        jacobian[at + k] += c * x[a, i, k]
                     for k in range(LANES):
-                        slopes[i, j, k] += c * y[a, i, k]
+                        slopes[there + k] += c * y[a, i, k]
         for k in range(LANES):
-            j00, j01, j02 = jacobian[0, 0, k], jacobian[0, 1, k], jacobian[0, 2, k]
-            j10, j11, j12 = jacobian[1, 0, k], jacobian[1, 1, k], jacobian[1, 2, k]
-            j20, j21, j22 = jacobian[2, 0, k], jacobian[2, 1, k], jacobian[2, 2, k]
+            j00, j01, j02 = jacobian[k], jacobian[LANES + k], jacobian[2 * LANES + k]
+            j10, j11, j12 = (
+                jacobian[3 * LANES + k],
+                jacobian[4 * LANES + k],
+                jacobian[5 * LANES + k],
+            )
+            j20, j21, j22 = (
+                jacobian[6 * LANES + k],
+                jacobian[7 * LANES + k],
+                jacobian[8 * LANES + k],
+            )
             a00, a10, a20 = j11 * j22 - j12 * j21, j12 * j20 - j10 * j22, j10 * j21 - j11 * j20
             a01, a11, a21 = j02 * j21 - j01 * j22, j00 * j22 - j02 * j20, j01 * j20 - j00 * j21
             a02, a12, a22 = j01 * j12 - j02 * j11, j02 * j10 - j00 * j12, j00 * j11 - j01 * j10
             det = j00 * a00 + j01 * a10 + j02 * a20
             # The cofactors are det J^-1: the gradients are divided by det here, the forces there.
             size = modulus[k] * weights[q] / abs(det)
-            h0, h1, h2 = slopes[0, 0, k], slopes[0, 1, k], slopes[0, 2, k]
+            h0, h1, h2 = slopes[k], slopes[LANES + k], slopes[2 * LANES + k]
             g00 = h0 * a00 + h1 * a01 + h2 * a02
             g01 = h0 * a10 + h1 * a11 + h2 * a12
             g02 = h0 * a20 + h1 * a21 + h2 * a22
-            h0, h1, h2 = slopes[1, 0, k], slopes[1, 1, k], slopes[1, 2, k]
+            h0, h1, h2 = slopes[3 * LANES + k], slopes[4 * LANES + k], slopes[5 * LANES + k]
             g10 = h0 * a00 + h1 * a01 + h2 * a02
             g11 = h0 * a10 + h1 * a11 + h2 * a12
             g12 = h0 * a20 + h1 * a21 + h2 * a22
-            h0, h1, h2 = slopes[2, 0, k], slopes[2, 1, k], slopes[2, 2, k]
+            h0, h1, h2 = slopes[6 * LANES + k], slopes[7 * LANES + k], slopes[8 * LANES + k]
             g20 = h0 * a00 + h1 * a01 + h2 * a02
             g21 = h0 * a10 + h1 * a11 + h2 * a12
             g22 = h0 * a20 + h1 * a21 + h2 * a22
@@ -343,21 +407,22 @@ def _stiffness_times(elements, modulus, x, y, f, jacobian, slopes):  # type: ign
                 size * (MU * (g02 + g20)),
                 size * (MU * (g12 + g21)),
             )
-            slopes[0, 0, k] = s00 * a00 + s01 * a10 + s02 * a20
-            slopes[0, 1, k] = s00 * a01 + s01 * a11 + s02 * a21
-            slopes[0, 2, k] = s00 * a02 + s01 * a12 + s02 * a22
-            slopes[1, 0, k] = s01 * a00 + s11 * a10 + s12 * a20
-            slopes[1, 1, k] = s01 * a01 + s11 * a11 + s12 * a21
-            slopes[1, 2, k] = s01 * a02 + s11 * a12 + s12 * a22
-            slopes[2, 0, k] = s02 * a00 + s12 * a10 + s22 * a20
-            slopes[2, 1, k] = s02 * a01 + s12 * a11 + s22 * a21
-            slopes[2, 2, k] = s02 * a02 + s12 * a12 + s22 * a22
+            slopes[k] = s00 * a00 + s01 * a10 + s02 * a20
+            slopes[LANES + k] = s00 * a01 + s01 * a11 + s02 * a21
+            slopes[2 * LANES + k] = s00 * a02 + s01 * a12 + s02 * a22
+            slopes[3 * LANES + k] = s01 * a00 + s11 * a10 + s12 * a20
+            slopes[4 * LANES + k] = s01 * a01 + s11 * a11 + s12 * a21
+            slopes[5 * LANES + k] = s01 * a02 + s11 * a12 + s12 * a22
+            slopes[6 * LANES + k] = s02 * a00 + s12 * a10 + s22 * a20
+            slopes[7 * LANES + k] = s02 * a01 + s12 * a11 + s22 * a21
+            slopes[8 * LANES + k] = s02 * a02 + s12 * a12 + s22 * a22
         for a in range(n):
             for j in range(d):
                 c = gradients[q, a, j]
                 for i in range(d):
+                    at = (3 * i + j) * LANES
                     for k in range(LANES):
-                        f[a, i, k] += c * slopes[i, j, k]
+                        f[a, i, k] += c * slopes[at + k]
 
 
 @njit(**OPTIONS)
@@ -368,11 +433,11 @@ def turned(elements, turn, field, shapes, out):  # type: ignore[no-untyped-def]
     """
     n, d = out.shape[1], out.shape[2]
     x, y, f = np.empty((n, d, LANES)), np.empty((n, d, LANES)), np.empty((n, d, LANES))
-    modulus, one, two = np.empty(LANES), np.empty((3, 3, LANES)), np.empty((3, 3, LANES))
+    scratch = np.empty(9 * LANES), np.empty(9 * LANES), np.empty(LANES)
     for first in range(0, len(out), LANES):
-        _corners(elements, first, x, modulus)
+        _corners(elements[0], elements[1], first, x)
         _lanes(elements, first, turn, field, shapes, y)
-        _stiffness_times(elements, modulus, x, y, f, one, two)
+        _stiffness_times(elements, first, x, y, f, scratch)
         _placed(elements, first, turn, f, out)
 
 
@@ -410,23 +475,22 @@ def changed(elements, turn, at, along, reverse, out):  # type: ignore[no-untyped
     n, d = out.shape[1], out.shape[2]
     x, u, y = np.empty((n, d, LANES)), np.empty((n, d, LANES)), np.empty((n, d, LANES))
     k_u, k_y, w = np.empty((n, d, LANES)), np.empty((n, d, LANES)), np.empty((n, d, LANES))
-    modulus, one, two = np.empty(LANES), np.empty((3, 3, LANES)), np.empty((3, 3, LANES))
-    s, weights, omega = np.empty((d, d)), np.empty((n, d)), np.empty((LANES, 3))
-    moment = np.empty((LANES, 3))
+    scratch = np.empty(9 * LANES), np.empty(9 * LANES), np.empty(LANES)
+    s, r, f = np.empty((d, d)), np.empty((d, d, LANES)), np.empty(9 * LANES)
+    omega, moment = np.empty((LANES, 3)), np.empty((LANES, 3))
     for first in range(0, len(out), LANES):
-        _corners(elements, first, x, modulus)
+        _corners(elements[0], elements[1], first, x)
         _lanes(elements, first, turn, at, 1.0, u)
         _lanes(elements, first, turn, along, 0.0, y)
-        _stiffness_times(elements, modulus, x, u, k_u, one, two)
+        _stiffness_times(elements, first, x, u, k_u, scratch)
         if reverse:
-            _stiffness_times(elements, modulus, x, y, k_y, one, two)
+            _stiffness_times(elements, first, x, y, k_y, scratch)
+        _map_weights(x, w, r)
+        _map(u, w, f)  # S = R^T F = I + sum_a u_a w_a^T
         for lane in range(LANES):
-            _map_weights(x[:, :, lane], weights)
-            w[:, :, lane] = weights
-            # S = R^T F = I + sum_a u_a w_a^T
-            _outer(u[:, :, lane], weights, s)
             for i in range(d):
-                s[i, i] += 1.0
+                for j in range(d):
+                    s[i, j] = f[(3 * i + j) * LANES + lane] + (1.0 if i == j else 0.0)
             moment[lane] = 0.0
             if reverse:
                 _add_crossed(k_u, y, lane, 1.0, moment[lane])
@@ -439,7 +503,7 @@ def changed(elements, turn, at, along, reverse, out):  # type: ignore[no-untyped
             else:
                 _add_spun(omega[lane], u, lane, -1.0, y)
         if not reverse:
-            _stiffness_times(elements, modulus, x, y, k_y, one, two)
+            _stiffness_times(elements, first, x, y, k_y, scratch)
             for lane in range(LANES):
                 _add_spun(omega[lane], k_u, lane, 1.0, k_y)
         _placed(elements, first, turn, k_y, out)
