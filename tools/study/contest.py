@@ -170,12 +170,21 @@ def _own(name: str, size: int | None, variant: str, **changes: Any) -> Any:
     return made.mesh, made.case.change(**changes)
 
 
+TURNED_BY = 10.0
+"""Angle in degrees by which the vane of ``turbine-row`` is turned."""
+
+
+def turned_row(size: int = 20_000) -> tuple[sv.Mesh, sv.Case]:
+    """Return the sample ``turbine-row`` with its vane turned instead of enlarged."""
+    motion = sv.Rotate("BLADE", TURNED_BY)
+    mesh, case = _own("turbine-row", size, "motion", motions=(motion,))
+    return mesh, case
+
+
 def contests(folder: Path | None) -> Iterator[Contest]:
     """Yield all rows; those of real meshes only with their ``folder``."""
     row = partial(_layered_rows, cases=_passage)
-    yield from row(
-        "turbine-row", lambda: _sample("turbine-row", 20_000).mesh, "BLADE", ("turned by 10",)
-    )
+    yield Contest(f"turbine-row turned by {TURNED_BY:.0f}", turned_row)
     shapes = ("bump", "bent", "thicker 10", "thicker 30")
     if folder is not None:
         read = partial(_real, folder)
@@ -304,7 +313,7 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--meshes", type=Path, metavar="DIR", help="SU2's folder TestCases")
     parser.add_argument("--rows", default="", metavar="REGEX", help="only rows with such a name")
     parser.add_argument("--methods", metavar="LIST", help=f"of {', '.join(METHODS)}")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write CSV")
+    parser.add_argument("-o", "--output", type=Path, metavar="NAME", help="write NAME.csv, NAME.md")
     parser.add_argument("--list", action="store_true", help="print names of rows, and run nothing")
     arguments = parser.parse_args(argv)
     rows = [row for row in contests(arguments.meshes) if re.search(arguments.rows, row.name)]
@@ -328,12 +337,46 @@ def main(argv: Sequence[str]) -> int:
     return 1 if broken else 0
 
 
-def write(path: Path, outcomes: Sequence[Outcome]) -> None:
-    """Write outcomes as CSV."""
-    with path.open("w", encoding="utf-8") as file:
+def write(name: Path, outcomes: Sequence[Outcome]) -> None:
+    """Write outcomes as ``name.csv``, and beside each other as ``name.md``."""
+    with name.with_suffix(".csv").open("w", encoding="utf-8") as file:
         table = csv.DictWriter(file, [f.name for f in fields(Outcome)], lineterminator="\n")
         table.writeheader()
         table.writerows(asdict(outcome) for outcome in outcomes)
+    name.with_suffix(".md").write_text("\n".join(beside(outcomes)) + "\n", encoding="utf-8")
+
+
+def beside(outcomes: Sequence[Outcome]) -> Iterator[str]:
+    """Yield the lines of two tables, with a row for each mesh and motion: with layers, without."""
+    rows: dict[str, dict[str, Outcome]] = {}
+    for outcome in outcomes:
+        rows.setdefault(outcome.row, {})[outcome.method] = outcome
+    for layered in (True, False):
+        chosen = {
+            name: found
+            for name, found in rows.items()
+            if any(o.height_min > 0 or o.height_min <= 0 for o in found.values()) == layered
+        }
+        methods = [m for m in METHODS if any(m in found for found in chosen.values())]
+        yield f"| mesh and motion | {' | '.join(methods)} |"
+        yield "| --- " * (len(methods) + 1) + "|"
+        for name, found in chosen.items():
+            cells = [_short(found[m]) if m in found else "" for m in methods]
+            yield f"| {name} | {' | '.join(cells)} |"
+        yield ""
+
+
+def _short(outcome: Outcome) -> str:
+    """Return mean and lowest quality, least and largest first height, and angle in one cell."""
+    o = outcome
+    if o.problem:
+        return "refused"
+    text = f"{o.mean:.3f}, " + (f"{o.inverted} inverted" if o.inverted else f"{o.lowest:.3f}")
+    if np.isnan(o.height_min):
+        return text
+    low, high = f"{o.height_min:.3f}", f"{o.height_max:.3f}"
+    heights = low if low == high else f"{low} to {high}"
+    return f"{text}; {heights}; {o.angle_deg:.1f}°"
 
 
 def say(text: str) -> None:
