@@ -46,8 +46,7 @@ _SEVERAL = {
     "an array of numbers": "arrays of numbers",
     "value": "values",
 }
-_SHORT = 60
-"""Largest length of a value that a message shows."""
+_SHORT = 60  # largest length of a value that a message shows
 
 
 class _Misfit(NamedTuple):

@@ -13,8 +13,7 @@ INVERTED_COLOR = "#e8112d"
 SELECTED_COLOR = "#ffb000"
 VALUE_EDGE = "#000000"
 """Edges of cells that are colored by values or roles: it differs from all colors of maps."""
-INTERSECTION_COLOR = "#e8112d"
-"""The motion ghost of a boundary that crosses another one."""
+INTERSECTION_COLOR = "#e8112d"  # the motion ghost of a boundary that crosses another one
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,7 @@ _COMMENT = re.compile(f"[{COMMENT_SIGNS}][^\n]*")
 _SEPARATORS = str.maketrans(",;", "  ")
 
 
-PART = 4000
-"""Lines that are turned into numbers at a time, so that other threads get a turn."""
+PART = 4000  # lines that are turned into numbers at a time, so that other threads get a turn
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ from slideviz.terms import FFD_BLENDINGS, FFD_SYSTEMS
 
 Definition = tuple[str, tuple[float, ...]]
 Degrees = tuple[int, int, int]
-NUMBERS = 24
-"""Coordinates of the 8 corners of a box."""
+NUMBERS = 24  # coordinates of the 8 corners of a box
 
 
 def _groups(text: str) -> list[list[Word]]:

@@ -42,8 +42,7 @@ from slideviz.mesh.check import LARGEST, within
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.topology import vertex_normals
 
-EPS = 1e-16
-"""What SU2 adds to coordinates of `surface_bump`."""
+EPS = 1e-16  # what SU2 adds to coordinates of `surface_bump`
 LEVEL = 1e-12
 """A node is on neither side where y is less than this part of its normal: that is rounding."""
 
@@ -218,8 +217,7 @@ def _read_file(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Displacement
     return replace(read_displacements(path, mesh.part.points[nodes], shape, of), nodes=nodes)
 
 
-AGREE = 1e-9
-"""Largest allowed difference of two displacements of one node, over the mesh's extent."""
+AGREE = 1e-9  # largest allowed difference of two displacements of one node, over the mesh's extent
 
 ALIKE = 1e-6
 """Largest allowed difference of two displacements of one node, over the largest displacement. The

@@ -51,8 +51,7 @@ VERB_OF: dict[type, MotionKind] = {
 }
 """Verbs of motions, by class."""
 ALL_MOVING = "*"
-MOST_TERMS = 100
-"""Most terms of an airfoil's shape function."""
+MOST_TERMS = 100  # most terms of an airfoil's shape function
 
 
 def read_motions(text: str) -> tuple[Motion, ...]:

@@ -19,10 +19,8 @@ from slideviz.terms import AXES, Term, labels
 Entry = Literal["text", "choice", "switch", "real", "whole", "axis", "point"]
 """The kind of field by which the window lets users enter a value."""
 
-LARGEST_WHOLE = 999_999_999
-"""The largest whole number: it has 9 digits, which ``_WHOLE`` allows."""
-MAX_STEPS = 9999
-"""Largest number of steps that the window offers; a case file may ask for more."""
+LARGEST_WHOLE = 999_999_999  # the largest whole number: it has 9 digits, which ``_WHOLE`` allows
+MAX_STEPS = 9999  # largest number of steps that the window offers; a case file may ask for more
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_./~:@=,+-]([A-Za-z0-9_./~:@=,+ -]*[A-Za-z0-9_./~:@=,+-])?\Z")
 _WHOLE = re.compile(r"[+-]?[0-9]{1,9}\Z")

@@ -18,8 +18,7 @@ from slideviz.case.words import list_of, number
 from slideviz.errors import CaseError, shown
 from slideviz.terms import COLOR_BY, COLOR_MAPS, POINTS_SHOWN, SHOWN
 
-HIDDEN = "hidden"
-"""The last word of a section that is not drawn."""
+HIDDEN = "hidden"  # the last word of a section that is not drawn
 
 SectionText = tuple[str, tuple[float, ...], bool, bool, bool]
 """A section: shape, numbers, whether whole cells are shown, has a flat view, and is drawn."""

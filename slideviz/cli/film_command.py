@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import Mesh
     from slideviz.session.state import Run, StepFrame
 
-SMOOTH = 4
-"""Films of fewer steps get a hint on ``--between``."""
+SMOOTH = 4  # films of fewer steps get a hint on ``--between``
 
 
 def add_film(calls: argparse._SubParsersAction) -> None:

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from slideviz.scene.overview import Zoom
     from slideviz.terms import Role
 
-REMEDY = "give --reference UNDEFORMED"
-"""The advice after that remark."""
+REMEDY = "give --reference UNDEFORMED"  # the advice after that remark
 
 
 def add_reference(call: argparse.ArgumentParser, case_help: str) -> None:

@@ -26,11 +26,9 @@ _PHASES = {
     "quality": "measuring cells",
     "convert": "converting",
 }
-_BEFORE = ("read", "convert", "classify")
-"""Phases in which a run can still be refused."""
+_BEFORE = ("read", "convert", "classify")  # phases in which a run can still be refused
 _EVERY = 0.1
-_WIPE = "\r\033[K"
-"""Control sequence that clears the line of a bar."""
+_WIPE = "\r\033[K"  # control sequence that clears the line of a bar
 
 
 @contextmanager

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
 
-MOST_COPIES = 100
-"""Most passages on each side: more could not be seen, and take too long to draw."""
+MOST_COPIES = 100  # most passages on each side: more could not be seen, and take too long to draw
 
 
 def glued(argv: Sequence[str]) -> list[str]:

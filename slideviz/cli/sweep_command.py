@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 _LISTED = 5
 """Most designs that are listed in one line, and most reasons of failed designs that are printed."""
-_CONNECTING = 10.0
-"""Seconds to wait for a connection to a scheduler."""
+_CONNECTING = 10.0  # seconds to wait for a connection to a scheduler
 
 
 def add_sweep(calls: argparse._SubParsersAction) -> None:

@@ -25,8 +25,7 @@ from slideviz.solver.stepping import (
 
 Report = Callable[[Progress], None]
 
-BYTES = 64
-"""Free memory for each entry of a factor, above which factors are kept for further calls."""
+BYTES = 64  # free memory for each entry of a factor, above which factors are kept for further calls
 
 
 def choose_steps(

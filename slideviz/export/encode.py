@@ -32,15 +32,13 @@ Pixels = NDArray[np.uint8]
 Add = Callable[[Pixels, float], None]
 """A function that writes an image (height, width, 3) to be shown for a number of seconds."""
 
-SUFFIXES = (".mp4", ".gif", ".png")
-"""The kinds of films (see `film_kind`)."""
+SUFFIXES = (".mp4", ".gif", ".png")  # the kinds of films (see `film_kind`)
 
 MIN_FPS = 10
 """Least frame rate of an MP4, as players fail with lower ones; images shown longer are repeated."""
 MAX_FPS = {".mp4": 60.0, ".gif": 50.0, ".png": float("inf")}
 """Largest frame rate by kind: what screens show, and what browsers play of a GIF."""
-_NUMBER = re.compile(r"(%(?:0\d)?d)")
-"""The place of the number in the name of numbered pictures."""
+_NUMBER = re.compile(r"(%(?:0\d)?d)")  # the place of the number in the name of numbered pictures
 
 
 @dataclass(frozen=True)

@@ -67,8 +67,7 @@ class FilmOptions:
         return self.fps or min(FPS, max(1.0, self.count(frames) / SECONDS))
 
 
-DEFAULT_FILM = FilmOptions()
-"""The default settings of a film."""
+DEFAULT_FILM = FilmOptions()  # the default settings of a film
 
 
 def check_film(
@@ -188,8 +187,7 @@ def _positions(steps: int, between: int) -> Iterator[float]:
     yield float(steps)
 
 
-_NARROWEST = 160
-"""Least width in pixels for the mesh in each of two pictures side by side."""
+_NARROWEST = 160  # least width in pixels for the mesh in each of two pictures side by side
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,7 @@ from slideviz.session.runs_words import run_words
 from slideviz.session.state import Session
 from slideviz.terms import COLOR_MAPS, NO_REFERENCE, ColorMap, Quantity, quantity_of
 
-_SHOWN = "shown: "
-"""Begin of the note about a threshold."""
+_SHOWN = "shown: "  # begin of the note about a threshold
 
 
 @dataclass(frozen=True)

@@ -21,12 +21,9 @@ from slideviz.scene.color_legend import set_letters
 
 SMALLEST, LARGEST = 64, 8192
 """Least and largest width or height of a picture in pixels; drivers draw no larger ones."""
-TITLE = 16
-"""Height of the title's letters in pixels, at normal size."""
-_NORMAL_HEIGHT = 620
-"""Height in pixels of a picture with letters of normal size."""
-CAPTION_AT = 0.02
-"""Left end of the title of a picture or film, relative to the width."""
+TITLE = 16  # height of the title's letters in pixels, at normal size
+_NORMAL_HEIGHT = 620  # height in pixels of a picture with letters of normal size
+CAPTION_AT = 0.02  # left end of the title of a picture or film, relative to the width
 LETTERS = 1.25
 """Size of the letters of pictures and films relative to the view's; they are often shown small."""
 

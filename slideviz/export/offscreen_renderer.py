@@ -287,14 +287,11 @@ class OffscreenRenderer:
             yield self.session.mesh
 
 
-PICTURE_SIZE = PictureOptions.size
-"""Default width and height in pixels."""
+PICTURE_SIZE = PictureOptions.size  # default width and height in pixels
 
-WHITE = 250
-"""Least red, green and blue (0 to 255) of a pixel that counts as background."""
+WHITE = 250  # least red, green and blue (0 to 255) of a pixel that counts as background
 
-_SMALL = 10
-"""Mean size of cells in pixels below which they are drawn without edges."""
+_SMALL = 10  # mean size of cells in pixels below which they are drawn without edges
 
 
 def picture(

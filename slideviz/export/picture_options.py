@@ -29,8 +29,7 @@ BACKGROUNDS: dict[Background, str] = {
 """The kinds of background, and their words in the dialog."""
 TITLE_ROOM = 40.0
 """Height of a title of one line in pixels, at normal letter size; a second line adds 20."""
-GAP = 12.0
-"""Distance in pixels between two pictures side by side, at normal letter size."""
+GAP = 12.0  # distance in pixels between two pictures side by side, at normal letter size
 
 
 @dataclass(frozen=True)

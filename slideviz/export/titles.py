@@ -27,12 +27,10 @@ if TYPE_CHECKING:
     from slideviz.scene.scene import Scene
 
 
-LETTER_WIDTH = 9.6
-"""Width of a title's letter in pixels, at normal size."""
+LETTER_WIDTH = 9.6  # width of a title's letter in pixels, at normal size
 DETAIL = " (whole mesh; detail shown)"
 """Text behind the quality of a mesh of which a detail is shown."""
-_SMALLEST = 0.6
-"""Smallest size of the letters of titles, relative to the usual one."""
+_SMALLEST = 0.6  # smallest size of the letters of titles, relative to the usual one
 LONGEST = "step {0}.00 of {0}, interpolated"
 """The longest text of a place in a film, by which the form of its titles is chosen once."""
 
@@ -172,11 +170,9 @@ def _cut(line: str, most: int) -> str:
     return line if len(line) <= most else line[: max(most - 1, 1)].rstrip(" ,") + "…"
 
 
-CELL_LABEL = "mark:words"
-"""Name of the actor of the marked cell's label."""
+CELL_LABEL = "mark:words"  # name of the actor of the marked cell's label
 
-_AWAY = 9.0
-"""Distance in pixels between the cell and its label, at normal letter size."""
+_AWAY = 9.0  # distance in pixels between the cell and its label, at normal letter size
 
 
 def mark_words(session: Session) -> str:

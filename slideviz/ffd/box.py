@@ -23,12 +23,10 @@ from slideviz.terms import FfdSystem
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-WEDGE = 0.1
-"""Half the angle in radians of a box in 2D with polar coordinates, about the axis."""
+WEDGE = 0.1  # half the angle in radians of a box in 2D with polar coordinates, about the axis
 POLAR_CORNERS = np.array([1, 2, 2, 1, 0, 3, 3, 0])
 """Which of the 4 corners that are given each of the 8 corners of a polar box in 2D is."""
-POLAR_SIDES = np.array([-1, -1, 1, 1, -1, -1, 1, 1])
-"""Side of the plane on which each of them is."""
+POLAR_SIDES = np.array([-1, -1, 1, 1, -1, -1, 1, 1])  # side of the plane on which each of them is
 
 
 @dataclass(frozen=True)
@@ -159,8 +157,7 @@ def _placed(values: FloatArray, first: np.ndarray, count: int) -> FloatArray:
 Index = tuple[int, int, int]
 """A control point (i, j, k); an index of -1 means all of that direction."""
 
-HALF = 0.5
-"""Half the thickness of a box in 2D, in the mesh's length unit."""
+HALF = 0.5  # half the thickness of a box in 2D, in the mesh's length unit
 CORNERS = np.array(
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
 )

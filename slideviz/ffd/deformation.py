@@ -24,18 +24,13 @@ INSIDE = 1e-8
 """A parametric coordinate may be so far outside of [0, 1]: a point on a side is inside."""
 MET = 1e-13
 """Distance from a point at which Newton's method ends, in parts of the box's size on each axis."""
-CLOSE = 1e-9
-"""Largest distance at which a point counts as found, in the same measure."""
-ROUNDING = 1e-14
-"""Part of the largest coordinate that is added to `CLOSE`."""
+CLOSE = 1e-9  # largest distance at which a point counts as found, in the same measure
+ROUNDING = 1e-14  # part of the largest coordinate that is added to `CLOSE`
 STEPS, HALVINGS, STARTS = 40, 12, 4
 """Most steps of Newton's method, most halvings of a step, and number of starts of a point."""
-SAMPLES = 3
-"""Sampled points for each control point and direction; the nearest ones are the starts."""
-REACH = 0.5
-"""Newton's method stays so near to [0, 1] in each parametric coordinate."""
-CHUNK = 20_000
-"""Points solved for together."""
+SAMPLES = 3  # sampled points for each control point and direction; the nearest ones are the starts
+REACH = 0.5  # Newton's method stays so near to [0, 1] in each parametric coordinate
+CHUNK = 20_000  # points solved for together
 
 
 def parametric(box: Box, points: FloatArray) -> tuple[FloatArray, np.ndarray]:

@@ -17,8 +17,7 @@ from slideviz.mesh.model import FloatArray
 
 NEARLY = 1e-6
 """SU2's shift of the plane in which a twist finds its centre (``SegmentIntersectsPlane``)."""
-NORMAL = np.array([NEARLY, 1.0 + NEARLY, NEARLY])
-"""Normal of that plane."""
+NORMAL = np.array([NEARLY, 1.0 + NEARLY, NEARLY])  # normal of that plane
 
 
 class Move(Protocol):

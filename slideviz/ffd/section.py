@@ -29,11 +29,9 @@ from slideviz.formats.su2.read import Document
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 _LETTERS = "IJK"
-_FARTHEST = 10.0
-"""Largest parametric coordinate of a point in a box, which goes from 0 to 1."""
+_FARTHEST = 10.0  # largest parametric coordinate of a point in a box, which goes from 0 to 1
 
-Row = tuple[int, list[str]]
-"""A line of numbers: its place in the section, from 0, and its words."""
+Row = tuple[int, list[str]]  # a line of numbers: its place in the section, from 0, and its words
 
 
 @dataclass
@@ -45,8 +43,7 @@ class BoxEntry:
     rows: list[Row] = field(default_factory=list)
 
 
-Entries = dict[str, BoxEntry]
-"""The keyword lines of a box, by key."""
+Entries = dict[str, BoxEntry]  # the keyword lines of a box, by key
 
 
 def read_boxes(mesh: Mesh, lines: list[str], system: CoordinateSystem) -> tuple[Box, ...]:

@@ -34,10 +34,8 @@ from slideviz.system.cleanup import open_temporary
 from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import Tick, ordered_map
 
-HEAD = 8
-"""Bytes before the first zone."""
-PIECES = 16
-"""Pieces of a text, each about a megabyte, in one task."""
+HEAD = 8  # bytes before the first zone
+PIECES = 16  # pieces of a text, each about a megabyte, in one task
 _Task = tuple[str, int, int]
 """``cells`` or ``points``, index of the first piece, and of the one after the last."""
 

@@ -49,14 +49,10 @@ _SECONDS = 20
 _SECONDS_PER_BYTE = 20e-6
 _MEMORY = 8 << 30
 _MEMORY_PER_BYTE = 200
-_TICK_SECONDS = 0.05
-"""Seconds between two calls of the progress function."""
-_BYTES_PER_SECOND = 5e6
-"""Speed of reading that the progress assumes."""
-_CHUNK_BYTES = 1 << 20
-"""Most bytes that are read from the process at a time."""
-_SET_DEATH_SIGNAL = 1
-"""``PR_SET_PDEATHSIG`` of Linux's ``prctl``."""
+_TICK_SECONDS = 0.05  # seconds between two calls of the progress function
+_BYTES_PER_SECOND = 5e6  # speed of reading that the progress assumes
+_CHUNK_BYTES = 1 << 20  # most bytes that are read from the process at a time
+_SET_DEATH_SIGNAL = 1  # ``PR_SET_PDEATHSIG`` of Linux's ``prctl``
 
 
 def read_in_subprocess(path: Path, progress: Tick) -> Mesh:

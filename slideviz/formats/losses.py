@@ -16,8 +16,7 @@ from slideviz.formats.table import FORMATS, MeshFormat, format_for, usual_ending
 from slideviz.mesh.model import Mesh
 from slideviz.terms import FileFormat
 
-OTHER_ZONES = "its other zones"
-"""What a file of one zone loses."""
+OTHER_ZONES = "its other zones"  # what a file of one zone loses
 
 
 def left_out(path: Path, mesh: Mesh) -> str:

@@ -31,17 +31,12 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 if TYPE_CHECKING:
     import h5py
 
-_VERSION = (2, 1)
-"""Version of the format."""
-_VOLUME = "volume"
-"""Name of the block with the cells."""
-_CHUNK_ROWS = 1 << 16
-"""Most rows in a chunk of an HDF5 dataset that grows."""
-PARTITION = 1 << 20
-"""Most cells of a partition."""
+_VERSION = (2, 1)  # version of the format
+_VOLUME = "volume"  # name of the block with the cells
+_CHUNK_ROWS = 1 << 16  # most rows in a chunk of an HDF5 dataset that grows
+PARTITION = 1 << 20  # most cells of a partition
 
-Values = Mapping[str, NDArray]
-"""Arrays by name, a row for each cell or point."""
+Values = Mapping[str, NDArray]  # arrays by name, a row for each cell or point
 
 
 @dataclass(frozen=True, eq=False)

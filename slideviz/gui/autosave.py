@@ -136,8 +136,7 @@ def _time_text(when: datetime) -> str:
     return f"{when:%H:%M}" if when.date() == datetime.now().date() else f"{when:%Y-%m-%d %H:%M}"
 
 
-HALF_WRITTEN_S = 60.0
-"""Age in seconds from which a temporary file is not being written any more."""
+HALF_WRITTEN_S = 60.0  # age in seconds from which a temporary file is not being written any more
 
 SOURCE = "saved as: "
 """Begin of the remark in a session's file that names the case file it belongs to."""

@@ -25,8 +25,7 @@ from slideviz.session.store import Store
 
 log = logging.getLogger("slideviz")
 
-READING = "Reading the cells of the section"
-"""Begin of the progress messages of `SectionReader`."""
+READING = "Reading the cells of the section"  # begin of the progress messages of `SectionReader`
 
 
 class BackgroundJob(QObject):

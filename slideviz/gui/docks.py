@@ -131,17 +131,14 @@ BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
 LEFT_WIDTH, RIGHT_WIDTH = 356, 316
 """Least initial width in pixels of the docks on each side of a window of `FULL_WIDTH`."""
 
-NARROWEST = {LEFT: 236, RIGHT: 224}
-"""Least width in pixels of the docks on each side."""
+NARROWEST = {LEFT: 236, RIGHT: 224}  # least width in pixels of the docks on each side
 
-FULL_WIDTH = 1280
-"""Width of a window in pixels below which the initial widths shrink in proportion."""
+FULL_WIDTH = 1280  # width of a window in pixels below which the initial widths shrink in proportion
 
 LOW_HEIGHT = 600
 """Height of the window in pixels below which the boundaries are a tab beside motion and method."""
 
-TITLE_BAR_HEIGHT = 40
-"""Height in pixels of a screen that is left for the window's title bar."""
+TITLE_BAR_HEIGHT = 40  # height in pixels of a screen that is left for the window's title bar
 
 HEIGHTS = {
     LEFT: {"boundaries": 240, "motion": 330, "run": 90},
@@ -152,8 +149,7 @@ HEIGHTS = {
 FIRST = {LEFT: "boundaries", RIGHT: "histogram"}
 """The dock whose width is set for each side before the window is shown."""
 
-SIDE_FRACTION = 0.22
-"""Initial width of each side's docks, relative to the window's."""
+SIDE_FRACTION = 0.22  # initial width of each side's docks, relative to the window's
 
 
 def available_area(window: QWidget) -> QRect:

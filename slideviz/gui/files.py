@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow
 
 log = logging.getLogger("slideviz")
-RECENT = 10
-"""Number of recent files that are remembered."""
+RECENT = 10  # number of recent files that are remembered
 
 
 class Files(QObject):

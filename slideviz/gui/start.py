@@ -33,20 +33,15 @@ from slideviz.gui.widgets.cards import SIZE, card
 from slideviz.gui.widgets.icons import icon, logo
 from slideviz.gui.widgets.labels import ElidedLabel, rich_label, wrapped
 
-WIDEST = 860
-"""Largest width of the page in pixels: longer lines would be hard to read."""
+WIDEST = 860  # largest width of the page in pixels: longer lines would be hard to read
 
-RECENT = 5
-"""Number of recent files that are listed."""
+RECENT = 5  # number of recent files that are listed
 
-COLUMNS = 4
-"""Most cards of samples in a row."""
+COLUMNS = 4  # most cards of samples in a row
 
-NARROWEST = 126
-"""Least width of a card in pixels, for its name."""
+NARROWEST = 126  # least width of a card in pixels, for its name
 
-TRIED = "passage"
-"""The sample that is deformed by one click."""
+TRIED = "passage"  # the sample that is deformed by one click
 
 TRY = "Try it: deform a blade passage"
 """The text of the button for that; only its beginning where the page is narrow."""

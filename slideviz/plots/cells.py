@@ -23,8 +23,7 @@ THICKEST, _THINNEST, _PART = 0.45, 0.04, 0.06
 _HAIR = 0.15
 """Width in points of a line in the cell's own color, which hides gaps between neighbours."""
 
-_AMBIENT = 0.7
-"""Brightness of a surface seen edge-on, relative to one seen face-on, with ``lit``."""
+_AMBIENT = 0.7  # brightness of a surface seen edge-on, relative to one seen face-on, with ``lit``
 
 
 def color_scale(color_map: str, limits: tuple[float, float]) -> Any:
@@ -131,11 +130,9 @@ def boxes_of(cells: Polygons) -> tuple[FloatArray, FloatArray]:
 
 MOST_EDGED = 150_000
 """Number of cells above which they are drawn as pixels without visible edges, which is faster."""
-_EDGE, _FACE = "#c9d0d8", "#f3f5f7"
-"""Colors of the faint cells' edges and faces."""
+_EDGE, _FACE = "#c9d0d8", "#f3f5f7"  # colors of the faint cells' edges and faces
 
-_SECTION_LINE = 0.7
-"""Width of the section's line in points."""
+_SECTION_LINE = 0.7  # width of the section's line in points
 
 
 def surroundings(
@@ -201,8 +198,7 @@ def draw_around(axes: Any, around: Polygons, section: Section, box: Box) -> None
     axes.add_collection(line, autolim=False)
 
 
-_OUTLINE = 0.6
-"""Width of a bar's outline in points."""
+_OUTLINE = 0.6  # width of a bar's outline in points
 _THICK, BAR_GAP = 0.14, 0.12
 """Thickness of a bar, and its distance from the axes beside it, in inches."""
 BAR_BELOW = 0.62

@@ -29,8 +29,7 @@ RESULTS = {
 """The results that can be drawn, and the labels of their axes."""
 _MOST_LINES = 12
 """Most curves drawn as lines in different colors; if there are more, only points are drawn."""
-_MOST_WORDS = 12
-"""Most texts along an axis whose column has no numbers."""
+_MOST_WORDS = 12  # most texts along an axis whose column has no numbers
 
 _SIGN, _AXIS, _HIGHEST = 7, 0.6, 0.35
 """Width of a legend's sign and the gap beside it, in letters; width of the labels left of the axes,

@@ -51,10 +51,8 @@ LABELS: dict[What, str] = {
     "control_nodes": "control nodes [-]",
     "max_error": "largest error [mesh units]",
 }
-_LABEL_GAP = 0.1
-"""Least distance of two labels of numbers of steps, relative to the axis."""
-_CROWDED = 300
-"""Number of cycles of a greedy selection above which its line is thin."""
+_LABEL_GAP = 0.1  # least distance of two labels of numbers of steps, relative to the axis
+_CROWDED = 300  # number of cycles of a greedy selection above which its line is thin
 
 
 def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -> None:

@@ -20,10 +20,8 @@ SETTINGS = {
 }
 """matplotlib's settings while a figure is written."""
 
-_AIR = 0.08
-"""Space in inches between the parts of a figure, and around them."""
-SMALLEST = 8.0
-"""Smallest size of letters in points, at the printed size."""
+_AIR = 0.08  # space in inches between the parts of a figure, and around them
+SMALLEST = 8.0  # smallest size of letters in points, at the printed size
 
 
 def empty_figure(inches: tuple[float, float], dpi: float, layout: str = "none") -> Any:

@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 BAND, _STEMS = 0.12, 0.62
 """Width of the strip of inverted cells, left of the values, relative to the range of values; and
 the part of the strip for the counts, beside its label."""
-_PALER = 0.45
-"""Part of the background's color mixed into bars, so that lines over them stand out."""
-_SWATCH = 5
-"""Number of colors that represent the bars in a legend."""
+_PALER = 0.45  # part of the background's color mixed into bars, so that lines over them stand out
+_SWATCH = 5  # number of colors that represent the bars in a legend
 
 
 def histogram(

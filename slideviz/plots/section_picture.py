@@ -33,10 +33,8 @@ from slideviz.sections.polygons import Polygons, joined
 from slideviz.sections.shape import Label
 from slideviz.terms import QUANTITIES
 
-TITLE, LETTERS = 10.0, 9.0
-"""Size in points of the title's letters, and of all others."""
-_LETTER_WIDTH = 0.075
-"""Width of a label's letter in inches."""
+TITLE, LETTERS = 10.0, 9.0  # size in points of the title's letters, and of all others
+_LETTER_WIDTH = 0.075  # width of a label's letter in inches
 
 SIDES, ENDS, BAR = 0.7, 1.0, 0.7
 """Approximate room in inches for numbers and labels beside the axes; for these and titles above and
@@ -44,8 +42,7 @@ below the axes; and for the color bar. They decide the arrangement."""
 HIGHER = {True: 1.4, False: 2.0}
 """Largest height of a picture of two runs, relative to one of one run: side by side (True), or one
 above the other (False)."""
-_NARROWEST = 2.2
-"""Least width in inches of each of two sections side by side, for their titles."""
+_NARROWEST = 2.2  # least width in inches of each of two sections side by side, for their titles
 _THIN, _MARGIN = 25.0, 0.02
 """Largest ratio of length to height of the box that is shown; margin around all sections, relative
 to their length."""
@@ -186,8 +183,7 @@ def draw_triad(figure: Any, piece: Polygons, section: Section) -> None:
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
-_LONGEST = 36
-"""Most letters of the name that a title begins with."""
+_LONGEST = 36  # most letters of the name that a title begins with
 
 
 @dataclass(frozen=True)

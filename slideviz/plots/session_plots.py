@@ -32,8 +32,7 @@ if TYPE_CHECKING:
 
 Coordinate = Literal["r", "x", "y", "z"]
 
-UNDEFORMED = 4
-"""Series number of the undeformed mesh, which no run has."""
+UNDEFORMED = 4  # series number of the undeformed mesh, which no run has
 
 
 def series_of(run: Run) -> int:
@@ -209,11 +208,9 @@ def _line(section: Section) -> Section:
     return replace(section, whole_cells=False)
 
 
-LEAST_SPREAD = 0.05
-"""Least range of qualities that the axis shows."""
+LEAST_SPREAD = 0.05  # least range of qualities that the axis shows
 
-MOST_COMPARED = 4
-"""Most runs that are compared with the shown one, so that lines can be told apart."""
+MOST_COMPARED = 4  # most runs that are compared with the shown one, so that lines can be told apart
 
 Range = tuple[float, float]
 

@@ -20,8 +20,7 @@ from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MOST_LAYERS = 40
-"""Most layers, if their number is not given."""
+MOST_LAYERS = 40  # most layers, if their number is not given
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,8 +35,7 @@ _DASHES: tuple[Any, ...] = (
 )
 """The dashes of series, as line styles of matplotlib."""
 
-_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-"""The markers of series."""
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # the markers of series
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,12 @@ from slideviz.case.model import Case, Rotate
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 
-LEAST = 16
-"""Fewest cells around the airfoil."""
+LEAST = 16  # fewest cells around the airfoil
 
 CENTRE, RADIUS = -0.06, 1.12
 """The circle: the airfoil is 12 % thick. One of radius 1.06 has a cusp for a trailing edge."""
 
-FAR = 50.0
-"""Radius of the far field over the chord."""
+FAR = 50.0  # radius of the far field over the chord
 
 THIN, GROWTH = 1e-3, 1.25
 """Height over length of the first cells of a layer, and the ratio of the heights of neighbours."""

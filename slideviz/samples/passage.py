@@ -52,8 +52,7 @@ class BladeSection:
     and its half height about the camber line."""
 
 
-PASSAGE = BladeSection()
-"""The section of the sample ``passage``."""
+PASSAGE = BladeSection()  # the section of the sample ``passage``
 
 
 def camber(x: FloatArray, section: BladeSection = PASSAGE) -> FloatArray:
@@ -198,10 +197,8 @@ def _pieces(places: tuple[float, ...], cells: tuple[int, ...]) -> FloatArray:
     return np.concatenate([*starts, places[-1:]])
 
 
-WALL = 0.05
-"""Height of the O-grid's cells at the blade, divided by that of its outermost ones."""
-LINE, QUADRILATERAL = 3, 9
-"""VTK identifiers."""
+WALL = 0.05  # height of the O-grid's cells at the blade, divided by that of its outermost ones
+LINE, QUADRILATERAL = 3, 9  # VTK identifiers
 
 # For edges e = (ax, ay, bx, by): a x b = e S e / 2 with this matrix S.
 _CROSS = np.array([[0, 0, 0, 1], [0, 0, -1, 0], [0, -1, 0, 0], [1, 0, 0, 0]], float)

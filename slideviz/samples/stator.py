@@ -39,12 +39,10 @@ from slideviz.samples.passage import (
 )
 from slideviz.samples.thesis import FILE, LARGEST, QUADRILATERAL, mesh_of, zone_of
 
-TWIST_DEG = -8.0
-"""Rotation about the stacking line at the shroud; 0 at the hub."""
+TWIST_DEG = -8.0  # rotation about the stacking line at the shroud; 0 at the hub
 LEAN_DEG = -3.0
 """Shift in theta at the shroud, which moves the blade out of its old passage; 0 at the hub."""
-BUMPS, SEED = 40, 41
-"""Number of bumps, and seed of their random places, widths and heights."""
+BUMPS, SEED = 40, 41  # number of bumps, and seed of their random places, widths and heights
 HEIGHT, WIDTH = 6e-4, (3e-3, 9e-3)
 """Greatest height of a bump, and its least and greatest radius, in the mesh's length unit."""
 
@@ -140,36 +138,24 @@ def _spline(block: FloatArray, shape: tuple[int, ...]) -> FloatArray:
     return np.stack(columns, axis=2)
 
 
-SIZES = (5_000, 5_000_000)
-"""Least and largest number of cells of a mesh in memory."""
-BLADES = 41
-"""Number of blades on the circumference (thesis Table 4.13)."""
-RADII = (0.25, 0.275, 0.3)
-"""Radii of hub, middle and shroud (thesis Table 4.13)."""
-DEPTH = 0.1143
-"""Extent of the mesh in z (thesis Table 4.13)."""
-LEADING_EDGE, CHORD = 0.035, 0.045
-"""z of the leading edge, and extent of the blade in z."""
+SIZES = (5_000, 5_000_000)  # least and largest number of cells of a mesh in memory
+BLADES = 41  # number of blades on the circumference (thesis Table 4.13)
+RADII = (0.25, 0.275, 0.3)  # radii of hub, middle and shroud (thesis Table 4.13)
+DEPTH = 0.1143  # extent of the mesh in z (thesis Table 4.13)
+LEADING_EDGE, CHORD = 0.035, 0.045  # z of the leading edge, and extent of the blade in z
 STACK = 0.4
 """Place of the stacking line, which all sections have at theta = 0, as a part of the chord."""
 ANGLES_DEG = ((4.0, -47.0), (7.0, -50.0), (10.0, -53.0))
 """`BladeSection.angles_deg` at hub, middle and shroud: a twisted blade."""
-THICKNESS = (0.08, 0.17, 1.4)
-"""`BladeSection.thickness` at all radii."""
-HOLE = (-0.12, 1.12, 0.16)
-"""`BladeSection.hole` at all radii."""
-SHARES = Shares(ahead=26, along=50, behind=25, nose=0.5, tail=0.15)
-"""Relative numbers of cells."""
-COARSE = 24
-"""Most cells along the inflow of a grid that is smoothed from straight lines."""
-FINEST = 126
-"""Most cells along the inflow of a grid that is smoothed."""
+THICKNESS = (0.08, 0.17, 1.4)  # `BladeSection.thickness` at all radii
+HOLE = (-0.12, 1.12, 0.16)  # `BladeSection.hole` at all radii
+SHARES = Shares(ahead=26, along=50, behind=25, nose=0.5, tail=0.15)  # relative numbers of cells
+COARSE = 24  # most cells along the inflow of a grid that is smoothed from straight lines
+FINEST = 126  # most cells along the inflow of a grid that is smoothed
 SPLINED = 48
 """Cells along the inflow of the smoothed grid that finer ones than FINEST are interpolated from."""
-RADIAL = 0.62
-"""Number of cells in r, divided by that along the inflow."""
-ROUGH = 1e-3
-"""Tolerance of `smooth` for interpolated grids, in chords."""
+RADIAL = 0.62  # number of cells in r, divided by that along the inflow
+ROUGH = 1e-3  # tolerance of `smooth` for interpolated grids, in chords
 
 
 def stator_mesh(size: int) -> Mesh:

@@ -23,10 +23,8 @@ from slideviz.formats.su2b.write import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.terms import Role
 
-LINE, QUADRILATERAL, HEXAHEDRON = 3, 9, 12
-"""VTK identifiers."""
-LARGEST = 200_000_000
-"""Most cells of a mesh that is written block by block."""
+LINE, QUADRILATERAL, HEXAHEDRON = 3, 9, 12  # VTK identifiers
+LARGEST = 200_000_000  # most cells of a mesh that is written block by block
 
 
 class Structured(Protocol):
@@ -98,8 +96,7 @@ SHIFT = (-0.2, -0.3, 0.2)
 """Translation of the block, after a rotation by 60 degrees about z (Figures 4.3 and 4.15)."""
 TRANSLATION = (-0.35, -0.43)
 """Translation of the block in the test of robustness, in five steps (Figure 4.4)."""
-FILE = Path("displacement.txt")
-"""Name of the displacement file of a sample."""
+FILE = Path("displacement.txt")  # name of the displacement file of a sample
 
 BLOCK_LENGTH, BLOCK_HEIGHT = 0.2, 0.04
 """Size of the block, as parts of the domain's (thesis Tables 4.1 and 4.9)."""

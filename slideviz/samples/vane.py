@@ -14,12 +14,9 @@ from scipy.interpolate import CubicSpline
 
 from slideviz.mesh.model import FloatArray
 
-LENGTH, HEIGHT = 0.058275, 0.097982
-"""Extents of the whole mesh in x and y (thesis Table 4.7)."""
-AHEAD = 0.0135
-"""Axial distance from the inflow to the leading edge, which is the origin."""
-CHORD = 0.0465
-"""Length of the camber line in the vane."""
+LENGTH, HEIGHT = 0.058275, 0.097982  # extents of the whole mesh in x and y (thesis Table 4.7)
+AHEAD = 0.0135  # axial distance from the inflow to the leading edge, which is the origin
+CHORD = 0.0465  # length of the camber line in the vane
 ANGLES_DEG = (0.0, -68.0, -57.0)
 """Direction of the camber line at the leading edge, at the trailing edge and at the outflow."""
 TURNS = (0.56, 0.9)

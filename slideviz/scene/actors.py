@@ -13,14 +13,12 @@ from slideviz.color_scheme import COLOR_MAP, INVERTED_COLOR
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted, padded
 
-VALUES = "values"
-"""Name of the cell data by which shapes are colored."""
+VALUES = "values"  # name of the cell data by which shapes are colored
 
 CELL, POINT = "vtkOriginalCellIds", "vtkOriginalPointIds"
 """Names of cell and point data with the indices of cells and nodes in the mesh."""
 
-LIFT = 1e-4
-"""Height at which lines of a 2D mesh are drawn above its cells, relative to its extent."""
+LIFT = 1e-4  # height at which lines of a 2D mesh are drawn above its cells, relative to its extent
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,5 +215,4 @@ def draw_in_front(mapper: Any) -> None:
     mapper.SetRelativeCoincidentTopologyPointOffsetParameter(_IN_FRONT)
 
 
-_IN_FRONT = -66_000.0
-"""Depth offset in 1/65536 of the depth range."""
+_IN_FRONT = -66_000.0  # depth offset in 1/65536 of the depth range

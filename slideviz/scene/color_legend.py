@@ -18,8 +18,7 @@ from slideviz.terms import ROLES, ColorByTerm, Role
 if TYPE_CHECKING:
     from slideviz.scene.stage import Stage
 
-OPACITY = 0.82
-"""Opacity of a plate, which covers the mesh."""
+OPACITY = 0.82  # opacity of a plate, which covers the mesh
 
 Rect = tuple[float, float, float, float]
 """Left, bottom, right and top, in pixels from the lower left corner of the view."""
@@ -70,8 +69,7 @@ STRIP = 104
 """Width in pixels of the strip at the right that is free of the mesh, at normal letter size."""
 
 _VTK_FONT_FILE = 4
-_AIR = 12.0
-"""Margin in pixels between the color bar and the edge of its plate."""
+_AIR = 12.0  # margin in pixels between the color bar and the edge of its plate
 _BAR, _LONG = 20.0, 11
 """Width of the color bar in pixels; number of letters from which a title needs the whole strip."""
 _LABEL, _GAP, _HEAD = 14.0, 4.0, 30.0

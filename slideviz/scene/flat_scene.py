@@ -27,11 +27,9 @@ from slideviz.session.section_cuts import Cuts, cut_frame, is_awaited
 from slideviz.session.state import Session
 from slideviz.terms import quantity_of
 
-FILL = 0.94
-"""Part of the view's height or width that a fitted section takes."""
+FILL = 0.94  # part of the view's height or width that a fitted section takes
 
-READING = "its cells are being read from the file of the mesh"
-"""Summary while cells are being read."""
+READING = "its cells are being read from the file of the mesh"  # summary while cells are being read
 
 
 class FlatScene:

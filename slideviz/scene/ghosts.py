@@ -158,8 +158,7 @@ def lattice_shape(boxes: list[tuple[FloatArray, np.ndarray]], dim: int, lift: fl
 RIM, WIRE = "\nrim", "\nwire"
 """Suffixes of the names of actors that draw the rim of a ghost, and the edges of its faces; no
 boundary's name has them."""
-STILL = 1e-9
-"""Displacement of a boundary, relative to its extent, that counts as a rounding error."""
+STILL = 1e-9  # displacement of a boundary, relative to its extent, that counts as a rounding error
 DEEPER = 330.0
 """Depth offset of ghosts: their faces are drawn this much behind their place, rims before it.
 
@@ -170,8 +169,7 @@ ON_TOP = 70000.0
 
 A ghost that enters the solid, behind opaque boundaries, would be invisible otherwise."""
 
-MOST_WIRE = 50_000
-"""Most faces of a ghost whose edges are drawn: more would be one area, and slow."""
+MOST_WIRE = 50_000  # most faces of a ghost whose edges are drawn: more would be one area, and slow
 ARRIVED = 0.01
 """Distance of a boundary from its ghost, relative to its displacement, that counts as none."""
 
@@ -354,8 +352,7 @@ def _motion(case: Case) -> tuple[object, ...]:
 
 
 NAME, HALO = "support:circles", "support:halo"
-PIECES = 180
-"""Straight pieces of a circle."""
+PIECES = 180  # straight pieces of a circle
 
 
 class SupportLayer(KeyedLayer):

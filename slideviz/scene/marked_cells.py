@@ -23,8 +23,7 @@ from slideviz.scene.stage import Layer, Stage
 from slideviz.session.inspect import cell_centers, nodes_of
 from slideviz.session.state import Session, StepFrame
 
-OUTLINE, FACES, DOT = "mark:outline", "mark:faces", "mark:dot"
-"""Names of the actors."""
+OUTLINE, FACES, DOT = "mark:outline", "mark:faces", "mark:dot"  # names of the actors
 
 
 class MarkLayer(Layer):
@@ -94,8 +93,7 @@ class MarkLayer(Layer):
 
 
 NAME = "points:inverted"
-MOST = 1000
-"""Most rings that are drawn; of more cells, some are left out, evenly by their indices."""
+MOST = 1000  # most rings that are drawn; of more cells, some are left out, evenly by their indices
 SIZES = ((0, 15.0), (50, 12.0), (300, 9.0))
 """Pairs of a number of rings, and their diameter in pixels from that number on."""
 

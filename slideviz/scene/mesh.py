@@ -23,12 +23,9 @@ if TYPE_CHECKING:
     from slideviz.scene.sections import SectionLayer
 
 
-FADED = 0.3
-"""Opacity of a 2D mesh while sections show the cells on them."""
-VEIL = 0.65
-"""Opacity of the veil over the halo cells of a 2D mesh: they are no cells of the domain."""
-GLASS = 0.15
-"""Opacity of boundaries that enclose moving ones, while colors show roles."""
+FADED = 0.3  # opacity of a 2D mesh while sections show the cells on them
+VEIL = 0.65  # opacity of the veil over the halo cells of a 2D mesh: they are no cells of the domain
+GLASS = 0.15  # opacity of boundaries that enclose moving ones, while colors show roles
 SEE_THROUGH = 0.25
 """Opacity of boundaries while the marked cell is inside the mesh, beside none of them."""
 

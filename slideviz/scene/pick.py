@@ -11,8 +11,7 @@ import pyvista as pv
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.scene.actors import DrawnBoundary
 
-REACH = 9.0
-"""Distance in pixels from a line up to which a click hits it."""
+REACH = 9.0  # distance in pixels from a line up to which a click hits it
 
 
 def to_display(plotter: Any, points: FloatArray) -> FloatArray:

@@ -32,8 +32,7 @@ from slideviz.session.inspect import cell_at, surroundings
 from slideviz.session.state import Session
 from slideviz.session.store import notify
 
-NEAR = 8.0
-"""Height of the view after flying to a cell, in sizes of the cell."""
+NEAR = 8.0  # height of the view after flying to a cell, in sizes of the cell
 
 
 class Scene:

@@ -15,8 +15,7 @@ from slideviz.scene.color_legend import STRIP
 from slideviz.sections.polygons import CellsInRange
 from slideviz.session.state import Session, StepFrame
 
-USUAL_DPI = 72.0
-"""VTK's dots per inch of a screen with a device pixel ratio of 1."""
+USUAL_DPI = 72.0  # VTK's dots per inch of a screen with a device pixel ratio of 1
 
 
 class Layer:

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
 TURN = 2.0 * np.pi
-_WHOLE = np.radians(300.0)
-"""A cut over more than this angle, in radians, is taken as a whole ring."""
+_WHOLE = np.radians(300.0)  # a cut over more than this angle, in radians, is taken as a whole ring
 _HOLE = 0.1
 """The handle is in the middle of a patch where the cut comes as near to that as this part of the
 patch's diagonal; else there is a hole, and it is at the nearest place of the cut."""

@@ -29,8 +29,7 @@ from slideviz.sections.shape import (
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
-_ENDS = 0.01, 89.99
-"""Smallest and largest half angle of a slider, in degrees."""
+_ENDS = 0.01, 89.99  # smallest and largest half angle of a slider, in degrees
 _NEAR = 0.03
 """The apex of a new cone may be moved to a round number by this part of the mesh's extent."""
 

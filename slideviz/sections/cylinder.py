@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from slideviz.sections.line import Box
     from slideviz.sections.model import Section
 
-_CHORDS = 720
-"""Number of chords that a circle is drawn with."""
+_CHORDS = 720  # number of chords that a circle is drawn with
 
 
 class Circle(InPlane):

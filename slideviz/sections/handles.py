@@ -17,8 +17,7 @@ Part = Literal["middle", "end", "line"]
 """The part of a handle that is dragged: the middle, an end of a line (or the point on a circle), or
 the line or circle itself anywhere."""
 
-_DIGITS = 4
-"""Digits of a place relative to the size of the view: more than a mouse can aim for."""
+_DIGITS = 4  # digits of a place relative to the size of the view: more than a mouse can aim for
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,11 +14,9 @@ from slideviz.sections.shape import DIGITS, InPlane, Label, axis_word, direction
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
-MARGIN = 0.03
-"""Margin of the box around a mesh, at which lines end, over the mesh's longest extent."""
+MARGIN = 0.03  # margin of the box around a mesh, at which lines end, over the mesh's longest extent
 
-Box = tuple[FloatArray, FloatArray]
-"""Lowest and highest coordinates, (2,) each."""
+Box = tuple[FloatArray, FloatArray]  # lowest and highest coordinates, (2,) each
 
 
 def box_around(points: FloatArray) -> Box:

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from slideviz.sections.line import Box
     from slideviz.sections.model import Section, Triple
 
-_LAYER = 1e-4
-"""Nodes whose values differ by less than this part of the span are on one layer."""
+_LAYER = 1e-4  # nodes whose values differ by less than this part of the span are on one layer
 _NEAR = 0.03
 """Where no layer is at the middle, a round number may be this far from it, over the span."""
 

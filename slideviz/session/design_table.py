@@ -30,13 +30,10 @@ from slideviz.mesh.model import Mesh
 from slideviz.session.jobs import JobProgress, Report, Stopped, raise_if_cancelled
 from slideviz.system.csv_table import csv_rows, write_csv
 
-MOST = 100_000
-"""Most designs of a table in the window."""
-FINE = 1e-5
-"""Rounding error allowed for the values of a range, over the step between them."""
+MOST = 100_000  # most designs of a table in the window
+FINE = 1e-5  # rounding error allowed for the values of a range, over the step between them
 _WORDS = ("problem",)
-_NAMED = 5
-"""Most designs that are named of those that failed for the same reason."""
+_NAMED = 5  # most designs that are named of those that failed for the same reason
 _RANGE = re.compile(r"(\S+)\s*(?:to|\.\.)\s*(\S+)\s*(?:in|:)\s*(\d+)\Z", re.IGNORECASE)
 
 

@@ -22,8 +22,7 @@ from slideviz.session.state import Session, StepFrame
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import CELL_STATES, CellState, ColorBy
 
-NEAR = 4
-"""The nearest point of a boundary is looked for in the elements at so many nearest nodes."""
+NEAR = 4  # the nearest point of a boundary is looked for in the elements at so many nearest nodes
 
 
 @dataclass(frozen=True)
@@ -121,8 +120,7 @@ def _to_polygon(corners: FloatArray, point: FloatArray) -> float:
     return far
 
 
-WORST = 100
-"""Length of the list of the worst cells."""
+WORST = 100  # length of the list of the worst cells
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,8 +38,7 @@ from slideviz.system.cleanup import private_folder
 from slideviz.system.file_checks import require_regular_file
 from slideviz.terms import CELL_STATES
 
-_ROWS = 5_000
-"""Cells that are written before the job looks again whether it is to stop."""
+_ROWS = 5_000  # cells that are written before the job looks again whether it is to stop
 
 
 def save_quality(path: Path, frame: StepFrame, report: Report, stopped: Stopped) -> Path:

@@ -43,8 +43,7 @@ from slideviz.system.atomic import atomic_write
 
 PLACEHOLDER = Path("table")
 """Stands for the file in messages of `parse_displacements`; `TableRows.check` replaces it."""
-MOST_BYTES = 5_000_000
-"""Most bytes of a file that can be edited by hand."""
+MOST_BYTES = 5_000_000  # most bytes of a file that can be edited by hand
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,8 +37,7 @@ class TypedNodes:
         return TypedNodes(self.nodes[keep], self.kinds[keep])
 
 
-NOTHING = TypedNodes(np.empty(0, np.int64), np.empty(0, np.int64))
-"""No nodes."""
+NOTHING = TypedNodes(np.empty(0, np.int64), np.empty(0, np.int64))  # no nodes
 
 
 class NodeTypes:

@@ -17,12 +17,9 @@ from slideviz.session.saving import view_from_case
 from slideviz.session.state import Guess, Run, Session, StepFrame, ViewState
 from slideviz.terms import ColorBy, Role
 
-RELATIVE_TOLERANCE = 1e-5
-"""Suggested tolerance of data reduction, over the mesh's extent."""
-SQUARE = 1e-6
-"""Directions are perpendicular or parallel where their cosine is this near to 0 or 1."""
-STEPS = 5
-"""Number of steps of a guessed case with sliding boundaries."""
+RELATIVE_TOLERANCE = 1e-5  # suggested tolerance of data reduction, over the mesh's extent
+SQUARE = 1e-6  # directions are perpendicular or parallel where their cosine is this near to 0 or 1
+STEPS = 5  # number of steps of a guessed case with sliding boundaries
 
 
 def open_mesh(

@@ -16,8 +16,7 @@ CheckCancelled = Callable[[], None]
 """A function that is called often, and raises `slideviz.errors.Cancelled` to end the work."""
 Result = TypeVar("Result")
 
-PART_CELLS = 10_000
-"""Faces that are sent to the graphics card in one piece."""
+PART_CELLS = 10_000  # faces that are sent to the graphics card in one piece
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from slideviz.solver.deform import Step
 
 
-LABEL = 20
-"""Most characters of a run's name in a plot."""
+LABEL = 20  # most characters of a run's name in a plot
 
 
 @dataclass(frozen=True, eq=False)

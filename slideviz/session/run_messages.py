@@ -31,8 +31,7 @@ from slideviz.solver.remedies import MOST_NAMES, beyond_pitch, fixed_beside, rem
 from slideviz.solver.setup import LOOSE
 from slideviz.terms import KERNELS
 
-LARGE = 1e9
-"""Bytes of memory from which on there is a message before a run on what it takes."""
+LARGE = 1e9  # bytes of memory from which on there is a message before a run on what it takes
 RATE = 2e10
 """Floating-point operations a second of a machine with few cores in factoring a large matrix."""
 

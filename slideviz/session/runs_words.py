@@ -178,10 +178,8 @@ def summary(run: Run, among: Sequence[Run] = (), method: bool = False) -> str:
     return " · ".join(filter(None, words))
 
 
-DIGITS = 4
-"""Decimals of qualities in the window."""
-QUALITY_FORMAT = f".{DIGITS}f"
-"""Format of qualities in the window."""
+DIGITS = 4  # decimals of qualities in the window
+QUALITY_FORMAT = f".{DIGITS}f"  # format of qualities in the window
 
 
 def _of_last(run: Run, name: str) -> float | None:

@@ -29,12 +29,9 @@ from slideviz.session.state import Session
 from slideviz.streaming.source import CellBlock, FileSource, cut_cells
 from slideviz.system.threads import Tick, in_parts
 
-GROUP = 4096
-"""Number of cells of a group."""
-MOST = 1 << 18
-"""Most cells that are read at a time."""
-KEPT_SLABS = 8
-"""Most slabs of a frame that are cached."""
+GROUP = 4096  # number of cells of a group
+MOST = 1 << 18  # most cells that are read at a time
+KEPT_SLABS = 8  # most slabs of a frame that are cached
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,8 +205,7 @@ def with_direction(section: Section, direction: Triple, points: FloatArray) -> S
     return new.shape.at_position(new, round_middle(positions))
 
 
-NO_POLYGONS = Polygons(np.empty((0, 3)), *(np.zeros(n, np.int64) for n in (1, 0, 0)))
-"""No polygons."""
+NO_POLYGONS = Polygons(np.empty((0, 3)), *(np.zeros(n, np.int64) for n in (1, 0, 0)))  # no polygons
 CACHE_SIZE = 24
 """Most cuts that are cached: dragging a section makes many that are not needed again."""
 

@@ -15,10 +15,8 @@ from slideviz.session.state import Guess, Session, ViewState
 Listener = Callable[[Session, Session], None]
 Failed = Callable[[Exception], None]
 
-MERGE_S = 1.0
-"""Changes of one kind with less than so many seconds between them are undone as one."""
-UNDO_LIMIT = 200
-"""Most changes that can be undone."""
+MERGE_S = 1.0  # changes of one kind with less than so many seconds between them are undone as one
+UNDO_LIMIT = 200  # most changes that can be undone
 
 
 def notify(

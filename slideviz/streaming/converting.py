@@ -27,8 +27,7 @@ from slideviz.system.atomic import atomic_write
 from slideviz.system.threads import Tick
 from slideviz.terms import FileFormat
 
-NEAR = 256
-"""Elements with at most so many others between them are read in one piece."""
+NEAR = 256  # elements with at most so many others between them are read in one piece
 
 
 def text_of_binary(source: FileSource, folder: Path) -> Iterator[bytes]:

@@ -34,15 +34,12 @@ from slideviz.system.file_checks import require_no_input
 from slideviz.system.ranks import SerialPool
 from slideviz.terms import SkewMetric
 
-CHUNK = 1 << 20
-"""Most nodes or cells of a part: one part is in memory at a time."""
-FEWEST = 1 << 16
-"""Fewest nodes or cells of a part, but for the last."""
+CHUNK = 1 << 20  # most nodes or cells of a part: one part is in memory at a time
+FEWEST = 1 << 16  # fewest nodes or cells of a part, but for the last
 PARTS = 1024
 """Parts of a file, within the two limits above: enough for many ranks. It does not depend on the
 number of ranks, for a stopped run may go on with another number of them."""
-Part = tuple[int, int]
-"""A range of nodes or cells: the first, and the one after the last."""
+Part = tuple[int, int]  # a range of nodes or cells: the first, and the one after the last
 
 
 class Output:

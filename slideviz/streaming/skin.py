@@ -91,8 +91,7 @@ def naming_text(text: Text, path: Path) -> Iterator[None]:
         raise MeshError(message) from problem
 
 
-Index = slice | IntArray
-"""Numbers of cells, as an index of an array."""
+Index = slice | IntArray  # numbers of cells, as an index of an array
 
 
 def read_skin(

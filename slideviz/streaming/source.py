@@ -29,15 +29,12 @@ from slideviz.system.atomic import reason_of
 from slideviz.system.cleanup import draft, open_temporary
 from slideviz.system.threads import Tick
 
-CELLS = 1 << 17
-"""Cells of a block of a file: one block is in memory at a time."""
-READ = 1 << 20
-"""Points that are read from a file at a time, at most."""
+CELLS = 1 << 17  # cells of a block of a file: one block is in memory at a time
+READ = 1 << 20  # points that are read from a file at a time, at most
 SPARSE = 8
 """All points between the lowest and highest node of a block of cells are read, used or not, where
 they are at most so many times as many as its cells."""
-Zone = tuple[Path, int | None]
-"""A file and the number of a zone in it, the first where it is None."""
+Zone = tuple[Path, int | None]  # a file and the number of a zone in it, the first where it is None
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,8 +26,7 @@ from slideviz.study.combinations import (
 )
 from slideviz.study.plots import WIDTH
 
-GridPlace = tuple[int, int]
-"""Row and column of a picture in the montage."""
+GridPlace = tuple[int, int]  # row and column of a picture in the montage
 
 DPI = 300
 NOT_KEPT = "not drawn: too many large meshes; compare fewer methods or steps at once"
@@ -35,8 +34,7 @@ _OVERSAMPLED = 2
 """Ratio of drawn to shown size of pictures, so that fine mesh lines turn grey, not black."""
 _NAME, _LOWEST = 0.3, 0.5
 """Inches: width of the name of a row, and the least height of a row, so that its name fits."""
-_HIGHEST = 40.0
-"""Inches: height of the figure while it is laid out; it is trimmed afterwards."""
+_HIGHEST = 40.0  # inches: height of the figure while it is laid out; it is trimmed afterwards
 
 
 def montage(rows: Sequence[CombinationRow], base: Mesh) -> Any:

@@ -67,8 +67,7 @@ def _titles(row: CombinationRow) -> tuple[str, str]:
     return COMPARED_METHODS[row.combination.method][0], MODES[row.combination.periodic]
 
 
-Profiler = Callable[[FacetLine], Profile]
-"""Returns the profile of a line's quality along the span."""
+Profiler = Callable[[FacetLine], Profile]  # returns the profile of a line's quality along the span
 
 
 def result_of(line: FacetLine) -> Result:
@@ -116,12 +115,9 @@ def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | Non
 WIDTH = 7.0
 """Width of figures, in inches: that of a page's text, so that letters are at least 8 points."""
 
-_BINS = 25
-"""Number of intervals of a histogram, each wide enough to show the dashes of its lines."""
-_WIDE = 8.0
-"""Ratio of the largest to the smallest time from which their axis is logarithmic."""
-_LAST = ("minimum", "mean")
-"""Names that come last in the legend: of markers, not of lines."""
+_BINS = 25  # number of intervals of a histogram, each wide enough to show the dashes of its lines
+_WIDE = 8.0  # ratio of the largest to the smallest time from which their axis is logarithmic
+_LAST = ("minimum", "mean")  # names that come last in the legend: of markers, not of lines
 _QUIET = replace(PRINT, legend=False)
 
 

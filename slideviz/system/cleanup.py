@@ -36,10 +36,8 @@ def private_file(path: Path) -> None:
         os.fchmod(file.fileno(), 0o600)
 
 
-PREFIX = ".slideviz-"
-"""Beginning of the names of all drafts."""
-_SUFFIX = ".tmp"
-"""Ending of the names of all drafts."""
+PREFIX = ".slideviz-"  # beginning of the names of all drafts
+_SUFFIX = ".tmp"  # ending of the names of all drafts
 
 
 class Process(Protocol):
@@ -54,10 +52,8 @@ class Process(Protocol):
 
 NOTHING_LEFT = "it leaves nothing half-written"
 """The answer of `leftover_message` where no partial file is kept."""
-_drafts: set[Path] = set()
-"""Files and folders to remove when the program ends early."""
-_processes: set[Process] = set()
-"""Processes to kill when the program ends early."""
+_drafts: set[Path] = set()  # files and folders to remove when the program ends early
+_processes: set[Process] = set()  # processes to kill when the program ends early
 _partial: dict[Path, str] = {}
 """Partial files that stay then, and the sentence on each for the user."""
 

@@ -20,8 +20,7 @@ from typing import Any
 
 from slideviz.errors import SlidevizError, printable
 
-Inputs = Mapping[Path, str]
-"""Input files, and what each is in words: ``the input mesh``."""
+Inputs = Mapping[Path, str]  # input files, and what each is in words: ``the input mesh``
 _known: list[Callable[[], Inputs]] = []
 """Functions that return input files: those of `protected` contexts that are open."""
 

@@ -28,10 +28,8 @@ WorkerFactory = Callable[..., AbstractContextManager[Callable[[Task], Result]]]
 RunTasks = Callable[[Sequence[Task]], Iterator[Result]]
 """A function that does tasks, in parallel, and yields their results in order."""
 
-AHEAD = 4
-"""Results for each rank, at most, that wait for the result of an earlier part."""
-PIECE = 1 << 30
-"""Most bytes of one message: MPI counts them in 32 bits."""
+AHEAD = 4  # results for each rank, at most, that wait for the result of an earlier part
+PIECE = 1 << 30  # most bytes of one message: MPI counts them in 32 bits
 
 
 class SerialPool:
@@ -62,8 +60,7 @@ class SerialPool:
                 pool.shutdown(cancel_futures=True)
 
 
-SERIAL = SerialPool()
-"""The default where no ranks are given."""
+SERIAL = SerialPool()  # the default where no ranks are given
 
 
 @dataclass(eq=False)

@@ -21,10 +21,8 @@ Result = TypeVar("Result")
 Tick = Callable[[float], object]
 """A callback for progress, called with the fraction done; what it raises ends the work."""
 
-PART = 16384
-"""Rows of a part."""
-_most = [sys.maxsize]
-"""Limits of `core_limit` contexts that are open, the innermost last."""
+PART = 16384  # rows of a part
+_most = [sys.maxsize]  # limits of `core_limit` contexts that are open, the innermost last
 
 
 def cores() -> int:

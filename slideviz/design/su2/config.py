@@ -153,8 +153,7 @@ NUMBERS = {
     "CONVEXITY_CHECK_DEPTH": 0.0,
 }
 """Keys of numbers among them, and what these must be above."""
-COUNTS = ("_ITER", "_DEPTH")
-"""Endings of those whose number is a whole one."""
+COUNTS = ("_ITER", "_DEPTH")  # endings of those whose number is a whole one
 LISTS = ("DV_KIND", "DV_PARAM", "DV_VALUE", "DV_MARKER", "MARKER_DEFORM_MESH")
 NOT_HERE = ("MARKER_MOVING", "MESH_FORMAT", "MESH_OUT_FORMAT", *FILES)
 """Keys of case files that mean something else in SU2, or are read in another way."""
@@ -165,8 +164,7 @@ OURS = {
 }
 ELSEWHERE = ("MOTION", "DEFORMATION_FILENAME")
 """Keys of case files that a configuration cannot have."""
-SU2_CONTINUITY = "2ND_DERIVATIVE"
-"""SU2's default of FFD_CONTINUITY."""
+SU2_CONTINUITY = "2ND_DERIVATIVE"  # SU2's default of FFD_CONTINUITY
 OWN = {name for name in OURS if not name.startswith(("FFD_", "MARKER_"))}
 """Keys of case files that resemble no key of SU2."""
 ALIKE, ALIKE_OWN = 0.9, 0.8

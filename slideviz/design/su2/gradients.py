@@ -25,10 +25,8 @@ from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 from slideviz.solver.deform import deform
 from slideviz.solver.steps import Progress
 
-DIRECTIONS = 16
-"""Most displacements for which control nodes are chosen at a design of zeros."""
-REACH = 1e-3
-"""Size of these displacements, as a part of the mesh's extent."""
+DIRECTIONS = 16  # most displacements for which control nodes are chosen at a design of zeros
+REACH = 1e-3  # size of these displacements, as a part of the mesh's extent
 
 INSUFFICIENT = (
     "; boundary nodes still get exactly their displacement, and the gradient is that of such a "

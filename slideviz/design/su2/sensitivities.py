@@ -15,10 +15,8 @@ from slideviz.errors import CaseError, Note
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.system.file_checks import require_regular_file
 
-MAGIC = 535532
-"""The first number of SU2's binary restart files."""
-NAME_BYTES = 33
-"""Length of a column's name in these files."""
+MAGIC = 535532  # the first number of SU2's binary restart files
+NAME_BYTES = 33  # length of a column's name in these files
 
 
 def read_restart(path: Path) -> tuple[list[str], FloatArray]:

@@ -17,8 +17,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 UNIT_CHORD = ("HICKS_HENNE", "CST", "NACA_4DIGITS", "PARABOLIC")
 """Kinds for which the airfoil lies between x = 0 and 1."""
-OFF_CHORD = 0.05
-"""How far its ends may be from there without a warning."""
+OFF_CHORD = 0.05  # how far its ends may be from there without a warning
 
 
 @dataclass(frozen=True, eq=False)

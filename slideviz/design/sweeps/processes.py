@@ -44,10 +44,8 @@ from slideviz.solver.steps import Step
 from slideviz.system.cleanup import clean_up
 from slideviz.terms import FileFormat
 
-_KEPT = 2
-"""Number of meshes that a process keeps: that of the sweep, and one of another sweep."""
-_meshes: dict[str, Mesh] = {}
-"""The meshes of this process, by name."""
+_KEPT = 2  # number of meshes that a process keeps: that of the sweep, and one of another sweep
+_meshes: dict[str, Mesh] = {}  # the meshes of this process, by name
 _one_at_a_time = Lock()
 """Held during a task: Numba ends the process if loops of two threads run at once."""
 

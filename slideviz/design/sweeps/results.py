@@ -43,8 +43,7 @@ from slideviz.system.file_checks import read_json, require_regular_file
 
 RESULTS, SOURCES = "results.csv", "sweep.json"
 LOCK = "sweep.lock"
-_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
-"""Errors of file systems without locks."""
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)  # errors of file systems without locks
 
 
 class SweepResults:

@@ -62,8 +62,7 @@ NUMBERS: Mapping[str, tuple[str, Callable[[str], float]]] = {
     "seconds": ("seconds that the worker spent", float),
 }
 """The numbers of a result, in the order of their columns: meaning, and how a cell is read."""
-WORDS = ("mesh", "warnings", "problem")
-"""The columns of texts after the numbers of a result."""
+WORDS = ("mesh", "warnings", "problem")  # the columns of texts after the numbers of a result
 _SEPARATORS = (",", ";", "\t")
 
 

@@ -19,8 +19,7 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray
 
 JOINED = 1e-6
 """Largest distance of merged nodes, as a fraction of the extent: R4 coordinates are rounded so."""
-_ONE_TO_ONE = "Abutting1to1"
-"""Value of GridConnectivityType for interfaces that are joined."""
+_ONE_TO_ONE = "Abutting1to1"  # value of GridConnectivityType for interfaces that are joined
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,13 +23,10 @@ from slideviz.mesh.model import IntArray
 if TYPE_CHECKING:
     import h5py
 
-_ADF = b"ADF Database"
-"""In the first ``_HEAD_BYTES`` of a CGNS file of the old kind."""
+_ADF = b"ADF Database"  # in the first ``_HEAD_BYTES`` of a CGNS file of the old kind
 _HEAD_BYTES = 32
-DATA = " data"
-"""Name of the dataset with the value of a node."""
-_LINK = " link"
-"""Name of the HDF5 link in a node that is a link."""
+DATA = " data"  # name of the dataset with the value of a node
+_LINK = " link"  # name of the HDF5 link in a node that is a link
 
 
 @contextmanager

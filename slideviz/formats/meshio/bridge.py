@@ -127,15 +127,12 @@ MESHIO_TYPES = {
     "pyramid": 14,
 }
 """VTK identifier by meshio's name of an element type."""
-_FLAT = 1e-9
-"""Largest range of z, as a fraction of the extent, of a mesh in the xy-plane."""
+_FLAT = 1e-9  # largest range of z, as a fraction of the extent, of a mesh in the xy-plane
 
-_HDF5 = b"\x89HDF\r\n\x1a\n"
-"""First bytes of an HDF5 file."""
+_HDF5 = b"\x89HDF\r\n\x1a\n"  # first bytes of an HDF5 file
 _MOST_SHRUNK = 1_100
 """Bytes that a byte of a compressed dataset has at most: zlib's 1,032, and some more."""
-_UNWRITTEN = 1 << 20
-"""Bytes of a dataset that may be missing in its file: HDF5 fills them."""
+_UNWRITTEN = 1 << 20  # bytes of a dataset that may be missing in its file: HDF5 fills them
 _INCLUDE = re.compile(rb"^\*INCLUDE\b[^=\n]*=([^\n]*)", re.IGNORECASE | re.MULTILINE)
 _MOST_FILES = 100
 """Most files that are searched for names of further files: two may name each other."""

@@ -39,17 +39,14 @@ _TAG = {
     "netgen": "netgen:index",
     "ugrid": "ugrid:ref",
 }
-_NAMED = ("gmsh", "netgen")
-"""The formats with a table of names for these numbers."""
+_NAMED = ("gmsh", "netgen")  # the formats with a table of names for these numbers
 _WRITTEN_AS = {"gmsh": "gmsh22"}
 """Name of the version that meshio is to write; Gmsh 2.2 has a group on each element."""
-_EXACT = 1e-12
-"""Largest error of a coordinate in a written file, as a fraction of the extent."""
+_EXACT = 1e-12  # largest error of a coordinate in a written file, as a fraction of the extent
 
 _TYPES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "u1": "UInt8"}
 """VTK's name of a data type by NumPy's."""
-_BLOCK_BYTES = 3 << 18
-"""A multiple of 3, so that the encoded blocks join."""
+_BLOCK_BYTES = 3 << 18  # a multiple of 3, so that the encoded blocks join
 # Order of a prism's nodes in VTU files. Until VTK 9.7 (vtk!12988) the first triangle faced outward.
 # Files do not say which order they have; other readers (older ParaView, meshio) expect this one.
 # VTKHDF files have the new order.

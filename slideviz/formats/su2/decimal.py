@@ -17,10 +17,8 @@ from slideviz.system.jit_cache import njit
 OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
 """Options of `njit` for the loops over text."""
 
-_LEAST, _MOST = -342, 308
-"""Powers of ten beyond which a number of 19 digits is zero or infinite."""
-_DIGITS = 19
-"""How many decimal digits fit into 64 bits."""
+_LEAST, _MOST = -342, 308  # powers of ten beyond which a number of 19 digits is zero or infinite
+_DIGITS = 19  # how many decimal digits fit into 64 bits
 
 
 def _powers_of_five() -> NDArray[np.uint64]:

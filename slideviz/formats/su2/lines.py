@@ -21,12 +21,10 @@ from slideviz.formats.su2 import KEYWORD
 from slideviz.mesh.model import IntArray
 
 _KEY = re.compile(rb"[A-Za-z_]\w*")
-_COUNT = re.compile(rb"\+?\d{1,18}")
-"""The value of a key that counts."""
+_COUNT = re.compile(rb"\+?\d{1,18}")  # the value of a key that counts
 KNOWN = ("NZONE", "IZONE", "NDIME", "NELEM", "NPOIN", "NMARK", "MARKER_TAG", "MARKER_ELEMS")
 """Keys of the sections that slideviz reads; all others are copied as they are."""
-ALIASES = {"MARKERTAG": "MARKER_TAG"}
-"""Other spellings of keys that SU2 reads."""
+ALIASES = {"MARKERTAG": "MARKER_TAG"}  # other spellings of keys that SU2 reads
 
 
 def is_ffd(text: bytes) -> bool:
@@ -173,14 +171,10 @@ def count_of(lines: Lines, section: KeywordBlock) -> int:
     return int(word)
 
 
-_BOM = b"\xef\xbb\xbf"
-"""The byte order mark of UTF-8."""
-_NUMERIC = tuple(b"%c" % code for code in b"+-.0123456789")
-"""Bytes that a number may begin with."""
-_BLANKS = bytes(range(33))
-"""Bytes before the first word of a line: blanks and control characters."""
-_LINE_BYTES = 256
-"""Bytes that are searched for the end of a line at first."""
+_BOM = b"\xef\xbb\xbf"  # the byte order mark of UTF-8
+_NUMERIC = tuple(b"%c" % code for code in b"+-.0123456789")  # bytes that a number may begin with
+_BLANKS = bytes(range(33))  # bytes before the first word of a line: blanks and control characters
+_LINE_BYTES = 256  # bytes that are searched for the end of a line at first
 
 
 @dataclass(frozen=True)
@@ -202,8 +196,7 @@ class Piece:
     in it."""
 
 
-Rows = tuple[Piece, ...]
-"""All rows of a section, in pieces."""
+Rows = tuple[Piece, ...]  # all rows of a section, in pieces
 
 
 def number_of(rows: Rows) -> int:

@@ -166,8 +166,7 @@ def print_changed(text, numbers, changed, out):  # type: ignore[no-untyped-def]
 
 SIZES = np.zeros(257, np.int64)
 """Number of nodes by element type, 0 for no type; the last entry is for all numbers above 255."""
-DIMS = np.full(257, -1)
-"""Dimension by element type, likewise; -1 for no type."""
+DIMS = np.full(257, -1)  # dimension by element type, likewise; -1 for no type
 for _row in ELEMENTS.values():
     SIZES[_row.vtk], DIMS[_row.vtk] = _row.n_nodes, _row.dim
 

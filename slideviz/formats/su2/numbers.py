@@ -23,8 +23,7 @@ _SUPPORTED = ", ".join(str(vtk) for vtk, row in ELEMENTS.items() if row.dim > 0)
 # VTK's quadratic and higher-order elements, and SU2's own identifiers: 100 more per degree.
 _HIGH_ORDER = (*range(21, 38), *range(60, 82))
 _LONE_SIGN = re.compile(rb"[+-](?![0-9])")
-_DIGITS = 18
-"""Most digits of a whole number that surely fits into 64 bits."""
+_DIGITS = 18  # most digits of a whole number that surely fits into 64 bits
 _EXTRA_POINT_WORDS = 2
 """Most numbers after the coordinates: the index, and in partitioned files the global index."""
 

@@ -187,8 +187,7 @@ _SCANNED = 0.2
 """Part of the time of reading a file, as told to the progress, that finding its lines takes."""
 
 
-_SNIFFED_BYTES = 1 << 16
-"""Bytes of a file that are searched for ``NDIME=``."""
+_SNIFFED_BYTES = 1 << 16  # bytes of a file that are searched for ``NDIME=``
 _NDIME = re.compile(rb"^\s*NDIME\s*=", re.IGNORECASE | re.MULTILINE)
 
 

@@ -36,8 +36,7 @@ from slideviz.formats.su2.numbers import fill_points, parse_cells
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.system.threads import Tick, ordered_map
 
-SEND_RECEIVE = "SEND_RECEIVE"
-"""Name of the markers of a halo (in `su2b.layout`, too)."""
+SEND_RECEIVE = "SEND_RECEIVE"  # name of the markers of a halo (in `su2b.layout`, too)
 # Remedies in messages.
 _NAME_IT = "; name the marker"
 _COUNT_THEM = "; add it with the number of elements"
@@ -309,8 +308,7 @@ class _Walk:
             )
 
 
-BLOCK_BYTES = 1 << 20
-"""About how many bytes a block has: whole lines that are scanned together."""
+BLOCK_BYTES = 1 << 20  # about how many bytes a block has: whole lines that are scanned together
 
 
 @dataclass(frozen=True, eq=False)

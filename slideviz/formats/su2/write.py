@@ -22,10 +22,8 @@ from slideviz.mesh.check import check_mesh, check_points
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 from slideviz.system.threads import ordered_map
 
-_BLOCK_ROWS = 20_000
-"""Most elements or points in a block of text."""
-_NUMBER_BYTES = 20
-"""Most bytes of an index, with the blank after it."""
+_BLOCK_ROWS = 20_000  # most elements or points in a block of text
+_NUMBER_BYTES = 20  # most bytes of an index, with the blank after it
 Edit = tuple[int, int, bytes]
 """A change of a file: first byte and end of the text to replace, and the new text."""
 
@@ -206,8 +204,7 @@ def require_text_names(mesh: str, names: Iterable[str]) -> None:
             )
 
 
-CellsOf = Callable[[int, int], Cells]
-"""A function that returns the cells ``i`` to ``j - 1``."""
+CellsOf = Callable[[int, int], Cells]  # a function that returns the cells ``i`` to ``j - 1``
 PointsOf = Callable[[int, int], FloatArray]
 """A function that returns the points ``i`` to ``j - 1``, (j - i, d)."""
 

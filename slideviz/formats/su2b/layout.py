@@ -23,12 +23,10 @@ from numpy.typing import DTypeLike, NDArray
 
 from slideviz.errors import MeshError, printable
 
-NAME_BYTES = 33
-"""Bytes of the name of a marker, padded with zeros."""
+NAME_BYTES = 33  # bytes of the name of a marker, padded with zeros
 SEND_RECEIVE = "SEND_RECEIVE"
 """Name of the markers of a halo (in `su2.text`, too), which this format cannot have."""
-_INT = 4
-"""Bytes of the integers that are no counts: numbers of zones and markers, dimension."""
+_INT = 4  # bytes of the integers that are no counts: numbers of zones and markers, dimension
 MAGIC = {
     np.array(width, f"{order}i4").tobytes(): (width, order) for width in (4, 8) for order in "<>"
 }

@@ -28,12 +28,9 @@ from slideviz.system.file_checks import read_json, require_no_input
 from slideviz.system.ranks import SERIAL, SerialPool, WorkerFactory
 from slideviz.system.threads import Tick
 
-_PIECE = 1 << 26
-"""Most bytes that are copied in one task."""
-_BLOCK = 1 << 20
-"""Most bytes of a piece that are in memory at a time."""
-Piece = tuple[int, int]
-"""First byte of a range, and the one after the last."""
+_PIECE = 1 << 26  # most bytes that are copied in one task
+_BLOCK = 1 << 20  # most bytes of a piece that are in memory at a time
+Piece = tuple[int, int]  # first byte of a range, and the one after the last
 
 
 def copying(
@@ -192,10 +189,8 @@ def _blocks(task: Piece) -> Iterator[tuple[int, int]]:
         yield at, min(_BLOCK, task[1] - at)
 
 
-BINARY = ".binary"
-"""End of the name of the partial file that is a binary copy of a text."""
-HEAD = 8
-"""Bytes that are zeros until the end."""
+BINARY = ".binary"  # end of the name of the partial file that is a binary copy of a text
+HEAD = 8  # bytes that are zeros until the end
 
 
 @dataclass(eq=False)

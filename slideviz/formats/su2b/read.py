@@ -30,8 +30,7 @@ from slideviz.mesh.interfaces import find_interfaces
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
 from slideviz.system.threads import Tick
 
-BLOCK = 1 << 18
-"""Most elements or points that are read at a time."""
+BLOCK = 1 << 18  # most elements or points that are read at a time
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,8 +25,7 @@ from slideviz.mesh.check import check_mesh
 from slideviz.mesh.elements import SIZES
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 
-SORTED = (3, 5, 9, 10, 12, 13, 14)
-"""SU2's order of the types of elements."""
+SORTED = (3, 5, 9, 10, 12, 13, 14)  # SU2's order of the types of elements
 LARGEST_4 = 2**32 - 1
 
 

@@ -23,8 +23,7 @@ from slideviz.session import changes, jobs
 from slideviz.session.state import Session
 
 log = logging.getLogger("slideviz")
-COPIED_WIDTH = 1600
-"""Least width of a picture on the clipboard, in pixels."""
+COPIED_WIDTH = 1600  # least width of a picture on the clipboard, in pixels
 
 
 class Exports(QObject):

@@ -202,8 +202,7 @@ def length_words(film_options: FilmOptions, frames: int, kind: str) -> str:
     return f"{text}. The film lasts {seconds:.1f} s."
 
 
-PREVIEW = (360, 225)
-"""Largest width and height of a preview, in pixels."""
+PREVIEW = (360, 225)  # largest width and height of a preview, in pixels
 
 
 class FilmDialog(QDialog):

@@ -29,8 +29,7 @@ from slideviz.gui.widgets.icons import logo
 from slideviz.gui.widgets.labels import fixed_font
 from slideviz.gui.widgets.services import Services
 
-LOG_LINES = 40
-"""Number of the log's last lines in a bug report."""
+LOG_LINES = 40  # number of the log's last lines in a bug report
 
 CLOSE = QDialogButtonBox.StandardButton.Close
 PANELS = (

@@ -80,10 +80,8 @@ def page_title(path: Path) -> str:
 
 
 PATH = Qt.ItemDataRole.UserRole
-PAGES = (".md", ".rst", "")
-"""Endings of the names of pages in links."""
-LARGEST = 740
-"""Largest width of a picture in a page, in pixels."""
+PAGES = (".md", ".rst", "")  # endings of the names of pages in links
+LARGEST = 740  # largest width of a picture in a page, in pixels
 
 
 class Pages(QTextBrowser):

@@ -41,8 +41,7 @@ from slideviz.gui.widgets.pixmaps import (
 )
 from slideviz.terms import SHOWN
 
-PREVIEW = (470, 330)
-"""Largest width and height of the preview, in pixels."""
+PREVIEW = (470, 330)  # largest width and height of the preview, in pixels
 
 SIZES = {
     "view": "as the view",
@@ -54,14 +53,12 @@ SIZES = {
 }
 """Sizes that can be chosen: in pixels, or by a name."""
 
-TEXT = {0.8: "small", 1.0: "normal", 1.4: "large"}
-"""Sizes of letters relative to the normal one."""
+TEXT = {0.8: "small", 1.0: "normal", 1.4: "large"}  # sizes of letters relative to the normal one
 
 PAPER = (16.0, 10.0, 300.0)
 """Initial width and height on paper in cm, as wide as a page's text; pixels per inch."""
 
-PAPER_POINTS = 8.5
-"""Size of normal letters on paper in points; journals ask for 8 at least."""
+PAPER_POINTS = 8.5  # size of normal letters on paper in points; journals ask for 8 at least
 
 OPTIONS = {
     "legend": ("Legend or color bar", "What the colors mean, at the right."),

@@ -123,8 +123,7 @@ ABOUT = (
     "table, and more values of the same number are added below. A click on a design that was run, "
     "here or in the plot, shows its mesh."
 )
-RANGE = "-8 to 0 in 9, or 1, 2, 5"
-"""Placeholder of the field for values."""
+RANGE = "-8 to 0 in 9, or 1, 2, 5"  # placeholder of the field for values
 
 
 class DesignRows(QWidget):

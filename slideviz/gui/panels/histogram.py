@@ -22,8 +22,7 @@ from slideviz.session import changes
 from slideviz.session.state import IN_FILE, Session, StepFrame
 from slideviz.session.store import Store
 
-END_PX = 6
-"""Distance in pixels up to which a press moves an end of the range."""
+END_PX = 6  # distance in pixels up to which a press moves an end of the range
 
 
 BRUSH = "Drag over values to show only the cells that have them; click to end it."

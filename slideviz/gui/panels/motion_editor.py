@@ -47,8 +47,7 @@ ABOUT = {
 """What a motion leaves in place, by the choice's value."""
 
 
-Z = (0.0, 0.0, 1.0)
-"""Axis of rotations in 2D."""
+Z = (0.0, 0.0, 1.0)  # axis of rotations in 2D
 RAISED = {
     True: ("Outwards by", "outwards, the lower side down,"),
     False: ("Raised by", "towards +y"),

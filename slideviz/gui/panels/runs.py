@@ -33,8 +33,7 @@ from slideviz.session.state import Run, Session
 from slideviz.session.store import Store
 
 TABLE_FILTERS = "Table (*.csv)"
-OF_ALL = ("copy", "export")
-"""Commands for all runs, whichever row is selected."""
+OF_ALL = ("copy", "export")  # commands for all runs, whichever row is selected
 
 
 class RunActions:

@@ -55,8 +55,7 @@ if TYPE_CHECKING:
     from slideviz.gui.viewport.section_views import SectionViews
 
 
-STEPS = 1000
-"""Positions of the slider."""
+STEPS = 1000  # positions of the slider
 
 FREE = "free"
 AXES: dict[str, Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -274,8 +273,7 @@ HINTS = {
 }
 """Hint shown while there are no sections, by the mesh's dimension."""
 
-BUTTONS_IN_ROW = 3
-"""Most buttons that add a section in one row."""
+BUTTONS_IN_ROW = 3  # most buttons that add a section in one row
 
 UNSEEN = "Tick the section in the list to show it."
 """Tip of the tools of a section that is not shown."""

@@ -65,8 +65,7 @@ class RepaintCoalescer(QObject):
         return True
 
 
-ONE_LIGHT = 0.95
-"""The intensity of the one light that replaces pyvista's five."""
+ONE_LIGHT = 0.95  # the intensity of the one light that replaces pyvista's five
 
 
 def one_light() -> pv.Light:

@@ -131,8 +131,7 @@ def tick_text(value: float, step: float) -> str:
     return f"{value:.{digits + (not exact)}f}"
 
 
-FRAME_PX = 110
-"""Height of the title, the ruler and the margins around a flat section, in pixels."""
+FRAME_PX = 110  # height of the title, the ruler and the margins around a flat section, in pixels
 
 
 class FlatViews(QWidget):
@@ -269,8 +268,7 @@ def _direction(swapped: bool, stacked: bool) -> QHBoxLayout.Direction:
     return directions.RightToLeft if swapped else directions.LeftToRight
 
 
-NOTHING = "The section cuts no cell."
-"""Text shown instead of the plot."""
+NOTHING = "The section cuts no cell."  # text shown instead of the plot
 
 
 class CurveView(QWidget):

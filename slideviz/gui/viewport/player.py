@@ -23,11 +23,9 @@ PLAY_MS = 3000
 STEP_MS = (50, 500)
 """The shortest and the longest time that one step is shown at speed 1, in milliseconds."""
 
-SPEEDS = (0.5, 1.0, 2.0, 4.0)
-"""The speeds in the player's menu, as multiples of the usual one."""
+SPEEDS = (0.5, 1.0, 2.0, 4.0)  # the speeds in the player's menu, as multiples of the usual one
 
-NARROW = 540
-"""Width in pixels below which the player hides speed and loop and shortens its text."""
+NARROW = 540  # width in pixels below which the player hides speed and loop and shortens its text
 
 NARROWEST = 330
 """Width in pixels below which the player also hides the slider and the buttons of both ends."""
@@ -215,8 +213,7 @@ class Player(QWidget):
             self.stop()
 
 
-SEPARATOR = "&nbsp;· "
-"""Between the numbers of a step."""
+SEPARATOR = "&nbsp;· "  # between the numbers of a step
 
 
 class ResultsLabel(QLabel):

@@ -30,22 +30,18 @@ from slideviz.sections.handles import HandleParts, Part, dragged, handle_parts, 
 from slideviz.sections.line import Box
 from slideviz.sections.model import Section
 
-HANDLE_COLOR = "#2f6fb5"
-"""Color of a handle that the mouse is not over."""
+HANDLE_COLOR = "#2f6fb5"  # color of a handle that the mouse is not over
 
-POINT_PX, RIM_PX = 11.0, 15.0
-"""Diameters of a handle's point and of the rim around it, in pixels."""
+POINT_PX, RIM_PX = 11.0, 15.0  # diameters of a handle's point and of the rim around it, in pixels
 
-REACH_PX = 10.0
-"""Distance from a point up to which the mouse takes it, in pixels."""
+REACH_PX = 10.0  # distance from a point up to which the mouse takes it, in pixels
 
 EDGE_PX = 22.0
 """Distance that a handle's points keep from the view's edges and the legend, in pixels."""
 
 Moved = Callable[[Section], None]
 """Called with the new section while it is dragged, at most once per turn of the event loop."""
-Dragging = Callable[[bool], None]
-"""Called with True when a drag begins and with False when it ends."""
+Dragging = Callable[[bool], None]  # called with True when a drag begins and with False when it ends
 
 
 Grasp = TypeVar("Grasp")
@@ -273,8 +269,7 @@ class InPlaneHandle(PointHandle[tuple[Section, Box]]):
 
 
 _FRAME = "handle:frame"
-_FRAME_WIDTH = 1.5
-"""Width of the frame's lines, in pixels."""
+_FRAME_WIDTH = 1.5  # width of the frame's lines, in pixels
 
 
 class AxisHandle(PointHandle[tuple[Section, PlaceOnSection]]):
@@ -374,14 +369,12 @@ class AxisHandle(PointHandle[tuple[Section, PlaceOnSection]]):
         actor.prop.color = color
 
 
-_CORNERS = 32
-"""Number of corners of the polygon that is drawn as a point."""
+_CORNERS = 32  # number of corners of the polygon that is drawn as a point
 
 _FAR_PX, _HEAD_PX, _SHAFT_PX = 25.0, 8.0, 2.5
 """Of an arrow, in pixels: distance of its tip from the middle, head length, shaft thickness."""
 
-_NECK_PX = _FAR_PX - _HEAD_PX
-"""Distance from the middle to where an arrow's head begins, in pixels."""
+_NECK_PX = _FAR_PX - _HEAD_PX  # distance from the middle to where an arrow's head begins, in pixels
 
 _ARROW = (
     np.array([(0.0, -0.5), (_NECK_PX, -0.5), (_NECK_PX, 0.5), (0.0, 0.5)]) * (1.0, _SHAFT_PX),

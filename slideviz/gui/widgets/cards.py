@@ -15,8 +15,7 @@ from qtpy.QtSvg import QSvgRenderer
 
 from slideviz.terms import ROLES
 
-SIZE = (152, 96)
-"""Width and height of a picture in pixels, at a device pixel ratio of 1."""
+SIZE = (152, 96)  # width and height of a picture in pixels, at a device pixel ratio of 1
 BODY, WALL, REPEAT = (ROLES[role].color for role in ("moving", "sliding", "periodic"))
 """Colors of moving, sliding and periodic boundaries."""
 

@@ -12,8 +12,7 @@ from qtpy.QtWidgets import QComboBox, QStyle, QStyleOptionComboBox, QStylePainte
 from slideviz.gui.widgets.labels import wrapped
 
 Value = TypeVar("Value")
-MARGIN = 4
-"""Space that the style leaves beside the text, in pixels."""
+MARGIN = 4  # space that the style leaves beside the text, in pixels
 
 
 class Choice(QComboBox):

@@ -17,8 +17,7 @@ from slideviz.gui.widgets.build import set_style
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.services import main_window
 
-_ALLOWED = re.compile(r"[\d.eE+\-*/() ]+\Z")
-"""The letters that an expression may have."""
+_ALLOWED = re.compile(r"[\d.eE+\-*/() ]+\Z")  # the letters that an expression may have
 
 _SIGNS: dict[type[ast.unaryop], Callable[[float], float]] = {
     ast.UAdd: operator.pos,
@@ -66,11 +65,9 @@ def number_text(value: float) -> str:
     return text.removesuffix(".0")
 
 
-SHORT = 8
-"""Length of a text up to which a number is shown with all its digits."""
+SHORT = 8  # length of a text up to which a number is shown with all its digits
 
-NOTHING = 1e-10
-"""Ratio of a number to a scale below which it counts as a rounding error of zero."""
+NOTHING = 1e-10  # ratio of a number to a scale below which it counts as a rounding error of zero
 
 
 def short_text(value: float, scale: float = 0.0) -> str:

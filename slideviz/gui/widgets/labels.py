@@ -72,8 +72,7 @@ def plain_labels(widget: QWidget) -> None:
             label.setTextFormat(Qt.TextFormat.PlainText)
 
 
-LETTERS = 60
-"""Average number of letters in a line of a tooltip."""
+LETTERS = 60  # average number of letters in a line of a tooltip
 
 
 def wrapped(text: str) -> str:

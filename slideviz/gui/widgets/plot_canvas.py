@@ -28,12 +28,10 @@ from slideviz.plots.draw import PRINT, Style
 from slideviz.plots.figure_io import figure_bytes
 from slideviz.system.atomic import atomic_write
 
-DPI = 100
-"""Resolution of a figure on a screen with a device pixel ratio of 1."""
+DPI = 100  # resolution of a figure on a screen with a device pixel ratio of 1
 
 
-THREAD = "slideviz-plot"
-"""Name of the threads that draw plots."""
+THREAD = "slideviz-plot"  # name of the threads that draw plots
 
 _DRAWING_LOCK = Lock()  # matplotlib is not made for several threads
 
@@ -142,8 +140,7 @@ def draw_in_thread(draw_on: Draw, paper: PlotFormat, place: AxesPlace) -> Future
     return coming
 
 
-FIGURE_INCHES = (4.2, 3.1)
-"""Width and height of a saved figure, in inches."""
+FIGURE_INCHES = (4.2, 3.1)  # width and height of a saved figure, in inches
 
 PLOT_FILTERS = "PNG picture (*.png);;SVG drawing (*.svg);;PDF drawing (*.pdf)"
 
