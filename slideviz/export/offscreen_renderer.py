@@ -288,9 +288,7 @@ class OffscreenRenderer:
 
 
 PICTURE_SIZE = PictureOptions.size  # default width and height in pixels
-
 WHITE = 250  # least red, green and blue (0 to 255) of a pixel that counts as background
-
 _SMALL = 10  # mean size of cells in pixels below which they are drawn without edges
 
 

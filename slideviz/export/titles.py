@@ -171,7 +171,6 @@ def _cut(line: str, most: int) -> str:
 
 
 CELL_LABEL = "mark:words"  # name of the actor of the marked cell's label
-
 _AWAY = 9.0  # distance in pixels between the cell and its label, at normal letter size
 
 

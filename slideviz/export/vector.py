@@ -27,7 +27,6 @@ from slideviz.session.state import Session
 from slideviz.terms import COLOR_BY, ROLES
 
 SUFFIXES = (".svg", ".pdf")  # suffixes of such pictures
-
 MOST_CELLS = 100_000  # most cells of such a picture: viewers take minutes to show more
 _SCREEN_DPI = 200.0  # pixels per inch of a picture whose size is given in pixels only
 _LETTERS, _LINE, _CUT, _EDGE = 13.0, 1.4, 0.8, 0.3

@@ -30,7 +30,6 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 _LETTERS = "IJK"
 _FARTHEST = 10.0  # largest parametric coordinate of a point in a box, which goes from 0 to 1
-
 Row = tuple[int, list[str]]  # a line of numbers: its place in the section, from 0, and its words
 
 

@@ -35,7 +35,6 @@ _VERSION = (2, 1)  # version of the format
 _VOLUME = "volume"  # name of the block with the cells
 _CHUNK_ROWS = 1 << 16  # most rows in a chunk of an HDF5 dataset that grows
 PARTITION = 1 << 20  # most cells of a partition
-
 Values = Mapping[str, NDArray]  # arrays by name, a row for each cell or point
 
 

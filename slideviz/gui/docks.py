@@ -132,7 +132,6 @@ LEFT_WIDTH, RIGHT_WIDTH = 356, 316
 """Least initial width in pixels of the docks on each side of a window of `FULL_WIDTH`."""
 
 NARROWEST = {LEFT: 236, RIGHT: 224}  # least width in pixels of the docks on each side
-
 FULL_WIDTH = 1280  # width of a window in pixels below which the initial widths shrink in proportion
 
 LOW_HEIGHT = 600

@@ -6,8 +6,9 @@ import html
 from datetime import datetime
 from pathlib import Path
 
-from qtpy.QtCore import QDate, QEvent, QLocale, QSize, Qt, Signal
-from qtpy.QtGui import QKeyEvent, QResizeEvent
+from qtpy.QtCore import QByteArray, QDate, QEvent, QLocale, QRectF, QSize, Qt, Signal
+from qtpy.QtGui import QKeyEvent, QPainter, QPixmap, QResizeEvent
+from qtpy.QtSvg import QSvgRenderer
 from qtpy.QtWidgets import (
     QFrame,
     QGridLayout,
@@ -29,18 +30,14 @@ from slideviz.gui.widgets.build import (
     in_row,
     push_button,
 )
-from slideviz.gui.widgets.cards import SIZE, card
 from slideviz.gui.widgets.icons import icon, logo
 from slideviz.gui.widgets.labels import ElidedLabel, rich_label, wrapped
 
 WIDEST = 860  # largest width of the page in pixels: longer lines would be hard to read
-
 RECENT = 5  # number of recent files that are listed
-
 COLUMNS = 4  # most cards of samples in a row
-
 NARROWEST = 126  # least width of a card in pixels, for its name
-
+SIZE = (152, 96)  # width and height of a card's picture in pixels, at a device pixel ratio of 1
 TRIED = "passage"  # the sample that is deformed by one click
 
 TRY = "Try it: deform a blade passage"
@@ -238,3 +235,19 @@ def _heading(text: str) -> QLabel:
     label = rich_label(f"<b>{text}</b>")
     label.setContentsMargins(0, 2, 0, 4)
     return label
+
+
+def card(name: str, line: str) -> QPixmap:
+    """Return the picture of a sample by its name, with mesh lines in the color ``line``."""
+    folder = Path(__file__).with_name("cards")
+    file = folder / f"{name}.svg"
+    svg = (file if file.exists() else folder / "mesh.svg").read_text(encoding="utf-8")
+    pixmap = QPixmap(QSize(2 * SIZE[0], 2 * SIZE[1]))
+    pixmap.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(pixmap)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    data = QByteArray(svg.replace("currentColor", line).encode())
+    QSvgRenderer(data).render(painter, QRectF(pixmap.rect()))
+    painter.end()
+    pixmap.setDevicePixelRatio(2.0)
+    return pixmap

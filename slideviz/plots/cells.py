@@ -131,7 +131,6 @@ def boxes_of(cells: Polygons) -> tuple[FloatArray, FloatArray]:
 MOST_EDGED = 150_000
 """Number of cells above which they are drawn as pixels without visible edges, which is faster."""
 _EDGE, _FACE = "#c9d0d8", "#f3f5f7"  # colors of the faint cells' edges and faces
-
 _SECTION_LINE = 0.7  # width of the section's line in points
 
 

@@ -19,9 +19,7 @@ PixelsOf = Callable[[FloatArray], FloatArray]
 """A function that returns the display coordinates (n, 2), in pixels, of points (n, 3)."""
 
 _MARGIN = 0.015  # margin between a patch and the frame around it, relative to the patch's diagonal
-
 _CHORD = np.radians(1.0)  # angle between the points of an arc, in radians
-
 _STEEP = 0.3  # foreshortening of the size's direction below which the mouse cannot drag along it
 
 _LEAST = 1e-3

@@ -28,7 +28,6 @@ from slideviz.session.state import Session
 from slideviz.terms import quantity_of
 
 FILL = 0.94  # part of the view's height or width that a fitted section takes
-
 READING = "its cells are being read from the file of the mesh"  # summary while cells are being read
 
 

@@ -11,7 +11,6 @@ from slideviz.errors import SlidevizError, not_one_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 TINY = 0.05  # size of the moved boundaries, relative to the mesh's, below which a detail is shown
-
 MARGIN = 2.5  # width of a detail relative to that of the moved boundaries
 
 

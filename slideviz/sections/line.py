@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
 MARGIN = 0.03  # margin of the box around a mesh, at which lines end, over the mesh's longest extent
-
 Box = tuple[FloatArray, FloatArray]  # lowest and highest coordinates, (2,) each
 
 

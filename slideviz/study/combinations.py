@@ -164,9 +164,7 @@ COMPARED_METHODS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
 """For each method its name, and the fields of a case that it changes."""
 
 MODES = terms.names(terms.PERIODIC_MODES)  # the name of each PERIODIC_MODE
-
 AUTO = 0  # number of steps that means STEPS= auto: the solver chooses it
-
 STEPS = (1, 5, 20)  # numbers of steps that are compared by default
 
 

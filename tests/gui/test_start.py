@@ -10,11 +10,11 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
 from slideviz.errors import Cancelled
-from slideviz.gui import files
-from slideviz.gui.start import COLUMNS, RECENT, StartPage, when_changed
-from slideviz.gui.widgets.cards import _DRAWINGS, SIZE, card
+from slideviz.gui import files, start
+from slideviz.gui.start import COLUMNS, RECENT, SIZE, StartPage, card, when_changed
 from slideviz.samples.table import SAMPLES
 from slideviz.session import jobs
+from slideviz.terms import ROLES
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
@@ -148,7 +148,9 @@ def test_all_cards_are_seen_without_scrolling(driver, passage_file):
 
 
 def test_each_sample_has_a_picture_of_its_own(qapp):
-    assert set(_DRAWINGS) == set(SAMPLES)
+    files = list(Path(start.__file__).with_name("cards").glob("*.svg"))
+    assert {file.stem for file in files} == {*SAMPLES, "mesh"}
+    assert all(ROLES["sliding"].color in file.read_text() for file in files)
     drawn = {name: card(name, "#888888").toImage() for name in SAMPLES}
     assert all(image.width() == 2 * SIZE[0] for image in drawn.values())
     names = list(drawn)

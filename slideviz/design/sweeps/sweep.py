@@ -28,7 +28,6 @@ from slideviz.formats.table import usual_ending
 from slideviz.mesh.model import Mesh, Origin
 
 LOST = 3  # number of lost workers at which a design is given up, and its row says so
-
 _EVERY = 0.2  # seconds between two calls of ``going_on``
 
 

@@ -128,7 +128,6 @@ MESHIO_TYPES = {
 }
 """VTK identifier by meshio's name of an element type."""
 _FLAT = 1e-9  # largest range of z, as a fraction of the extent, of a mesh in the xy-plane
-
 _HDF5 = b"\x89HDF\r\n\x1a\n"  # first bytes of an HDF5 file
 _MOST_SHRUNK = 1_100
 """Bytes that a byte of a compressed dataset has at most: zlib's 1,032, and some more."""

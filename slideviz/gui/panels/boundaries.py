@@ -28,7 +28,6 @@ from slideviz.session.store import Store
 from slideviz.terms import ROLES, labels
 
 NAME, COUNT, ROLE = 0, 1, 2  # the columns of the table
-
 NARROW = 290  # width of the table in pixels below which it has no room for the numbers of elements
 
 

@@ -24,7 +24,6 @@ STEP_MS = (50, 500)
 """The shortest and the longest time that one step is shown at speed 1, in milliseconds."""
 
 SPEEDS = (0.5, 1.0, 2.0, 4.0)  # the speeds in the player's menu, as multiples of the usual one
-
 NARROW = 540  # width in pixels below which the player hides speed and loop and shortens its text
 
 NARROWEST = 330

@@ -31,9 +31,7 @@ from slideviz.sections.line import Box
 from slideviz.sections.model import Section
 
 HANDLE_COLOR = "#2f6fb5"  # color of a handle that the mouse is not over
-
 POINT_PX, RIM_PX = 11.0, 15.0  # diameters of a handle's point and of the rim around it, in pixels
-
 REACH_PX = 10.0  # distance from a point up to which the mouse takes it, in pixels
 
 EDGE_PX = 22.0

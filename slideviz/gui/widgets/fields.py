@@ -66,7 +66,6 @@ def number_text(value: float) -> str:
 
 
 SHORT = 8  # length of a text up to which a number is shown with all its digits
-
 NOTHING = 1e-10  # ratio of a number to a scale below which it counts as a rounding error of zero
 
 

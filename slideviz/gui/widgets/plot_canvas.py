@@ -32,7 +32,6 @@ DPI = 100  # resolution of a figure on a screen with a device pixel ratio of 1
 
 
 THREAD = "slideviz-plot"  # name of the threads that draw plots
-
 _DRAWING_LOCK = Lock()  # matplotlib is not made for several threads
 
 Draw = Callable[[Figure, Style], None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from string import Template
 
 from qtpy.QtCore import Qt
 from qtpy.QtGui import QColor, QPalette
@@ -49,56 +50,11 @@ _STYLE = {
     "noted": ("#8fb3dc", "#4f76a3"),
     "frame": ("#87919c", "#818c98"),
 }
-"""The other colors of the style sheet `_SHEET`, in the light and the dark theme.
+"""The other colors of the style sheet ``theme.qss``, in the light and the dark theme.
 
 ``bad`` is for invalid fields, warning labels and the alarm banner's border; ``banner`` is that
 banner's background; ``note`` and ``noted`` are background and border of the calm banner; ``soft``
 is for hints; ``frame`` for outlines of fields, menus and tooltips."""
-
-_SHEET = """
-QDockWidget {{ font-weight: 600; titlebar-close-icon: url("{signs}/close_{name}.svg");
-    titlebar-normal-icon: url("{signs}/float_{name}.svg"); }}
-QDockWidget::title {{ background: {title}; padding: 5px 8px; }}
-QDockWidget > QWidget {{ font-weight: 400; }}
-QDialogButtonBox {{ dialogbuttonbox-buttons-have-icons: 0; }}
-QToolBar {{ border: none; spacing: 2px; padding: 2px 4px; }}
-QToolButton {{ padding: 3px; border-radius: 4px; border: 1px solid transparent; }}
-QToolButton:hover {{ background: {hover}; }}
-QToolButton:checked {{ background: {checked}; border: 1px solid {line}; }}
-QToolButton:focus, QPlainTextEdit:focus, QListView:focus, QTreeView:focus,
-QTableView:focus {{ border: 1px solid {accent}; }}
-QStatusBar {{ border-top: 1px solid {line}; }}
-QStatusBar::item {{ border: none; }}
-QMainWindow::separator {{ width: 5px; height: 5px; background: {Window}; }}
-QToolTip {{ padding: 4px; border: 1px solid {frame}; background: {ToolTipBase};
-    color: {ToolTipText}; }}
-QMenu {{ border: 1px solid {frame}; }}
-QListWidget#motions::item {{ padding: 3px 2px; }}
-QLabel[hint="true"] {{ color: {soft}; }}
-QLabel[bad="true"] {{ color: {bad}; }}
-QLineEdit[bad="true"],
-QSpinBox[bad="true"] {{ border: 1.5px solid {bad}; border-radius: 2px; padding: 2px; }}
-QPushButton#run {{ background: {accent}; color: white; font-weight: 600; border: none;
-    border-radius: 4px; padding: 7px 18px; }}
-QPushButton#run:hover {{ background: {accent_hover}; }}
-QPushButton#run:disabled {{ background: {mid}; color: {soft}; }}
-QPushButton#open_page {{ padding: 6px 17px; border: 1px solid {line}; border-radius: 4px;
-    background: {Base}; }}
-QPushButton#open_page:hover {{ background: {hover}; }}
-QPushButton#open_page:focus, QPushButton#run:focus {{ border: 2px solid {noted};
-    padding: 5px 16px; }}
-QToolButton[card="true"] {{ background: {Base}; border: 1px solid {line}; border-radius: 6px;
-    padding: 8px 4px 6px 4px; }}
-QToolButton[card="true"]:hover {{ background: {note}; border: 1px solid {noted}; }}
-QToolButton[card="true"]:focus {{ border: 2px solid {accent}; }}
-QPushButton[recent="true"] {{ border: 1px solid transparent; border-radius: 4px;
-    background: transparent; text-align: left; }}
-QPushButton[recent="true"]:hover {{ background: {hover}; }}
-QPushButton[recent="true"]:focus {{ border: 1px solid {accent}; }}
-QFrame#banner {{ background: {banner}; border: 1px solid {bad}; border-radius: 4px; }}
-QFrame#banner[calm="true"] {{ background: {note}; border: 1px solid {noted}; }}
-"""
-"""The style sheet, with the keys of `_PALETTE` and `_STYLE` in place of colors."""
 
 FRAMED = (
     "QCheckBox",
@@ -151,8 +107,10 @@ def apply(theme: str) -> ColorScheme:
     framed.setColor(QPalette.ColorRole.Window, outline)
     for kind in FRAMED:
         app.setPalette(framed, kind)  # type: ignore[arg-type]  # a str is taken, too
-    signs = Path(__file__).with_name("dock_signs").as_posix()
-    app.setStyleSheet(_SHEET.format(**colors, name=name, signs=signs))
+    here = Path(__file__)
+    sheet = Template(here.with_name("theme.qss").read_text(encoding="utf-8"))
+    signs = here.with_name("dock_signs").as_posix()
+    app.setStyleSheet(sheet.substitute(colors, name=name, signs=signs))
     return DARK if dark else LIGHT
 
 
