@@ -60,7 +60,7 @@ def one(deformer, **options):
 @pytest.mark.parametrize(("dim", "steps"), [(2, 1), (2, 3), (3, 1)])
 def test_the_component_gives_what_the_deformer_gives(dim, steps):
     deformer = deformer_of(dim, steps=steps)
-    problem = one(deformer, quality=True, p=20.0)
+    problem = one(deformer, quality=True, margin=True, p=20.0)
     problem.run_model()
     points = deformer.deform(moved_surface(deformer) - deformer.mesh.points[deformer.nodes])
     np.testing.assert_array_equal(problem.get_val("aero_vol_coords"), points.ravel())
@@ -69,6 +69,9 @@ def test_the_component_gives_what_the_deformer_gives(dim, steps):
     ).derivative
     assert problem.get_val("minimum_quality")[0] == found.minimum
     assert problem.get_val("mean_quality")[0] == found.mean
+    moved = moved_surface(deformer) - deformer.mesh.points[deformer.nodes]
+    margin = deformer.constraint("margin", moved, p=20.0).value
+    assert problem.get_val("minimum_margin")[0] == pytest.approx(margin, abs=1e-14)
 
 
 def test_before_it_runs_it_has_the_undeformed_mesh():
@@ -87,7 +90,7 @@ def test_two_scenarios_in_one_model_have_exact_partials_forward_and_reverse(step
     deformer = deformer_of(steps=steps)
     model = om.Group()
     for k in range(2):
-        part = MeshDeformation(deformer=deformer, quality=True, p=10.0)
+        part = MeshDeformation(deformer=deformer, quality=True, margin=True, p=10.0)
         model.add_subsystem(f"scenario{k}", part)
     problem = problem_of(model)
     for k in range(2):
@@ -96,7 +99,8 @@ def test_two_scenarios_in_one_model_have_exact_partials_forward_and_reverse(step
     checked = problem.check_partials(out_stream=None, form="central", step=1e-6)
     assert len(checked) == 2
     for pairs in checked.values():
-        assert {of for of, _ in pairs} == {"aero_vol_coords", "minimum_quality", "mean_quality"}
+        names = {"aero_vol_coords", "minimum_quality", "mean_quality", "minimum_margin"}
+        assert {of for of, _ in pairs} == names
         assert all(found["J_fwd"].any() and found["J_rev"].any() for found in pairs.values())
     assert_check_partials(checked, atol=2e-7, rtol=2e-7)
 

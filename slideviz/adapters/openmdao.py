@@ -14,6 +14,7 @@ import numpy as np
 
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
+from slideviz.mesh.quality_derivative import smooth_margin
 
 try:
     import openmdao.api as om
@@ -29,12 +30,13 @@ if TYPE_CHECKING:
 
     from slideviz.design.deformer import Deformer
     from slideviz.mesh.model import FloatArray, IntArray
-    from slideviz.mesh.quality_derivative import QualityDerivative
 
+Slope = tuple[float, "FloatArray"]
+"""A number, and its derivative by the points (n, d)."""
 SURFACE = MPhysVariables.Aerodynamics.Surface.COORDINATES
 MESH_SURFACE = MPhysVariables.Aerodynamics.Surface.Mesh.COORDINATES
 VOLUME = "aero_vol_coords"
-MINIMUM, MEAN = "minimum_quality", "mean_quality"
+MINIMUM, MEAN, MARGIN = "minimum_quality", "mean_quality", "minimum_margin"
 
 
 class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
@@ -44,7 +46,8 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
     ``deformer.nodes``, not their displacement. The output ``aero_vol_coords`` (n d,) has all
     points. Both are flat, and in the mesh's length unit. With ``quality=True`` there are two more
     outputs, ``minimum_quality``, the smooth minimum (`slideviz.QualityDerivative`), and
-    ``mean_quality``.
+    ``mean_quality``. With ``margin=True`` there is ``minimum_margin``, the smooth minimum of the
+    margins, which is 0 where the first cell folds (`slideviz.Deformer.constraint`).
 
     Products with the Jacobian, forward and reverse, are those of the deformer: exact for its frozen
     choices, such as the control nodes. These are made at the deformer's reference; to renew them,
@@ -52,20 +55,21 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
 
     Variables are not distributed: it is made for one process.
 
-    Options: ``deformer``, a `slideviz.Deformer`; ``quality``; ``p``, the exponent of the smooth
-    minimum. Errors of the deformer become an `openmdao.api.AnalysisError`, after which an optimiser
-    may try another design.
+    Options: ``deformer``, a `slideviz.Deformer`; ``quality``; ``margin``; ``p``, the exponent of
+    the smooth minima. Errors of the deformer become an `openmdao.api.AnalysisError`, after which an
+    optimiser may try another design.
     """
 
     def initialize(self) -> None:
         """Declare the options."""
         self.options.declare("deformer", recordable=False, desc="what deforms the mesh")
         self.options.declare("quality", False, types=bool, desc="whether it has the quality too")
+        self.options.declare("margin", False, types=bool, desc="whether it has the margin too")
         self.options.declare("p", 50.0, types=(int, float), desc="exponent of the smooth minimum")
 
     def setup(self) -> None:
         """Declare the variables, with the undeformed mesh as their values."""
-        self._measured: tuple[Deformer, FloatArray, QualityDerivative] | None = None
+        self._measured: tuple[Deformer, FloatArray, dict[str, Slope]] | None = None
         deformer = self.options["deformer"]
         points = deformer.mesh.points
         self.add_input(
@@ -80,6 +84,8 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
         if self.options["quality"]:
             self.add_output(MINIMUM, tags=["mphys_result"], desc="smooth minimum of the quality")
             self.add_output(MEAN, tags=["mphys_result"], desc="mean quality")
+        if self.options["margin"]:
+            self.add_output(MARGIN, tags=["mphys_result"], desc="smooth minimum of the margins")
 
     def compute(self, inputs: Any, outputs: Any) -> None:
         """Deform the mesh, and write points and qualities to ``outputs``."""
@@ -87,9 +93,8 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
         try:
             points = deformer.deform(displacement)
             outputs[VOLUME] = points.ravel()
-            if self.options["quality"]:
-                measured = self._measure(displacement, points)
-                outputs[MINIMUM], outputs[MEAN] = measured.minimum, measured.mean
+            for name, (value, _) in self._measure(displacement, points).items():
+                outputs[name] = value
         except SlidevizError as problem:
             raise om.AnalysisError(str(problem)) from problem
 
@@ -99,9 +104,8 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
             return
         deformer, displacement = self._at(inputs)
         slopes = {}
-        if MINIMUM in d_outputs or MEAN in d_outputs:
-            measured = self._measure(displacement)
-            slopes = {MINIMUM: measured.of_minimum, MEAN: measured.of_mean}
+        if any(name in d_outputs for name in (MINIMUM, MEAN, MARGIN)):
+            slopes = {name: slope for name, (_, slope) in self._measure(displacement).items()}
         if mode == "fwd":
             moved = deformer.jvp(displacement, d_inputs[SURFACE].reshape(displacement.shape))
             if VOLUME in d_outputs:
@@ -126,23 +130,27 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
 
     def _measure(
         self, displacement: FloatArray, points: FloatArray | None = None
-    ) -> QualityDerivative:
-        """Return the quality and its derivative at a displacement (m, d); the last one is cached.
+    ) -> dict[str, Slope]:
+        """Return the numbers that are outputs at a displacement (m, d); the last ones are cached.
 
         ``points`` (n, d) are those of the deformed mesh, if known.
         """
-        deformer, kept = self.options["deformer"], self._measured
+        deformer, kept, options = self.options["deformer"], self._measured, self.options
         if kept is None or kept[0] is not deformer or not np.array_equal(kept[1], displacement):
-            mesh = deformer.mesh
-            measured = quality(
-                mesh.with_points(deformer.deform(displacement) if points is None else points),
-                mesh,
-                deformer.case.quality_metric,
-                derivative=True,
-                p=self.options["p"],
-            ).derivative
-            assert measured is not None
-            kept = self._measured = deformer, displacement.copy(), measured
+            found: dict[str, Slope] = {}
+            if options["quality"] or options["margin"]:
+                base = deformer.mesh
+                mesh = base.with_points(deformer.deform(displacement) if points is None else points)
+            if options["quality"]:
+                metric = deformer.case.quality_metric
+                slope = quality(mesh, base, metric, derivative=True, p=options["p"]).derivative
+                assert slope is not None
+                found[MINIMUM] = slope.minimum, slope.of_minimum
+                found[MEAN] = slope.mean, slope.of_mean
+            if options["margin"]:
+                margin = smooth_margin(mesh, base, options["p"])
+                found[MARGIN] = margin.value, margin.of_points
+            kept = self._measured = deformer, displacement.copy(), found
         return kept[2]
 
 
@@ -174,7 +182,7 @@ class MeshDeformationBuilder(Builder):  # type: ignore[misc]
     in_coupling : bool
         Whether to deform the mesh in the coupling group, as needed for a structure that deflects;
         else once before it. Without a solver it is always in the coupling group.
-    quality, p
+    quality, margin, p
         As the options of `MeshDeformation`.
     """
 
@@ -185,12 +193,13 @@ class MeshDeformationBuilder(Builder):  # type: ignore[misc]
         *,
         in_coupling: bool = False,
         quality: bool = False,
+        margin: bool = False,
         p: float = 50.0,
     ) -> None:
         super().__init__()
         self.deformer, self.solver = deformer, solver
         self.in_coupling = in_coupling or solver is None
-        self._options = {"deformer": deformer, "quality": quality, "p": p}
+        self._options = {"deformer": deformer, "quality": quality, "margin": margin, "p": p}
 
     def initialize(self, comm: Any) -> None:
         """Prepare the solver; the deformer is ready."""

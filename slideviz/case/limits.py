@@ -20,6 +20,7 @@ from slideviz.case.words import name_text, number
 from slideviz.errors import CaseError, not_one_of, shown
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, PIECE, UNPROVEN, Quality
+from slideviz.mesh.quality_derivative import cell_margins
 from slideviz.mesh.walls import walls
 
 OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
@@ -76,6 +77,14 @@ def _of_quality(name: str) -> Callable[[MeasuredMesh, str], Values]:
     return lambda measured, _: (getattr(measured.quality, name), None)
 
 
+def _margins(measured: MeasuredMesh) -> FloatArray:
+    """Return the margins (m,) of the cells; none without an undeformed mesh."""
+    assert measured.mesh is not None
+    if measured.reference is None:
+        return np.empty(0)
+    return cell_margins(measured.mesh, measured.reference)
+
+
 def _of_walls(name: str) -> Callable[[MeasuredMesh, str], Values]:
     """Return the function of a number of `slideviz.mesh.walls`: at the corners of facets."""
 
@@ -115,6 +124,11 @@ NUMBERS: Mapping[str, LimitNumber] = {
     ),
     "size": LimitNumber("size of cells beside the undeformed ones", ">", _of_quality("size")),
     "skew": LimitNumber("shape of cells", ">", _of_quality("skew")),
+    "margin": LimitNumber(
+        "least coefficient of a cell's Jacobian over that before; 0 folds",
+        ">",
+        lambda measured, _: (_margins(measured), None),
+    ),
     "first_height": _wall("first_height", "distance of the first node from its wall", "<>"),
     "height_ratio": _wall("height_ratio", "first height over that before", "<>"),
     "growth": _wall("growth", "ratio of successive layers, the first five", "<"),

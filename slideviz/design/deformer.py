@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,9 +24,11 @@ from slideviz.design.checks import (
 from slideviz.design.choosing import choose_steps
 from slideviz.design.frozen.step import FrozenStep, StepState
 from slideviz.design.known_nodes import known_node_map
-from slideviz.errors import CaseError, DeformError
+from slideviz.errors import CaseError, DeformError, not_one_of
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
+from slideviz.mesh.quality import quality
+from slideviz.mesh.quality_derivative import smooth_margin
 from slideviz.rbf.images import FAR
 from slideviz.rbf.loops import to_points
 from slideviz.rbf.tape import Array, Tape, Variable, value
@@ -37,6 +40,30 @@ TOGETHER = 128
 """Designs that are deformed together, so that each radial function is computed once for all."""
 
 Report = Callable[[Progress], None]
+
+
+CONSTRAINTS = ("min", "mean", "margin")
+"""The numbers of a mesh that have derivatives: names of `slideviz.case.limits.NUMBERS`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint:
+    """A number of a deformed mesh, with exact derivatives by the design."""
+
+    value: float
+    of_points: FloatArray
+    """(n, d): its derivative by the points of the mesh."""
+    _start: Variable
+    _end: Variable
+
+    def jvp(self, direction: FloatArray) -> float:
+        """Return the derivative of the number in a direction (m, d) of the displacement."""
+        moved = self._start.tape.push(self._start, np.asarray(direction, float), self._end)
+        return float(np.vdot(self.of_points, moved))
+
+    def vjp(self, weight: float = 1.0) -> FloatArray:
+        """Return the gradient (m, d) of ``weight`` times the number by the displacement."""
+        return np.array(self._start.tape.pull(self._end, weight * self.of_points, self._start))
 
 
 class Deformer:
@@ -247,6 +274,43 @@ class Deformer:
         _, start, end = self._taped(displacement)
         adjoint = self._shaped(weights, self.mesh.points.shape, "weights")
         return np.array(start.tape.pull(end, adjoint, start))
+
+    @check_types
+    def constraint(
+        self, name: str, displacement: FloatArray | None = None, p: float = 50.0
+    ) -> Constraint:
+        """Return a number of the deformed mesh that an optimiser can constrain, with its gradient.
+
+        Parameters
+        ----------
+        name : {"min", "mean", "margin"}
+            The smooth minimum or the mean of the quality (`slideviz.QualityDerivative`), or the
+            smooth minimum of the margins (`slideviz.mesh.quality_derivative.SmoothMargin`).
+        displacement : (m, d), optional
+            The design; the case's own if not given.
+        p : float
+            The exponent of the smooth minimum.
+
+        Raises
+        ------
+        CaseError
+            The number has no derivative, or the exponent is below 1.
+        MeshError
+            An undeformed cell has no positive volume to compare with.
+        """
+        design = self.displacement if displacement is None else displacement
+        if name not in CONSTRAINTS:
+            raise CaseError(f"constraint: {not_one_of(name, CONSTRAINTS)}")
+        states, start, end = self._taped(design)
+        mesh = self.mesh.with_points(value(states[-1].points))
+        if name == "margin":
+            margin = smooth_margin(mesh, self.mesh, p)
+            return Constraint(margin.value, margin.of_points, start, end)
+        slope = quality(mesh, self.mesh, self.case.quality_metric, derivative=True, p=p).derivative
+        assert slope is not None
+        if name == "min":
+            return Constraint(slope.minimum, slope.of_minimum, start, end)
+        return Constraint(slope.mean, slope.of_mean, start, end)
 
     def as_run(self) -> FloatArray | None:
         """Return the points (n, d) that ``sv.deform`` gives at the reference, to the bit.

@@ -11,6 +11,7 @@ import numpy as np
 
 from slideviz.mesh.jacobians import (
     LANES,
+    NODE,
     OPTIONS,
     corners,
     cross3,
@@ -163,6 +164,110 @@ def _spread_slopes(vtk, x, y, z):  # type: ignore[no-untyped-def]
         (b * y[0], b * y[1], b * y[2]),
         (c * z[0], c * z[1], c * z[2]),
     )
+
+
+@njit(**OPTIONS)
+def pull_coefficients(vtk, points, nodes, table, weights, out):  # type: ignore[no-untyped-def]
+    """Write derivatives by nodes of the weighted sum of each cell's coefficients to ``out``.
+
+    Parameters
+    ----------
+    points, nodes, table
+        As of `slideviz.mesh.jacobians.measure`.
+    weights : (k, m)
+        Factors of the coefficients: the 27 of a hexahedron and the 9 of a prism, in the order of
+        `jacobians.hexahedron_coefficients` and `jacobians.prism_coefficients`, else the corners.
+    out : (m, n, d)
+        Written.
+    """
+    at = np.empty((points.shape[1], nodes.shape[1], LANES))
+    slope = np.empty_like(at)
+    part, none = np.zeros((len(weights), LANES)), np.zeros((len(weights), LANES))
+    for first in range(0, len(nodes), LANES):
+        count = min(LANES, len(nodes) - first)
+        gather(points, nodes, first, count, at)
+        part[:, :count] = weights[:, first : first + count]
+        slope[:] = 0.0
+        if vtk == 12:
+            _pull_hexahedron(at, count, part.reshape(3, 3, 3, LANES), slope)
+        elif vtk == 13:
+            _pull_prism(at, count, part.reshape(3, 3, LANES), slope)
+        elif points.shape[1] == 2:
+            _pull_plane(5, at, table, count, part, none, slope)
+        else:
+            _pull_solid(14, at, table, count, part, none, slope)
+        for c in range(count):
+            for j in range(nodes.shape[1]):
+                for axis in range(points.shape[1]):
+                    out[first + c, j, axis] = slope[axis, j, c]
+
+
+_U, _V = NODE.transpose(1, 0, 2), NODE
+_SIDES = np.array(
+    [[[_U[j, :, 0], _V[i, :, 0], _U[j, :, 1], _V[i, :, 1]] for j in range(2)] for i in range(2)]
+)
+"""Nodes of the edges u0, v0, u1, v1 of a hexahedron at i and j, (2, 2, 4, 2)."""
+_PRISM_SIDES = np.array([[0, 1], [0, 2], [3, 4], [3, 5]])
+_PRISM_HEIGHTS = np.array([[0, 3], [1, 4], [2, 5]])
+
+
+@njit(**OPTIONS)
+def _pull_hexahedron(at, count, weights, slope):  # type: ignore[no-untyped-def]
+    """Add the derivatives of the coefficients of hexahedra, times ``weights`` (3, 3, 3, ...)."""
+    heights, factors = NODE.reshape(4, 2), np.empty((3, 4))
+    for i in range(2):
+        for j in range(2):
+            for c in range(count):
+                for p in range(2):
+                    for q in range(2):
+                        # As in `jacobians.hexahedron_coefficients`.
+                        weight = (0.5 if i != p else 1.0) * (0.5 if j != q else 1.0)
+                        for n in range(3):
+                            factors[n, 2 * p + q] = weight * weights[i + p, j + q, n, c]
+                _pull_heights(at, c, _SIDES[i, j], heights, factors, slope)
+
+
+@njit(**OPTIONS)
+def _pull_prism(at, count, weights, slope):  # type: ignore[no-untyped-def]
+    """Add the derivatives of the coefficients of prisms, times ``weights`` (3, 3, ...)."""
+    for c in range(count):
+        _pull_heights(at, c, _PRISM_SIDES, _PRISM_HEIGHTS, weights[:, :, c], slope)
+
+
+@njit(**OPTIONS)
+def _pull_heights(at, c, sides, heights, factors, slope):  # type: ignore[no-untyped-def]
+    """Add derivatives of ``Σ_h w_h · (f0h u0 x v0 + f1h (u0 x v1 + u1 x v0) / 2 + f2h u1 x v1)``.
+
+    ``sides`` (4, 2) are the nodes of the edges u0, v0, u1, v1 of cell c, ``heights`` (h, 2) those
+    of w, ``factors`` (3, h).
+    """
+    u0, v0 = edge(at, sides[0, 0], sides[0, 1], c), edge(at, sides[1, 0], sides[1, 1], c)
+    u1, v1 = edge(at, sides[2, 0], sides[2, 1], c), edge(at, sides[3, 0], sides[3, 1], c)
+    low, top = cross3(u0, v0), cross3(u1, v1)
+    middle = half_sum(cross3(u0, v1), cross3(u1, v0))
+    total = np.zeros((3, 3))
+    for h in range(len(heights)):
+        one, two = heights[h]
+        w = edge(at, one, two, c)
+        for axis in range(3):
+            for n in range(3):
+                total[n, axis] += factors[n, h] * w[axis]
+            value = factors[0, h] * low[axis] + factors[1, h] * middle[axis]
+            value += factors[2, h] * top[axis]
+            slope[axis, one, c] -= value
+            slope[axis, two, c] += value
+    a, b, d = total[0], 0.5 * total[1], total[2]
+    by_edges = (
+        (cross3(v0, a), cross3(v1, b)),
+        (cross3(a, u0), cross3(b, u1)),
+        (cross3(v1, d), cross3(v0, b)),
+        (cross3(d, u1), cross3(b, u0)),
+    )
+    for k in range(4):
+        for axis in range(3):
+            value = by_edges[k][0][axis] + by_edges[k][1][axis]
+            slope[axis, sides[k, 0], c] -= value
+            slope[axis, sides[k, 1], c] += value
 
 
 @njit(**OPTIONS)

@@ -233,8 +233,8 @@ def _write_prism(at, count, found):  # type: ignore[no-untyped-def]
             found[2, i, c] = dot3(top, height)
 
 
-# Node of a hexahedron by its parameters (i, j, k), each 0 or 1.
-_NODE = np.array([[[0, 4], [3, 7]], [[1, 5], [2, 6]]])
+NODE = np.array([[[0, 4], [3, 7]], [[1, 5], [2, 6]]])
+"""Node of a hexahedron by its parameters (i, j, k), each 0 or 1."""
 
 
 @njit(**OPTIONS)
@@ -244,17 +244,17 @@ def _write_hexahedron(at, count, found):  # type: ignore[no-untyped-def]
     for i in range(2):
         for j in range(2):
             for c in range(count):
-                u0 = edge(at, _NODE[0, j, 0], _NODE[1, j, 0], c)
-                u1 = edge(at, _NODE[0, j, 1], _NODE[1, j, 1], c)
-                v0 = edge(at, _NODE[i, 0, 0], _NODE[i, 1, 0], c)
-                v1 = edge(at, _NODE[i, 0, 1], _NODE[i, 1, 1], c)
+                u0 = edge(at, NODE[0, j, 0], NODE[1, j, 0], c)
+                u1 = edge(at, NODE[0, j, 1], NODE[1, j, 1], c)
+                v0 = edge(at, NODE[i, 0, 0], NODE[i, 1, 0], c)
+                v1 = edge(at, NODE[i, 0, 1], NODE[i, 1, 1], c)
                 low, top = cross3(u0, v0), cross3(u1, v1)
                 middle = half_sum(cross3(u0, v1), cross3(u1, v0))
                 for p in range(2):
                     for q in range(2):
                         # 1 / binomial(2, a) for the sum of two linear Bernstein factors, each way.
                         weight = (0.5 if i != p else 1.0) * (0.5 if j != q else 1.0)
-                        w = edge(at, _NODE[p, q, 0], _NODE[p, q, 1], c)
+                        w = edge(at, NODE[p, q, 0], NODE[p, q, 1], c)
                         found[i + p, j + q, 0, c] += weight * dot3(low, w)
                         found[i + p, j + q, 1, c] += weight * dot3(middle, w)
                         found[i + p, j + q, 2, c] += weight * dot3(top, w)

@@ -12,7 +12,7 @@ with + for a cell that is smaller than the undeformed one, - for one that is lar
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from slideviz.errors import CaseError, MeshError
-from slideviz.mesh.jacobian_slopes import add_to_points, write_slopes
+from slideviz.mesh.jacobian_slopes import add_to_points, pull_coefficients, write_slopes
 from slideviz.mesh.jacobians import (
     CORNERS,
     INVERTED,
@@ -30,6 +30,7 @@ from slideviz.mesh.jacobians import (
     prism_coefficients,
 )
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, sealed
+from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.skew import EXPONENTS
 from slideviz.system.threads import PART, cores, in_parts
 
@@ -102,8 +103,7 @@ def derivative_of(
     CaseError
         The exponent is below 1 or no number.
     """
-    if not 1 <= p < np.inf:
-        raise CaseError(f"the exponent of the smooth minimum is {p}; give one of 1 or more, as 50")
+    _check_exponent(p)
     _check(mesh, found, sums)
     counted = np.zeros(len(found), bool)
     counted[found.counted] = True
@@ -131,6 +131,12 @@ def derivative_of(
     )
 
 
+def _check_exponent(p: float) -> None:
+    """Raise CaseError if the exponent of a smooth minimum is below 1 or no number."""
+    if not 1 <= p < np.inf:
+        raise CaseError(f"the exponent of the smooth minimum is {p}; give one of 1 or more, as 50")
+
+
 def _check(mesh: Mesh, found: Quality, sums: FloatArray | None) -> None:
     """Raise MeshError if a point is not finite, or an undeformed cell has no positive volume."""
     wrong = ~np.isfinite(mesh.points).all(axis=1)
@@ -144,11 +150,15 @@ def _check(mesh: Mesh, found: Quality, sums: FloatArray | None) -> None:
         flat = np.zeros(len(sums), bool)
         flat[found.counted] = ~(sums[found.counted] > 0)
         if flat.any():
-            raise MeshError(
-                f"cell {int(flat.argmax())} of the undeformed mesh has no positive volume that "
-                f"the one of {mesh.name} could be compared with; repair it, or leave the "
-                "reference away"
-            )
+            raise MeshError(_flat_sentence(int(flat.argmax()), mesh))
+
+
+def _flat_sentence(cell: int, mesh: Mesh) -> str:
+    """Return the message that an undeformed cell has no positive volume."""
+    return (
+        f"cell {cell} of the undeformed mesh has no positive volume that the one of {mesh.name} "
+        "could be compared with; repair it, or leave the reference away"
+    )
 
 
 def _smooth_minimum(
@@ -294,3 +304,113 @@ def _pull(vtk: int, at: FloatArray, weights: FloatArray) -> FloatArray:
             unit[axis, j] = 1.0
             out[:, j, axis] = (weights * _coefficients(vtk, unit)).sum(axis=0)
     return out
+
+
+LEAST_SCALE = 0.1
+"""Smallest value that a coefficient is divided by, over the mean one of the undeformed cell."""
+NEGLIGIBLE = 1e-20
+"""Share of a cell in the smooth minimum of the margins below which it is left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothMargin:
+    """The smooth minimum of the margins of all cells, and its derivative by the points.
+
+    The *margin* of a cell is the smallest of its Jacobian's coefficients, each over the value it
+    had before: 1 for a cell that is only moved, 0 where it folds. Coefficients are the corner
+    Jacobians and, of prisms and hexahedra, the other Bernstein coefficients: while all margins are
+    positive, all cells are proved valid. (Coefficients below a tenth of the mean one of the
+    undeformed cell are divided by that tenth.) The smooth minimum of the coefficients r of all
+    cells is ``(Σ r^-p)^(-1/p)``, or where some are negative ``-(Σ |r|^p)^(1/p)`` of these. So it is
+    never above the smallest margin.
+    """
+
+    p: float
+    """The exponent."""
+    value: float
+    of_points: FloatArray
+    """(n, d): the derivative by the points, per unit of length."""
+
+
+def cell_margins(mesh: Mesh, reference: Mesh) -> FloatArray:
+    """Return the margin (m,) of each cell (`SmoothMargin`).
+
+    Raises
+    ------
+    MeshError
+        An undeformed cell has no positive volume to compare with.
+    """
+    out = np.empty(len(mesh.cells))
+    for ids, _, _, _, ratio in _ratios(mesh, reference):
+        out[ids] = ratio.min(axis=0)
+    return out
+
+
+def smooth_margin(mesh: Mesh, reference: Mesh, p: float = 50.0) -> SmoothMargin:
+    """Return the smooth minimum of the margins of the cells, with its derivative by the points.
+
+    Parameters
+    ----------
+    mesh, reference : Mesh
+        The deformed mesh, and the undeformed one, with the same cells.
+    p : float
+        The exponent, at least 1.
+
+    Raises
+    ------
+    CaseError
+        The exponent is below 1 or no number.
+    MeshError
+        An undeformed cell has no positive volume to compare with.
+    """
+    _check_exponent(p)
+    margins = cell_margins(mesh, reference)
+    halo = np.zeros(len(margins), bool) if mesh.halo is None else mesh.halo.cells
+    least = float(margins[~halo].min())
+    total, gradient = 0.0, np.zeros(mesh.points.shape)
+    for ids, vtk, nodes, factor, ratio in _ratios(mesh, reference):
+        ratio[:, halo[ids]] = np.inf
+        part = np.array(ratio == 0, float)
+        if least != 0:
+            part = np.maximum(least / ratio if least > 0 else ratio / least, 0.0)
+        power = p + 1 if least > 0 else p - 1 if least < 0 else 1
+        some = np.flatnonzero(part.max(axis=0) ** power > NEGLIGIBLE)
+        part, used = part[:, some], nodes[some]
+        total += float((part**p).sum())
+        # The derivatives of the minimum by the ratios, up to a factor that all have.
+        weights = np.where(part > 0, part**power, 0.0) * factor[:, some]
+        by_nodes = np.empty((*used.shape, mesh.dim))
+        pull_coefficients(vtk, mesh.points, used, CORNERS[vtk], weights, by_nodes)
+        np.add.at(gradient, used, by_nodes)
+    power = -1 / p if least > 0 else 1 / p
+    gradient *= total ** (power - 1) if least else 1 / total
+    return SmoothMargin(float(p), least * total**power, sealed(gradient))
+
+
+def _ratios(
+    mesh: Mesh, reference: Mesh
+) -> Iterator[tuple[IntArray, int, IntArray, FloatArray, FloatArray]]:
+    """Yield blocks of cells: numbers (m,), VTK type, nodes (m, n), and for each coefficient (k, m).
+
+    That is the factor by which it is multiplied (its sign, over its undeformed value), and the
+    product.
+    """
+    _, signs = reference_of(reference)
+    for vtk, (every, all_nodes) in mesh.cells.by_type.items():
+        for first in range(0, len(every), PART):
+            ids, nodes = every[first : first + PART], all_nodes[first : first + PART]
+            before = signs[ids] * _proved(vtk, _at(reference, nodes))
+            scale = np.maximum(before, LEAST_SCALE * before.mean(axis=0))
+            flat = ~(scale > 0).all(axis=0)
+            if flat.any():
+                raise MeshError(_flat_sentence(int(ids[flat.argmax()]), mesh))
+            factor = signs[ids] / scale
+            yield ids, vtk, nodes, factor, factor * _proved(vtk, _at(mesh, nodes))
+
+
+def _proved(vtk: int, at: FloatArray) -> FloatArray:
+    """Return all coefficients (k, m) of the proof of validity, ordered as `pull_coefficients`."""
+    if vtk in (12, 13):
+        every = hexahedron_coefficients(at) if vtk == 12 else prism_coefficients(at)
+        return every.reshape(-1, at.shape[2])
+    return _coefficients(vtk, at)
