@@ -18,10 +18,12 @@ from slideviz.argument_types import CheckedFields
 from slideviz.case.values import Kind
 from slideviz.case.words import name_text, number
 from slideviz.errors import CaseError, not_one_of, shown
+from slideviz.mesh.metrics import metric
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, PIECE, UNPROVEN, Quality
 from slideviz.mesh.quality_derivative import cell_margins
 from slideviz.mesh.walls import walls
+from slideviz.terms import METRICS, SIZE_SKEW, Metric, field_of
 
 OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
     ">": operator.gt,
@@ -77,6 +79,18 @@ def _of_quality(name: str) -> Callable[[MeasuredMesh, str], Values]:
     return lambda measured, _: (getattr(measured.quality, name), None)
 
 
+def _of_metric(name: Metric) -> Callable[[MeasuredMesh, str], Values]:
+    """Return the function of a metric; size-skew and its factors are in the quality already."""
+    if name in SIZE_SKEW:
+        return _of_quality({"size-skew": "values"}.get(name, name))
+
+    def values(measured: MeasuredMesh, _: str) -> Values:
+        assert measured.mesh is not None
+        return metric(measured.mesh, name, measured.reference).of_cells, None
+
+    return values
+
+
 def _margins(measured: MeasuredMesh) -> FloatArray:
     """Return the margins (m,) of the cells; none without an undeformed mesh."""
     assert measured.mesh is not None
@@ -122,8 +136,6 @@ NUMBERS: Mapping[str, LimitNumber] = {
         status=UNPROVEN,
         streamed=True,
     ),
-    "size": LimitNumber("size of cells beside the undeformed ones", ">", _of_quality("size")),
-    "skew": LimitNumber("shape of cells", ">", _of_quality("skew")),
     "margin": LimitNumber(
         "least coefficient of a cell's Jacobian over that before; 0 folds",
         ">",
@@ -135,9 +147,15 @@ NUMBERS: Mapping[str, LimitNumber] = {
     "equal_layers": _wall("equal_layers", "first layers of equal height, up to five", ">"),
     "wall_angle": _wall("wall_angle", "between first edge and wall in degrees, 90 best", ">"),
     "angle_change": _wall("angle_change", "change of that angle in degrees", "<"),
+    **{
+        field_of(name): LimitNumber(
+            f"{term.label} {term.unit}".strip(), "<>"[term.best == "high"], _of_metric(name)
+        )
+        for name, term in METRICS.items()
+    },
 }
-"""The numbers that can be limited, by name. Those of `slideviz.mesh.walls` are measured at the
-boundary after @, or at all with layers."""
+"""The numbers that can be limited, by name: totals, those of `slideviz.mesh.walls`, measured at the
+boundary after @ or at all with layers, and all metrics."""
 
 
 @dataclass(frozen=True)
@@ -269,7 +287,7 @@ def _read_limit(text: str) -> Limit:
         raise CaseError(f"{shown(text)} is no limit; expected NAME > NUMBER, as min > 0.3")
     quoted = match["quoted"]
     marker = match["plain"] or "" if quoted is None else quoted.replace('""', '"')
-    return Limit(match["name"], match["sign"], number(match["value"]), marker)
+    return Limit(field_of(match["name"]), match["sign"], number(match["value"]), marker)
 
 
 def write_limits(limits: tuple[Limit, ...]) -> str:

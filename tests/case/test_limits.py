@@ -20,9 +20,11 @@ from slideviz.case.limits import (
 )
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
+from slideviz.mesh.metrics import metric
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.mesh.walls import CHANGES, VALUES, walls
+from slideviz.terms import METRICS, field_of
 from tests.builders import grid
 
 
@@ -143,6 +145,21 @@ def test_a_streamed_run_knows_some_numbers_only():
     require_streamed(read_limits("min > 0.3, mean > 0.3, inverted = 0, unproven = 0"))
     with pytest.raises(CaseError, match=r"size > 0.5 needs the mesh in memory.* min, mean, inv"):
         require_streamed(read_limits("min > 0.3, size > 0.5"))
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_every_metric_can_be_limited(measured, name):
+    values = metric(measured.mesh, name, measured.reference).of_cells
+    high = METRICS[name].best == "high"
+    bound = float(np.median(values))
+    (result,) = check_limits(read_limits(f"{name} {'<>'[high]} {bound!r}"), measured)
+    assert result.actual == (values.min() if high else values.max())
+    failing = values <= bound if high else values >= bound
+    np.testing.assert_array_equal(np.sort(result.cells), np.flatnonzero(failing))
+    assert result.cells[0] in np.flatnonzero(values == result.actual)
+    assert result.limit.name == field_of(name)
+    with pytest.raises(CaseError, match="the limits of"):
+        Limit(field_of(name), "<>"[not high], bound)
 
 
 WALLS = {
