@@ -268,6 +268,14 @@ RELAXES: dict[Relax, Term] = {
 }
 """Whether the mesh is relaxed after each step."""
 
+Layers = Literal["auto", "no", "keep"]
+LAYERS: dict[Layers, Term] = {
+    "auto": Term("automatic", "Walls with boundary layers carry these along; other walls do not."),
+    "no": Term("off", "Boundary layers follow as all other nodes."),
+    "keep": Term("at all walls", "All moving and fixed boundaries carry nodes near them along."),
+}
+"""Whether nodes near walls go with the walls' own displacement and rotation."""
+
 LevelCriterion = Literal["size", "tol"]
 LEVEL_CRITERIA: dict[LevelCriterion, Term] = {
     "size": Term("by size"),

@@ -17,6 +17,7 @@ from slideviz.rbf.reduction import Reduction
 from slideviz.terms import (
     DATA_REDUCTIONS,
     KERNELS,
+    LAYERS,
     LEVEL_CRITERIA,
     METHODS,
     RELAXES,
@@ -367,6 +368,36 @@ METHOD_ROWS = (
         tip="The radial function; a global one reaches through the whole mesh whatever the "
         "radius, and needs a smaller support radius.",
         run_label="{}",
+        method="rbf",
+    ),
+    setting(
+        "LAYERS",
+        METHOD,
+        one_of(LAYERS),
+        "layers",
+        "Keep boundary layers: nodes near walls go with the displacement and rotation of the wall, "
+        "so that first heights and angles stay. Walls are moving and fixed boundaries: AUTO takes "
+        "those with flat quadrilaterals, hexahedra or prisms, KEEP all of them.",
+        label="Layers",
+        form="main",
+        tip="Whether nodes near walls go with the wall's own displacement and rotation: this keeps "
+        "the heights of boundary layers.",
+        run_label="layers {}",
+        method="rbf",
+    ),
+    setting(
+        "LAYER_THICKNESS",
+        METHOD,
+        or_auto(real(0.0), "AUTO"),
+        "layer_thickness",
+        "How far from walls LAYERS acts, in the mesh's length unit. AUTO: a fiftieth of the wall's "
+        "largest extent, or the thickness of its boundary layer if that is less.",
+        label="Layer thickness",
+        form="more",
+        tip="How far from walls nodes go with them, in the mesh's length unit. Automatic: a "
+        "fiftieth of the wall's extent, or the thickness of its boundary layer if that is less.",
+        run_label="to {}",
+        idle_reason=lambda case: "layers are off" if case.layers == "no" else "",
         method="rbf",
     ),
     setting(

@@ -20,6 +20,7 @@ from slideviz.terms import (
     FFD_BLENDINGS,
     FFD_SYSTEMS,
     KERNELS,
+    LAYERS,
     METHODS,
     PERIODIC_MODES,
     PERIODIC_TYPES,
@@ -31,6 +32,7 @@ from slideviz.terms import (
     FfdBlending,
     FfdSystem,
     FileFormat,
+    Layers,
     Method,
     PeriodicMode,
     PeriodicType,
@@ -265,6 +267,7 @@ class Case(CheckedFields):
     * ``influence_factor``: the support radius over the extent of the mesh; 0, or "auto", fits it
       to the motion. ``support_radius``, if not None, is used instead: a length.
     * ``reduction``: None: all boundary nodes are control nodes, however many.
+    * ``layer_thickness``: how far from walls ``layers`` acts: a length; 0, or "auto", finds it.
     * ``idw_power``: None: the number of dimensions.
     * ``limits``: what the deformed mesh must meet; changes no mesh.
     * ``view``: how the window showed the case, by key; changes no result.
@@ -318,6 +321,8 @@ class Case(CheckedFields):
     kernel: str = field(default="wendland-c2", metadata=KERNELS)
     reduction: Reduction | None = AUTO
     relax: Relax = field(default="no", metadata=RELAXES)
+    layers: Layers = field(default="no", metadata=LAYERS)
+    layer_thickness: Annotated[float, 'a length, or "auto"'] = 0.0
     idw_power: float | None = None
     idw_fixed_weight: float = 1.0
     quality_metric: SkewMetric = field(default="knupp", metadata=SKEW_METRICS)
@@ -328,7 +333,7 @@ class Case(CheckedFields):
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("steps", "influence_factor"):
+        for name in ("steps", "influence_factor", "layer_thickness"):
             if str(getattr(self, name)).lower() == "auto":  # as in a case file
                 object.__setattr__(self, name, 0)
         if isinstance(self.limits, str):

@@ -21,6 +21,7 @@ _PHASES = {
     "evaluate": "moving nodes",
     "project": "sliding",
     "relax": "relaxing cells",
+    "layers": "keeping layers",
     "read": "reading",
     "write": "writing the mesh",
     "quality": "measuring cells",

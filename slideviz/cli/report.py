@@ -32,7 +32,8 @@ WORST = 10
 """Cells of lowest quality listed in a report."""
 
 PHASES = (
-    *("read", "classify", "select", "solve", "evaluate", "project", "correct", "relax"),
+    *("read", "classify", "select", "solve", "evaluate", "project", "correct"),
+    *("layers", "relax"),
     *("quality", "write"),
 )
 TRIAL_KEYS = ("planned", "steps", "min", "mean", "inverted")
@@ -108,6 +109,7 @@ def run_report(
             default=None,
         ),
         "relax": None if (relaxed := _relaxed(steps)) is None else asdict(relaxed),
+        "layers": None if last.kept_layers is None else last.kept_layers.report(),
         "seconds": {name: round(value, 6) for name, value in spent.items()},
         "node_counts": dict(last.node_counts),
         "warnings": list(last.warnings),

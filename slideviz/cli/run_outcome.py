@@ -206,6 +206,11 @@ def _print_run(
         rows.append(
             ("relaxation", f"{relax['rounds']} rounds, residual {relax['residual']:.2g}{cut}")
         )
+    if (layers := report["layers"]) is not None:
+        walls = layers["walls"]
+        reach = max(wall["thickness"] for wall in walls)
+        where = f"at {counted(len(walls), 'wall')}, up to {reach:.3g} away"
+        rows.append(("nodes carried by walls", f"{layers['nodes']} {where}"))
     if report["periodic_misfit"] is not None:
         rows.append(("periodic misfit", report["periodic_misfit"]))
     print(table(rows))

@@ -79,6 +79,7 @@ class Relaxation:
         displacement: Array,
         constraints: Constraints,
         tie: Callable[[Array], Array],
+        keep: Callable[[Array], Array],
         timer: PhaseTimer,
     ) -> tuple[Array, Relaxed]:
         """Return the displacement (..., n, d) of a step after relaxation, in the frame.
@@ -89,6 +90,8 @@ class Relaxation:
             Of the step, as radial functions have it.
         tie
             Gives periodic images the displacement of the node that represents them.
+        keep
+            Lets walls carry the nodes near them, after relaxation and before the safeguard.
         """
         with timer.phase("relax") as tick:
             at = value(problem.coords) + value(displacement)
@@ -97,6 +100,7 @@ class Relaxation:
             )
             kept = self._kept(problem, given, constraints, tick)
             moved, residual = self._iterated(problem, displacement, kept, given, tie, tick)
+            moved = keep(moved)
             part = problem.choose("part", lambda: self._part(problem, displacement, moved, tie))
             out = self._blended(problem, displacement, moved, part, tie)
         return out, Relaxed(ITERATIONS, residual, part)

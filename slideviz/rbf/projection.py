@@ -231,7 +231,7 @@ def find_tracks(
         of_node[nodes] = len(simplices)
         curved |= _bends(vectors[member])
         beyond = surface_extension(boundary, member, moving, place, reach)
-        simplices.append(np.concatenate([_simplices(place(boundary.facets[member])), beyond]))
+        simplices.append(np.concatenate([as_simplices(place(boundary.facets[member])), beyond]))
     if boundary.dim == 3:
         for nodes, ends in _edge_chains(boundary, fans, classes):
             of_node[nodes] = len(simplices)
@@ -335,7 +335,7 @@ def _by_surfaces(
     return [(nodes, np.array(key)) for key, nodes in found]
 
 
-def _simplices(sides: FloatArray) -> FloatArray:
+def as_simplices(sides: FloatArray) -> FloatArray:
     """Return segments (s, 2, 2) or triangles (s, 3, 3) of corners (f, k, d); 4 corners give two."""
     if sides.shape[1] == 2:
         return sides

@@ -182,6 +182,7 @@ PHASES = {
     "evaluate": "moving the nodes",
     "project": "projecting onto the boundaries",
     "relax": "relaxing the cells",
+    "layers": "keeping the layers at walls",
     "quality": "quality",
 }
 """Words in the window for the phases of a run (``Progress.phase``)."""

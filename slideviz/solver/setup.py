@@ -19,11 +19,13 @@ from slideviz.rbf.classify import Classes, directions
 from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.frames import Frame, hold_on_axis
 from slideviz.rbf.frames import corners as corners_of
+from slideviz.rbf.layers import LayerZone
 from slideviz.rbf.methods import SLIDING_METHODS
 from slideviz.rbf.problem import PhaseTimer, Problem, Solution
 from slideviz.rbf.projection import Tracks, find_tracks
 from slideviz.rbf.reduction import Reduction
 from slideviz.solver.domain import Domain, find_domain
+from slideviz.solver.layers import layer_zone
 from slideviz.solver.prescribed import fitted_radius, largest_of, prescribe, support_radius
 
 if TYPE_CHECKING:
@@ -160,6 +162,8 @@ class Setup(Domain):
     """The edges and surfaces along which nodes slide."""
     solve: Callable[[Problem, PhaseTimer], Solution]
     """Solves one step by the method of the case."""
+    zone: LayerZone | None
+    """The nodes that go with walls (LAYERS); None: there are none."""
     fitted_radius: float
     """The support radius that fits the motion, whatever the case says."""
     relaxation: Relaxation | None = None
@@ -282,6 +286,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
         layers=needed_by_layers(reduction, gap),
         tracks=tracks,
         solve=_method(case, mesh, frame, axis),
+        zone=layer_zone(case, mesh, domain, conditions.known),
         fitted_radius=fitted_radius(case, mesh, conditions.moved),
         relaxation=relaxation_of(case, mesh, frame, axis),
     )

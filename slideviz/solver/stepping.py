@@ -194,6 +194,7 @@ class Stepping:
             support_radius=self.setup.basis.radius if self.case.method == "rbf" else None,
             field=solution.field if self.rate is not None else None,
             relaxed=solution.relaxed,
+            kept_layers=self.setup.zone.summary() if self.setup.zone is not None else None,
         )
 
 
@@ -233,12 +234,37 @@ def one_step(
     def tie(displacement: Array) -> Array:
         return put(displacement, second, take(displacement, first), overwrite=True)
 
-    displacement, relaxed = tie(solution.displacement), None
+    keep = keep_layers(setup, problem, goal, timer)
+    displacement, relaxed = tie(keep(solution.displacement)), None
     if setup.relaxation is not None:
         displacement, relaxed = setup.relaxation.relaxed(
-            problem, displacement, setup.constraints, tie, timer
+            problem, displacement, setup.constraints, tie, lambda moved: tie(keep(moved)), timer
         )
     return replace(solution, displacement=displacement, relaxed=relaxed)
+
+
+def keep_layers(
+    setup: Setup, problem: Problem, goal: Array, timer: PhaseTimer
+) -> Callable[[Array], Array]:
+    """Return a function of displacements (..., n, d) that lets walls carry the nodes near them.
+
+    Those that slide are then projected. ``goal`` as of `one_step`.
+    """
+    zone = setup.zone
+    if zone is None:
+        return lambda displacement: displacement
+    with timer.phase("layers"):
+        carried, coords = zone.carried(zone.walls.motion(goal)), take(problem.coords, zone.nodes)
+
+    def keep(displacement: Array) -> Array:
+        with timer.phase("layers"):
+            moved = zone.displacement(coords, take(displacement, zone.nodes), carried)
+            if len(zone.sliding):
+                slid = problem.project(zone.nodes[zone.sliding], take(moved, zone.sliding))
+                moved = put(moved, zone.sliding, slid, overwrite=True)
+            return put(displacement, zone.nodes, moved, overwrite=True)
+
+    return keep
 
 
 def problem_at(

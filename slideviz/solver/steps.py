@@ -14,6 +14,7 @@ import numpy as np
 
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.rbf.field import Field
+from slideviz.rbf.layers import KeptLayers
 from slideviz.rbf.problem import Cycle, Relaxed
 
 if TYPE_CHECKING:
@@ -29,8 +30,8 @@ class Progress:
     total: int
     """`step`, `total`: the number of the current step, from 1, and of all steps."""
     phase: str
-    """``classify``, ``select``, ``solve``, ``evaluate``, ``project``, ``correct`` or ``relax``;
-    in a streamed run also ``read``, ``quality`` and ``write``."""
+    """``classify``, ``select``, ``solve``, ``evaluate``, ``project``, ``correct``, ``layers`` or
+    ``relax``; in a streamed run also ``read``, ``quality`` and ``write``."""
     fraction: float
     """The part of the phase that is done, 0 to 1."""
     left: float | None = None
@@ -100,6 +101,8 @@ class Step:
     runs."""
     relaxed: Relaxed | None = None
     """How the step was relaxed; None where it was not."""
+    kept_layers: KeptLayers | None = None
+    """The walls that carried the nodes near them along (LAYERS); None where none did."""
 
 
 @dataclass(frozen=True, eq=False)

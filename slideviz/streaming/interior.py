@@ -8,12 +8,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from slideviz.errors import DeformError, MeshError, UnsoundError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.rbf.frames import on_axis
+from slideviz.rbf.layers import LayerZone, find_zone
+from slideviz.rbf.tape import value
 from slideviz.solver.growth import overshoot_of_rest
 from slideviz.solver.setup import Setup
 from slideviz.solver.stepping import cartesian, shifted
@@ -62,9 +65,14 @@ class InteriorDisplacer:
         inner[at] = False
         self._require_enclosed(nodes, points, start, inner)
         axis, coords = on_axis(frame, start), start
-        for step in self.steps:
+        zone = self._zone(start, inner & ~axis)
+        for step, motion in zip(self.steps, self._motions, strict=True):
             assert step.field is not None
             displacement = step.field.at(frame.features(coords), frame.points(coords))
+            if zone is not None:
+                by, carried = displacement[zone.nodes], zone.carried(motion)
+                moved = zone.displacement(coords[zone.nodes], by, carried)
+                displacement[zone.nodes] = value(moved)
             coords = shifted(coords, displacement, axis)
             now = cartesian(frame, points, start, coords)
             if not np.all(np.isfinite(now)):
@@ -74,6 +82,24 @@ class InteriorDisplacer:
             out = now.copy()
             out[at] = step.mesh.points[where]
             yield out
+
+    @cached_property
+    def _motions(self) -> list[Any]:
+        """Return the motion of the walls that carry nodes after each step (`WallNodes.motion`)."""
+        setup = self.setup
+        if setup.zone is None:
+            return [None] * len(self.steps)
+        start = setup.coords[setup.known]
+        return [setup.zone.walls.motion(start + setup.target * step.part) for step in self.steps]
+
+    def _zone(self, start: FloatArray, free: np.ndarray) -> LayerZone | None:
+        """Return the zone of walls among the nodes of a mask (m,), with coordinates (m, d)."""
+        zone, nodes = self.setup.zone, np.flatnonzero(free)
+        if zone is None:
+            return None
+        return find_zone(
+            zone.walls, nodes, self.setup.frame.points(start[nodes]), np.zeros(len(nodes), bool)
+        )
 
     def _in_skin(self, nodes: IntArray) -> tuple[IntArray, IntArray]:
         """Return the places (b,) in ``nodes`` of those that are in the skin, and in the skin (b,).

@@ -51,6 +51,9 @@ RUNS = [
     ),
     ("polar", 12, ("STEPS=auto",)),
     ("airfoil", 24, ("STEPS=2",)),
+    ("turbine-row", 5000, ("STEPS=2", "LAYERS=AUTO")),
+    ("polar", 12, ("STEPS=2", "LAYERS=KEEP", "LAYER_THICKNESS=0.1")),
+    ("cylindrical", 6, ("STEPS=2", "LAYERS=KEEP", "LAYER_THICKNESS=0.1")),
     ("airfoil", 24, ("STEPS=1", "DATA_REDUCTION=YES", "DATA_RED_TOLERANCE=1e-3")),
 ]
 """Sample, size and changes of its case: every sliding method, periodic mode and kind of frame."""

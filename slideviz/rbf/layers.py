@@ -1,0 +1,402 @@
+"""The layer zone: near a wall, nodes go with the wall's own displacement and rotation.
+
+Radial functions know neither cells nor the body that they reach through, and change the heights of
+boundary layers. So nearer to a wall than its thickness delta, a node at X goes to the place where
+the wall nodes i near it (at X_i, displaced by d_i, turned by M_i) would carry it:
+
+    u = sum_i w_i (d_i + (M_i - 1)(X - X_i)),    w_i ~ s_i |X - X_i|^-6,    sum_i w_i = 1
+    x <- x + b (X + u - x),                      b = 1 - smooth((distance - h) / delta)
+
+where h is the height of the wall's first layer, smooth(t) = t^3 (10 - 15 t + 6 t^2), and i are the
+`NEAREST` nodes of the wall that see the node: s_i rises from 0 to 1 with the cosine of the angle
+between the wall's normal and X - X_i, so that the two sides of a thin body do not mix. Of several
+walls whose zones overlap each has the weight b / distance^6, and 1 - b is the product of theirs.
+All of this is found from the undeformed mesh; u is linear in d and M. M is the rotation nearest to
+the map of the directions of the facets at the wall node (lines in 2D, normals and edges in 3D).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from slideviz.mesh.axis_frame import axis_basis
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.topology import corner_vectors
+from slideviz.mesh.topology import unit as unit_rows
+from slideviz.rbf.closest import ClosestPoints
+from slideviz.rbf.frames import Frame
+from slideviz.rbf.operations import difference_from, points
+from slideviz.rbf.polar import nearest_rotations
+from slideviz.rbf.projection import as_simplices
+from slideviz.rbf.tape import (
+    Array,
+    cross,
+    gather,
+    join,
+    mixed,
+    multiply,
+    recorded,
+    reshape,
+    take,
+    transform,
+    unit,
+    value,
+)
+from slideviz.system.threads import in_parts
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
+NEAREST = 12
+"""Wall nodes that carry a node."""
+
+CANDIDATES = 3 * NEAREST
+"""Nearest wall nodes among which those that see the node are looked for."""
+
+POWER = 6
+"""Power of the inverse distance in the weights of wall nodes, and of walls. Cells at a small edge
+may be as long as high; with 3 their heights would change by up to 2 %."""
+
+GRAZING = 0.3
+"""Cosine from which a wall node sees a node fully; below minus this not at all."""
+
+EDGES = 0.01
+"""Weight of the edges of the facets at a wall node over that of their normals, in 3D."""
+
+
+def smooth(t: FloatArray) -> FloatArray:
+    """Return t^3 (10 - 15 t + 6 t^2), for t between 0 and 1: 0 and 1, with flat ends."""
+    t = np.clip(t, 0.0, 1.0)
+    return t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """A connected wall with layers."""
+
+    names: tuple[str, ...]
+    """The boundaries that it consists of."""
+    facets: IntArray
+    """(f, 2 or 4): its facets, nodes ordered so that normals point out of the mesh."""
+    thickness: float
+    first: float
+    """`thickness`, `first`: of its zone, and of the first layer of cells, which is wholly in it, in
+    the mesh's length unit."""
+    moves: bool
+    """Whether its nodes are moving ones; others stay."""
+
+
+@dataclass(frozen=True, eq=False)
+class WallNodes:
+    """The nodes of all walls, and the sources: these and their periodic images."""
+
+    frame: Frame
+    known: IntArray
+    """(w,): the nodes, by their places among the known nodes; nodes of two walls are here twice."""
+    start: FloatArray
+    """(w, d): undeformed Cartesian points."""
+    facets: IntArray
+    """(f, 2 or 4): of moving walls, by places of nodes here."""
+    walls: tuple[tuple[Wall, slice, IntArray], ...]
+    """Each wall, with its sources, and its facets and their images by places of sources."""
+    origin: IntArray
+    """(s,): the place here of the node that each source is, or is an image of."""
+    turn: FloatArray | None
+    """(s, d, d): rotations from it to the source; None: images are only shifted."""
+    places: FloatArray
+    normals: FloatArray
+    """`places`, `normals` (s, d): of the sources, undeformed, Cartesian; normals into the mesh."""
+
+    @cached_property
+    def _trees(self) -> list[tuple[cKDTree, ClosestPoints]]:
+        from scipy.spatial import cKDTree  # takes long to load
+
+        return [
+            (cKDTree(self.places[at]), ClosestPoints(as_simplices(self.places[facets])))
+            for _, at, facets in self.walls
+        ]
+
+    @cached_property
+    def _rest(self) -> FloatArray:
+        """Return the rotations at rest, (w, d d): the identity, to rounding."""
+        return value(self._rotations(self.start))
+
+    def motion(self, goal: Array) -> tuple[Array, Array]:
+        """Return displacement (..., s, d) and rotation less identity (..., s d, d) of all sources.
+
+        Of the latter row (i, b) has the column b of M_i - 1, Cartesian as all.
+
+        Parameters
+        ----------
+        goal : (..., a, d)
+            Where the known nodes are, in the frame.
+        """
+        now = points(self.frame, take(goal, self.known))
+        dim = self.start.shape[1]
+        moved, turned = now - self.start, self._rotations(now) - self._rest
+        moved, turned = take(moved, self.origin), take(turned, self.origin)
+        if self.turn is not None:
+            both = np.einsum("sac,sbd->sabcd", self.turn, self.turn)
+            moved = transform(self.turn, moved)
+            turned = transform(both.reshape(-1, dim * dim, dim * dim), turned)
+        return moved, reshape(turned, len(self.origin) * dim, dim)
+
+    def _rotations(self, now: Array) -> Array:
+        """Return the transposed rotations (..., w, d d) of wall nodes ``now`` (..., w, d)."""
+        facets, start, dim = self.facets, self.start, self.start.shape[1]
+        count, once = len(start), np.ones(facets.shape)
+        if dim == 3:  # a triangle repeats its last node, but counts once there
+            once[facets[:, 2] == facets[:, 3], 3] = 0.0
+        corner, at = np.arange(facets.size) // facets.shape[1], facets.reshape(-1)
+        total = np.bincount(at, once.reshape(-1), count)[:, None]
+        still = total == 0.0
+        spread = _outer(value(_directions(start, facets)), _directions(now, facets))
+        spread = gather(multiply(take(spread, corner), once.reshape(-1, 1)), at, count)
+        found = multiply(spread, 1.0 / (total + still))
+        if dim == 3:
+            one, two = self._edges
+            along = start[two] - start[one]
+            along = along / np.einsum("ed,ed->e", along, along)[:, None]
+            spread = _outer(along, take(now, two) - take(now, one))
+            ends = np.concatenate([one, two])
+            each = EDGES / np.maximum(1, np.bincount(ends, minlength=count))[:, None]
+            found = found + multiply(gather(join(spread, spread), ends, count), each)
+        return nearest_rotations(found + still * np.eye(dim).reshape(1, -1), dim)
+
+    @cached_property
+    def _edges(self) -> IntArray:
+        """Return the nodes (2, e) of the edges of the facets, each once."""
+        ends = np.stack([self.facets, np.roll(self.facets, -1, axis=1)], axis=-1).reshape(-1, 2)
+        ends = np.unique(np.sort(ends, axis=1), axis=0)
+        return ends[ends[:, 0] != ends[:, 1]].T
+
+    def near(self, targets: FloatArray) -> tuple[IntArray, FloatArray, csr_array, csr_array]:
+        """Return which points (m, d) are in the zone, (z,), their share b (z, 1), and two matrices.
+
+        The matrices (z, s) and (z, s d) take what `motion` returns to b u, (z, d). The result for a
+        point does not depend on the others.
+        """
+        outside, weight = np.ones(len(targets)), np.zeros(len(targets))
+        parts = [self._reached(k, targets) for k in range(len(self.walls))]
+        for some, share, each in parts:
+            outside[some] *= 1.0 - share
+            weight[some] += each
+        hit = np.flatnonzero(outside < 1.0)
+        place = np.empty(len(targets), np.int64)
+        place[hit] = np.arange(len(hit))
+        found = []
+        for k, (some, _, each) in enumerate(parts):
+            nearest, carrier = self._carriers(k, targets[some])
+            carrier *= (each * (1.0 - outside[some]) / weight[some])[:, None]
+            row, column = np.nonzero(carrier)
+            source = self.walls[k][1].start + nearest[row, column]
+            found.append((place[some[row]], source, carrier[row, column]))
+        rows, columns, values = (np.concatenate(each) for each in zip(*found, strict=True))
+        arm = values[:, None] * (targets[hit[rows]] - self.places[columns])
+        (total, dim), count = self.places.shape, len(hit)
+        wide = (columns[:, None] * dim + np.arange(dim)).reshape(-1)
+        by_rotation = (arm.reshape(-1), (np.repeat(rows, dim), wide))
+        return (
+            hit,
+            1.0 - outside[hit, None],
+            csr_array((values, (rows, columns)), shape=(count, total)),
+            csr_array(by_rotation, shape=(count, total * dim)),
+        )
+
+    def _reached(self, k: int, targets: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Return which points (m, d) are in the zone of wall k, (z,), their shares, and weights."""
+        wall, (tree, closest) = self.walls[k][0], self._trees[k]
+        limit, gap = wall.first + wall.thickness, np.full(len(targets), np.inf)
+        corners = closest.corners
+        reach = limit + np.linalg.norm(np.ptp(corners, axis=1), axis=1).max(initial=0.0)
+
+        def measure(part: slice) -> None:
+            near = tree.query(targets[part], distance_upper_bound=reach)[0]
+            some = part.start + np.flatnonzero(np.isfinite(near))
+            if len(some):
+                x = targets[some]
+                gap[some] = np.linalg.norm(closest.query(x) - x, axis=1)
+
+        in_parts(measure, len(targets))
+        some = np.flatnonzero(gap < limit)
+        share = 1.0 - smooth((gap[some] - wall.first) / wall.thickness)
+        return some, share, share * (limit / np.maximum(gap[some], 1e-9 * limit)) ** POWER
+
+    def _carriers(self, k: int, targets: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return the sources of wall k near points (m, d), and their weights, both (m, c)."""
+        tree, (_, at, _) = self._trees[k][0], self.walls[k]
+        count = min(CANDIDATES, tree.n)
+        nearest = np.empty((len(targets), count), np.int64)
+        weight = np.empty((len(targets), count))
+
+        def find(part: slice) -> None:
+            found = tree.query(targets[part], k=count)
+            gap, index = (np.reshape(x, (-1, count)) for x in found)
+            gap = np.maximum(gap, np.finfo(float).tiny)
+            away = targets[part][:, None] - self.places[at][index]
+            cosine = np.einsum("mcd,mcd->mc", away, self.normals[at][index]) / gap
+            seen = smooth((cosine + GRAZING) / (2.0 * GRAZING))
+            seen[~(seen > 0.0).any(axis=1)] = 1.0
+            seen[np.cumsum(seen > 0.0, axis=1) > NEAREST] = 0.0
+            w = seen * (gap[:, :1] / gap) ** POWER
+            nearest[part], weight[part] = index, w / w.sum(axis=1, keepdims=True)
+
+        in_parts(find, len(targets))
+        return nearest, weight
+
+
+def _directions(now: Array, facets: IntArray) -> Array:
+    """Return a unit vector of each facet, (..., f, d): along it in 2D, its normal in 3D."""
+    x = [take(now, facets[:, k]) for k in range(facets.shape[1])]
+    return unit(x[1] - x[0] if len(x) == 2 else cross(x[2] - x[0], x[3] - x[1]))
+
+
+def _outer(fixed: FloatArray, x: Array) -> Array:
+    """Return the products (..., n, d d) of ``fixed`` (n, d), a constant, and x (..., n, d)."""
+
+    def times(t: FloatArray) -> FloatArray:
+        out = fixed[:, :, None] * t[..., None, :]
+        return out.reshape(*t.shape[:-1], -1)
+
+    def back(g: FloatArray) -> FloatArray:
+        return np.einsum("nb,...nba->...na", fixed, g.reshape(*g.shape[:-1], *fixed.shape[1:], -1))
+
+    return recorded(times(value(x)), (x, times, back))
+
+
+def wall_nodes(
+    frame: Frame, coords: FloatArray, known: IntArray, walls: Sequence[Wall]
+) -> WallNodes:
+    """Return the nodes of walls.
+
+    Parameters
+    ----------
+    coords : (n, d)
+        Undeformed, in the frame.
+    known : (a,)
+        The nodes whose displacement is known: all of the walls' among them.
+    """
+    place = np.full(len(coords), -1)
+    place[known] = np.arange(len(known))
+    shifts = [0, -1, 1] if np.any(frame.shift()) else [0]
+    nodes, facets, rows, parts, corners = [], [], [], [], []
+    first = begin = 0
+    for wall in walls:
+        some, local = np.unique(wall.facets, return_inverse=True)
+        local = local.reshape(wall.facets.shape)
+        if wall.moves:
+            facets.append(first + local)
+        images = np.concatenate([begin + k * len(some) + local for k in range(len(shifts))])
+        size = len(shifts) * len(some)
+        parts.append((wall, slice(begin, begin + size), images))
+        rows.append(np.tile(first + np.arange(len(some)), len(shifts)))
+        corners.append(np.repeat(shifts, len(some)))
+        nodes.append(some)
+        first, begin = first + len(some), begin + size
+    which, by = np.concatenate(nodes), np.concatenate(corners)
+    origin = np.concatenate(rows)
+    at = coords[which[origin]] + by[:, None] * frame.shift()
+    sources = frame.points(at)
+    normals = np.zeros_like(sources)
+    for _, _, images in parts:
+        for corner in images.T:
+            np.add.at(normals, corner, -corner_vectors(sources[images]))
+    none = np.empty((0, 2 if frame.dim == 2 else 4), np.int64)
+    return WallNodes(
+        frame=frame,
+        known=place[which],
+        start=frame.points(coords[which]),
+        facets=np.concatenate([none, *facets]),
+        walls=tuple(parts),
+        origin=origin,
+        turn=_turns(frame, by) if frame.cylindrical and len(shifts) > 1 else None,
+        places=sources,
+        normals=unit_rows(normals),
+    )
+
+
+def _turns(frame: Frame, periods: IntArray) -> FloatArray:
+    """Return the rotations (s, d, d) about the axis of a frame by whole periods (s,)."""
+    assert frame.axis is not None
+    basis, angle = axis_basis(frame.axis), periods * frame.period
+    local = np.zeros((len(periods), 3, 3))
+    local[:, 0, 0] = local[:, 1, 1] = np.cos(angle)
+    local[:, 1, 0] = np.sin(angle)
+    local[:, 0, 1], local[:, 2, 2] = -local[:, 1, 0], 1.0
+    turns = np.einsum("ka,skl,lb->sab", basis, local, basis)
+    turns[periods == 0] = np.eye(3)
+    return turns[:, : frame.dim, : frame.dim]
+
+
+@dataclass(frozen=True)
+class KeptLayers:
+    """The layer zone of a run, for its report."""
+
+    walls: tuple[tuple[tuple[str, ...], float], ...]
+    """The boundaries of each connected wall, and the thickness of its zone, in the mesh's unit."""
+    nodes: int
+    """Nodes of the zone; of a streamed mesh those of its skin."""
+
+    def report(self) -> dict[str, Any]:
+        """Return the same as values of JSON."""
+        walls = [{"boundaries": names, "thickness": delta} for names, delta in self.walls]
+        return {"walls": walls, "nodes": self.nodes}
+
+
+@dataclass(frozen=True, eq=False)
+class LayerZone:
+    """Nodes that go with walls, and how."""
+
+    walls: WallNodes
+    nodes: IntArray
+    """(z,): nodes in the zone."""
+    start: FloatArray
+    """(z, d): their undeformed Cartesian points."""
+    sliding: IntArray
+    """(k,): places of those that slide."""
+    share: FloatArray
+    by_displacement: csr_array
+    by_rotation: csr_array
+    """`share`, `by_displacement`, `by_rotation`: as `WallNodes.near` returns them."""
+
+    def carried(self, motion: tuple[Array, Array]) -> Array:
+        """Return b u, (..., z, d), by the ``motion`` of the walls (`WallNodes.motion`)."""
+        moved, turned = motion
+        return mixed(self.by_displacement, moved) + mixed(self.by_rotation, turned)
+
+    def displacement(self, coords: Array, by: Array, carried: Array) -> Array:
+        """Return the displacement (..., z, d) of the nodes of the zone in a step, in the frame.
+
+        Parameters
+        ----------
+        coords, by : (..., z, d)
+            Their coordinates before the step, and their displacement in the step so far.
+        carried : (..., z, d)
+            As `carried` returns it.
+        """
+        frame = self.walls.frame
+        here = points(frame, coords + by)
+        return by + difference_from(frame, here, multiply(self.start - here, self.share) + carried)
+
+    def summary(self) -> KeptLayers:
+        """Return what a report says of the zone."""
+        walls = tuple((wall.names, wall.thickness) for wall, *_ in self.walls.walls)
+        return KeptLayers(walls, len(self.nodes))
+
+
+def find_zone(
+    walls: WallNodes, nodes: IntArray, targets: FloatArray, slides: np.ndarray
+) -> LayerZone:
+    """Return the zone of walls among ``nodes`` (m,), at undeformed Cartesian ``targets`` (m, d).
+
+    ``slides`` (m,) bool: which of them slide.
+    """
+    hit, share, by_displacement, by_rotation = walls.near(targets)
+    sliding = np.flatnonzero(slides[hit])
+    return LayerZone(walls, nodes[hit], targets[hit], sliding, share, by_displacement, by_rotation)

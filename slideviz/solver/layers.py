@@ -1,0 +1,76 @@
+"""The layer zone of a case: its walls, their thickness, and the nodes that go with them.
+
+The thickness is found from the cells at the boundary alone, as a streamed mesh has them: a layer of
+height h on facets of length l, growing by a fifth from cell to cell, is 2 l - 6 h thick where its
+cells are a third as high as long.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slideviz.case.model import Case
+from slideviz.mesh.fans import components
+from slideviz.mesh.model import IntArray, Mesh
+from slideviz.mesh.topology import facet_vectors
+from slideviz.mesh.walls import find_columns
+from slideviz.rbf.layers import LayerZone, Wall, find_zone, wall_nodes
+from slideviz.solver.domain import Domain
+
+SIZE = 0.02
+"""Largest automatic thickness of a zone over the largest extent of its wall."""
+
+
+def layer_zone(case: Case, mesh: Mesh, domain: Domain, known: IntArray) -> LayerZone | None:
+    """Return the nodes that go with walls in a case (LAYERS); None where there are no such walls.
+
+    ``known`` (a,) are moving and fixed nodes.
+    """
+    if case.layers == "no" or case.method != "rbf":
+        return None
+    walls = _walls(case, mesh, domain)
+    if not walls:
+        return None
+    free = domain.classes.representative == np.arange(len(mesh.points))
+    free &= ~domain.axis
+    free[known] = False
+    if mesh.halo is not None:
+        free[np.setdiff1d(mesh.halo.receivers, domain.images)] = False
+        free[mesh.halo.outer] = False
+    nodes, frame = np.flatnonzero(free), domain.frame
+    targets, slides = frame.points(domain.coords[nodes]), np.isin(nodes, domain.classes.sliding)
+    return find_zone(wall_nodes(frame, domain.coords, known, walls), nodes, targets, slides)
+
+
+def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
+    """Return the connected walls that carry nodes: moving ones, then fixed ones."""
+    boundary, points = domain.boundary, mesh.points
+    height = find_columns(mesh, 1).stack_thickness(points)
+    size = np.linalg.norm(facet_vectors(points, boundary.facets), axis=1)
+    length = size if mesh.dim == 2 else np.sqrt(size / 2)
+    walls = []
+    for role in ("moving", "fixed"):
+        chosen = np.zeros(len(height), bool)
+        for k, name in enumerate(boundary.names):
+            mine = boundary.marker == k
+            layered = case.layers == "keep" or 2 * np.count_nonzero(height[mine]) > mine.sum()
+            if layered and domain.roles.get(name, "fixed") == role:
+                chosen |= mine
+        facets = boundary.facets[chosen]
+        links = np.concatenate([facets[:, [0, k]] for k in range(1, facets.shape[1])])
+        part = components(len(points), *links.T)[facets[:, 0]]
+        for label in np.unique(part):
+            some = np.flatnonzero(chosen)[part == label]
+            extent = np.ptp(points[np.unique(boundary.facets[some])], axis=0).max()
+            flat = some[height[some] > 0.0]
+            thickness = np.median(2.0 * length[flat] - 6.0 * height[flat]) if len(flat) else np.inf
+            walls.append(
+                Wall(
+                    tuple(boundary.names[m] for m in np.unique(boundary.marker[some])),
+                    boundary.facets[some],
+                    case.layer_thickness or min(SIZE * float(extent), float(thickness)),
+                    float(np.median(height[flat])) if len(flat) else 0.0,
+                    role == "moving",
+                )
+            )
+    return walls

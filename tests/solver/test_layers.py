@@ -1,0 +1,164 @@
+"""The layer zone: first heights, both sides of thin bodies, images, sliding and fixed walls."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.case.model import Case, Prescribed, Rotate, Translate
+from slideviz.mesh.model import Cells, Marker, Mesh
+from slideviz.samples.table import sample
+from slideviz.solver.setup import make_setup
+from tests.design.test_deformer_derivatives import check, motions
+from tests.test_laws import box, box_case, sector, sector_case
+
+
+def around(shape, rings, count, first=1e-4, far=20.0):
+    """An O-mesh of quadrilaterals about a closed curve; ``shape`` maps angles to points."""
+    angle = np.arange(count) * 2 * np.pi / count
+    wall = shape(angle)
+    ring = 10.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    along = np.roll(wall, -1, axis=0) - np.roll(wall, 1, axis=0)
+    normal = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    height = first * (1.2 ** np.arange(rings) - 1.0) / 0.2
+    straight = wall + height[:, None, None] * normal
+    part = np.clip((height / height[-1])[:, None, None], 0.0, 1.0) ** 2
+    points = ((1 - part) * straight + part * ring).reshape(-1, 2)
+    node = np.arange(rings * count).reshape(rings, count)
+    near, beyond = np.roll(node, -1, axis=1)[:-1], np.roll(node, -1, axis=1)[1:]
+    quads = np.stack([node[:-1], node[1:], beyond, near], axis=-1).reshape(-1, 4)
+    sides = [np.stack([row, np.roll(row, -1)], axis=1) for row in (node[0], node[-1])]
+    markers = [Marker(n, Cells.from_blocks([(3, s)])) for n, s in zip("wf", sides, strict=True)]
+    return Mesh(points, Cells.from_blocks([(9, quads)]), tuple(markers))
+
+
+def ellipse(angle, thickness=0.12):
+    return np.stack([np.cos(angle), thickness * np.sin(angle)], axis=1)
+
+
+def thin(angle):
+    """A plate, 0.2 % thick at its sharp ends' neighbours."""
+    x = np.cos(angle)
+    return np.stack([x, 0.05 * np.sign(np.sin(angle)) * (1 - x**2)], axis=1)
+
+
+def bent(x):
+    return np.stack([0 * x[:, 0], 0.1 * x[:, 0] ** 2], axis=1)
+
+
+def thicker(x):
+    return np.stack([0 * x[:, 0], 0.1 * x[:, 1]], axis=1)
+
+
+def deformed(mesh, motion, **settings):
+    nodes = mesh.marker("w").nodes
+    if callable(motion):
+        motion = Prescribed(nodes, motion(mesh.points[nodes]), "w")
+    case = Case(roles={"w": "moving"}, motions=(motion,), **{"layers": "auto", **settings})
+    *_, last = sv.deform(case, mesh)
+    return case, last
+
+
+SHAPES = {"thick": ellipse, "thin": thin}
+MOTIONS = {"turned": Rotate("w", 20.0), "bent": bent, "thicker": thicker}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_first_heights_and_angles_stay(shape, motion):
+    mesh = around(SHAPES[shape], 40, 80)
+    for steps in (1, 3):
+        _, last = deformed(mesh, MOTIONS[motion], steps=steps)
+        walls = sv.walls(last.mesh, mesh).summary()["w"]
+        assert walls["height_ratio"]["min"] > 0.999
+        assert walls["height_ratio"]["max"] < 1.001
+        assert walls["angle_change"]["max"] < (1.0 if shape == "thick" else 5.0)
+        assert sv.quality(last.mesh, mesh).inverted == 0
+
+
+def test_a_wall_that_only_turns_takes_its_zone_along_exactly():
+    mesh = around(ellipse, 40, 80)
+    case, last = deformed(mesh, Rotate("w", 25.0, (0.3, 0.1)), steps=2)
+    zone = make_setup(case, mesh).zone
+    c, s = np.cos(np.radians(25)), np.sin(np.radians(25))
+    turned = (mesh.points - [0.3, 0.1]) @ np.array([[c, s], [-s, c]]) + [0.3, 0.1]
+    whole = zone.nodes[zone.share[:, 0] == 1.0]
+    assert len(whole) >= 80
+    np.testing.assert_allclose(last.mesh.points[whole], turned[whole], rtol=0, atol=1e-13)
+
+
+def test_without_motion_no_bit_changes():
+    mesh = around(ellipse, 20, 30)
+    _, last = deformed(mesh, Translate("w", (0.0, 0.0)))
+    assert np.array_equal(last.mesh.points, mesh.points)
+
+
+def test_a_fixed_wall_keeps_its_layers_in_place():
+    """Two walls: of a channel the lower one moves, the upper one has layers and stays."""
+    y = np.r_[0.0, 1e-3 * (1.3 ** np.arange(1, 16) - 1) / 0.3, 0.6, 0.8, 0.95, 0.99, 1.0]
+    x = np.linspace(0, 2, 21)
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    node = np.arange(len(points)).reshape(len(y), len(x))
+    quads = np.stack([node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]], axis=-1)
+    sides = {"w": node[0], "top": node[-1], "in": node[:, 0], "out": node[:, -1]}
+    markers = [
+        Marker(name, Cells.from_blocks([(3, np.stack([row[:-1], row[1:]], axis=1))]))
+        for name, row in sides.items()
+    ]
+    mesh = Mesh(points, Cells.from_blocks([(9, quads.reshape(-1, 4))]), tuple(markers))
+    roles = {"w": "moving", "in": "sliding", "out": "sliding"}
+    case = Case(roles=roles, motions=(Translate("w", (0.0, 0.1)),), sliding="ps", layers="auto")
+    *_, last = sv.deform(case, mesh)
+    walls = sv.walls(last.mesh, mesh).summary()
+    for name in ("w", "top"):
+        assert walls[name]["height_ratio"]["min"] > 1 - 1e-9
+        assert walls[name]["height_ratio"]["max"] < 1 + 1e-9
+    assert last.mesh.points[node[-2], 1] == pytest.approx(0.99, abs=1e-12)
+    # Nodes at the ends slide along them, as their wall takes them.
+    assert np.array_equal(last.mesh.points[node[:, 0], 0], np.zeros(len(y)))
+    report = last.kept_layers.report()
+    assert [wall["boundaries"] for wall in report["walls"]] == [("w",), ("top",)]
+    plain = sv.walls(list(sv.deform(case.change(layers="no"), mesh))[-1].mesh, mesh).summary()
+    assert plain["top"]["height_ratio"]["min"] < 0.9
+
+
+def test_walls_without_layers_carry_nothing_unless_they_are_asked_to():
+    mesh = around(ellipse, 12, 80, first=0.05)
+    case, last = deformed(mesh, MOTIONS["bent"])
+    assert make_setup(case, mesh).zone is None
+    assert last.kept_layers is None
+    case, last = deformed(mesh, MOTIONS["bent"], layers="keep", layer_thickness=0.1)
+    assert last.kept_layers.nodes == len(make_setup(case, mesh).zone.nodes) > 0
+
+
+def test_periodic_images_are_carried_alike():
+    """A vane whose zone reaches the periodic side: `deform` refuses images that differ."""
+    row = sample("turbine-row", 3000)
+    case = row.case.change(motions=(Rotate("BLADE", 8.0),), layers="keep", layer_thickness=0.01)
+    zone = make_setup(case, row.mesh).zone
+    setup = make_setup(case, row.mesh)
+    assert np.isin(setup.images[:, 0], zone.nodes).sum() > 5
+    *_, last = sv.deform(case, row.mesh)
+    assert last.periodic_misfit < 1e-15
+
+
+CASES = [
+    ("translational", ("ps", "moving"), 2, 3, None),
+    ("translational", ("ds", "fixed"), 3, 1, None),
+    ("rotational", ("ps", "moving"), 3, 1, None),
+    pytest.param("rotational", ("ds", "periodic"), 2, 3, None, marks=pytest.mark.slow),
+    pytest.param("rotational", ("ds", "moving"), 3, 3, None, marks=pytest.mark.slow),
+    pytest.param("cartesian", ("none", "none"), 2, 3, None, marks=pytest.mark.slow),
+]
+
+
+@pytest.mark.parametrize(("frame", "method", "dim", "steps", "reduction"), CASES)
+def test_derivatives(frame, method, dim, steps, reduction):
+    settings = {"steps": steps, "reduction": reduction, "layers": "keep", "layer_thickness": 0.6}
+    make, case = (sector, sector_case) if frame == "rotational" else (box, box_case)
+    mesh = make(dim)
+    motion = motions(mesh, "blade" if (frame, dim) == ("rotational", 3) else "BLOCK")
+    deformer = check(case(mesh, method, motion, **settings), mesh)
+    assert len(deformer._setup.zone.nodes)
