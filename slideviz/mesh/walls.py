@@ -5,7 +5,8 @@ cells are quadrilaterals, hexahedra, or prisms entered by a triangle; another ce
 edges that lead from the corners of the facet through the stack are its *columns*: nodes
 p0 (on the boundary), p1, p2 ... A column belongs to all facets whose stacks begin with the edge
 p0 p1 (both sides of a sharp trailing edge of an O-mesh; of a C-mesh each side has its own), and
-its normal n is the mean of the inward normals of these facets, weighted with their areas.
+its normal n is the mean of the inward unit normals of these facets, whatever their areas: else a
+sharp edge, whose normals nearly cancel, would seem to turn where a facet only becomes longer.
 
 ==================  ==============================================================================
 first height        (p1 - p0)·n: the distance of the first node from the wall, on which y+ depends.
@@ -244,7 +245,7 @@ def measure_walls(columns: Columns, points: FloatArray) -> dict[str, FloatArray]
     they are nan.
     """
     facets, nodes = columns.boundary.facets, columns.nodes
-    width, inward = _widths(facets), -facet_vectors(points, facets)
+    width, inward = _widths(facets), -unit(facet_vectors(points, facets))
     total = np.zeros((len(nodes) + len(columns.bare), points.shape[1]))
     for k in range(facets.shape[1]):  # a facet counts once in each of its columns
         some = k < width

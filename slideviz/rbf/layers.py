@@ -27,7 +27,7 @@ from scipy.sparse import csr_array
 
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.topology import corner_vectors
+from slideviz.mesh.topology import TINY, corner_vectors
 from slideviz.mesh.topology import unit as unit_rows
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.frames import Frame
@@ -123,7 +123,7 @@ class WallNodes:
         ]
 
     @cached_property
-    def _rest(self) -> FloatArray:
+    def _undeformed(self) -> FloatArray:
         """Return the rotations at rest, (w, d d): the identity, to rounding."""
         return value(self._rotations(self.start))
 
@@ -139,7 +139,7 @@ class WallNodes:
         """
         now = points(self.frame, take(goal, self.known))
         dim = self.start.shape[1]
-        moved, turned = now - self.start, self._rotations(now) - self._rest
+        moved, turned = now - self.start, self._rotations(now) - self._undeformed
         moved, turned = take(moved, self.origin), take(turned, self.origin)
         if self.turn is not None:
             both = np.einsum("sac,sbd->sabcd", self.turn, self.turn)
@@ -226,7 +226,11 @@ class WallNodes:
         in_parts(measure, len(targets))
         some = np.flatnonzero(gap < limit)
         share = 1.0 - smooth((gap[some] - wall.first) / wall.thickness)
-        return some, share, share * (limit / np.maximum(gap[some], 1e-9 * limit)) ** POWER
+        return (
+            some,
+            share,
+            share * (limit / np.maximum(gap[some], max(1e-9 * limit, TINY))) ** POWER,
+        )
 
     def _carriers(self, k: int, targets: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return the sources of wall k near points (m, d), and their weights, both (m, c)."""
@@ -238,7 +242,7 @@ class WallNodes:
         def find(part: slice) -> None:
             found = tree.query(targets[part], k=count)
             gap, index = (np.reshape(x, (-1, count)) for x in found)
-            gap = np.maximum(gap, np.finfo(float).tiny)
+            gap = np.maximum(gap, TINY)
             away = targets[part][:, None] - self.places[at][index]
             cosine = np.einsum("mcd,mcd->mc", away, self.normals[at][index]) / gap
             seen = smooth((cosine + GRAZING) / (2.0 * GRAZING))

@@ -19,7 +19,7 @@ TEXTS = ("1e300", "1.7e308", "1e30", "1e-30", "1e-300", "1e-320", "5e-324")
 FIELDS = [key for key in KEYS.values() if key.group in (METHOD, REDUCTION)]
 REALS = [key.name for key in FIELDS if key.kind.allowed.startswith("a number")]
 REFUSED = {
-    "small": [name for name in REALS if "above 0 " not in f"{KEYS[name].kind.allowed} "],
+    "small": [name for name in REALS if not re.search(r"above 0\b(?!\.)", KEYS[name].kind.allowed)],
     "large": [name for name in REALS if re.search("below|up to", KEYS[name].kind.allowed)],
 }
 ENDS = [

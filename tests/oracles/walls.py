@@ -57,13 +57,14 @@ def columns(mesh, marker, skip=(), most=5):
 
 
 def inward(mesh, side, cell):
-    """The normal of a side into its cell, as long as its area."""
+    """The unit normal of a side into its cell."""
     x = mesh.points[side]
     if mesh.dim == 2:
         normal = np.array([x[1, 1] - x[0, 1], x[0, 0] - x[1, 0]])
     else:
         normal = sum(np.cross(x[k] - x[0], x[k + 1] - x[0]) for k in range(1, len(x) - 1)) / 2
     towards = mesh.points[cell].mean(0) - x.mean(0)
+    normal = normal / np.linalg.norm(normal)
     return normal if normal @ towards > 0 else -normal
 
 

@@ -13,6 +13,8 @@ from slideviz.solver.setup import make_setup
 from tests.design.test_deformer_derivatives import check, motions
 from tests.test_laws import box, box_case, sector, sector_case
 
+pytestmark = pytest.mark.filterwarnings("ignore::slideviz.errors.ToleranceWarning")
+
 
 def around(shape, rings, count, first=1e-4, far=20.0):
     """An O-mesh of quadrilaterals about a closed curve; ``shape`` maps angles to points."""
@@ -74,7 +76,7 @@ def test_first_heights_and_angles_stay(shape, motion):
         walls = sv.walls(last.mesh, mesh).summary()["w"]
         assert walls["height_ratio"]["min"] > 0.999
         assert walls["height_ratio"]["max"] < 1.001
-        assert walls["angle_change"]["max"] < (1.0 if shape == "thick" else 5.0)
+        assert walls["angle_change"]["max"] < 0.5
         assert sv.quality(last.mesh, mesh).inverted == 0
 
 
@@ -121,7 +123,7 @@ def test_a_fixed_wall_keeps_its_layers_in_place():
     report = last.kept_layers.report()
     assert [wall["boundaries"] for wall in report["walls"]] == [("w",), ("top",)]
     plain = sv.walls(list(sv.deform(case.change(layers="no"), mesh))[-1].mesh, mesh).summary()
-    assert plain["top"]["height_ratio"]["min"] < 0.9
+    assert plain["top"]["height_ratio"]["min"] < 0.95
 
 
 def test_walls_without_layers_carry_nothing_unless_they_are_asked_to():
@@ -135,7 +137,7 @@ def test_walls_without_layers_carry_nothing_unless_they_are_asked_to():
 
 def test_periodic_images_are_carried_alike():
     """A vane whose zone reaches the periodic side: `deform` refuses images that differ."""
-    row = sample("turbine-row", 3000)
+    row = sample("turbine-row", 5000)
     case = row.case.change(motions=(Rotate("BLADE", 8.0),), layers="keep", layer_thickness=0.01)
     zone = make_setup(case, row.mesh).zone
     setup = make_setup(case, row.mesh)
