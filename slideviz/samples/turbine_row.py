@@ -189,7 +189,7 @@ The first two are those of thesis Tables 4.7 and 4.8; the third follows by Euler
 """
 SIZES = (5_000, 5_000_000)
 """Least and largest number of cells."""
-SPAN, TWIST_DEG = 0.5 * CHORD, 10.0
+SPAN, TWIST_DEG = CHORD, 10.0
 """Length of the vane from hub to shroud in 3D, and by how much its case turns the shroud's end."""
 VANE_BOX, VANE_AXIS = ((-0.002, -0.034), (0.03, 0.006)), (0.016, -0.012)
 """Corners of a rectangle around the vane; where the axis of the twist meets it."""
@@ -307,8 +307,8 @@ def extruded_row(size: int) -> Mesh:
 def extruded_case(size: int) -> Case:
     """Return the case that twists the vane by `TWIST_DEG` from hub to shroud, which slide.
 
-    A box for free-form deformation does it: the middle of its three planes of control points turns
-    half as far as the last.
+    A box for free-form deformation does it, with four planes of control points along the span. The
+    first two stay and the last two turn, so that the vane remains perpendicular to hub and shroud.
     """
     flat = row_case(size)
     (x0, y0), (x1, y1) = VANE_BOX
@@ -317,10 +317,10 @@ def extruded_case(size: int) -> Case:
     return flat.change(
         roles={**flat.roles, "HUB": "sliding", "SHROUD": "sliding"},
         ffd_boxes=(("VANE", tuple(value for corner in corners for value in corner)),),
-        ffd_degrees=((1, 2, 1),),
+        ffd_degrees=((1, 3, 1),),
         motions=tuple(
-            FfdTwist("BLADE", "VANE", plane, angle, (*VANE_AXIS, 0.0), (0.0, 0.0, 1.0))
-            for plane, angle in ((1, TWIST_DEG / 2), (2, TWIST_DEG))
+            FfdTwist("BLADE", "VANE", plane, TWIST_DEG, (*VANE_AXIS, 0.0), (0.0, 0.0, 1.0))
+            for plane in (2, 3)
         ),
         steps=1,
         reduction=Reduction(tolerance=TOLERANCE),

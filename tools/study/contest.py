@@ -28,6 +28,7 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import sample
+from slideviz.samples.turbine_row import TWIST_DEG, VANE_AXIS
 from tools.study.flows import SHAPES, c_mesh, o_mesh, triangle_mesh
 
 METHODS: Mapping[str, Mapping[str, Any]] = {
@@ -181,6 +182,17 @@ def turned_row(size: int = 20_000) -> tuple[sv.Mesh, sv.Case]:
     return mesh, case
 
 
+def _linear_twist() -> dict[str, Any]:
+    """Return settings of ``turbine-row-3d`` that turn the vane in proportion to the span.
+
+    Its wall then leans at hub and shroud, where nodes slide and first edges cannot follow.
+    """
+    axis = (*VANE_AXIS, 0.0), (0.0, 0.0, 1.0)
+    planes = ((1, 0.5 * TWIST_DEG), (2, TWIST_DEG))
+    motions = tuple(sv.FfdTwist("BLADE", "VANE", plane, angle, *axis) for plane, angle in planes)
+    return {"ffd_degrees": ((1, 2, 1),), "motions": motions}
+
+
 def contests(folder: Path | None) -> Iterator[Contest]:
     """Yield all rows; those of real meshes only with their ``folder``."""
     row = partial(_layered_rows, cases=_passage)
@@ -198,6 +210,10 @@ def contests(folder: Path | None) -> Iterator[Contest]:
     yield from _layered_rows("O-mesh", o_layers, "airfoil", ("turned by 30", *shapes), _outer)
     yield from _layered_rows("C-mesh", cache(c_mesh), "airfoil", ("turned by 30", *shapes), _outer)
     yield Contest("turbine-row-3d twisted by 10", partial(_own, "turbine-row-3d", None, "motion"))
+    yield Contest(
+        "turbine-row-3d twisted linearly",
+        partial(_own, "turbine-row-3d", None, "motion", **_linear_twist()),
+    )
     yield from _bare_rows()
 
 
