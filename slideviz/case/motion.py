@@ -278,16 +278,9 @@ def moved_together(
 ) -> dict[str, FloatArray]:
     """Return the displacement (k, d) of the nodes of each marker after all motions, in sequence.
 
-    Markers that one motion moves are moved as one body: about their common centroid.
-
-    Parameters
-    ----------
-    points : (n, d) float64
-        Undeformed positions of all nodes.
-    on : mapping of str to (k,) int64
-        The nodes of each moving marker.
-    files : mapping of object to Displacements
-        As in `displacement_of`.
+    Markers that one motion moves are moved as one body: about their common centroid. ``points`` (n,
+    d) float64: undeformed positions of all nodes. ``on``: the nodes of each moving marker.
+    ``files``: as in `displacement_of`.
     """
     total = {name: np.zeros_like(points[nodes]) for name, nodes in on.items()}
     for motion in motions:

@@ -35,15 +35,9 @@ def run_shared(argv: Sequence[str], variable: str, run: Callable[[Ranks], int]) 
     """Run a command that several processes share, and return its exit code.
 
     Raises SlidevizError if processes cannot share this command, or MPI does not connect them.
-
-    Parameters
-    ----------
-    argv : sequence of str
-        The words of the command line.
-    variable : str
-        The variable with the number of processes, of `launched`.
-    run : callable
-        Runs the command; called on rank 0 only, while the others serve it.
+    ``argv``: the words of the command line. ``variable``: the variable with the number of
+    processes, of `launched`. ``run``: runs the command; called on rank 0 only, while the others
+    serve it.
     """
     count, rank = _number(variable), _number(dict(_LAUNCHERS)[variable])
     if rank:

@@ -60,16 +60,9 @@ def say_compiling() -> None:
 class Bar:
     """A progress bar on stderr: ``with Bar() as bar: deform(case, mesh, bar)``.
 
-    It is drawn only where stderr is a terminal, and cleared at the end.
-
-    Parameters
-    ----------
-    head : str
-        Text before the words of the bar.
-    expected : float, optional
-        Estimate of all seconds, where known; used until the first step is done.
-    begun : callable, optional
-        Called when nothing can be refused any more.
+    It is drawn only where stderr is a terminal, and cleared at the end. ``head``: text before the
+    words of the bar. ``expected``: estimate of all seconds, where known; used until the first step
+    is done. ``begun``: called when nothing can be refused any more.
     """
 
     def __init__(

@@ -60,10 +60,8 @@ class KnownNodeMap:
     def _require_alike(self, vectors: FloatArray, moved: FloatArray) -> None:
         """Raise DeformError where images, or copies and their originals, are displaced differently.
 
-        Parameters
-        ----------
-        vectors, moved : (..., m, d), (..., s, d)
-            Cartesian displacements of the moving nodes, and those of the sources in the frame.
+        ``vectors`` and ``moved`` (..., m, d), (..., s, d): Cartesian displacements of the moving
+        nodes, and those of the sources in the frame.
         """
         setup, mesh = self.setup, self.mesh
         if len(self.others):

@@ -310,14 +310,8 @@ def picture(
 def pictures_alike(frames: Sequence[StepFrame], base: Mesh, side: int) -> list[Pixels]:
     """Return a square picture (side, side, 3) of each mesh, without legend, all from one camera.
 
-    Parameters
-    ----------
-    frames : sequence of StepFrame
-        The deformed meshes, at least one.
-    base : Mesh
-        The undeformed mesh.
-    side : int
-        Width and height of each picture in pixels.
+    ``frames``: the deformed meshes, at least one. ``base``: the undeformed mesh. ``side``: width
+    and height of each picture in pixels.
     """
     runs = [Run(k, Case(), (frame,), "done") for k, frame in enumerate(frames, start=1)]
     session = session_of_runs(StepFrame(base, frames[0].quality), runs)

@@ -39,15 +39,9 @@ def write_vector(renderer: OffscreenRenderer, options: PictureOptions, file: Pat
     """Write the picture of a 2D mesh as SVG or PDF, whole or not at all.
 
     Raises SlidevizError if the mesh is 3D or has too many cells, or the file cannot be written.
-
-    Parameters
-    ----------
-    renderer : OffscreenRenderer
-        Holds the session, and says what part of the mesh is shown.
-    options : PictureOptions
-        The options of the picture; its background is white or transparent.
-    file : Path
-        A name ending with .svg or .pdf.
+    ``renderer``: holds the session, and says what part of the mesh is shown. ``options``: the
+    options of the picture; its background is white or transparent. ``file``: a name ending with
+    .svg or .pdf.
     """
     require_vector(renderer.session, file)
     drawn = draw_vector(renderer, options)

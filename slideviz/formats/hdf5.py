@@ -108,16 +108,9 @@ def hdf5_write(
 ) -> Iterator[Hdf5Draft]:
     """Context with an HDF5 file to write, which replaces ``path`` at the end if nothing was raised.
 
-    Raises MeshError if it cannot be written; what was at ``path`` is as before.
-
-    Parameters
-    ----------
-    path : Path
-        The file to write.
-    replaces : Path, optional
-        The input that may be overwritten.
-    source : Path, optional
-        A file whose copy the new one is at first; when left out it is empty.
+    Raises MeshError if it cannot be written; what was at ``path`` is as before. ``path``: the file
+    to write. ``replaces``: the input that may be overwritten. ``source``: a file whose copy the new
+    one is at first; when left out it is empty.
     """
     import h5py
 

@@ -66,16 +66,9 @@ class StepSeries:
     def add(self, points: FloatArray, cell_data: Values, point_data: Values) -> None:
         """Write the next step, whose time is its number (0 for the first).
 
-        Raises MeshError if the file cannot be written.
-
-        Parameters
-        ----------
-        points : (n, d)
-            Points of the mesh.
-        cell_data : mapping of str to (m,) or (m, k)
-            Values on its cells; the same names in every step.
-        point_data : mapping of str to (n,) or (n, d)
-            Values on its points; vectors get a third component.
+        Raises MeshError if the file cannot be written. ``points`` (n, d): points of the mesh.
+        ``cell_data``: values on its cells; the same names in every step. ``point_data``: values on
+        its points; vectors get a third component.
         """
         for block in self._blocks:
             self._append(block.group, "Points", _in_space(points[block.nodes]))

@@ -44,14 +44,8 @@ if TYPE_CHECKING:
 class SessionRecovery(QObject):
     """Finds the sessions of earlier starts that did not end properly, and offers to restore them.
 
-    Parameters
-    ----------
-    window : MainWindow
-        Opens a session.
-    banner : Banner
-        Offers the sessions; a banner of its own, so that no other message replaces the offer.
-    autosave : Autosave
-        Saves the restored session from then on.
+    ``window``: opens a session. ``banner``: offers the sessions; a banner of its own, so that no
+    other message replaces the offer. ``autosave``: saves the restored session from then on.
     """
 
     def __init__(self, window: MainWindow, banner: Banner, autosave: Autosave) -> None:
@@ -152,14 +146,9 @@ log = logging.getLogger("slideviz")
 class Autosave(QObject):
     """The file with the session of a window: written after changes, removed at a clean end.
 
-    Parameters
-    ----------
-    folder : Path
-        The folder of all windows' session files; made when needed.
-    camera : callable
-        Returns the camera of the first view.
-    designs : callable
-        Returns the table of designs, and the case of its results.
+    ``folder``: the folder of all windows' session files; made when needed. ``camera``: returns the
+    camera of the first view. ``designs``: returns the table of designs, and the case of its
+    results.
     """
 
     def __init__(

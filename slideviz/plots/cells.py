@@ -152,14 +152,9 @@ def surroundings(
 def window(cut: Box, around: Polygons, ratio: float) -> Box:
     """Return the box of a 2D mesh to show around a cut, with the ratio of the room on paper.
 
-    Parameters
-    ----------
-    cut : (2,), (2,) float64
-        Corners of the box around the cut, which the result contains.
-    around : Polygons
-        All cells; the result is within the box around them.
-    ratio : float
-        Width by height of the room.
+    ``cut`` (2,), (2,) float64: corners of the box around the cut, which the result contains.
+    ``around``: all cells; the result is within the box around them. ``ratio``: width by height of
+    the room.
     """
     low, high = cut
     size = high - low

@@ -35,14 +35,9 @@ def histogram(
 ) -> None:
     """Draw the number of cells against their quality, an outline for each run.
 
-    Parameters
-    ----------
-    metric : str
-        Name of the value, for the axis.
-    edges : (k + 1,) float64, optional
-        Limits of equal intervals; by default 25 intervals from 0 to 1.
-    log : bool
-        Whether the counts' axis is logarithmic, which shows a few bad cells among many.
+    ``metric``: name of the value, for the axis. ``edges`` (k + 1,) float64, optional: limits of
+    equal intervals; by default 25 intervals from 0 to 1. ``log``: whether the counts' axis is
+    logarithmic, which shows a few bad cells among many.
     """
     edges = np.linspace(0.0, 1.0, 26) if edges is None else edges
     outlines = []
@@ -66,14 +61,8 @@ def draw_distribution(
 ) -> None:
     """Draw the number of cells: one distribution as bars, if given, and others as outlines.
 
-    Parameters
-    ----------
-    outlines : sequence of Outline
-        All have the same intervals as the bars.
-    metric : str
-        Label of the values' axis.
-    log : bool
-        Whether the counts' axis is logarithmic, which shows a few bad cells among many.
+    ``outlines``: all have the same intervals as the bars. ``metric``: label of the values' axis.
+    ``log``: whether the counts' axis is logarithmic, which shows a few bad cells among many.
     """
     style_axes(axes, style, metric, "cells [-]")
     foot = 0.5 if log else 0.0

@@ -92,14 +92,9 @@ def draw_curves(
 ) -> None:
     """Draw curves as steps onto empty axes; they are interrupted where there is no cell.
 
-    Parameters
-    ----------
-    rows : sequence of CurveRow
-        The last one is the main one: its inverted cells are marked, and areas are below it.
-    labels : (str, str)
-        Labels of the positions and of the values.
-    colors : Colors, optional
-        Colors of the areas; without them no areas are drawn.
+    ``rows``: the last one is the main one: its inverted cells are marked, and areas are below it.
+    ``labels`` (str, str): labels of the positions and of the values. ``colors``: colors of the
+    areas; without them no areas are drawn.
     """
     style_axes(axes, style, *labels)
     good = np.concatenate([row.curve.values for row in rows])

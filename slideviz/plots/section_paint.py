@@ -80,16 +80,9 @@ def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = N
     """Return the paint of a mesh: a quantity of every cell, with its usual limits.
 
     Raises CaseError if the quantity is unknown, or the displacement is wanted without the mesh that
-    it is measured from, or with another.
-
-    Parameters
-    ----------
-    quality : Quality
-        That of the mesh.
-    by : Quantity
-        The displacement of a cell is the mean of the lengths by which its nodes moved.
-    reference : Mesh, optional
-        The undeformed mesh; the displacement needs it.
+    it is measured from, or with another. ``quality``: that of the mesh. ``by``: the displacement of
+    a cell is the mean of the lengths by which its nodes moved. ``reference``: the undeformed mesh;
+    the displacement needs it.
     """
     if by not in QUANTITIES:
         raise CaseError(f"color: {not_one_of(by, QUANTITIES)}")

@@ -113,15 +113,8 @@ def arrangement(size: FloatArray, inches: tuple[float, float], count: int) -> tu
 
     If they are, the color bar is upright at their right; else they are one above the other, with
     the bar below. Of one section, only the bar's place is chosen. The larger scale is preferred.
-
-    Parameters
-    ----------
-    size : (2,) float64
-        Width and height of a section, in the mesh's length unit.
-    inches : (float, float)
-        Width and height of the picture.
-    count : int
-        Number of sections, 1 or 2.
+    ``size`` (2,) float64: width and height of a section, in the mesh's length unit. ``inches``
+    (float, float): width and height of the picture. ``count``: number of sections, 1 or 2.
     """
     width, height = inches
     high = {upright: height * (HIGHER[upright] if count > 1 else 1.0) for upright in (True, False)}

@@ -62,6 +62,9 @@ def along_radius(
 ) -> Profile:
     """Return the quality in layers of equal height along the radius about an axis.
 
+    Raises SlidevizError if there is not a value for each cell, no layer, or the mesh has no span,
+    and MeshError if the axis has length zero.
+
     Parameters
     ----------
     mesh : Mesh
@@ -72,13 +75,6 @@ def along_radius(
         Direction of the axis, of any length but zero, and a point on it.
     layers : int, optional
         At least 1; when left out, one for each layer of cells of usual height, 40 at most.
-
-    Raises
-    ------
-    SlidevizError
-        There is not a value for each cell, no layer, or the mesh has no span.
-    MeshError
-        The axis has length zero.
     """
     local = in_axis_frame(mesh.points, axis, origin)
     return _profile(

@@ -50,14 +50,8 @@ HEIGHT, WIDTH = 6e-4, (3e-3, 9e-3)
 def reshaped(points: FloatArray, radii: tuple[float, float], stack_z: float) -> FloatArray:
     """Return displacements (k, 3) of blade nodes that keep their distance from the axis.
 
-    Parameters
-    ----------
-    points : (k, 3)
-        Nodes of the blade; the axis is z.
-    radii : (float, float)
-        Radii of hub and shroud.
-    stack_z : float
-        z of the stacking line, which has theta = 0.
+    ``points`` (k, 3): nodes of the blade; the axis is z. ``radii`` (float, float): radii of hub and
+    shroud. ``stack_z``: z of the stacking line, which has theta = 0.
     """
     r, theta = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
     z, arc = points[:, 2], r * theta

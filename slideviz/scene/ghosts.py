@@ -126,15 +126,8 @@ def lattices(case: Case, mesh: Mesh) -> tuple[dict[str, Box], dict[str, Box]]:
 def lattice_shape(boxes: list[tuple[FloatArray, np.ndarray]], dim: int, lift: float) -> Any:
     """Return control points and the lines between neighbouring ones as PolyData.
 
-    Parameters
-    ----------
-    boxes : list of ((I, J, K, 3) float64, (I, J, K) bool)
-        The control points of each box, and which of them are drawn; lines have one of these at
-        least.
-    dim : int
-        In 2D only the layer k = 0 is drawn.
-    lift : float
-        Height above z = 0 in 2D.
+    ``boxes``: the control points of each box, and which of them are drawn; lines have one of these
+    at least. ``dim``: in 2D only the layer k = 0 is drawn. ``lift``: height above z = 0 in 2D.
     """
     points, lines, wanted, start = [], [], [], 0
     for box, drawn in boxes:

@@ -84,12 +84,8 @@ class PassageLayer(KeyedLayer):
     """The neighbouring passages: boundaries, cells of a 2D mesh, cells within the threshold.
 
     The actors of all neighbours share the data sets of the scene, and per data set one mapper and
-    one property: a whole wheel takes the memory of one passage.
-
-    Parameters
-    ----------
-    cells, boundaries, threshold
-        The layers whose data sets are drawn again.
+    one property: a whole wheel takes the memory of one passage. ``cells``, ``boundaries``,
+    ``threshold``: the layers whose data sets are drawn again.
     """
 
     def __init__(

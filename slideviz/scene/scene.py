@@ -38,14 +38,8 @@ NEAR = 8.0  # height of the view after flying to a cell, in sizes of the cell
 class Scene:
     """Draws the state of a session into a plotter.
 
-    Parameters
-    ----------
-    plotter : pyvista.BasePlotter
-        Where to draw.
-    scheme : ColorScheme
-        Colors of background, text and edges.
-    font_scale : float
-        Factor of the letters' size, for pictures of many pixels.
+    ``plotter``: where to draw. ``scheme``: colors of background, text and edges. ``font_scale``:
+    factor of the letters' size, for pictures of many pixels.
     """
 
     def __init__(self, plotter: Any, scheme: ColorScheme = LIGHT, font_scale: float = 1.0) -> None:

@@ -41,15 +41,9 @@ def handle_parts(section: Section, box: Box) -> HandleParts | None:
 def part_at(shown: list[tuple[Part, FloatArray]], at: FloatArray, reach: float) -> Part | None:
     """Return the first part of a handle within reach of a pixel, or None.
 
-    Parameters
-    ----------
-    shown : list of (part, (k, 2) float64)
-        The parts, the preferred one first: points of the middle or the ends, or one polyline, in
-        pixels.
-    at : (2,) float64
-        The pixel.
-    reach : float
-        In pixels; for lines it is half of that.
+    ``shown``: the parts, the preferred one first: points of the middle or the ends, or one
+    polyline, in pixels. ``at`` (2,) float64: the pixel. ``reach``: in pixels; for lines it is half
+    of that.
     """
     for part, points in shown:
         if part == "line":

@@ -29,13 +29,7 @@ def is_large(path: Path, zone: int | None) -> bool:
     """Return whether only the boundary of a mesh is to be opened.
 
     That is for a 3D mesh in a ``.su2b`` file, with many cells or more than free memory allows.
-
-    Raises
-    ------
-    MeshError
-        The file has a mistake.
-    OSError
-        It cannot be read.
+    Raises MeshError if the file has a mistake, and OSError if it cannot be read.
     """
     if path.suffix.lower() != ".su2b" or not is_su2b(path):
         return False
@@ -49,12 +43,7 @@ def is_large(path: Path, zone: int | None) -> bool:
 def read_boundary(path: Path, zone: int | None, tick: Callable[[float], object]) -> Mesh:
     """Return the boundary of a mesh, with a remark that its cells stay in the file.
 
-    Raises
-    ------
-    MeshError
-        The file has a mistake.
-    OSError
-        It cannot be read.
+    Raises MeshError if the file has a mistake, and OSError if it cannot be read.
     """
     skin = read_skin(path, zone, tick)
     assert skin.part is not None
@@ -68,12 +57,8 @@ def read_boundary(path: Path, zone: int | None, tick: Callable[[float], object])
 def first_frame(skin: Mesh, metric: SkewMetric, tick: Callable[[float], object]) -> StepFrame:
     """Return the undeformed frame of a mesh by its ``skin``, with the quality of all its cells.
 
-    Raises
-    ------
-    MeshError
-        The file has a mistake, or there is no disk space for 9 bytes for each cell.
-    OSError
-        It cannot be read.
+    Raises MeshError if the file has a mistake, or there is no disk space for 9 bytes for each cell,
+    and OSError if it cannot be read.
     """
     assert skin.source is not None
     folder = Path(tempfile.gettempdir())
@@ -90,14 +75,8 @@ def frame_of(
 ) -> StepFrame:
     """Return the frame of a large mesh: its boundary in memory, its cells in a file.
 
-    Parameters
-    ----------
-    now, skin : Mesh
-        The boundary, deformed and undeformed.
-    file : Path
-        The deformed mesh.
-    totals : QualityTotals
-        The qualities of all its cells.
+    ``now`` and ``skin``: the boundary, deformed and undeformed. ``file``: the deformed mesh.
+    ``totals``: the qualities of all its cells.
     """
     assert skin.source is not None
     with ExitStack() as stack:

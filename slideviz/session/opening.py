@@ -72,14 +72,8 @@ def session_of_runs(
 ) -> Session:
     """Return a session for a picture: the last step of a run, with that of a second run beside it.
 
-    Parameters
-    ----------
-    first : StepFrame
-        The undeformed mesh.
-    runs : sequence of Run
-        Runs of that mesh: none, one or two, with different numbers.
-    color_by : {"size-skew", "size", "skew", "displacement"}
-        The quantity to color by, with one color range for both.
+    ``first``: the undeformed mesh. ``runs``: runs of that mesh: none, one or two, with different
+    numbers. ``color_by``: the quantity to color by, with one color range for both.
     """
     last, beside = 0, None
     if runs:

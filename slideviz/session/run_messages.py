@@ -81,14 +81,9 @@ def inverted_words(run: Run) -> str:
 def remedy_for(run: Run, mesh: Mesh | None, folding: str = "") -> str:
     """Return sentences on a run's inverted cells: their first step, and remedies.
 
-    Parameters
-    ----------
-    run
-        A run with inverted cells after its last step.
-    mesh
-        The undeformed mesh.
-    folding
-        ``Session.folding``: where what moves crosses itself, which only another motion can mend.
+    ``run``: a run with inverted cells after its last step. ``mesh``: the undeformed mesh.
+    ``folding``: ``Session.folding``: where what moves crosses itself, which only another motion can
+    mend.
     """
     if folding:
         crossed = folding.partition("; ")[0]

@@ -92,12 +92,7 @@ def read_slab(
 ) -> StepFrame:
     """Return the slab of cells that a section cuts: a frame of its own, with their quality.
 
-    Raises
-    ------
-    MeshError
-        A file has changed, and has mistakes.
-    OSError
-        It cannot be read.
+    Raises MeshError if a file has changed, and has mistakes, and OSError if it cannot be read.
     """
     skin, metric = frame.mesh, frame.quality.metric
     assert skin.source is not None

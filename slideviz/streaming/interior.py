@@ -44,19 +44,15 @@ class InteriorDisplacer:
     def after_steps(self, nodes: IntArray, points: FloatArray) -> Iterator[FloatArray]:
         """Yield the points (m, d) of some nodes after each step.
 
+        Raises DeformError if coordinates became infinite, or a node would go far beyond the motion,
+        and MeshError if a node is outside of the sector that the skin spans in a cylindrical frame.
+
         Parameters
         ----------
         nodes : (m,)
             Their numbers in the whole mesh, ascending.
         points : (m, d)
             Their undeformed points.
-
-        Raises
-        ------
-        DeformError
-            Coordinates became infinite, or a node would go far beyond the motion.
-        MeshError
-            A node is outside of the sector that the skin spans in a cylindrical frame.
         """
         frame = self.setup.frame
         start = frame.coords(points)

@@ -117,6 +117,10 @@ def stream(
 ) -> RunResult:
     """Deform the mesh of a case from file to file, with only its skin in memory; return numbers.
 
+    Raises CaseError or MeshError if the case does not fit the mesh, or the mesh is of no format
+    that can be streamed, and DeformError if the system cannot be solved, or the method needs the
+    whole mesh.
+
     Parameters
     ----------
     output : Path
@@ -142,13 +146,6 @@ def stream(
         have room for them, too.
     ranks : SerialPool or Ranks
         The processes that share the work; this one is rank 0.
-
-    Raises
-    ------
-    CaseError, MeshError
-        The case does not fit the mesh, or the mesh is of no format that can be streamed.
-    DeformError
-        The system cannot be solved, or the method needs the whole mesh.
     """
     assert case.mesh_file is not None
     path = case.mesh_file
@@ -263,12 +260,8 @@ def _naming_file_nodes(numbers: IntArray) -> Iterator[None]:
 def require_stream(case: Case) -> None:
     """Raise where a case cannot be streamed.
 
-    Raises
-    ------
-    CaseError
-        Its method, linear elasticity, or one of its limits needs the whole mesh at once.
-    MeshError
-        Its mesh is of no format that can be streamed.
+    Raises CaseError if its method, linear elasticity, or one of its limits needs the whole mesh at
+    once, and MeshError if its mesh is of no format that can be streamed.
     """
     path = case.mesh_file
     assert path is not None

@@ -99,14 +99,8 @@ def read_skin(
 ) -> Mesh:
     """Return the skin of a zone of an SU2 binary mesh; the whole zone is read and checked.
 
-    ``zone`` is counted from 1; None: the first.
-
-    Raises
-    ------
-    MeshError
-        The file has a mistake; the message has its byte.
-    OSError
-        It cannot be read.
+    ``zone`` is counted from 1; None: the first. Raises MeshError if the file has a mistake; the
+    message has its byte; and OSError if it cannot be read.
     """
     with open_zone(path, zone) as (source, place):
         markers = read_markers(source, place)

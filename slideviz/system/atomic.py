@@ -42,16 +42,9 @@ def atomic_write(
     When the block raises, whatever was at ``path`` stays as it was and the temporary file is
     removed. A symbolic link stays a link, and an existing file keeps its permissions. Raises
     SlidevizError if it cannot be written: missing folder, no permission, full disk; or it is an
-    input. The message has the path, the reason and the remedy.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file to write.
-    error : type of SlidevizError
-        The class of error to raise: ``MeshError`` unless another is given.
-    replaces : Path, optional
-        The input that may be written over; see `slideviz.system.file_checks`.
+    input. The message has the path, the reason and the remedy. ``path``: the file to write.
+    ``error``: the class of error to raise: ``MeshError`` unless another is given. ``replaces``: the
+    input that may be written over; see `slideviz.system.file_checks`.
     """
     target = Path(path)
     require_no_input(target, error, replaces)

@@ -75,12 +75,8 @@ def same_file(path: Path, other: Path) -> bool:
 def require_regular_file(path: Path, error: type[SlidevizError]) -> int:
     """Return the size in bytes of an ordinary file, without opening it: some devices react to that.
 
-    Raises
-    ------
-    SlidevizError
-        It is a device or a pipe; ``error`` is the class.
-    OSError, ValueError
-        There is no such file, or it is a folder.
+    Raises SlidevizError if it is a device or a pipe; ``error`` is the class; and OSError or
+    ValueError if there is no such file, or it is a folder.
     """
     status = path.stat()
     if stat.S_ISDIR(status.st_mode):

@@ -58,10 +58,7 @@ class MeasuredSystem:
     def tangent(self, right: FloatArray) -> FloatArray:
         """Return the solutions (..., n, m) of the forward pass: changes of weights.
 
-        Warns
-        -----
-        ConditionWarning
-            The field of a solution is not accurate to `TRUSTED`.
+        Warns with ConditionWarning if the field of a solution is not accurate to `TRUSTED`.
         """
         weights = self(right)
         worst = float(self.error_estimate.max(initial=0.0))
@@ -77,10 +74,7 @@ class MeasuredSystem:
     def adjoint(self, right: FloatArray) -> FloatArray:
         """Return the solutions (..., n, m) of the reverse pass, which are gradients themselves.
 
-        Warns
-        -----
-        ConditionWarning
-            The solution is not accurate to `TRUSTED`.
+        Warns with ConditionWarning if the solution is not accurate to `TRUSTED`.
         """
         if not self._refined:  # the error of a field is no measure for a gradient
             return solved(self._blocks, [system.factor for system in self._systems], right)

@@ -152,16 +152,9 @@ def read_positions(
     Lines are ``index x y [z]`` in any order, with blanks, tabs or commas between; a plane mesh may
     have a z of 0. As in SU2, nodes that are on none of the moving boundaries are ignored, but with
     a warning. Raises CaseError if the file cannot be read, has mistakes (a line ``file:line:
-    sentence`` for each), or none of these nodes.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    nodes : (m,) int64
-        Of the moving boundaries, ascending.
-    of : str
-        Key and moving boundaries for messages: ``DV_MARKER= (low)``.
+    sentence`` for each), or none of these nodes. ``path``: the file. ``nodes`` (m,) int64: of the
+    moving boundaries, ascending. ``of``: key and moving boundaries for messages: ``DV_MARKER=
+    (low)``.
     """
     text, warnings = read_text(path, "surface file")
     every = np.arange(len(mesh.points))
@@ -258,14 +251,9 @@ class MovingSurface:
     def slope(self, place: int, part: int = 0, undeformed: bool = False) -> FloatArray:
         """Return the derivative (m, d) of the displacement with respect to a value.
 
-        Parameters
-        ----------
-        place : int
-            Number of the variable, from 0.
-        part : int
-            Number of the value among those of the variable, from 0.
-        undeformed : bool
-            Whether at the design that moves nothing, instead of this one.
+        ``place``: number of the variable, from 0. ``part``: number of the value among those of the
+        variable, from 0. ``undeformed``: whether at the design that moves nothing, instead of this
+        one.
         """
         if self.idle[place]:
             return np.zeros((len(self.nodes), self.mesh.dim))

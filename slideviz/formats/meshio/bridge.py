@@ -225,12 +225,8 @@ def flattened(path: Path, points: FloatArray, cells: Cells) -> FloatArray:
 def require_own_folder(path: Path) -> None:
     """Raise if a file, or one that it names, names files that are not in its folder.
 
-    Raises
-    ------
-    MeshError
-        It names a file in another folder, or has an external link of HDF5.
-    OSError
-        It cannot be read.
+    Raises MeshError if it names a file in another folder, or has an external link of HDF5, and
+    OSError if it cannot be read.
     """
     seen: set[Path] = set()
     waiting = [path]

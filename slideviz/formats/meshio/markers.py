@@ -51,16 +51,8 @@ def find_markers(mesh: Mesh, data: meshio.Mesh, sides: Sequence[MeshioBlock]) ->
 
     They are found by the first of these that the file has: named sets of boundary elements, numbers
     on boundary elements (with names where the file has them), named sets of points. Without any,
-    they are the parts of the outer surface, divided at its edges.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Points and cells.
-    data : meshio.Mesh
-        What meshio read.
-    sides : sequence of MeshioBlock
-        Its elements of one dimension less than the mesh.
+    they are the parts of the outer surface, divided at its edges. ``mesh``: points and cells.
+    ``data``: what meshio read. ``sides``: its elements of one dimension less than the mesh.
     """
     groups = _by_cell_sets(data, sides) or _by_tags(mesh, data, sides)
     if groups:

@@ -60,14 +60,8 @@ def _tied(
 ) -> HaloAndRemarks:
     """Return the halo of those pairs whose motion is found, and remarks.
 
-    Parameters
-    ----------
-    donors : (h,)
-        Nodes.
-    receivers : (h, 2)
-        Nodes and their ``PERIODIC_INDEX``.
-    given : dict of int to (3, 3)
-        Centre, angles and translation by ``PERIODIC_INDEX``.
+    ``donors`` (h,): nodes. ``receivers`` (h, 2): nodes and their ``PERIODIC_INDEX``. ``given``:
+    centre, angles and translation by ``PERIODIC_INDEX``.
     """
     remarks: list[str] = []
     motions: list[RigidMotion] = []
@@ -231,16 +225,9 @@ def read_su2_file(path: Path, zone: int | None, progress: Tick) -> Mesh:
 def read_su2(raw: Source, zone: int | None, progress: Tick) -> Mesh:
     """Return one zone of an SU2 file.
 
-    Raises MeshError if the file has a mistake; the message has the line.
-
-    Parameters
-    ----------
-    raw : Source
-        The file.
-    zone : int or None
-        The zone, from 1; None for the first.
-    progress : callable
-        Called with the fraction done; may raise to stop.
+    Raises MeshError if the file has a mistake; the message has the line. ``raw``: the file.
+    ``zone``: the zone, from 1; None for the first. ``progress``: called with the fraction done; may
+    raise to stop.
     """
     lines = scan(raw, lambda done: progress(_SCANNED * done))
     sections = find_blocks(lines)

@@ -157,12 +157,8 @@ def _ranges(begin: int, end: int) -> list[tuple[int, int]]:
 def moved_rows(raw: Source, piece: Piece, before: FloatArray, now: FloatArray) -> bytes:
     """Return the text of a piece of points with the coordinates that changed replaced.
 
-    Raises MeshError if the file was changed.
-
-    Parameters
-    ----------
-    before, now : (m, d) float64
-        The points of these rows, as read and as they are to be written.
+    Raises MeshError if the file was changed. ``before`` and ``now`` (m, d) float64: the points of
+    these rows, as read and as they are to be written.
     """
     from slideviz.formats.su2.loops import print_changed
 
@@ -217,14 +213,8 @@ def text_of_parts(
 ) -> Iterator[bytes]:
     """Yield the SU2 file of a mesh whose parts are made by functions, called from several threads.
 
-    Parameters
-    ----------
-    dim : int
-        2 or 3.
-    cells, points : (int, callable)
-        Their number, and the function that returns some of them.
-    markers : sequence of Marker
-        The boundaries.
+    ``dim``: 2 or 3. ``cells`` and ``points`` (int, callable): their number, and the function that
+    returns some of them. ``markers``: the boundaries.
     """
     yield from _zone(dim, cells, points)
     yield from _markers(markers, 0)

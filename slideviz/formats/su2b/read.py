@@ -117,14 +117,9 @@ def _split_list(
 ) -> ElementBlock:
     """Return the elements in a part of a list; raise MeshError for a wrong type or length.
 
-    Parameters
-    ----------
-    first, begin : int
-        Place of the first element, and the byte where the part begins.
-    numbers : (n,)
-        The part of the list.
-    offsets : (k + 1,)
-        Where each element begins in ``numbers``, and the end.
+    ``first`` and ``begin``: place of the first element, and the byte where the part begins.
+    ``numbers`` (n,): the part of the list. ``offsets`` (k + 1,): where each element begins in
+    ``numbers``, and the end.
     """
     types = numbers[offsets[:-1]]
     known = (types > 0) & (types < 256)
@@ -216,19 +211,15 @@ class BinaryForm(Origin):
 def read_su2b(path: Path, zone: int | None, progress: Tick) -> Mesh:
     """Return one zone of an SU2 binary mesh.
 
+    Raises MeshError if the file has a mistake; the message has its byte; and OSError if it cannot
+    be read.
+
     Parameters
     ----------
     zone : int or None
         The zone, from 1; None for the first.
     progress : callable
         Called with the fraction done; may raise to stop.
-
-    Raises
-    ------
-    MeshError
-        The file has a mistake; the message has its byte.
-    OSError
-        It cannot be read.
     """
     with open_zone(path, zone) as (source, place):
         whole = place.cells.count + place.n_points + sum(m.elements.count for m in place.markers)

@@ -78,14 +78,8 @@ OPTIONS = {
 class PictureDialog(QDialog):
     """The dialog for the options of a picture, with a preview.
 
-    Parameters
-    ----------
-    renderer : OffscreenRenderer
-        Draws the picture.
-    view_size : (int, int)
-        Width and height of the view in pixels.
-    kept : str
-        The `choices` of the last time; empty for none.
+    ``renderer``: draws the picture. ``view_size`` (int, int): width and height of the view in
+    pixels. ``kept``: the `choices` of the last time; empty for none.
     """
 
     def __init__(

@@ -134,16 +134,9 @@ class TableDialog(QDialog):
 def ask_table(parent: QWidget, rows: TableRows, path: Path, default: Path) -> Path | None:
     """Open the dialog of a table; return the file it was saved to, or None if it was not saved.
 
-    Raises SlidevizError if the file cannot be read or written.
-
-    Parameters
-    ----------
-    rows : TableRows
-        The nodes the table may list; checks the text.
-    path : Path
-        The displacement file to edit, if it exists.
-    default : Path
-        The name that is offered for a new file.
+    Raises SlidevizError if the file cannot be read or written. ``rows``: the nodes the table may
+    list; checks the text. ``path``: the displacement file to edit, if it exists. ``default``: the
+    name that is offered for a new file.
     """
     dialog = TableDialog(parent, rows, table_text(path))
     there = path.is_file()

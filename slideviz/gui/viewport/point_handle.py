@@ -49,10 +49,7 @@ Grasp = TypeVar("Grasp")
 class PointHandle(QObject, Generic[Grasp]):
     """The base of handles of points; subclasses place them and apply drags to the section.
 
-    Parameters
-    ----------
-    moved, dragging : callable
-        See `Moved` and `Dragging`.
+    ``moved`` and ``dragging``: see `Moved` and `Dragging`.
     """
 
     def __init__(self, view: View3D, scene: Scene, moved: Moved, dragging: Dragging) -> None:

@@ -44,10 +44,7 @@ _MARGIN = 0.03
 class Handles:
     """The handles of a section, one in each view, by which it is dragged.
 
-    Parameters
-    ----------
-    moved, dragging : callable
-        See `Moved` and `Dragging`.
+    ``moved`` and ``dragging``: see `Moved` and `Dragging`.
     """
 
     def __init__(self, moved: Moved, dragging: Dragging) -> None:
@@ -97,10 +94,7 @@ class Handles:
 class PlaneHandle:
     """The handle of a plane section: VTK's plane widget, with frame, normal arrow and ball.
 
-    Parameters
-    ----------
-    moved, dragging : callable
-        See `Moved` and `Dragging`.
+    ``moved`` and ``dragging``: see `Moved` and `Dragging`.
     """
 
     def __init__(self, view: View3D, scene: Scene, moved: Moved, dragging: Dragging) -> None:

@@ -35,14 +35,9 @@ from slideviz.session.store import Store
 class TitleBar(QFrame):
     """The title above a view, cut short where there is no room, with a button to close the view.
 
-    Parameters
-    ----------
-    name : str
-        The widget's object name.
-    closing : str
-        The tooltip of the button that closes the view.
-    fill : callable, optional
-        Fills a menu with what the view can show instead; the title is then a drop-down button.
+    ``name``: the widget's object name. ``closing``: the tooltip of the button that closes the view.
+    ``fill``: fills a menu with what the view can show instead; the title is then a drop-down
+    button.
     """
 
     closed = Signal()

@@ -82,16 +82,9 @@ def ask_unsaved(
 
     Return ``case``, ``mesh``, ``table`` or ``all`` to save that, ``discard`` or ``cancel``. Called
     by `slideviz.gui.files.Files.ask_about_unsaved`, which has the text from
-    `slideviz.session.saving`.
-
-    Parameters
-    ----------
-    what : str
-        The question; the text after a line break is shown in smaller letters.
-    can_save : sequence of {"case", "mesh", "table"}
-        What can be saved now.
-    now : callable, optional
-        Returns the question as it is now, for what goes on meanwhile.
+    `slideviz.session.saving`. ``what``: the question; the text after a line break is shown in
+    smaller letters. ``can_save``: what can be saved now. ``now``: returns the question as it is
+    now, for what goes on meanwhile.
     """
     box = QMessageBox(parent)
     box.setIcon(QMessageBox.Icon.Question)
