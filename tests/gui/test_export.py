@@ -21,9 +21,9 @@ from slideviz.export.film import FilmOptions
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.gui.dialogs import exports as export
-from slideviz.gui.dialogs import manual
+from slideviz.gui.dialogs import help as manual
+from slideviz.gui.dialogs.exports import PictureDialog
 from slideviz.gui.dialogs.film import FilmDialog, FilmForm, length_words
-from slideviz.gui.dialogs.picture import PictureDialog
 from slideviz.gui.panels.boundaries import BoundariesPanel
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import fitted, framed, to_image

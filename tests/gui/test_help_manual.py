@@ -4,8 +4,8 @@ import re
 import tomllib
 from pathlib import Path
 
-from slideviz.gui.dialogs import manual
-from slideviz.gui.dialogs.manual import manual_folder, manual_pages, page_text, page_title
+from slideviz.gui.dialogs import help as manual
+from slideviz.gui.dialogs.help import manual_folder, manual_pages, page_text, page_title
 
 ROOT = Path(__file__).parents[2]
 
