@@ -33,7 +33,7 @@ from slideviz.gui.widgets.command import (
     target_boundaries,
     why_not,
 )
-from slideviz.gui.widgets.icons import STROKES
+from slideviz.gui.widgets.icons import NAMES
 from slideviz.session import changes
 from slideviz.session.colors import fit_colors, usual_range
 from slideviz.terms import SHOWN, Shown, ShownTerm
@@ -234,7 +234,7 @@ _THEMES = Menu("theme", "&Theme", "Light or dark colors.", (
 
 def _shown_command(name: Shown, term: ShownTerm) -> Command:
     able = {"": has_mesh, "boxes": has_boxes, "3d": is_3d}[term.needs]
-    image = name if name in STROKES else ""
+    image = name if name in NAMES else ""
     return Command(name, term.name, term.tip, partial(_toggle_shown, name), (term.shortcut,),
                    image, able, checked=lambda now: name in now.session.view.drawn,
                    tip_now=lambda now: term.why_not if has_mesh(now) and not able(now) else "")

@@ -6,9 +6,8 @@ import html
 from datetime import datetime
 from pathlib import Path
 
-from qtpy.QtCore import QByteArray, QDate, QEvent, QLocale, QRectF, QSize, Qt, Signal
-from qtpy.QtGui import QKeyEvent, QPainter, QPixmap, QResizeEvent
-from qtpy.QtSvg import QSvgRenderer
+from qtpy.QtCore import QDate, QEvent, QLocale, QSize, Qt, Signal
+from qtpy.QtGui import QKeyEvent, QPixmap, QResizeEvent
 from qtpy.QtWidgets import (
     QFrame,
     QGridLayout,
@@ -30,7 +29,7 @@ from slideviz.gui.widgets.build import (
     in_row,
     push_button,
 )
-from slideviz.gui.widgets.icons import icon, logo
+from slideviz.gui.widgets.icons import icon, logo, svg_pixmap
 from slideviz.gui.widgets.labels import ElidedLabel, rich_label, wrapped
 
 WIDEST = 860  # largest width of the page in pixels: longer lines would be hard to read
@@ -242,12 +241,6 @@ def card(name: str, line: str) -> QPixmap:
     folder = Path(__file__).with_name("cards")
     file = folder / f"{name}.svg"
     svg = (file if file.exists() else folder / "mesh.svg").read_text(encoding="utf-8")
-    pixmap = QPixmap(QSize(2 * SIZE[0], 2 * SIZE[1]))
-    pixmap.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(pixmap)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    data = QByteArray(svg.replace("currentColor", line).encode())
-    QSvgRenderer(data).render(painter, QRectF(pixmap.rect()))
-    painter.end()
+    pixmap = svg_pixmap(svg.replace("currentColor", line), 2 * SIZE[0], 2 * SIZE[1])
     pixmap.setDevicePixelRatio(2.0)
     return pixmap

@@ -7,7 +7,7 @@ from qtpy.QtGui import QKeySequence
 
 from slideviz.gui.commands import COMMANDS, MENUS
 from slideviz.gui.widgets.command import CommandState
-from slideviz.gui.widgets.icons import STROKES
+from slideviz.gui.widgets.icons import NAMES
 from slideviz.session import changes
 from slideviz.session.state import Session
 from slideviz.terms import SHOWN
@@ -34,7 +34,7 @@ def test_the_tip_of_a_button_names_the_key_there_is():
 def test_each_command_says_what_it_does_and_has_the_icon_it_names(one):
     assert one.tip.endswith(".")
     assert len(one.tip.split()) >= 3
-    assert one.image in {"", *STROKES}
+    assert one.image in {"", *NAMES}
     assert one.called(CommandState(Session()))
 
 

@@ -93,56 +93,8 @@ def _binary(path: Path) -> tuple[list[str], FloatArray]:
     return [name.strip().strip('"') for name in names], table
 
 
-SUFFIXES = {
-    "DRAG": "cd",
-    "LIFT": "cl",
-    "SIDEFORCE": "csf",
-    "EFFICIENCY": "eff",
-    "MOMENT_X": "cmx",
-    "MOMENT_Y": "cmy",
-    "MOMENT_Z": "cmz",
-    "FORCE_X": "cfx",
-    "FORCE_Y": "cfy",
-    "FORCE_Z": "cfz",
-    "INVERSE_DESIGN_PRESSURE": "invpress",
-    "INVERSE_DESIGN_HEAT": "invheat",
-    "INVERSE_DESIGN_HEATFLUX": "invheat",
-    "MAXIMUM_HEATFLUX": "maxheat",
-    "TOTAL_HEATFLUX": "totheat",
-    "AVG_TEMPERATURE": "avtp",
-    "EQUIVALENT_AREA": "ea",
-    "NEARFIELD_PRESSURE": "nfp",
-    "THRUST": "ct",
-    "TORQUE": "cq",
-    "FIGURE_OF_MERIT": "merit",
-    "BUFFET": "buffet",
-    "SURFACE_TOTAL_PRESSURE": "pt",
-    "SURFACE_STATIC_PRESSURE": "pe",
-    "SURFACE_STATIC_TEMPERATURE": "T",
-    "SURFACE_MASSFLOW": "mfr",
-    "SURFACE_MACH": "mach",
-    "SURFACE_UNIFORMITY": "uniform",
-    "SURFACE_SECONDARY": "second",
-    "SURFACE_MOM_DISTORTION": "distort",
-    "SURFACE_SECOND_OVER_UNIFORM": "sou",
-    "SURFACE_PRESSURE_DROP": "dp",
-    "CUSTOM_OBJFUNC": "custom",
-    "KINETIC_ENERGY_LOSS": "ke",
-    "TOTAL_PRESSURE_LOSS": "pl",
-    "ENTROPY_GENERATION": "entg",
-    "EULERIAN_WORK": "ew",
-    "FLOW_ANGLE_OUT": "fao",
-    "FLOW_ANGLE_IN": "fai",
-    "MASS_FLOW_OUT": "mfo",
-    "MASS_FLOW_IN": "mfi",
-    "TOTAL_EFFICIENCY": "teff",
-    "TOTAL_STATIC_EFFICIENCY": "tseff",
-    "REFERENCE_GEOMETRY": "refgeom",
-    "REFERENCE_NODE": "refnode",
-    "VOLUME_FRACTION": "volfrac",
-    "TOPOL_COMPLIANCE": "topcomp",
-    "STRESS_PENALTY": "stress",
-}
+_OBJECTIVES = Path(__file__).with_name("objectives.csv").read_text(encoding="utf-8")
+SUFFIXES = dict(line.split(",") for line in _OBJECTIVES.splitlines()[1:])
 """Suffixes that SU2 adds to the names of adjoint files, by objective; ``combo`` for several."""
 EXACT, CLOSE, SAME = 1e-13, 1e-8, 1e-6
 """Differences of positions in a file from points, as a part of the largest coordinate: up to
