@@ -152,12 +152,16 @@ def limit_words(entry: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _relaxed(steps: Sequence[Step]) -> Relaxed | None:
-    """Return how the steps were relaxed: the largest residual, and the smallest part."""
+    """Return how the steps were relaxed: the worst of each number, and the sum of the rounds."""
     each = [step.relaxed for step in steps if step.relaxed is not None]
     if not each:
         return None
-    residual, theta = max(one.residual for one in each), min(one.theta for one in each)
-    return Relaxed(sum(one.rounds for one in each), residual, theta)
+    return Relaxed(
+        sum(one.rounds for one in each),
+        max(one.residual for one in each),
+        min(one.theta for one in each),
+        max(one.limited for one in each),
+    )
 
 
 def folded_cells(steps: Sequence[Step], mesh: Mesh, quality: Quality) -> dict[int, tuple[int, int]]:

@@ -202,10 +202,10 @@ def _print_run(
     if radius["used"] is not None:
         rows.append((f"support radius{' (AUTO)' * radius['automatic']}", radius["used"]))
     if (relax := report["relax"]) is not None:
-        cut = "" if relax["theta"] == 1.0 else f", at least {100 * relax['theta']:.0f} % kept"
-        rows.append(
-            ("relaxation", f"{relax['rounds']} rounds, residual {relax['residual']:.2g}{cut}")
-        )
+        words = f"{relax['rounds']} rounds, residual {relax['residual']:.2g}"
+        if relax["limited"]:
+            words += f", held back at {counted(relax['limited'], 'node')}"
+        rows.append(("relaxation", words))
     if (layers := report["layers"]) is not None:
         walls = layers["walls"]
         reach = max(wall["thickness"] for wall in walls)

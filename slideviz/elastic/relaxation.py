@@ -20,12 +20,14 @@ from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from scipy.sparse import block_array, csr_array
 
 from slideviz.elastic.conditions import Body, conditions
 from slideviz.elastic.corotated import Corotated
 from slideviz.elastic.laplacian import LaplacianCycle
 from slideviz.elastic.multigrid import MAKING, while_ticking
 from slideviz.elastic.stiffness import Conditions
+from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobians import INVERTED, VALID
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.quality import Quality, quality
@@ -38,8 +40,17 @@ from slideviz.terms import SkewMetric
 ITERATIONS = 6
 """Enough to come to the mean quality of the equilibrium within 0.001 to 0.003."""
 
-PARTS = (1.0, 0.5, 0.25, 0.0)
-"""The parts of the relaxation that the safeguard tries, in this order."""
+TRIES = 8
+"""How often the safeguard changes the parts of the relaxation that it leaves."""
+
+LEAST = 0.2
+"""A part below this becomes zero where cells are still worse."""
+
+STRAIN = 0.15
+"""Along an edge, the part may grow by so much that the edge is strained by this."""
+
+TINY = 1e-9
+"""Growth along edges of no length, and between periodic images."""
 
 WORSE, ENOUGH = 0.9, 0.3
 """The lowest quality may become ``WORSE`` times what it was, or ``ENOUGH`` if that is less."""
@@ -101,9 +112,12 @@ class Relaxation:
             kept = self._kept(problem, given, constraints, tick)
             moved, residual = self._iterated(problem, displacement, kept, given, tie, tick)
             moved = keep(moved)
-            part = problem.choose("part", lambda: self._part(problem, displacement, moved, tie))
-            out = self._blended(problem, displacement, moved, part, tie)
-        return out, Relaxed(ITERATIONS, residual, part)
+            theta: FloatArray = problem.choose(
+                "theta", lambda: self._kept_part(problem, displacement, moved, tie)
+            )
+            out = blended(problem, displacement, moved, theta, tie)
+        limited = int(np.count_nonzero(theta[given.place >= 0] < 1.0))
+        return out, Relaxed(ITERATIONS, residual, float(theta.min()), limited)
 
     def _conditions(self, problem: Problem, at: FloatArray, constraints: Constraints) -> Conditions:
         """Return the conditions of the body at coordinates (n, d)."""
@@ -168,45 +182,91 @@ class Relaxation:
                 moved = _slid(problem, moved, tie)
         return moved, float(np.sqrt(max(energies[-1], 0.0) / max(energies[0], 1e-300)))
 
-    def _blended(
-        self,
-        problem: Problem,
-        before: Array,
-        after: Array,
-        part: float,
-        tie: Callable[[Array], Array],
-    ) -> Array:
-        """Return the displacement that is a part of the way from ``before`` to ``after``."""
-        if part in (0.0, 1.0):
-            return after if part else before
-        return _slid(problem, before + (after - before) * part, tie)
-
-    def _part(
+    def _kept_part(
         self, problem: Problem, before: Array, after: Array, tie: Callable[[Array], Array]
-    ) -> float:
-        """Return the largest part of the relaxation after which no cell is worse."""
+    ) -> FloatArray:
+        """Return the parts (n, 1) of the relaxation after which no cell is worse.
+
+        Where cells would be worse the part is halved, up to zero, and grows from there as far as
+        that strains cells by `STRAIN`, so that layers go as one. Zero everywhere if that fails.
+        """
         first = self._quality(problem, before)
-        for part in PARTS[:-1]:
-            now = self._quality(problem, self._blended(problem, before, after, part, tie))
-            if not worse(first, now):
-                return part
-        return PARTS[-1]
+        theta, cap = np.ones(len(self.mesh.points)), np.full(len(self.mesh.points), np.inf)
+        graph = None
+        for _ in range(TRIES):
+            moved = blended(problem, before, after, theta[:, None], tie)
+            now = self._quality(problem, moved)
+            bad = spoiled(first, now)
+            if not bad.any():
+                return theta[:, None] if now.mean >= first.mean else np.zeros((len(theta), 1))
+            nodes = np.unique(self.domain.cells.take(bad).nodes)
+            cap[nodes] = np.where(theta[nodes] > LEAST, 0.5 * theta[nodes], 0.0)
+            if graph is None:
+                graph = self._graph(problem, value(before), value(after))
+            theta = _grown(graph, cap)
+        return np.zeros((len(theta), 1))
+
+    def _graph(self, problem: Problem, before: FloatArray, after: FloatArray) -> csr_array:
+        """Return how much the part may grow along each edge of the mesh, (n, n), for ``_grown``."""
+        frame, n = self.body.frame, len(self.mesh.points)
+        coords = value(problem.coords)
+        shift = frame.points(coords + after) - frame.points(coords + before)
+        size = np.linalg.norm(shift, axis=1)
+        pairs = [
+            nodes[:, ELEMENTS[vtk].edges].reshape(-1, 2)
+            for vtk, (_, nodes) in self.domain.cells.by_type.items()
+        ]
+        low, high = np.sort(np.concatenate(pairs), axis=1).T
+        ends = np.stack(np.divmod(np.unique(low * n + high), n), axis=1)
+        length = np.linalg.norm(np.diff(self.mesh.points[ends], axis=1)[:, 0], axis=1)
+        far = np.maximum(size[ends].max(axis=1), 1e-300)
+        images = np.flatnonzero(problem.same_as != np.arange(n))
+        rows = np.concatenate([ends[:, 0], images])
+        columns = np.concatenate([ends[:, 1], problem.same_as[images]])
+        apart = np.clip(STRAIN * length / far, TINY, 2.0)
+        growth = np.concatenate([apart, np.full(len(images), TINY)])
+        return csr_array((growth, (rows, columns)), shape=(n, n))
 
     def _quality(self, problem: Problem, displacement: Array) -> Quality:
         at = self.body.frame.points(value(problem.coords) + value(displacement))
         return quality(self.domain.with_points(sealed(at)), self.domain, self.metric)
 
 
-def worse(before: Quality, after: Quality) -> bool:
-    """Return whether a mesh is worse than before by the rules of the safeguard.
+def _grown(graph: csr_array, cap: FloatArray) -> FloatArray:
+    """Return the largest parts (n,), up to 1, below ``cap`` (n,) that grow as the graph allows."""
+    from scipy.sparse.csgraph import dijkstra
 
-    A cell is inverted or unproved that was not, the mean quality is lower, or the lowest one is
-    below `WORSE` times what it was and `ENOUGH`.
+    rows = np.flatnonzero(np.isfinite(cap))
+    n = len(cap)
+    to = csr_array((np.maximum(cap[rows], TINY), (np.zeros(len(rows), int), rows)), shape=(1, n))
+    whole = csr_array(block_array([[graph, None], [to, csr_array((1, 1))]], format="csr"))
+    far = dijkstra(whole, directed=False, indices=np.array([n]), limit=1.0)[0, :n]  # type: ignore[arg-type]
+    return np.where(far > LEAST / 4, np.minimum(far, 1.0), 0.0)
+
+
+def blended(
+    problem: Problem,
+    before: Array,
+    after: Array,
+    theta: FloatArray,
+    tie: Callable[[Array], Array],
+) -> Array:
+    """Return the displacement that is the parts (n, 1) of the way from ``before`` to ``after``."""
+    if (theta == 1.0).all() or (theta == 0.0).all():
+        return after if theta.all() else before
+    return _slid(problem, before + multiply(after - before, theta), tie)
+
+
+def spoiled(before: Quality, after: Quality) -> np.ndarray:
+    """Return which cells (c,) are worse than before by the rules of the safeguard.
+
+    They are inverted or unproved and were not, or their quality is below `WORSE` times the lowest
+    before, and `ENOUGH`.
     """
-    spoiled = (after.status != VALID) & (before.status == VALID)
-    spoiled |= (after.status == INVERTED) & (before.status != INVERTED)
     low = min(WORSE * before.min, ENOUGH)
-    return bool(spoiled.any()) or after.min < low or after.mean < before.mean
+    bad = (after.status != VALID) & (before.status == VALID)
+    bad |= (after.status == INVERTED) & (before.status != INVERTED)
+    return np.asarray(bad | (after.values < low))
 
 
 def _held(free: FloatArray) -> np.ndarray:

@@ -206,7 +206,9 @@ class Relaxed:
     residual: float
     """Last residual over the first, in the norm of the preconditioner."""
     theta: float
-    """The part of the relaxation that the safeguard left, 0 to 1."""
+    """The smallest part of the relaxation that the safeguard left anywhere, 0 to 1."""
+    limited: int
+    """Nodes where it left less than all."""
 
 
 @dataclass(frozen=True, eq=False)

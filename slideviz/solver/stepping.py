@@ -112,8 +112,8 @@ class Stepping:
             elif not remarks:
                 remarks = _dropped_warning(setup, solution, index, total, mesh)
             warnings += [f"step {index}: {text}" for text in solution.warnings]
-            if solution.relaxed is not None and solution.relaxed.theta < 1.0:
-                warnings.append(_cut_note(solution.relaxed.theta, index))
+            if solution.relaxed is not None and solution.relaxed.limited:
+                warnings.append(_limited_note(solution.relaxed.limited, len(coords), index))
             stray = []
             if self.rate is None and self.case.method == "rbf":
                 if setup.frame.cylindrical:
@@ -378,11 +378,10 @@ def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
     )
 
 
-def _cut_note(theta: float, index: int) -> Note:
-    kept = f"only {100 * theta:.0f} % of the relaxation was" if theta else "no relaxation was"
+def _limited_note(limited: int, nodes: int, index: int) -> Note:
     return Note(
-        f"step {index}: {kept} kept, because more would have made the worst cells worse; more "
-        "STEPS may help"
+        f"step {index}: the relaxation was held back at {limited} of {nodes} nodes, where it would "
+        "have made the worst cells worse; more STEPS may help"
     )
 
 
