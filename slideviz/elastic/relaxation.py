@@ -40,8 +40,9 @@ from slideviz.terms import SkewMetric
 ITERATIONS = 6
 """Enough to come to the mean quality of the equilibrium within 0.001 to 0.003."""
 
-TRIES = 8
-"""How often the safeguard changes the parts of the relaxation that it leaves."""
+TRIES, SLOWER = 20, 0.85
+"""How often the safeguard changes the parts of the relaxation that it leaves, and how much slower
+they grow each time."""
 
 LEAST = 0.2
 """A part below this becomes zero where cells are still worse."""
@@ -203,6 +204,7 @@ class Relaxation:
             cap[nodes] = np.where(theta[nodes] > LEAST, 0.5 * theta[nodes], 0.0)
             if graph is None:
                 graph = self._graph(problem, value(before), value(after))
+            graph.data *= SLOWER
             theta = _grown(graph, cap)
         return np.zeros((len(theta), 1))
 
