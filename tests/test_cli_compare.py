@@ -222,3 +222,17 @@ def test_without_pictures_no_mesh_is_kept(square, tmp_path, monkeypatch):
     assert run([*argv, "-q", "-o", str(tmp_path / "a")]) == 0
     assert run([*argv, "-q", "-o", str(tmp_path / "b"), "--no-pictures"]) == 0
     assert [mesh is None for mesh in kept] == [False, False, True, True]
+
+
+def test_limits_are_a_column_and_missed_ones_are_said(square, tmp_path, capsys):
+    words = ["compare", str(square), "--methods", "none,ps", "--steps", "1", "--no-pictures"]
+    limits = ["--set", "LIMITS=( inverted = 0 )"]
+    assert run([*words, *limits, "-o", str(tmp_path / "out")]) == 0
+    out = capsys.readouterr().out
+    rows = [row for row in table(tmp_path / "out") if not row["problem"]]
+    missed = [row for row in rows if int(row["inverted"])]
+    assert missed
+    for row in rows:
+        count = int(row["inverted"])
+        assert row["limits"] == (f"inverted = 0: {count}" if count else "met")
+    assert out.count("not inverted = 0: ") == len(missed)

@@ -155,3 +155,29 @@ def test_a_signal_ends_it_and_resume_goes_on(folder, number):
     assert child.returncode == 128 + number
     assert "of 400 designs, and --resume continues" in err
     assert err.count("\n") == 1
+
+
+def test_limits_are_a_column_and_designs_that_miss_one_are_grouped(folder, in_threads, capsys):
+    words = ("sweep", "passage.cfg", "designs.csv", "-o", "out")
+    limited = ("--set", "LIMITS=( min > 0.3, mean > 0.999 )", "--json", "report.json")
+    code, out, err = said(capsys, *words, *limited)
+    assert (code, err) == (0, "")
+    with (folder / "out" / "results.csv").open(newline="") as file:
+        cells = {row["design"]: (row["limits"], row) for row in csv.DictReader(file)}
+    for text, row in cells.values():
+        expected = [f"min > 0.3: {float(row['min']):.6g}"] * (float(row["min"]) <= 0.3)
+        assert text == "; ".join([*expected, f"mean > 0.999: {float(row['mean']):.6g}"])
+    assert cells["3"][0].startswith("min > 0.3: 0; mean")
+    report = json.loads((folder / "report.json").read_text())
+    assert report["limits"] == [
+        {"limit": "mean > 0.999", "designs": [1, 2, 3]},
+        {"limit": "min > 0.3", "designs": [3]},
+    ]
+    assert "not min > 0.3          1  (design 3)" in out
+    assert "not mean > 0.999       3  (design 1, 2, 3)" in out
+    code, out, _ = said(capsys, *words, *limited, "--resume")
+    assert "3 were there" in out
+    assert json.loads((folder / "report.json").read_text())["limits"] == report["limits"]
+    met = ("--set", "LIMITS=( mean > 0 )", "--force")
+    assert "not mean" not in said(capsys, *words, *met)[1]
+    assert (folder / "out" / "results.csv").read_text().count(",met,") == 3

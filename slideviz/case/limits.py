@@ -10,7 +10,7 @@ import operator
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from slideviz.mesh.quality import INVERTED, PIECE, UNPROVEN, Quality
 from slideviz.mesh.quality_derivative import cell_margins
 from slideviz.mesh.walls import walls
 from slideviz.terms import METRICS, SIZE_SKEW, Metric, field_of
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
 
 OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
     ">": operator.gt,
@@ -211,6 +214,27 @@ class LimitResult:
 def check_limits(limits: Iterable[Limit], measured: MeasuredMesh) -> tuple[LimitResult, ...]:
     """Return for each limit whether a mesh meets it."""
     return tuple(_result(limit, measured) for limit in limits)
+
+
+def check_case_limits(
+    case: Case, quality: Quality, mesh: Mesh, reference: Mesh
+) -> tuple[LimitResult, ...]:
+    """Return for each limit of a case whether its deformed mesh meets it."""
+    names = case.walls(mesh.marker_names)
+    return check_limits(case.limits, MeasuredMesh(quality, mesh, reference, names))
+
+
+MET = "met"
+"""What `outcome` returns where all limits are met."""
+
+
+def outcome(results: Sequence[LimitResult]) -> str:
+    """Return `MET`, or the limits that are not met with their numbers; "" where there are none.
+
+    As a cell of a table: ``min > 0.3: 0.21; inverted = 0: 5``.
+    """
+    missed = [f"{one.limit}: {one.actual:.6g}" for one in results if not one.passed]
+    return "; ".join(missed) or MET * bool(results)
 
 
 def _result(limit: Limit, measured: MeasuredMesh) -> LimitResult:

@@ -114,6 +114,7 @@ def _report(
     ``worst`` are numbers and VTK types of the worst cells, ``reference`` is the undeformed mesh,
     ``walls`` a summary of `Walls`.
     """
+    from slideviz.case.limits import check_limits
     from slideviz.cli.report import (
         histogram_lines,
         limit_lines,
@@ -130,7 +131,7 @@ def _report(
     found = measured.quality
     report = quality_report(name, found, worst)
     report |= {"walls": walls, "reference": str(reference) if reference else None}
-    report["limits"] = limits_report(arguments.limits, measured)
+    report["limits"] = limits_report(check_limits(arguments.limits, measured))
     if not save_json(arguments.json, report):
         print(f"{arguments.mesh}: size-skew, metric {found.metric}")
         print(f"  {reference_words(reference)}")

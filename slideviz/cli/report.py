@@ -10,7 +10,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from slideviz.case.limits import Limit, MeasuredMesh, check_limits
+from slideviz.case.limits import LimitResult, check_case_limits
 from slideviz.case.method_keys import automatic_radius, get_reduction
 from slideviz.case.model import Case
 from slideviz.case.words import counted
@@ -67,7 +67,6 @@ def run_report(
         The layers at the boundaries; None where the mesh is in a file.
     """
     last = steps[-1]
-    measured = MeasuredMesh(quality, last.mesh, mesh, case.walls(mesh.marker_names))
     spent = dict.fromkeys(PHASES, 0.0) | dict(seconds)
     for step in steps:
         for phase, value in step.seconds.items():
@@ -88,7 +87,7 @@ def run_report(
             "inverted_at_step": [step for _, step in folded.values()],
             "undeformed": {"min": undeformed.min, "mean": undeformed.mean},
         },
-        "limits": limits_report(case.limits, measured),
+        "limits": limits_report(check_case_limits(case, quality, last.mesh, mesh)),
         "walls": {} if walls is None else walls.summary(),
         "tried": [_fields(trial, TRIAL_KEYS) for trial in last.tried],
         "control_nodes": [step.control_nodes for step in steps],
@@ -121,7 +120,7 @@ def run_report(
     }
 
 
-def limits_report(limits: Iterable[Limit], measured: MeasuredMesh) -> list[dict[str, Any]]:
+def limits_report(results: Iterable[LimitResult]) -> list[dict[str, Any]]:
     """Return the JSON array of limits: each with its number, and the worst cells that fail."""
     return [
         {
@@ -135,7 +134,7 @@ def limits_report(limits: Iterable[Limit], measured: MeasuredMesh) -> list[dict[
             "failing": len(result.cells),
             "cells": result.cells[:LISTED].tolist(),
         }
-        for result in check_limits(limits, measured)
+        for result in results
     ]
 
 

@@ -197,11 +197,24 @@ def _report(
         "earlier": len(rows) - len(fresh),
         "failed": len(rows) - len(done),
         "inverted": [row.design for row in sorted(done, key=_number) if row.inverted],
+        "limits": _missed(rows),
         "best": _named(done[0]) if done else None,
         "worst": _named(done[-1]) if done else None,
         "lost_workers": sum(row.lost for row in fresh),
         "seconds": {"total": seconds, "designs": sum(row.seconds for row in fresh)},
     }
+
+
+def _missed(rows: Sequence[DesignRow]) -> list[dict[str, Any]]:
+    """Return the entry of a report for each limit that designs miss: limit and their numbers."""
+    from slideviz.case.limits import MET
+
+    missed: dict[str, list[int]] = {}
+    for row in sorted(rows, key=_number):
+        for text in row.limits.removesuffix(MET).split("; "):
+            if text:
+                missed.setdefault(text.rpartition(": ")[0], []).append(row.design)
+    return [{"limit": limit, "designs": designs} for limit, designs in missed.items()]
 
 
 def _number(row: DesignRow) -> int:
@@ -228,15 +241,20 @@ def _print_sweep(report: dict[str, Any]) -> None:
             one = report[word]
             lines.append((f"{word} minimum quality", f"{one['min']:.6f}  (design {one['design']})"))
     if report["inverted"]:
-        named = ", ".join(map(str, report["inverted"][:_LISTED]))
-        more = ", ..." if len(report["inverted"]) > _LISTED else ""
-        lines.append(("with inverted cells", f"{len(report['inverted'])}  (design {named}{more})"))
+        lines.append(("with inverted cells", _counted(report["inverted"])))
+    lines += [(f"not {one['limit']}", _counted(one["designs"])) for one in report["limits"]]
     if report["failed"]:
         lines.append(("failed", report["failed"]))
     if report["lost_workers"]:
         lines.append(("workers lost", report["lost_workers"]))
     print(table(lines))
     print(f"results: {report['results']}")
+
+
+def _counted(designs: Sequence[int]) -> str:
+    """Return how many designs there are, with the first of them."""
+    more = ", ..." if len(designs) > _LISTED else ""
+    return f"{len(designs)}  (design {', '.join(map(str, designs[:_LISTED]))}{more})"
 
 
 def _warn(warnings: Sequence[str], rows: Sequence[DesignRow], quiet: bool) -> None:

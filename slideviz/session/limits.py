@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from slideviz.case.limits import NUMBERS, MeasuredMesh, check_limits, require_streamed
+from slideviz.case.limits import (
+    NUMBERS,
+    MeasuredMesh,
+    check_case_limits,
+    check_limits,
+    require_streamed,
+)
 from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import Mesh
@@ -19,10 +25,9 @@ def check_frame(
 ) -> CheckedLimits:
     """Return the limits of a case, checked on a frame."""
     if frame.extra is None:
-        names = case.walls(frame.mesh.marker_names)
-        measured = MeasuredMesh(frame.quality, frame.mesh, frame.base or undeformed, names)
         try:
-            return CheckedLimits(frame, case.limits, check_limits(case.limits, measured))
+            results = check_case_limits(case, frame.quality, frame.mesh, frame.base or undeformed)
+            return CheckedLimits(frame, case.limits, results)
         except SlidevizError as error:
             return CheckedLimits(frame, case.limits, (), str(error))
     joined = Quality.joined([frame.quality, frame.extra.quality])  # numbered as in the frame

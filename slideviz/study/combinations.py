@@ -18,6 +18,7 @@ import numpy as np
 
 from slideviz import terms
 from slideviz.case.check import check_case
+from slideviz.case.limits import MET, check_case_limits, outcome
 from slideviz.case.model import Case, Translate
 from slideviz.errors import Cancelled, CaseError, SlidevizError
 from slideviz.mesh.model import FloatArray, Mesh, frozen_array
@@ -85,11 +86,17 @@ KEY_COLUMNS = ("method", "periodic", "steps")
 
 
 def csv_text(rows: Sequence[CombinationRow]) -> str:
-    """Return the table as CSV; numbers with all their digits, empty cells without a result."""
-    lines: list[list[object]] = [[*KEY_COLUMNS, *COLUMNS, "problem"]]
+    """Return the table as CSV; numbers with all their digits, empty cells without a result.
+
+    It has a column ``limits`` where the case has some.
+    """
+    columns = dict(COLUMNS)
+    if any(row.result is not None and row.result.limits for row in rows):
+        columns["limits"] = StudyColumn("limits that are not met, or met", lambda r: r.limits)
+    lines: list[list[object]] = [[*KEY_COLUMNS, *columns, "problem"]]
     for row in rows:
         tried, result = row.combination, row.result
-        values = [None if result is None else c.value(result) for c in COLUMNS.values()]
+        values = [None if result is None else c.value(result) for c in columns.values()]
         lines.append([tried.method, tried.periodic, tried.steps or "auto", *values, row.problem])
     return csv_table.csv_text(lines)
 
@@ -137,7 +144,8 @@ def terminal_line(row: CombinationRow, given: list[str] | None = None) -> str:
         for column in COLUMNS.values()
         if column.head
     ]
-    return "  ".join([begin, *shown])
+    missed = [] if row.result.limits in ("", MET) else [f"not {row.result.limits}"]
+    return "  ".join([begin, *shown, *missed])
 
 
 def _reason(problem: str, given: list[str] | None) -> str:
@@ -218,6 +226,8 @@ class Result:
     history: tuple[tuple[int, Cycle], ...]
     """tuple of (int, Cycle): number of the step, and a cycle of its greedy selection."""
     warnings: tuple[str, ...]
+    limits: str = ""
+    """Whether the limits of the case are met (`slideviz.case.limits.outcome`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -372,6 +382,7 @@ def _result(
         tolerance=shared.setup.reduction.tolerance if shared.setup.reduction else None,
         history=tuple((step.index, cycle) for step in steps for cycle in step.history),
         warnings=steps[-1].warnings,
+        limits=outcome(check_case_limits(applied, measured, steps[-1].mesh, mesh)),
     )
 
 

@@ -33,6 +33,7 @@ from threading import Lock
 from typing import Any, NamedTuple, NoReturn
 
 from slideviz import __version__
+from slideviz.case.limits import check_case_limits, outcome
 from slideviz.case.model import Case
 from slideviz.design.sweeps.table import DesignRow
 from slideviz.errors import Note, SlidevizError
@@ -149,6 +150,7 @@ def _result(task: Task, mesh: Mesh, begin: float) -> DesignRow:
         seconds=time.perf_counter() - begin,
         mesh=task.output,
         warnings=_warnings(last),
+        limits=outcome(check_case_limits(task.case, measured, last.mesh, mesh)),
     )
 
 

@@ -27,6 +27,7 @@ from slideviz.case.keys import KEYS
 from slideviz.case.model import BoxMotion, Case, FromFile, Prescribed
 from slideviz.design.sweeps.columns import Value
 from slideviz.design.sweeps.table import (
+    WORDS,
     DesignRow,
     Designs,
     cells_of,
@@ -55,7 +56,9 @@ class SweepResults:
     def __init__(self, folder: Path, designs: Designs, sources: Mapping[str, str]) -> None:
         self._folder, self._designs, self._sources = folder, designs, sources
         self._lock: BaseFileLock | None = None
-        self._head = head_of(designs.columns)
+        limited = any(design.case.limits for design in designs.rows)
+        self._words = ("limits", *WORDS) if limited else WORDS
+        self._head = head_of(designs.columns, self._words)
 
     @property
     def path(self) -> Path:
@@ -158,7 +161,7 @@ class SweepResults:
         problem, *warnings = (" ".join(text.split()) for text in (row.problem, *row.warnings))
         plain = replace(row, problem=problem, warnings=tuple(warnings))
         values = [row.values[name] for name in self._designs.columns]
-        return cells_of(row.design, values, plain, folder=self._folder)
+        return cells_of(row.design, values, plain, self._words, self._folder)
 
     def _row(self, line: int, cells: Sequence[str]) -> DesignRow:
         """Return the row of a line; CaseError where the design of that number is another."""

@@ -44,6 +44,8 @@ class DesignRow:
     mesh: Path | None = None
     """The file of the deformed mesh, where it was written."""
     warnings: tuple[str, ...] = ()
+    limits: str = ""
+    """Whether the limits of its case are met (`slideviz.case.limits.outcome`)."""
     problem: str = ""
     """Why there is no result; empty where there is one."""
     lost: int = 0
@@ -202,6 +204,7 @@ def cells_of(
     result = row or DesignRow(number)
     texts = {
         "mesh": result.mesh and os.path.relpath(result.mesh, folder),
+        "limits": result.limits,
         "warnings": "; ".join(result.warnings),
         "problem": result.problem,
     }
@@ -224,6 +227,7 @@ def result_of(head: Sequence[str], cells: Sequence[str], folder: Path = Path()) 
         **numbers,
         mesh=folder / fields["mesh"] if fields.get("mesh") else None,
         warnings=tuple(fields["warnings"].split("; ")) if fields.get("warnings") else (),
+        limits=fields.get("limits", ""),
         problem=fields["problem"],
     )
 
