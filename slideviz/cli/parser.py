@@ -69,7 +69,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
 
     Raises SystemExit on wrong usage (code 2), or if help was asked for (code 0).
     """
-    if not any(word in COMMANDS for word in argv[:1]) and not _asks_help(argv):
+    if not any(word in (*COMMANDS, "-h", "--help", "help") for word in argv[:1]):
         parser = _window_parser()
         if argv[1:] and not argv[0].startswith("-") and not Path(argv[0]).exists():
             meant = nearest(argv[0], COMMANDS)
@@ -80,10 +80,6 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     # Load only the module of the command that is called, where it is the first word.
     called = argv[:1] if argv[0] in COMMANDS else COMMANDS
     return _parser(called).parse_args(glued(argv))
-
-
-def _asks_help(argv: Sequence[str]) -> bool:
-    return bool(argv) and argv[0] in ("-h", "--help", "help")
 
 
 class _Parser(argparse.ArgumentParser):

@@ -40,7 +40,10 @@ def choose_steps(
     """
     require_memory(setup, case, lasting=True)
     kept = setup
-    setup = replace(setup, solve=lambda problem, timer: kept.solve(_for_any_data(problem), timer))
+    # The conditioning is also checked for data other than the reference.
+    setup = replace(
+        setup, solve=lambda problem, timer: kept.solve(replace(problem, lasting=True), timer)
+    )
     parts, solutions, points = _reference(case, mesh, replace(setup, target=targets[0]), report)
     # The other methods choose nothing but the number of steps.
     others = list(targets[1:]) if case.method == "rbf" else []
@@ -82,11 +85,6 @@ def _continued(
 ) -> Solution:
     """Solve a problem whose selection begins with the rows ``stages``."""
     return setup.solve(replace(problem, stages=stages), timer)
-
-
-def _for_any_data(problem: Problem) -> Problem:
-    """Also check conditioning for data other than the reference."""
-    return replace(problem, lasting=True)
 
 
 def _reference(

@@ -20,7 +20,7 @@ from slideviz.session.runs_words import (
     method_words,
     run_words,
 )
-from slideviz.session.state import Run, Session, StepFrame
+from slideviz.session.state import Session, StepFrame
 from slideviz.terms import ColorBy
 
 if TYPE_CHECKING:
@@ -115,21 +115,18 @@ def pair_names(pair: Sequence[Session]) -> list[str]:
     # In a comparison with the undeformed mesh, both sessions have the same run.
     alone = runs[0] is runs[-1]
     both = [run for run in runs if run is not None]
+    methods_differ = len({method_words(run.case) for run in both}) > 1
     names = []
     for one, run in zip(pair, runs, strict=True):
         if run is None or (alone and one.view.frame == 0):
             names.append("Undeformed")
             continue
         words = [f"Run {run.number}", run_words(run)]
-        words += [method_words(run.case)] if run.name and _methods_differ(both) else []
+        words += [method_words(run.case)] if run.name and methods_differ else []
         names.append(
             ", ".join(filter(None, [*words, "" if alone else differences_from(run, both)]))
         )
     return names
-
-
-def _methods_differ(runs: Sequence[Run]) -> bool:
-    return len({method_words(run.case) for run in runs}) > 1
 
 
 def pair_titles(pair: Sequence[Session], quality: bool) -> list[str]:

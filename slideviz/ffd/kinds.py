@@ -356,10 +356,6 @@ def _about(request: Request, chosen: np.ndarray, rate: float) -> Turn:
     return Turn(chosen, first, second - first, rate)
 
 
-def _nothing(_box: Box, _request: Request, _held: Planes) -> tuple[Move, ...]:
-    return ()
-
-
 KINDS: dict[str, Callable[[Box, Request, Planes], tuple[Move, ...]]] = {
     "FFD_CONTROL_POINT": _control_point,
     "FFD_CONTROL_POINT_2D": _control_point_2d,
@@ -372,7 +368,7 @@ KINDS: dict[str, Callable[[Box, Request, Planes], tuple[Move, ...]]] = {
     "FFD_ROTATION": _rotation,
     "FFD_CONTROL_SURFACE": _control_surface,
     "FFD_NACELLE": _nacelle,
-    "FFD_ANGLE_OF_ATTACK": _nothing,
+    "FFD_ANGLE_OF_ATTACK": lambda *_: (),
 }
 """The moves of each kind of FFD variable."""
 DIRECTIONS: dict[str, tuple[int, ...]] = {

@@ -300,15 +300,12 @@ def find_sessions(folder: Path) -> tuple[list[OrphanedSession], list[str]]:
         except (SlidevizError, OSError, ValueError) as problem:
             problems.append(_rename_broken(path, str(problem).splitlines()[0]))
             lock.unlock()
-    left = [path for path in folder.glob(".slideviz-*.tmp") if _is_stale(path)]
     problems += [
-        _rename_broken(path, "it was being written when the program ended") for path in left
+        _rename_broken(path, "it was being written when the program ended")
+        for path in folder.glob(".slideviz-*.tmp")
+        if time.time() - _modified(path) > HALF_WRITTEN_S
     ]
     return found, problems
-
-
-def _is_stale(path: Path) -> bool:
-    return time.time() - _modified(path) > HALF_WRITTEN_S
 
 
 def _designs_file(path: Path) -> Path:

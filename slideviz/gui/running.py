@@ -15,7 +15,7 @@ from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.widgets.banner import NO_ANSWERS, Banner
 from slideviz.session import changes, jobs
-from slideviz.session.jobs import JobProgress, compute_in_file
+from slideviz.session.jobs import compute_in_file
 from slideviz.session.run_messages import (
     inverted_words,
     notes_of,
@@ -60,14 +60,11 @@ class Running(QObject):
         banner.shown.connect(self._forget_run)
         store.listen(self._hide_other)
         self.runner.progressed.connect(self.progressed)
-        self.runner.progressed.connect(self._show_progress)
+        self.runner.progressed.connect(lambda doing: self.status_changed.emit(doing.text))
         self.runner.yielded.connect(lambda frames: store.change(changes.add_frames, frames))
         self.runner.finished.connect(self._finished)
         self.runner.cancelled.connect(self._cancelled)
         self.runner.failed.connect(self._failed)
-
-    def _show_progress(self, doing: JobProgress) -> None:
-        self.status_changed.emit(doing.text)
 
     def start_job(
         self,

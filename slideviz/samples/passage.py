@@ -155,17 +155,7 @@ def counts(size: int, shares: Shares = PASSAGE_SHARES) -> GridCounts:
     below = (size - beside) // 2
     nose, tail = round(beside * shares.nose), round(beside * shares.tail)
     above = size - beside - below
-    return GridCounts(
-        ahead=ahead,
-        along=along,
-        behind=behind,
-        below=below,
-        beside=beside,
-        above=above,
-        layers=layers,
-        nose=nose,
-        tail=tail,
-    )
+    return GridCounts(ahead, along, behind, below, beside, above, layers, nose, tail)
 
 
 def channel_numbers(n: GridCounts) -> IntArray:

@@ -11,17 +11,8 @@ import numpy as np
 from slideviz.case.keys import KEYS
 from slideviz.case.model import (
     Case,
-    Ffd,
-    FfdCamber,
-    FfdThickness,
-    FfdTwist,
     FromFile,
     Motion,
-    OnAirfoil,
-    Radial,
-    Rotate,
-    Scale,
-    Translate,
     applies_to,
 )
 from slideviz.errors import Note
@@ -180,19 +171,17 @@ def _lacks_file(path: Path) -> str:
     return f"The displacement file {path} does not exist."
 
 
+_STILL = dict.fromkeys(("vector", "angle_deg", "distance", "height", "amount"), 0.0)
+_STILL |= {"factors": 1.0, "factor": 1.0}  # by attributes of motions: the value that moves nothing
+
+
 def moves_nothing(motion: Motion) -> bool:
     """Return whether a motion leaves its boundary in place; False for displacement files."""
-    if isinstance(motion, Translate | Ffd):
-        return not any(motion.vector)
-    if isinstance(motion, FfdCamber | FfdThickness):
-        return motion.amount == 0
-    if isinstance(motion, Rotate | FfdTwist):
-        return motion.angle_deg == 0
-    if isinstance(motion, OnAirfoil):
-        return motion.height == 0
-    if isinstance(motion, Scale):
-        return all(factor == 1 for factor in motion.factors)
-    return isinstance(motion, Radial) and motion.factor == 1 and motion.distance == 0
+    sizes = {name: getattr(motion, name) for name in _STILL if hasattr(motion, name)}
+    return bool(sizes) and all(
+        set(size if isinstance(size, tuple) else (size,)) == {_STILL[name]}
+        for name, size in sizes.items()
+    )
 
 
 def tolerance_warning(case: Case, extent: float, largest: float) -> str:

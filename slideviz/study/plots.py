@@ -307,7 +307,10 @@ def _one_legend(figure: Figure) -> None:
     labels = [name for name in handles if name not in _LAST]
     labels += [name for name in _LAST if name in handles]
     crosses = [
-        line for axes in figure.axes for line in axes.lines if _is_cross(str(line.get_gid()))
+        line
+        for axes in figure.axes
+        for line in axes.lines
+        if str(line.get_gid()).startswith("inverted:")  # at meshes with inverted cells
     ]
     if crosses:
         labels.append("has inverted cells")
@@ -322,11 +325,6 @@ def _one_legend(figure: Figure) -> None:
             handlelength=3.2,
             frameon=False,
         )
-
-
-def _is_cross(gid: str) -> bool:
-    """Return whether a line with this gid is the crosses at meshes with inverted cells."""
-    return gid.startswith("inverted:")
 
 
 def _same_height(together: Sequence[Axes]) -> None:

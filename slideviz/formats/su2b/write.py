@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -232,11 +231,6 @@ def _zone(mesh: Mesh, order: IntArray | None) -> ZoneContent:
         n_points=len(mesh.points),
         cells=part,
         types=types,
-        points=partial(_slice, mesh.points),
+        points=lambda i, j: mesh.points[i:j],
         markers=mesh.markers,
     )
-
-
-def _slice(array: FloatArray, i: int, j: int) -> FloatArray:
-    """Return the rows ``i`` to ``j - 1``."""
-    return array[i:j]

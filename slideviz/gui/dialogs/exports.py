@@ -304,7 +304,7 @@ class PictureDialog(QDialog):
         left = in_column(self.preview, self.words, self.kinds, None)
         parts = in_row(left, in_column(self._form, None), spacing=16)
         self.setLayout(in_column(on_screen(as_widget(parts), self), self._make_buttons()))
-        self._timer = single_shot(self, self._draw, PREVIEW_MS)
+        self._timer = single_shot(self, lambda: self._runner.start(self._drawing()), PREVIEW_MS)
         self._runner = PieceRunner(self)
         self._runner.failed.connect(reraise)
         self._restore_choices(kept)
@@ -451,9 +451,6 @@ class PictureDialog(QDialog):
             self._timer.start()
 
     # Picture ---------------------------------------------------------------------------
-
-    def _draw(self) -> None:
-        self._runner.start(self._drawing())
 
     def _drawing(self) -> Generator[object, Any, None]:
         """Yield pieces of the work that draws the preview: of a large mesh it takes a second."""

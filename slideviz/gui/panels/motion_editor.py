@@ -192,7 +192,7 @@ class MotionEditor(QWidget):
         )
         self.plane = NumberField(
             0.0,
-            plane_index_problem,
+            lambda value: control_point_problem((value,)),
             tip="The plane of control points, counted from 0 along j; -1 is all.",
         )
         self.amount = NumberField(
@@ -472,11 +472,6 @@ def control_point_problem(values: Sequence[float]) -> str:
     """Return why numbers are no index of a control point; empty if they are."""
     whole = all(value == int(value) and value >= -1 for value in values)
     return "" if whole else "expected whole numbers from 0, or -1 for all"
-
-
-def plane_index_problem(value: float) -> str:
-    """Return why a number is none of a plane of control points; empty if it is."""
-    return control_point_problem((value,))
 
 
 def term_problem(values: Sequence[float]) -> str:

@@ -95,7 +95,7 @@ class SectionEditor(QWidget):
         self.direction = VectorField((0.0, 0.0, 1.0), tip="Any length but zero.")
         self.direction.changed.connect(self._direction_typed)
         self.centre = VectorField()
-        self.centre.changed.connect(self._centre_typed)
+        self.centre.changed.connect(lambda at: self._emit_changed(origin=(*at, 0.0)[:3]))
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setRange(0, STEPS)
         self.slider.setPageStep(STEPS // 20)
@@ -220,9 +220,6 @@ class SectionEditor(QWidget):
                 self._typing = False
         elif not any(direction):
             self.direction.fields[0].setToolTip("A direction is needed: not all may be 0.")
-
-    def _centre_typed(self, values: tuple[float, ...]) -> None:
-        self._emit_changed(origin=(*values, 0.0)[:3])
 
     def _position_typed(self, value: float) -> None:
         if self._section is not None:
