@@ -217,7 +217,6 @@ class USMesh:
         self._gradient = np.zeros_like(self._displacement)
 
     # What the solver says ------------------------------------------------------------------
-
     def setExternalMeshIndices(self, ind: ArrayLike) -> None:
         """Set which coordinates of the grid, counted from 0, the solver has, and in which order.
 
@@ -251,7 +250,6 @@ class USMesh:
         self._coordinates = self._followed(now)
 
     # Coordinates ---------------------------------------------------------------------------
-
     def getSurfaceCoordinates(self) -> FloatArray:
         """Return the coordinates of the surface (N, d)."""
         return self._coordinates.copy()
@@ -296,7 +294,6 @@ class USMesh:
         write(fileName, self.deformer.mesh.with_points(self._points))
 
     # Derivatives ---------------------------------------------------------------------------
-
     def warpDeriv(self, dXv: ArrayLike, solverVec: bool = True) -> None:
         """Compute the transposed Jacobian times ``dXv``, flat, at the surface that was set.
 
@@ -350,7 +347,6 @@ class USMesh:
         return np.array(rows).reshape(-1, 2)
 
     # Between the orders of numbers ---------------------------------------------------------
-
     def _followed(self, coordinates: FloatArray) -> FloatArray:
         """Return coordinates (N, d), with those of nodes that are no moving nodes from the grid."""
         return np.where(self._surface.held, self._points[self._surface.nodes], coordinates)

@@ -43,9 +43,8 @@ if TYPE_CHECKING:
 
 KEY = QKeySequence.StandardKey
 
+
 # What they do ------------------------------------------------------------------------------
-
-
 def _undo_or_redo(window: MainWindow, step: Callable[[], bool], words: str, done: str) -> None:
     """Call ``step`` (undo or redo), and show in the status bar which change that was."""
     if step():

@@ -53,7 +53,6 @@ class Files(QObject):
         window.running.ended.connect(lambda: setattr(self, "saving", False))
 
     # Open ------------------------------------------------------------------------------
-
     def recent(self) -> list[Path]:
         """Return the files used last, the latest first."""
         listed = self.settings.value("recent", []) or []
@@ -187,7 +186,6 @@ class Files(QObject):
             self._answered = False
 
     # Save ------------------------------------------------------------------------------
-
     def stem(self) -> str:
         """Return the stem of file names that dialogs suggest: that of the case or the mesh."""
         session = self.window.store.session

@@ -76,7 +76,6 @@ class StartPage(QScrollArea):
         column.setStretch(column.count() - 1, 3)
 
     # Parts -----------------------------------------------------------------------------
-
     def _make_head(self) -> QHBoxLayout:
         picture = QLabel()
         picture.setPixmap(logo().pixmap(QSize(64, 64)))
@@ -145,7 +144,6 @@ class StartPage(QScrollArea):
             button.setIcon(card(name, line))
 
     # Recent files ----------------------------------------------------------------------
-
     def show_recent(self, paths: list[Path]) -> None:
         """List the files used last, with folder and time; missing files are disabled."""
         while self._recent.count():
@@ -164,7 +162,6 @@ class StartPage(QScrollArea):
             self.recent_buttons.append(button)
 
     # Qt --------------------------------------------------------------------------------
-
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         narrow = self.width() < 3 * NARROWEST

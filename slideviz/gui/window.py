@@ -119,7 +119,6 @@ class MainWindow(Services):
         self.sync_actions()
 
     # Parts -----------------------------------------------------------------------------
-
     def _make_centre(self, multi_samples: int) -> None:
         centre, stack = QWidget(), QWidget()
         grid = QGridLayout(stack)
@@ -229,7 +228,6 @@ class MainWindow(Services):
             self.recovery = SessionRecovery(self, self.recovery_banner, self.autosave)
 
     # The session -----------------------------------------------------------------------
-
     def sync_actions(self) -> None:
         """Update menus, tool bar, window title, and the facts of the mesh in the status bar."""
         session = self.store.session
@@ -272,7 +270,6 @@ class MainWindow(Services):
         self.show_status(f"Opened {name}{''.join(f'. {text}' for text in notes if text)}")
 
     # Jobs ------------------------------------------------------------------------------
-
     def start_run(self) -> None:
         """Start a run; if the mesh stays in its file, ask for the deformed mesh's file first."""
         session = self.store.session
@@ -296,7 +293,6 @@ class MainWindow(Services):
             self.show_status(text)
 
     # The view --------------------------------------------------------------------------
-
     def focus_requirement(self, missing: Requirement) -> None:
         """Bring the panel to the front where a missing requirement is met, and focus the field."""
         if missing.place == "open":
@@ -331,7 +327,6 @@ class MainWindow(Services):
         self.viewing.set_scheme(scheme)
 
     # Qt --------------------------------------------------------------------------------
-
     def focusNextPrevChild(self, forwards: bool) -> bool:
         moved = super().focusNextPrevChild(forwards)
         first = self.focusWidget()

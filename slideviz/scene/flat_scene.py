@@ -151,7 +151,6 @@ class FlatScene:
         self._mark.show(self.polygons.take(mine))
 
     # Facts --------------------------------------------------------------------------------
-
     @property
     def summary(self) -> str:
         """Return a sentence with the number of cells cut, their min, mean and inverted ones.
@@ -191,7 +190,6 @@ class FlatScene:
         return pick.front_cell(self.stage.plotter, x, y, [(one, cells) for one in shown])
 
     # Camera ----------------------------------------------------------------------------
-
     def set_scheme(self, scheme: ColorScheme) -> None:
         """Take the colors of another color scheme for background and edges."""
         self.stage.scheme = scheme

@@ -91,7 +91,6 @@ class Scene:
         return 0 if self._cells.shape is None else int(self._cells.shape.n_cells)
 
     # What is in the scene ---------------------------------------------------------------
-
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
         """Draw another mesh with its boundaries, and fit it to the view."""
         for _ in self.opening(session, surfaces):
@@ -156,7 +155,6 @@ class Scene:
             notify((layer.update for layer in self.layers), self.session, self.session)
 
     # While the camera moves --------------------------------------------------------------
-
     @property
     def coarse(self) -> bool:
         """Return whether the coarse boundaries are drawn."""
@@ -171,7 +169,6 @@ class Scene:
         self._coarse.surfaces = {one.name: one for one in surfaces}
 
     # Ghosts -----------------------------------------------------------------------------
-
     def set_motion_ghosts(self, ghosts: Mapping[str, FloatArray]) -> None:
         """Draw ghosts of moved boundaries: for each name, points (u, d) of its nodes."""
         self._ghosts.set_moved(ghosts)
@@ -182,7 +179,6 @@ class Scene:
         return dict(self._ghosts.moved)
 
     # Camera and mouse -------------------------------------------------------------------
-
     def look_from(self, side: str) -> None:
         """Fit all of the mesh, seen from a side: a key of `slideviz.scene.camera.SIDES`."""
         self.camera.look_from(side, self._parallel())

@@ -113,7 +113,6 @@ class AboutAxis(Shape):
     handle = "pull"
 
     # What each shape defines, besides the functions of `Shape` ------------------------
-
     @abstractmethod
     def quadric(self, section: Section) -> tuple[FloatArray, float]:
         """Return w (3,) and c: in the section's frame the surface is w · (x², y², z²) = c."""
@@ -143,7 +142,6 @@ class AboutAxis(Shape):
         """Return the distance from the axis at a length along the surface."""
 
     # What follows from these ------------------------------------------------------------
-
     @property
     def size(self) -> Size:
         """Return the row of the size: label, unit and range."""

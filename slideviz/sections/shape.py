@@ -98,7 +98,6 @@ class Shape(Protocol):
     """Whether the sign of the direction matters, for signed distances at least."""
 
     # What it cuts ----------------------------------------------------------------------
-
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
         """Return signed distances (n,) of points; their sign changes at the section only.
 
@@ -115,7 +114,6 @@ class Shape(Protocol):
         """
 
     # Its numbers -----------------------------------------------------------------------
-
     def position(self, section: Section) -> float:
         """Return the number that a slider moves: position along the normal, radius, half angle."""
 
@@ -140,7 +138,6 @@ class Shape(Protocol):
         """
 
     # Words -----------------------------------------------------------------------------
-
     def describe(self, section: Section) -> str:
         """Return the section in words."""
 
@@ -151,7 +148,6 @@ class Shape(Protocol):
         """Return the message that a section does not cut points (n, d), with positions that do."""
 
     # Laid flat, and looked at ----------------------------------------------------------
-
     def flatten(
         self, section: Section, polygons: Polygons, near: float | None, ahead: float | None
     ) -> Polygons:
@@ -229,8 +225,6 @@ class InPlane(Protocol):
 
 
 # Words that the shapes share -----------------------------------------------------------
-
-
 def axis_word(direction: Triple, digits: int = DIGITS) -> str:
     """Return x, y or z for a direction along that axis, either way, else its components."""
     unit = np.asarray(direction) / np.linalg.norm(direction)

@@ -61,8 +61,6 @@ def _without(rows: tuple[Row, ...], index: int) -> tuple[Row, ...]:
 
 
 # The view --------------------------------------------------------------------------------
-
-
 UNDO_WORDS: dict[str, str] = {
     "color_range": "color range",
     "color_map": "colors",
@@ -206,8 +204,6 @@ def inherit_view(session: Session, old: ViewState) -> Session:
 
 
 # Roles, motions and settings -------------------------------------------------------------
-
-
 @undoable("role")
 def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
     """Return the session with boundaries in a role, which is no longer a guess.
@@ -348,8 +344,6 @@ def saved_case(session: Session, case: Case) -> Session:
 
 
 # Runs ------------------------------------------------------------------------------------
-
-
 def start_run(session: Session, case: Case | None = None, name: str = "") -> Session:
     """Return the session with a new run, which is shown: of ``case``, or of the session's case.
 

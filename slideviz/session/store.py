@@ -211,7 +211,6 @@ class Store:
             raise first
 
     # Undo ------------------------------------------------------------------------------
-
     @property
     def can_undo(self) -> str:
         """Return the words for the change that `undo` takes back; "" where there is none."""

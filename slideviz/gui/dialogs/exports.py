@@ -72,7 +72,6 @@ class Exports(QObject):
         return OffscreenRenderer(self._session, viewing.surfaces, viewing.scene)
 
     # Pictures --------------------------------------------------------------------------
-
     def picture(self) -> None:
         """Ask for the options of a picture, then for a file name, and write the picture."""
         if self._session.mesh is None:
@@ -129,7 +128,6 @@ class Exports(QObject):
         self.window.show_status(f"Copied a picture of {size[0]} × {size[1]} pixels")
 
     # Films -----------------------------------------------------------------------------
-
     def make_film(self) -> None:
         """Open the dialog that makes a film of the steps; if it is open, bring it to the front.
 
@@ -174,7 +172,6 @@ class Exports(QObject):
             self.film.reject()
 
     # Tables and meshes -----------------------------------------------------------------
-
     def quality(self) -> None:
         """Ask for a file name and write the quality of every cell of the shown step as CSV."""
         frame, files = self._session.frame, self.window.files
@@ -311,7 +308,6 @@ class PictureDialog(QDialog):
         self._changed()
 
     # Parts -----------------------------------------------------------------------------
-
     def _make_preview(self) -> None:
         self.preview = preview_label("Preview of the picture", PREVIEW)
         self.preview.setObjectName("preview")
@@ -365,7 +361,6 @@ class PictureDialog(QDialog):
         return buttons
 
     # What was chosen -------------------------------------------------------------------
-
     @property
     def picture_options(self) -> PictureOptions:
         """Return the options of the picture as chosen in the dialog."""
@@ -451,7 +446,6 @@ class PictureDialog(QDialog):
             self._timer.start()
 
     # Picture ---------------------------------------------------------------------------
-
     def _drawing(self) -> Generator[object, Any, None]:
         """Yield pieces of the work that draws the preview: of a large mesh it takes a second."""
         options = self.picture_options.within(drawn_for(self.renderer, PREVIEW))

@@ -120,7 +120,6 @@ class FilmForm(QWidget):
         )
 
     # What was chosen -------------------------------------------------------------------
-
     @property
     def film_options(self) -> FilmOptions:
         """Return size, frame rate, duration of the last image, and images between steps."""
@@ -244,7 +243,6 @@ class FilmDialog(QDialog):
         self._show_filming(False)
 
     # Parts -----------------------------------------------------------------------------
-
     def _make_previews(self) -> QHBoxLayout:
         words = ("First image", "Last image")
         self.previews = [preview_label(word, PREVIEW) for word in words]
@@ -282,7 +280,6 @@ class FilmDialog(QDialog):
             label.setPixmap(framed(fitted(to_image(pixels), PREVIEW)))
 
     # Filming ---------------------------------------------------------------------------
-
     @property
     def filming(self) -> bool:
         """Return whether a film is being made."""

@@ -123,7 +123,6 @@ class BoundariesPanel(Panel):
         return table
 
     # State to widgets ------------------------------------------------------------------
-
     def sync(self, session: Session) -> None:
         """Fill the table from the session, and show how many roles are guesses."""
         names = session.mesh.marker_names if session.mesh else ()
@@ -214,7 +213,6 @@ class BoundariesPanel(Panel):
                 self.table.scrollTo(index)
 
     # Widgets to state ------------------------------------------------------------------
-
     def selected(self) -> tuple[str, ...]:
         """Return the boundaries of the selected rows."""
         rows = sorted({index.row() for index in self.table.selectionModel().selectedRows()})

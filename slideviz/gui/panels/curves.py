@@ -99,7 +99,6 @@ class CurvesPanel(Panel):
         return self.span_row
 
     # State to widgets ------------------------------------------------------------------
-
     def sync(self, session: Session) -> None:
         """Plot the selected curves of the session, or show why there are none."""
         kind = self.kind.currentData()
@@ -142,7 +141,6 @@ class CurvesPanel(Panel):
         return ""
 
     # Drawing ---------------------------------------------------------------------------
-
     def drawing(self) -> Draw:
         """Return a function that draws the selected plot into a figure."""
         session, kind = self.store.session, self.kind.currentData()
@@ -158,7 +156,6 @@ class CurvesPanel(Panel):
         return partial(draw_span, find, coordinate, what, whole)
 
     # What the user does ----------------------------------------------------------------
-
     def _other_plot(self) -> None:
         """Draw the newly selected plot; wipe the old one first, as its axes are other ones."""
         self.canvas.wipe()

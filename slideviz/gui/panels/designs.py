@@ -265,7 +265,6 @@ class DesignsPanel(Panel):
         self.job.progressed.connect(self._progressed)
 
     # State to widgets ------------------------------------------------------------------
-
     def _clear(self, _session: Session) -> None:
         """Stop and clear the table, as another mesh is shown."""
         self.runner.cancel()
@@ -321,7 +320,6 @@ class DesignsPanel(Panel):
         set_style(self.status.label, "bad", wrong)
 
     # What the user does ----------------------------------------------------------------
-
     @property
     def unsaved(self) -> str:
         """Return a sentence about results that closing would lose; empty if there are none."""
@@ -451,7 +449,6 @@ class DesignsPanel(Panel):
         self._sync()
 
     # The job ---------------------------------------------------------------------------
-
     def start(self) -> None:
         """Run the designs that have no result with the present settings."""
         session, table = self.store.session, self._with_valid_results()

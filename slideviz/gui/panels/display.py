@@ -213,7 +213,6 @@ class DisplayPanel(Panel):
         return button
 
     # State to widgets ------------------------------------------------------------------
-
     def sync(self, session: Session) -> None:
         """Fill the panel from the session."""
         with QSignalBlocker(self.only), QSignalBlocker(self.passages):
@@ -268,7 +267,6 @@ class DisplayPanel(Panel):
         self.passages_label.setToolTip(wrapped(tip))
 
     # Widgets to state ------------------------------------------------------------------
-
     def _set(self, **values: Any) -> None:
         self.store.change(changes.set_view, **values)
 

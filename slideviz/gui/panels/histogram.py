@@ -160,7 +160,6 @@ class HistogramPanel(Panel):
         return WrappingRow((self.log, self.whole), (self.show_all, self.save))
 
     # State to widgets ------------------------------------------------------------------
-
     def sync(self, session: Session) -> None:
         """Plot the histogram of the session's step, with the threshold as selected range."""
         self.whole.setText("from 0" if session.view.color_by == "displacement" else "0–1")
@@ -222,14 +221,12 @@ class HistogramPanel(Panel):
             QTimer.singleShot(0, self, lambda: self._sync_words(self.store.session))
 
     # Drawing ---------------------------------------------------------------------------
-
     def drawing(self) -> Draw:
         """Return a function that draws the histogram of the shown step into a figure."""
         log, whole = self.log.isChecked(), self.whole.isChecked()
         return partial(draw_histogram, self._counts, self.store.session, log=log, full_range=whole)
 
     # What the user does ----------------------------------------------------------------
-
     def _range_dragged(self, band: Range | None) -> None:
         """Schedule the threshold for a selected range; None ends the threshold."""
         if band is None:

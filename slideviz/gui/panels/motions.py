@@ -212,7 +212,6 @@ class MotionPanel(Panel):
                 yield button
 
     # State to widgets ------------------------------------------------------------------
-
     def sync(self, session: Session) -> None:
         """Fill list and editor from the motions of the session's case."""
         motions, moving = session.case.motions, session.case.markers_with("moving")
@@ -287,7 +286,6 @@ class MotionPanel(Panel):
         self.hint.setVisible(any(hints))
 
     # Widgets to state ------------------------------------------------------------------
-
     def _row_changed(self) -> None:
         self.editor.show_another()
         session = self.store.session

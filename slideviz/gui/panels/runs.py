@@ -208,7 +208,6 @@ class RunsPanel(Panel):
         self._fill(self.store.session)
 
     # State to widgets ------------------------------------------------------------------
-
     def sync(self, session: Session) -> None:
         """Select the row of the session's run; playing does not fill the list again."""
         with QSignalBlocker(self.tree):
@@ -276,7 +275,6 @@ class RunsPanel(Panel):
         item.setIcon(RUN, icon("beside") if beside else QIcon())
 
     # Widgets to state ------------------------------------------------------------------
-
     def _chosen(self, item: QTreeWidgetItem | None, _before: object = None) -> None:
         if item is not None:
             self.actions_table.show(item.data(RUN, NUMBER))

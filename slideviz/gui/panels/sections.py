@@ -126,7 +126,6 @@ class SectionEditor(QWidget):
         self.form = form
 
     # What is shown ---------------------------------------------------------------------
-
     def show_section(
         self, section: Section | None, mesh: Mesh | None, place: int | None = None
     ) -> None:
@@ -191,7 +190,6 @@ class SectionEditor(QWidget):
             self.slider.setValue(round(float(np.clip(share, 0.0, 1.0)) * STEPS))
 
     # Widgets to state ------------------------------------------------------------------
-
     def _emit_changed(self, **values: object) -> None:
         if self._section is not None:
             self._emit(replace(self._section, **values))  # type: ignore[arg-type]
@@ -305,7 +303,6 @@ class SectionsPanel(Panel):
         self.follow(_shown)
 
     # Parts -----------------------------------------------------------------------------
-
     def _make_list(self) -> None:
         self.add = {
             kind: push_button(row.words[3].name, "", partial(self._add, kind))
@@ -363,7 +360,6 @@ class SectionsPanel(Panel):
         in_column(*parts, wide=[self.list], spacing=5, on=self, margins=(6, 6, 6, 6))
 
     # What is shown ---------------------------------------------------------------------
-
     def sync(self, session: Session) -> None:
         """Show the sections of a session."""
         mesh, sections = session.mesh, session.view.sections
@@ -430,7 +426,6 @@ class SectionsPanel(Panel):
         self.picture.setToolTip(wrapped(IN_FILE) if session.in_file else self._picture_tip)
 
     # What is wanted --------------------------------------------------------------------
-
     def _add(self, kind: str, _checked: bool = False) -> None:
         session = self.store.session
         pair = self._period.of(session)

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from qtpy.QtCore import QObject, QTimer
 
 # Interpreter, threads and garbage ----------------------------------------------------------
-
 SWITCH_S = 0.00005
 """How long a thread may keep the interpreter (GIL) when another one waits for it, in seconds.
 
@@ -46,7 +45,6 @@ CLOSING_S = 1.0
 """How long a closing window waits for its job's thread, which a library may keep for minutes."""
 
 # Painting ----------------------------------------------------------------------------------
-
 REPAINT_MS = 1
 """Delay from a change to the view's repaint.
 
@@ -77,7 +75,6 @@ COUNTING_MS = 300
 """Delay from a repeated error to showing its count, as each one repaints the whole window."""
 
 # Plots and tables --------------------------------------------------------------------------
-
 REST_MS = 200  # least time between two drawings of a plot or table while steps are played
 
 REST_TIMES, MOST_REST = 4.0, 4
@@ -86,7 +83,6 @@ REST_TIMES, MOST_REST = 4.0, 4
 LOOK_MS = 8  # interval at which a finished plot is polled for: half the time of a screen's frame
 
 # After what the user does ------------------------------------------------------------------
-
 SELECTING_MS = 120
 """Delay from a drag in the histogram to selecting the cells: not once per mouse event."""
 

@@ -91,7 +91,6 @@ class PointHandle(QObject, Generic[Grasp]):
         self.put()
 
     # Subclasses ------------------------------------------------------------------------
-
     def parts(self) -> list[tuple[Part, FloatArray]]:
         """Return the parts in pixels, (k, 2) each, the preferred one first; a line's are joined."""
         raise NotImplementedError
@@ -117,7 +116,6 @@ class PointHandle(QObject, Generic[Grasp]):
         raise NotImplementedError
 
     # Drawing ---------------------------------------------------------------------------
-
     def put(self) -> None:
         """Draw the points in the visible part of the view, with those under the mouse marked."""
         if self.section is None:
@@ -130,7 +128,6 @@ class PointHandle(QObject, Generic[Grasp]):
             self._point_at(None)
 
     # Mouse -----------------------------------------------------------------------------
-
     def part_at(self, where: QPoint) -> Part | None:
         """Return the part of the handle at a position in the widget; None if none is in reach."""
         if self.section is None:

@@ -230,7 +230,6 @@ class SectionViews(QSplitter):
         self.handles.drop(self.viewing.second)
 
     # What is wanted --------------------------------------------------------------------
-
     @property
     def section(self) -> Section | None:
         """Return the selected section, or None."""
@@ -266,7 +265,6 @@ class SectionViews(QSplitter):
         self.viewing.fit()
 
     # What is shown ---------------------------------------------------------------------
-
     def _session_changed(self, old: Session, new: Session) -> None:
         if old.mesh is not new.mesh:
             # A 2D mesh has a curve where a 3D one has flat views.

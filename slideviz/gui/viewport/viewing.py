@@ -182,7 +182,6 @@ class Viewing(QWidget):
         self._link: CameraLink | None = None
 
     # Parts -----------------------------------------------------------------------------
-
     def _title(self, column: int) -> TitleBar:
         title = TitleBar(
             f"view_title_{column}",
@@ -304,7 +303,6 @@ class Viewing(QWidget):
         self._rearranged(sees_all)
 
     # The session -----------------------------------------------------------------------
-
     def open(self, opened: jobs.Opened, session: Session) -> None:
         """Show a mesh that was opened, with the camera stored for its case if there is one."""
         self._drop_second()
@@ -368,7 +366,6 @@ class Viewing(QWidget):
         return (self.scene,) if self.second_scene is None else (self.scene, self.second_scene)
 
     # Mouse -----------------------------------------------------------------------------
-
     def _zoomed(self, view: View3D, scene: Scene, where: QPoint, factor: float) -> None:
         scene.camera.zoom_at(*view.to_pixels(where), factor)
         self.render()
@@ -378,7 +375,6 @@ class Viewing(QWidget):
         self._share_width()
 
     # Camera and pictures ---------------------------------------------------------------
-
     def render(self) -> None:  # type: ignore[override]  # as the views do
         """Repaint the views."""
         self.view.render()

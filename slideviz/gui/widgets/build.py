@@ -36,9 +36,8 @@ Part = QWidget | QLayout | int | None
 Slot = Callable[..., object] | SignalInstance
 Box = TypeVar("Box", bound=QBoxLayout)
 
+
 # Layouts -----------------------------------------------------------------------------------
-
-
 def in_row(*parts: Part, wide: Sequence[Part] = (), spacing: int = -1) -> QHBoxLayout:
     """Return a horizontal layout of parts, of which those in ``wide`` share the spare width."""
     return _filled(QHBoxLayout(), parts, wide, spacing)
@@ -181,8 +180,6 @@ def on_screen(content: QWidget, dialog: QWidget) -> QWidget:
 
 
 # Buttons -----------------------------------------------------------------------------------
-
-
 def push_button(text: str, tip: str, do: Slot, name: str = "") -> QPushButton:
     """Return a push button with a text that calls ``do`` when clicked; ``name``: object name."""
     button = QPushButton(text)
@@ -275,8 +272,6 @@ def dialog_buttons(dialog: QDialog, *kinds: QDialogButtonBox.StandardButton) -> 
 
 
 # Labels and bars ---------------------------------------------------------------------------
-
-
 def hint_label(text: str = "", align: Qt.AlignmentFlag | None = None) -> QLabel:
     """Return a label for a hint: word-wrapped, in the theme's soft color."""
     label = QLabel(text)

@@ -191,8 +191,6 @@ def _vtk_heard() -> Iterator[None]:
 
 
 # Crashes of the whole program ------------------------------------------------------------
-
-
 @contextlib.contextmanager
 def crash_log(folder: Path) -> Iterator[None]:
     """Write the traces of all threads to ``crash-PID.log`` in a folder if the process crashes.

@@ -198,7 +198,6 @@ class PlotCanvas(QWidget):
         return self._coming is not None or self._timer.isActive()
 
     # Drawing ---------------------------------------------------------------------------
-
     def request_draw(self) -> None:
         """Schedule a drawing; a hidden plot is drawn when it is shown."""
         self._stale = True
@@ -246,7 +245,6 @@ class PlotCanvas(QWidget):
         self.request_draw()
 
     # Places ----------------------------------------------------------------------------
-
     @property
     def _scale(self) -> tuple[float, float]:
         """Return the image's pixels per pixel of the widget, which may have been resized since."""
@@ -269,7 +267,6 @@ class PlotCanvas(QWidget):
         return self.height() - box.y1 / scale, box.height / scale
 
     # Qt --------------------------------------------------------------------------------
-
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._last = 0.0  # without delay: the present image is shown stretched
