@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 NEAREST = 12
 """Wall nodes that carry a node."""
 
-CANDIDATES = 3 * NEAREST
+CANDIDATES = 2 * NEAREST
 """Nearest wall nodes among which those that see the node are looked for."""
 
 POWER = 6
@@ -65,6 +65,10 @@ may be as long as high; with 3 their heights would change by up to 2 %."""
 
 GRAZING = 0.3
 """Cosine from which a wall node sees a node fully; below minus this not at all."""
+
+CORNER = 0.6
+"""Largest distance from a point of a facet to its nearest corner over the diagonal of its box; in
+an equilateral triangle it is 1 / sqrt(3) of an edge."""
 
 EDGES = 0.01
 """Weight of the edges of the facets at a wall node over that of their normals, in 3D."""
@@ -212,25 +216,20 @@ class WallNodes:
     def _reached(self, k: int, targets: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
         """Return which points (m, d) are in the zone of wall k, (z,), their shares, and weights."""
         wall, (tree, closest) = self.walls[k][0], self._trees[k]
-        limit, gap = wall.first + wall.thickness, np.full(len(targets), np.inf)
-        corners = closest.corners
-        reach = limit + np.linalg.norm(np.ptp(corners, axis=1), axis=1).max(initial=0.0)
+        limit, near = wall.first + wall.thickness, np.zeros(len(targets), bool)
+        size = np.linalg.norm(np.ptp(closest.corners, axis=1), axis=1).max(initial=0.0)
+        reach = float(np.hypot(limit, CORNER * size))
 
-        def measure(part: slice) -> None:
-            near = tree.query(targets[part], distance_upper_bound=reach)[0]
-            some = part.start + np.flatnonzero(np.isfinite(near))
-            if len(some):
-                x = targets[some]
-                gap[some] = np.linalg.norm(closest.query(x) - x, axis=1)
+        def find(part: slice) -> None:
+            near[part] = np.isfinite(tree.query(targets[part], distance_upper_bound=reach)[0])
 
-        in_parts(measure, len(targets))
-        some = np.flatnonzero(gap < limit)
-        share = 1.0 - smooth((gap[some] - wall.first) / wall.thickness)
-        return (
-            some,
-            share,
-            share * (limit / np.maximum(gap[some], max(1e-9 * limit, TINY))) ** POWER,
-        )
+        in_parts(find, len(targets))
+        some = np.flatnonzero(near)
+        gap = np.linalg.norm(closest.query(targets[some]) - targets[some], axis=1)
+        some, gap = some[gap < limit], gap[gap < limit]
+        share = 1.0 - smooth((gap - wall.first) / wall.thickness)
+        least = max(1e-9 * limit, TINY)
+        return some, share, share * (limit / np.maximum(gap, least)) ** POWER
 
     def _carriers(self, k: int, targets: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return the sources of wall k near points (m, d), and their weights, both (m, c)."""
@@ -247,12 +246,25 @@ class WallNodes:
             cosine = np.einsum("mcd,mcd->mc", away, self.normals[at][index]) / gap
             seen = smooth((cosine + GRAZING) / (2.0 * GRAZING))
             seen[~(seen > 0.0).any(axis=1)] = 1.0
-            seen[np.cumsum(seen > 0.0, axis=1) > NEAREST] = 0.0
-            w = seen * (gap[:, :1] / gap) ** POWER
+            w = seen * (gap[:, :1] / gap) ** POWER * _faded(gap, seen > 0.0, count < tree.n)
             nearest[part], weight[part] = index, w / w.sum(axis=1, keepdims=True)
 
         in_parts(find, len(targets))
         return nearest, weight
+
+
+def _faded(gap: FloatArray, seen: np.ndarray, more: bool) -> FloatArray:
+    """Return factors (m, c) that fall to 0 where the `NEAREST` nodes of those seen (m, c) end.
+
+    So a node that enters or leaves them, or is one of several at one distance, changes nothing.
+    ``gap`` (m, c) are ascending distances; ``more``: whether there are farther nodes.
+    """
+    beyond = np.where(np.cumsum(seen, axis=1) > NEAREST, gap, np.inf).min(axis=1)
+    end = np.minimum(beyond, gap[:, -1] if more else np.inf)[:, None]
+    out = np.clip(1.0 - gap / end, 0.0, 1.0) ** 2
+    alike = ~(seen & (out > 0.0)).any(axis=1)  # all are equally far
+    out[alike] = 1.0
+    return out
 
 
 def _directions(now: Array, facets: IntArray) -> Array:

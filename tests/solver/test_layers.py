@@ -10,6 +10,7 @@ from slideviz.case.model import Case, Prescribed, Rotate, Translate
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.samples.table import sample
 from slideviz.solver.setup import make_setup
+from tests import builders
 from tests.design.test_deformer_derivatives import check, motions
 from tests.test_laws import box, box_case, sector, sector_case
 
@@ -164,3 +165,14 @@ def test_derivatives(frame, method, dim, steps, reduction):
     motion = motions(mesh, "blade" if (frame, dim) == ("rotational", 3) else "BLOCK")
     deformer = check(case(mesh, method, motion, **settings), mesh)
     assert len(deformer._setup.zone.nodes)
+
+
+def test_the_numbering_does_not_matter():
+    """Of a symmetric mesh, too, where several wall nodes are equally far from a node."""
+    mesh = around(ellipse, 30, 40, first=5e-3)
+    order, other = builders.shuffled(mesh, 3)
+    settings = {"layers": "keep", "layer_thickness": 0.3, "reduction": None}
+    motion = Rotate("w", 10.0, (0.2, 0.0))
+    points = deformed(mesh, motion, **settings)[1].mesh.points
+    shuffled = deformed(other, motion, **settings)[1].mesh.points
+    np.testing.assert_allclose(shuffled, points[order], rtol=0, atol=1e-12)
