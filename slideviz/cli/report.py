@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
+from itertools import zip_longest
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -87,7 +88,10 @@ def run_report(
             "inverted_at_step": [step for _, step in folded.values()],
             "undeformed": {"min": undeformed.min, "mean": undeformed.mean},
         },
-        "limits": limits_report(check_case_limits(case, quality, last.mesh, mesh)),
+        "limits": limits_report(
+            check_case_limits(case, quality, last.mesh, mesh),
+            check_case_limits(case, undeformed, mesh, mesh),
+        ),
         "walls": {} if walls is None else walls.summary(),
         "tried": [_fields(trial, TRIAL_KEYS) for trial in last.tried],
         "control_nodes": [step.control_nodes for step in steps],
@@ -120,8 +124,17 @@ def run_report(
     }
 
 
-def limits_report(results: Iterable[LimitResult]) -> list[dict[str, Any]]:
-    """Return the JSON array of limits: each with its number, and the worst cells that fail."""
+def limits_report(
+    results: Sequence[LimitResult], before: Sequence[LimitResult] = ()
+) -> list[dict[str, Any]]:
+    """Return the JSON array of limits: each with its number, and the worst cells that fail.
+
+    ``before`` are those of the undeformed mesh, if it is known.
+    """
+
+    def actual(result: LimitResult | None) -> float | None:
+        return float(result.actual) if result is not None and isfinite(result.actual) else None
+
     return [
         {
             "limit": str(result.limit),
@@ -129,25 +142,31 @@ def limits_report(results: Iterable[LimitResult]) -> list[dict[str, Any]]:
             "marker": result.limit.marker or None,
             "op": result.limit.sign,
             "value": result.limit.value,
-            "actual": float(result.actual) if isfinite(result.actual) else None,
+            "actual": actual(result),
+            "undeformed": actual(old),
             "passed": result.passed,
             "failing": len(result.cells),
             "cells": result.cells[:LISTED].tolist(),
         }
-        for result in results
+        for result, old in zip_longest(results, before)
     ]
 
 
 def limit_lines(report: Sequence[Mapping[str, Any]]) -> str:
     """Return the limits of a report as a text table."""
-    return table([(entry["limit"], *limit_words(entry)) for entry in report])
+    rows = [(entry["limit"], *limit_words(entry)) for entry in report]
+    return table(rows if any(row[2] for row in rows) else [(*row[:2], row[3]) for row in rows])
 
 
-def limit_words(entry: Mapping[str, Any]) -> tuple[str, str]:
-    """Return number and outcome of a limit of a report, as ``0.21``, ``not met, in 5 cells``."""
+def limit_words(entry: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Return the words on a limit of a report: ``0.2``, ``undeformed 0.4``, ``not met``.
+
+    The second is empty where it is unknown.
+    """
     value = "no value" if entry["actual"] is None else f"{entry['actual']:.6g}"
+    before = "" if entry["undeformed"] is None else f"undeformed {entry['undeformed']:.6g}"
     cells = f", in {counted(entry['failing'], 'cell')}" if entry["failing"] else ""
-    return value, "met" if entry["passed"] else f"not met{cells}"
+    return value, before, "met" if entry["passed"] else f"not met{cells}"
 
 
 def _relaxed(steps: Sequence[Step]) -> Relaxed | None:

@@ -153,9 +153,9 @@ def report_limits(limits: Sequence[Mapping[str, Any]], advice: str = "") -> int:
     missed = [entry for entry in limits if not entry["passed"]]
     for entry in missed:
         named = ", ".join(map(str, entry["cells"][:5])) + " ..." * (entry["failing"] > 5)
-        value, outcome = limit_words(entry)
+        value, before, outcome = limit_words(entry)
         sentence = f"the limit {entry['limit']} is {outcome}{f' ({named})' * bool(named)}: {value}"
-        print(f"slideviz: {sentence}", file=sys.stderr)
+        print(f"slideviz: {sentence}{f', {before}' * bool(before)}", file=sys.stderr)
     if missed and advice:
         print(f"slideviz: {advice}", file=sys.stderr)
     return LIMIT_MISSED if missed else DONE
@@ -252,6 +252,7 @@ def advice_for(
         return ""
     import numpy as np
 
+    from slideviz.case.limits import NUMBERS
     from slideviz.solver.remedies import beyond_pitch, fixed_beside, remedies
 
     beside: tuple[str, ...] = ()
@@ -262,7 +263,12 @@ def advice_for(
             cells = np.array([cell for entry in missed for cell in entry["cells"]], np.int64)
         beside = fixed_beside(case, mesh, cells)
         pitch = beyond_pitch(case, mesh)
-    ideas = "; ".join(remedy.keys for remedy in remedies(case, beside, pitch, layers))
+    every = [remedy.keys for remedy in remedies(case, beside, pitch, layers)]
+    if found is not None and not found.inverted and case.method == "rbf":
+        walls = any(NUMBERS[entry["name"]].on_boundary for entry in missed)
+        keep = ["LAYERS= KEEP"] * (walls and case.layers == "no")
+        every = [*keep, *["RELAX= YES"] * (case.relax == "no"), *every]
+    ideas = "; ".join(every)
     return f"{pitch[:1].lower()}{pitch[1:]}; what may help: {ideas}".removeprefix("; ")
 
 
