@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import csv
+import re
+from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 
@@ -13,6 +17,7 @@ from slideviz.samples.table import SAMPLES
 from slideviz.study.combinations import COMPARED_METHODS
 from slideviz.terms import PERIODIC_MODES
 from tools.study import __main__ as study
+from tools.study import contest, leading_edge
 from tools.study.__main__ import FIGURES
 from tools.study.cases import CALLS, GREEDY
 from tools.study.dense import dense
@@ -176,3 +181,86 @@ def test_what_is_published_are_figures_that_calls_write():
         folder, name = figure.split("/")
         assert folder in folders
         assert folder != "dense" or name.removesuffix(".png") in lines
+
+
+OUTCOME = contest.Outcome("row", "auto", 0.9, 0.5, 0, 0, 1.0, 1.0, 0.1, 1.0)
+
+
+def test_rows_of_the_contest_have_names_of_their_own_and_real_meshes_are_optional(tmp_path):
+    without, all_rows = (list(contest.contests(folder)) for folder in (None, tmp_path))
+    names = [row.name for row in all_rows]
+    assert len(set(names)) == len(names)
+    real = {"LS89 turned by 15", "stator turned by 10", "NACA 0012 turned by 30"}
+    assert real < set(names)
+    assert not real & {row.name for row in without}
+    assert sum(" in triangles " in name or " in quadr" in name for name in names) == 24
+
+
+@pytest.mark.parametrize(
+    ("ours", "words"),
+    [
+        ({}, None),
+        ({"height_max": 1.02}, "first heights 1.000 to 1.020, expected 0.99 to 1.01"),
+        ({"angle_deg": 1.5}, "first edges turn by 1.5 degrees"),
+        ({"inverted": 1}, "1 cells are inverted"),
+        ({"lowest": 0.29}, "lowest 0.290, 0 inverted, from 0.500"),
+        ({"mean": 0.79}, "mean 0.7900, of radial basis functions 0.8"),
+        ({"mean": 0.886}, "mean 0.8860, of elastic 0.89"),
+        ({"lowest": 0.44}, "lowest 0.440, of elasticity 0.5"),
+    ],
+)
+def test_laws_of_the_contest_notice_what_is_worse(ours, words):
+    row = contest.Contest("row", tuple)
+    found = {
+        "rbf": replace(OUTCOME, method="rbf", mean=0.8),
+        "elastic": replace(OUTCOME, method="elastic", mean=0.89),
+        "auto": replace(OUTCOME, **ours),
+    }
+    said = list(contest.faults(row, found))
+    assert (words is None) == (not said)
+    assert words is None or any(words in text for text in said)
+
+
+def test_contest_keeps_layers_where_elasticity_stretches_them(tmp_path, capsys):
+    rows = ["--rows", "^O-mesh turned", "-o", str(tmp_path / "out")]
+    assert contest.main([*rows, "--methods", "rbf,auto,elastic"]) == 0
+    assert "no law is broken" in capsys.readouterr().out
+    with (tmp_path / "out.csv").open() as file:
+        by_method = {row["method"]: row for row in csv.DictReader(file)}
+    assert float(by_method["elastic"]["height_max"]) > 1.1
+    assert abs(float(by_method["auto"]["height_max"]) - 1.0) < 1e-3
+    table = (tmp_path / "out.md").read_text().splitlines()
+    assert table[0] == "| mesh and motion | rbf | auto | elastic |"
+
+
+@pytest.mark.parametrize("shape", ["block", "cross"])
+def test_relaxation_is_better_without_layers(shape):
+    rows = [row for row in contest.contests(None) if row.name.startswith(f"{shape} in triangles")]
+    for row in rows:
+        found = {o.method: o for o in contest.run_row(row, contest.BARE)}
+        assert not list(contest.faults(row, found))
+        assert found["relax"].mean > found["rbf"].mean
+
+
+FOLDER = Path(__file__).parents[1] / ".." / "shared" / "meshes" / "su2"
+REAL = [row.name for row in contest.contests(FOLDER) if re.match("LS89|stator .", row.name)]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not FOLDER.is_dir(), reason="the real meshes are not here")
+@pytest.mark.parametrize("name", REAL)
+def test_layers_of_real_blades_are_kept(name):
+    row = next(row for row in contest.contests(FOLDER) if row.name == name)
+    found = {o.method: o for o in contest.run_row(row, ("rbf", "auto", "elastic"))}
+    assert not list(contest.faults(row, found))
+
+
+@pytest.mark.slow
+def test_leading_edge_is_drawn(tmp_path):
+    path = leading_edge.draw(tmp_path / "edge.png", 5_000)
+    with Image.open(path) as image:
+        assert image.size == tuple(round(x * leading_edge.DPI) for x in leading_edge.INCHES)
+        shown = np.asarray(image.convert("RGB")).astype(int)
+    quarter = image.width * 7 // 32  # the color bar takes the last eighth
+    blue = [(p[..., 2] - p[..., 0] > 40).sum() for p in np.split(shown[:, : 4 * quarter], 4, 1)]
+    assert blue[1] > 20 * max(blue[0], blue[3], 1)
