@@ -323,6 +323,8 @@ def extruded_case(size: int) -> Case:
             for plane in (2, 3)
         ),
         steps=1,
+        relax="auto",
+        layers="auto",
         reduction=Reduction(tolerance=TOLERANCE),
     )
 
