@@ -264,9 +264,9 @@ Relax = Literal["auto", "no", "yes"]
 RELAXES: dict[Relax, Term] = {
     "auto": Term("automatic", "Relaxed, unless the mesh has more than a million cells."),
     "no": Term("off", "As the radial functions leave it."),
-    "yes": Term("on", "Relaxed after each step."),
+    "yes": Term("on", "Relaxed after the last step."),
 }
-"""Whether the mesh is relaxed after each step."""
+"""Whether the mesh is relaxed after the last step."""
 
 Layers = Literal["auto", "no", "keep"]
 LAYERS: dict[Layers, Term] = {

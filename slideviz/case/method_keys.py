@@ -289,8 +289,8 @@ METHOD_ROWS = (
         METHOD,
         one_of(RELAXES),
         "relax",
-        "Relax the mesh after each step: a few iterations of an elastic body whose cells go back "
-        "to their undeformed shapes, turned as they are. Cells are better in the mean, and "
+        "Relax the mesh after the last step: a few iterations of an elastic body whose cells go "
+        "back to their undeformed shapes, turned as they are. Cells are better in the mean, and "
         "boundary layers keep their heights and angles. AUTO does so up to a million cells in "
         "memory.",
         label="Relaxation",

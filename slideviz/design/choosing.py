@@ -63,7 +63,7 @@ def choose_steps(
     reuse = BYTES * sum(n**2 for n in rows) < free_memory()
     steps = tuple(
         FrozenStep(
-            setup=kept,
+            setup=kept.at_step(k == len(parts) - 1),
             mesh=mesh,
             part=part,
             first=k == 0,
@@ -125,7 +125,9 @@ def _further(
             control = np.concatenate([control, more[~np.isin(more, control)]])
         timer = PhaseTimer(partial(_report, report, k + 1, total))
         goal = setup.coords[setup.known] + setup.target * part
-        begun = replace(setup, solve=partial(_continued, setup, solution.stages))
+        begun = replace(
+            setup.at_step(k == total - 1), solve=partial(_continued, setup, solution.stages)
+        )
         made.append(
             one_step(
                 begun, coords, goal, timer, replace(solution, control=control, carried=carried)

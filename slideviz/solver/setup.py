@@ -167,7 +167,15 @@ class Setup(Domain):
     fitted_radius: float
     """The support radius that fits the motion, whatever the case says."""
     relaxation: Relaxation | None = None
-    """What relaxes each step; None where RELAX has no effect."""
+    """What relaxes the last step; None where RELAX has no effect."""
+
+    def at_step(self, is_last: bool) -> Setup:
+        """Return the setup of a step: only the last one is relaxed.
+
+        So relaxation starts from what radial functions make of all steps, and its safeguard holds
+        for the result: over several relaxed steps small losses of the worst cells would add up.
+        """
+        return self if is_last or self.relaxation is None else replace(self, relaxation=None)
 
     @cached_property
     def largest(self) -> float:

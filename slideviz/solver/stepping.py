@@ -80,7 +80,7 @@ class Stepping:
             total = index + len(ahead)
             timer = PhaseTimer(self._phase_report(index + 1, total), seconds)
             goal = setup.coords[setup.known] + setup.target * part
-            solution = one_step(setup, coords, goal, timer, before)
+            solution = one_step(setup.at_step(len(ahead) == 1), coords, goal, timer, before)
             moved = displaced_coords(setup, coords, value(solution.displacement), goal)
             points = cartesian(setup.frame, mesh.points, setup.coords, moved)
             if mesh.halo is not None:
