@@ -89,9 +89,9 @@ class Relaxation:
         self,
         problem: Problem,
         displacement: Array,
+        rigid: IntArray,
         constraints: Constraints,
         tie: Callable[[Array], Array],
-        keep: Callable[[Array], Array],
         timer: PhaseTimer,
     ) -> tuple[Array, Relaxed]:
         """Return the displacement (..., n, d) of a step after relaxation, in the frame.
@@ -100,19 +100,21 @@ class Relaxation:
         ----------
         displacement : (..., n, d)
             Of the step, as radial functions have it.
+        rigid : (r,)
+            Nodes that stay where they are, besides the known ones.
         tie
             Gives periodic images the displacement of the node that represents them.
-        keep
-            Lets walls carry the nodes near them, after relaxation and before the safeguard.
         """
         with timer.phase("relax") as tick:
             at = value(problem.coords) + value(displacement)
+            held = np.concatenate([problem.known, rigid])
             given: Conditions = problem.choose(
-                "conditions", lambda: self._conditions(problem, at, constraints)
+                "conditions", lambda: self._conditions(problem, at, held, constraints)
             )
-            kept = self._kept(problem, given, constraints, tick)
+            start = self.body.frame.coords(self.mesh.points)
+            free = self._conditions(problem, start, held, constraints).free
+            kept = self._kept(problem, given.place, free, tick)
             moved, residual = self._iterated(problem, displacement, kept, given, tie, tick)
-            moved = keep(moved)
             theta: FloatArray = problem.choose(
                 "theta", lambda: self._kept_part(problem, displacement, moved, tie)
             )
@@ -120,24 +122,26 @@ class Relaxation:
         limited = int(np.count_nonzero(theta[given.place >= 0] < 1.0))
         return out, Relaxed(ITERATIONS, residual, float(theta.min()), limited)
 
-    def _conditions(self, problem: Problem, at: FloatArray, constraints: Constraints) -> Conditions:
-        """Return the conditions of the body at coordinates (n, d)."""
+    def _conditions(
+        self, problem: Problem, at: FloatArray, held: IntArray, constraints: Constraints
+    ) -> Conditions:
+        """Return the conditions of the body at coordinates (n, d) if nodes ``held`` stay."""
         nodes, normals = constraints(at)
         there = replace(problem, coords=at, normal_nodes=nodes, normals=normals)
-        return conditions(there, self.body, problem.known, np.zeros_like(value(problem.values)))
+        return conditions(there, self.body, held, np.zeros((len(held), at.shape[1])))
 
-    def _kept(
-        self, problem: Problem, given: Conditions, constraints: Constraints, tick: Tick
-    ) -> _Kept:
-        """Return what is kept of this mesh, with the preconditioner for these conditions."""
-        x, frame, place = self.mesh.points, self.body.frame, given.place
+    def _kept(self, problem: Problem, place: IntArray, free: FloatArray, tick: Tick) -> _Kept:
+        """Return what is kept of this mesh, with the preconditioner for these conditions.
+
+        ``place`` (n,) and ``free`` (k, d, d) are those of undeformed conditions.
+        """
+        x, frame = self.mesh.points, self.body.frame
         kept = _KEPT.get(self.mesh)
         if kept is None:
             kept = _KEPT[self.mesh] = _Kept(Corotated.of(x, self.body.parts))
-        start = frame.coords(x)
-        free = self._conditions(problem, start, constraints).free
         axes = np.eye(x.shape[1])
         if frame.cylindrical:
+            start = frame.coords(x)
             owner = np.zeros(len(free), np.int64)
             owner[place[place >= 0]] = problem.same_as[place >= 0]
             each = [frame.turned_back(start[owner], np.tile(row, (len(free), 1))) for row in axes]

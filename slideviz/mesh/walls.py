@@ -47,7 +47,7 @@ LAYERS = 5
 """Layers that growth and equal layers are found from."""
 EQUAL = 0.01
 """Largest difference of the lengths of edges, as a part of the first one's, that are equal."""
-FLAT = 1 / 3
+FLAT = 2 / 3
 """Largest height of a cell of the stack, as a part of its length."""
 
 _EDGES = np.full((15, 12, 2), -1)
@@ -81,8 +81,8 @@ class Columns:
         """Return the thickness (f,) of the stack of flat cells on each facet, at ``points`` (n, d).
 
         That is the sum of the heights of the first layers whose height (mean length of the edges
-        that lead through it) is below a third of their length (of the side nearer to the wall: the
-        length of a line, else the square root of the area); 0 where there are none.
+        that lead through it) is below two thirds of their length (of the side nearer to the wall:
+        the length of a line, else the square root of the area); 0 where there are none.
         """
         facets, width = self.boundary.facets, self.boundary.facets.shape[1]
         thickness, flat = np.zeros(len(facets)), self.depth > 0

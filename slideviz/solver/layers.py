@@ -2,7 +2,7 @@
 
 The thickness is found from the cells at the boundary alone, as a streamed mesh has them: a layer of
 height h on facets of length l, growing by a fifth from cell to cell, is 2 l - 6 h thick where its
-cells are a third as high as long.
+cells are a third as high as long; where they are h from the beginning, the zone fades over h.
 """
 
 from __future__ import annotations
@@ -63,7 +63,8 @@ def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
             some = np.flatnonzero(chosen)[part == label]
             extent = np.ptp(points[np.unique(boundary.facets[some])], axis=0).max()
             flat = some[height[some] > 0.0]
-            thickness = np.median(2.0 * length[flat] - 6.0 * height[flat]) if len(flat) else np.inf
+            fading = np.maximum(2.0 * length[flat] - 6.0 * height[flat], height[flat])
+            thickness = np.median(fading) if len(flat) else np.inf
             walls.append(
                 Wall(
                     tuple(boundary.names[m] for m in np.unique(boundary.marker[some])),

@@ -31,6 +31,9 @@ from slideviz.solver.setup import Setup
 from slideviz.solver.steps import Progress, Step, Trial
 from slideviz.system.threads import in_parts
 
+RIGID = 0.99
+"""Nodes that walls carry with a share above this stay where they carry them in relaxation."""
+
 HALVINGS = 3
 """How often at most a step that folds a cell is halved: into eighths."""
 
@@ -238,9 +241,17 @@ def one_step(
     displacement, relaxed = tie(keep(solution.displacement)), None
     if setup.relaxation is not None:
         displacement, relaxed = setup.relaxation.relaxed(
-            problem, displacement, setup.constraints, tie, lambda moved: tie(keep(moved)), timer
+            problem, displacement, _rigid(setup), setup.constraints, tie, timer
         )
     return replace(solution, displacement=displacement, relaxed=relaxed)
+
+
+def _rigid(setup: Setup) -> IntArray:
+    """Return the nodes (r,) that walls carry nearly alone."""
+    zone = setup.zone
+    if zone is None:
+        return setup.known[:0]
+    return zone.nodes[zone.share[:, 0] > RIGID]
 
 
 def keep_layers(

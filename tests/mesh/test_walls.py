@@ -184,7 +184,7 @@ def test_stack_of_prisms_uses_the_square_root_of_the_area():
     mesh = grid((n, n, 4), kind="prism", place=place)
     columns = find_columns(mesh, 20)
     at = columns.boundary.marker == columns.boundary.names.index("z_m")
-    np.testing.assert_allclose(columns.stack_thickness(mesh.points)[at], 0.05)
+    np.testing.assert_allclose(columns.stack_thickness(mesh.points)[at], 0.2)
 
 
 def test_a_mesh_of_tetrahedra_has_first_heights_only():
