@@ -23,6 +23,7 @@ from slideviz.gui.panels.curves import CurvesPanel
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.panels.display import DisplayPanel
 from slideviz.gui.panels.histogram import HistogramPanel
+from slideviz.gui.panels.limits import LimitsPanel
 from slideviz.gui.panels.log import LogPanel
 from slideviz.gui.panels.method import MethodPanel
 from slideviz.gui.panels.motions import MotionPanel
@@ -194,6 +195,9 @@ DOCKS: tuple[DockRow, ...] = (
         RIGHT,
         lambda w: WorstPanel(w.store, w.viewing.fly_to, w.viewing.fly_back),
         "histogram",
+    ),
+    DockRow(
+        "limits", "Limits", RIGHT, lambda w: LimitsPanel(w.store, w.viewing.fly_to), "histogram"
     ),
     DockRow("curves", "Curves", RIGHT, lambda w: CurvesPanel(w.store), "histogram"),
     DockRow("runs", "Runs", RIGHT, lambda w: RunsPanel(w.store)),

@@ -27,6 +27,7 @@ from slideviz.session.run_messages import (
 from slideviz.session.runs_words import method_words
 from slideviz.session.state import Run, Session, StepFrame
 from slideviz.session.store import Store
+from slideviz.session.walls_table import heights_words
 from slideviz.terms import PERIODIC_MODES
 
 log = logging.getLogger("slideviz")
@@ -199,6 +200,8 @@ class Running(QObject):
             f"{_steps_text(run.last)}min {quality.min:.4f}, mean {quality.mean:.4f}, "
             f"{quality.inverted:,} inverted"
         )
+        if heights := heights_words(run.last, run.case):
+            text += f", first heights {heights} of those before"
         log.info("done: %s", text)
         warnings = self._log_remarks(run)
         bad = inverted_words(run)

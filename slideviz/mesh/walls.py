@@ -30,7 +30,7 @@ Sources: AIAA drag prediction workshops 4 to 7, gridding guidelines (growth, equ
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -298,6 +298,10 @@ class Walls:
     """The boundaries that `summary` reports."""
     n_cells: int
     """Number of cells of the mesh."""
+
+    def of(self, markers: Sequence[str]) -> Walls:
+        """Return the same for other boundaries to be reported."""
+        return replace(self, markers=tuple(markers))
 
     def summary(self) -> dict[str, dict]:
         """Return what the report says, by boundary.

@@ -25,6 +25,7 @@ from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import Surface, coarse_surfaces, enclosing_of, find_surfaces
+from slideviz.mesh.walls import Walls, walls
 from slideviz.session.large import first_frame, frame_of, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.opening import open_mesh
@@ -270,7 +271,8 @@ def prepare(
         report(JobProgress("Measuring the cells", fraction))
 
     if mesh.part is None:
-        first = StepFrame(mesh, quality(mesh, metric=metric, going_on=going_on))
+        measured = quality(mesh, metric=metric, going_on=going_on)
+        first = StepFrame(mesh, measured, walls=_walls(mesh, mesh))
     else:
         first = first_frame(mesh, metric, measuring)
     going_on()
@@ -292,6 +294,14 @@ def _precompute(frame: StepFrame) -> None:
     mesh, measured = frame.mesh, frame.quality
     _ = mesh.bounds, mesh.extent, mesh.cells.nodes, mesh.cells.by_type
     _ = measured.min, measured.mean, measured.inverted, measured.cells
+
+
+def _walls(mesh: Mesh, undeformed: Mesh) -> Walls | None:
+    """Return the layers at the boundaries; None where a boundary is no side of the cells."""
+    try:
+        return walls(mesh, undeformed)
+    except MeshError:
+        return None
 
 
 def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
@@ -326,7 +336,7 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         unfinished = step.index < step.total
         report(JobProgress(f"Step {step.index} of {step.total}: quality", step.index / step.total))
         measured = quality(step.mesh, mesh, case.quality_metric, going_on)
-        frame = StepFrame(step.mesh, measured, step)
+        frame = StepFrame(step.mesh, measured, step, walls=_walls(step.mesh, mesh))
         _precompute(frame)
         report(frame)
         going_on()

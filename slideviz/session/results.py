@@ -18,6 +18,7 @@ from slideviz.system.threads import in_parts
 from slideviz.terms import METRICS, SIZE_SKEW, ColorBy
 
 if TYPE_CHECKING:
+    from slideviz.mesh.walls import Walls
     from slideviz.solver.deform import Step
 
 
@@ -40,6 +41,9 @@ class StepFrame:
     """The undeformed mesh of this frame, where it is not that of the session."""
     file: Path | None = None
     """The file of the whole mesh, if only the skin is in memory."""
+    walls: Walls | None = None
+    """The layers at all boundaries, compared with those of the undeformed mesh; None where only the
+    skin is in memory."""
 
     def has(self, cell: int | None) -> bool:
         """Return whether the frame has a cell of that number, its own or of ``extra``."""

@@ -13,6 +13,7 @@ from slideviz.case.motion_words import deformation, describe, motion_labels
 from slideviz.errors import SlidevizError
 from slideviz.session.run_messages import notes_of, warnings_of
 from slideviz.session.state import Run
+from slideviz.session.walls_table import angle_change, height_ratios
 from slideviz.system.csv_table import csv_text, write_csv
 from slideviz.terms import KERNELS, METHODS, PERIODIC_MODES, SLIDING
 
@@ -233,6 +234,9 @@ COLUMNS: tuple[Column, ...] = (
     Column("minimum quality", lambda run: _of_last(run, "min"), QUALITY_FORMAT),
     Column("mean quality", lambda run: _of_last(run, "mean"), QUALITY_FORMAT),
     Column("inverted cells", lambda run: _of_last(run, "inverted"), ",d"),
+    Column("lowest first height, ratio", lambda run: height_ratios(run.last, run.case)[0], ".3f"),
+    Column("highest first height, ratio", lambda run: height_ratios(run.last, run.case)[1], ".3f"),
+    Column("largest change of a wall angle", lambda run: angle_change(run.last, run.case), ".2g"),
     Column("control nodes", control_nodes, ",d"),
     Column("largest error at control", _error, ".3g"),
     Column("periodic misfit", _misfit, ".3g"),

@@ -16,6 +16,7 @@ from slideviz.gui.widgets.theme import alarm
 from slideviz.session import changes
 from slideviz.session.state import Session
 from slideviz.session.store import Store
+from slideviz.session.walls_table import heights_words
 
 PLAY_MS = 3000
 """Duration of all steps together at speed 1, in milliseconds, unless `STEP_MS` limits it."""
@@ -279,13 +280,17 @@ def plain(rich: str) -> str:
 def result_parts(session: Session) -> list[list[str]]:
     """Return two forms of the shown step's numbers, as rich text, the longest form first.
 
-    Each form is the list of inverted cells, minimum and mean quality: in full, and with a shorter
-    word. No number has fewer decimals: it would look cut off. Empty if no mesh is open.
+    Each form is the list of inverted cells, minimum and mean quality, and of a step the ratios of
+    first heights where walls have layers: in full, and with a shorter word. No number has fewer
+    decimals: it would look cut off. Empty if no mesh is open.
     """
     frame = session.frame
     if frame is None:
         return []
     quality = frame.quality
+    run = session.run_shown
+    deformed = frame.step is not None and run is not None
+    heights = heights_words(frame, run.case) if deformed and run is not None else ""
     color = f" style='color:{alarm()}'" if quality.inverted else ""
 
     def form(word: str) -> list[str]:
@@ -293,6 +298,7 @@ def result_parts(session: Session) -> list[list[str]]:
             f"<span{color}><b>{quality.inverted:,}</b> {word}</span>",
             f"min <b>{quality.min:.4f}</b>",
             f"mean <b>{quality.mean:.4f}</b>",
+            *([f"first heights <b>{heights}</b>"] if heights else []),
         ]
 
     return [form("inverted"), form("inv.")]

@@ -1,0 +1,243 @@
+"""The panel of limits and walls: what the step must meet, and its layers before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from qtpy.QtCore import QSignalBlocker, QSize, Qt, QTimer
+from qtpy.QtGui import QBrush, QColor, QPaintEvent
+from qtpy.QtWidgets import QHeaderView, QLabel, QTreeWidget, QTreeWidgetItem
+
+from slideviz.case.limits import LimitResult, read_limits, write_limits
+from slideviz.errors import CaseError
+from slideviz.gui.widgets.build import hint_label, in_column, in_row, push_button, set_style
+from slideviz.gui.widgets.fields import TextField
+from slideviz.gui.widgets.labels import wrapped
+from slideviz.gui.widgets.panel import Panel
+from slideviz.gui.widgets.plot_canvas import ask_and_write, is_seen, words_label
+from slideviz.gui.widgets.services import folder_of
+from slideviz.gui.widgets.theme import alarm
+from slideviz.session import changes, walls_table
+from slideviz.session.limits import choose_limit
+from slideviz.session.state import IN_FILE, Session
+from slideviz.session.store import Store
+
+NAME = Qt.ItemDataRole.UserRole
+"""Item data role of the boundary, or the place of the limit, of a row."""
+EXAMPLE = "min > 0.3, inverted = 0"
+FIELD_TIP = (
+    "What the deformed mesh must meet (LIMITS): names of numbers with >, >=, <, <= or = and a "
+    "value, with commas between. `slideviz keys LIMITS` lists the names."
+)
+LIMIT_TIPS = (
+    "A click marks the cells that fail the limit with rings, and flies to the worst of them.",
+    "The number at the step that is shown, or that of the worst cell.",
+    "How many cells fail.",
+)
+"""What each column of the list of limits has."""
+ROW_HEIGHT = 20
+"""Height of a row in pixels."""
+NO_WALLS = "No boundary is a wall: all are periodic or internal."
+
+
+def _table(name: str, titles: Sequence[str], tips: Sequence[str], decorated: bool) -> QTreeWidget:
+    tree = QTreeWidget()
+    tree.setObjectName(name)
+    tree.setHeaderLabels(list(titles))
+    tree.setRootIsDecorated(decorated)
+    tree.setIndentation(12)
+    tree.setAlternatingRowColors(True)
+    tree.setUniformRowHeights(True)
+    tree.setAllColumnsShowFocus(True)
+    letters = tree.font()
+    letters.setPointSizeF(0.9 * letters.pointSizeF())
+    tree.setFont(letters)
+    header = tree.header()
+    header.setFont(letters)
+    header.setStretchLastSection(False)
+    header.setMinimumSectionSize(32)
+    header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+    for column, tip in enumerate(tips):
+        tree.headerItem().setToolTip(column, wrapped(tip))
+        if column:
+            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
+            tree.headerItem().setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
+    return tree
+
+
+def _row(texts: Sequence[str], tip: str, key: object) -> QTreeWidgetItem:
+    item = QTreeWidgetItem(list(texts))
+    item.setData(0, NAME, key)
+    item.setSizeHint(0, QSize(0, ROW_HEIGHT))
+    for column in range(len(texts)):
+        item.setToolTip(column, wrapped(tip))
+        if column:
+            item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
+    return item
+
+
+class LimitsPanel(Panel):
+    """The limits of the case, met or not at the step that is shown, and the table of its walls.
+
+    Parameters
+    ----------
+    store : Store
+    fly_to : callable
+        Moves the camera to a cell.
+    """
+
+    def __init__(self, store: Store, fly_to: Callable[[int], None]) -> None:
+        super().__init__(store)
+        self._fly_to = fly_to
+        self._walls_key: tuple[object, ...] = ()
+        self.field = TextField()
+        self.field.setObjectName("limits_text")
+        self.field.setPlaceholderText(EXAMPLE)
+        self.field.setToolTip(wrapped(FIELD_TIP))
+        self.field.editingFinished.connect(self._typed)
+        self.problem = QLabel()
+        self.problem.setWordWrap(True)
+        set_style(self.problem, "bad", True)
+        self.limits = _table("limits", ("Limit", "Now", "Cells"), LIMIT_TIPS, False)
+        self.limits.itemClicked.connect(self._limit_clicked)
+        self.hint = hint_label("Walls: worst number of each boundary, at the step that is shown.")
+        self.walls = _table("walls", walls_table.COLUMNS, walls_table.TIPS, True)
+        self.walls.itemSelectionChanged.connect(self._wall_chosen)
+        self.words = words_label()
+        self.export = push_button(
+            "Export CSV…",
+            "Write the walls with smallest, mean and largest of every number, and every digit.",
+            self._export,
+        )
+        field = in_row(QLabel("Limits"), self.field)
+        parts = (field, self.problem, self.limits, self.hint, self.walls, self.words)
+        buttons = in_row(None, self.export)
+        wide = [self.walls, self.words]
+        in_column(*parts, buttons, wide=wide, spacing=3, on=self, margins=(4, 4, 4, 4))
+        self.follow(lambda one: one.case.limits, self._show_text)
+        self.follow(lambda one: (one.limit_results, one.checked, one.limit), self._show_limits)
+        self.follow(lambda one: (one.frame, one.case.roles, one.mesh), self._show_walls)
+
+    # State to widgets ------------------------------------------------------------------
+
+    def _show_text(self, session: Session) -> None:
+        text = write_limits(session.case.limits).strip("() ")
+        if text != self.field.text():
+            self.field.setText(text)
+        self.problem.hide()
+
+    def _show_limits(self, session: Session) -> None:
+        """Fill the list of limits; a dash where one is not checked yet."""
+        limits, results = session.case.limits, session.limit_results
+        known = {} if not results else {result.limit: result for result in results}
+        with QSignalBlocker(self.limits):
+            self.limits.clear()
+            for limit in limits:
+                self.limits.addTopLevelItem(self._limit_row(str(limit), known.get(limit), session))
+        self.limits.setVisible(bool(limits) and session.frame is not None)
+        rows = self.limits.topLevelItemCount()
+        if rows:
+            height = self.limits.header().sizeHint().height() + 4
+            height += min(rows, 6) * ROW_HEIGHT
+            self.limits.setFixedHeight(height)
+        if session.checked is not None and limits and session.checked.problem:
+            self.problem.setText(session.checked.problem)
+            self.problem.show()
+
+    def _limit_row(
+        self, text: str, result: LimitResult | None, session: Session
+    ) -> QTreeWidgetItem:
+        if result is None:
+            return _row((f"   {text}", "…", ""), "It is being checked.", -1)
+        place = (session.limit_results or ()).index(result)
+        count = f"{len(result.cells):,}" if len(result.cells) else ""
+        now = "–" if result.actual != result.actual else f"{result.actual:.5g}"
+        sign, word = ("✓", "It is met.") if result.passed else ("✗", "It is not met.")
+        item = _row((f"{sign} {text}", now, count), word, place)
+        if not result.passed:
+            for column in range(3):
+                item.setForeground(column, QBrush(QColor(alarm())))
+        if session.limit == place:
+            letters = item.font(0)
+            letters.setBold(True)
+            item.setFont(0, letters)
+        return item
+
+    def _show_walls(self, session: Session) -> None:
+        """Fill the table of walls, unless the panel is behind another."""
+        frame = session.frame
+        known = frame is not None and frame.walls is not None
+        for widget in (self.hint, self.walls, self.export):
+            widget.setVisible(known)
+        self.words.setVisible(not known)
+        if not known:
+            self._walls_key = ()
+            opened = IN_FILE if session.in_file else "The walls of this mesh are not known."
+            empty = "Open a mesh first. Then this panel has its limits and walls."
+            self.words.setText(empty if session.mesh is None else opened)
+            return
+        key = (frame, session.case.roles)
+        if key == self._walls_key or not is_seen(self):
+            return
+        self._walls_key = key
+        with QSignalBlocker(self.walls):
+            self.walls.clear()
+            for row in walls_table.wall_rows(session):
+                moved = session.view.frame > 0
+                texts = (row.name, *(row.after if moved else row.before))
+                item = _row(texts, row.tip, row.name)
+                self.walls.addTopLevelItem(item)
+                if moved:
+                    item.addChild(_row(("before", *row.before), row.tip, row.name))
+                    item.addChild(_row(("change", *row.change), row.tip, row.name))
+                    item.setExpanded(row.layered)
+        if not self.walls.topLevelItemCount():
+            self.hint.setText(NO_WALLS)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        session = self.store.session
+        # While the panel was behind another tab, the table was not filled.
+        if (session.frame, session.case.roles) != self._walls_key and session.frame is not None:
+            QTimer.singleShot(0, self, lambda: self._show_walls(self.store.session))
+
+    def take_theme(self, _scheme: object) -> None:
+        """Fill the list again in the colors of another theme."""
+        self._show_limits(self.store.session)
+
+    # What the user does ----------------------------------------------------------------
+
+    def _typed(self) -> None:
+        try:
+            limits = read_limits(f"( {self.field.text()} )")
+        except CaseError as error:
+            self.problem.setText(str(error))
+            self.problem.show()
+            return
+        self.problem.hide()
+        if limits != self.store.session.case.limits:
+            self.store.change(changes.set_case, limits=limits)
+
+    def _limit_clicked(self, item: QTreeWidgetItem) -> None:
+        session, place = self.store.session, item.data(0, NAME)
+        again = place == session.limit
+        self.store.change(choose_limit, None if again or place < 0 else place)
+        chosen = self.store.session.limit_chosen
+        if chosen is not None and len(chosen.cells):
+            cell = int(chosen.cells[0])
+            self.store.change(changes.mark_cell, cell)
+            self._fly_to(cell)
+
+    def _wall_chosen(self) -> None:
+        names = {item.data(0, NAME) for item in self.walls.selectedItems()}
+        self.store.change(changes.select, tuple(names))
+
+    def _export(self) -> None:
+        session = self.store.session
+        ask_and_write(
+            self,
+            "Export the table of walls",
+            folder_of(self) / "walls.csv",
+            "Comma-separated values (*.csv)",
+            lambda path: walls_table.write_table(path, session),
+        )
