@@ -35,6 +35,7 @@ LIMIT_TIPS = (
     "How many cells fail.",
 )
 """What each column of the list of limits has."""
+RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 ROW_HEIGHT = 20
 """Height of a row in pixels."""
 NO_WALLS = "No boundary is a wall: all are periodic or internal."
@@ -61,7 +62,7 @@ def _table(name: str, titles: Sequence[str], tips: Sequence[str], decorated: boo
         tree.headerItem().setToolTip(column, wrapped(tip))
         if column:
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
-            tree.headerItem().setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
+            tree.headerItem().setTextAlignment(column, RIGHT)
     return tree
 
 
@@ -72,7 +73,7 @@ def _row(texts: Sequence[str], tip: str, key: object) -> QTreeWidgetItem:
     for column in range(len(texts)):
         item.setToolTip(column, wrapped(tip))
         if column:
-            item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
+            item.setTextAlignment(column, RIGHT)
     return item
 
 
@@ -124,6 +125,7 @@ class LimitsPanel(Panel):
         text = write_limits(session.case.limits).strip("() ")
         if text != self.field.text():
             self.field.setText(text)
+            self.field.setCursorPosition(0)
         self.problem.hide()
 
     def _show_limits(self, session: Session) -> None:
