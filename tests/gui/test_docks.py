@@ -230,7 +230,7 @@ def test_nothing_overlaps_in_a_small_window_where_boundaries_are_a_tab(start, qt
         assert run_is_seen(window)
     window.files.open_path(sample_folder / "passage" / "passage.cfg")
     qtbot.waitUntil(lambda: not window.runner.busy)
-    for dock in ("motion", "method", "worst", "curves", "sections", "display", "designs"):
+    for dock in ("motion", "method", "worst", "limits", "curves", "sections", "display", "designs"):
         window.dock_manager.bring_to_front(dock)
         settled(qtbot, window)
         assert overlaps(window) == set(), dock
@@ -311,7 +311,7 @@ def test_a_panel_is_taken_out_of_its_tab_and_put_back(start, qtbot, monkeypatch)
 
 def test_a_panel_without_a_tab_has_a_title_and_the_menu_of_a_tab_closes_it(start, qtbot):
     window = start(SMALL)
-    for name in ("worst", "curves"):
+    for name in ("worst", "limits", "curves"):
         window.docks[name].close()
     settled(qtbot, window)
     assert is_titled(window.docks["histogram"])
@@ -366,7 +366,7 @@ for _ in range(2):
 def test_no_tab_is_left_over_the_panels(tmp_path):
     call = [sys.executable, "-c", TWICE, str(tmp_path / "settings.ini")]
     done = subprocess.run(call, capture_output=True, text=True, timeout=120, check=True)
-    every = [["Histogram", "Worst cells", "Curves"], ["Motion", "Method"]]
+    every = [["Histogram", "Worst cells", "Limits", "Curves"], ["Motion", "Method"]]
     every.append(["Runs", "Sections", "Display"])
     said = done.stdout.strip().splitlines()
     assert said == [str(every)] * 4, "twice at the start, and after the layout was put back"
