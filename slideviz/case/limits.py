@@ -224,8 +224,7 @@ def check_case_limits(
     return check_limits(case.limits, MeasuredMesh(quality, mesh, reference, names))
 
 
-MET = "met"
-"""What `outcome` returns where all limits are met."""
+MET = "met"  # what `outcome` returns where all limits are met
 
 
 def outcome(results: Sequence[LimitResult]) -> str:
@@ -281,10 +280,7 @@ def require_streamed(limits: Iterable[Limit]) -> None:
 def read_limits(text: str) -> tuple[Limit, ...]:
     """Return the limits of a text like ``( min > 0.3, inverted = 0 )``; () for ``( )`` or NONE.
 
-    Raises
-    ------
-    CaseError
-        Some have mistakes; the message has a line for each.
+    Raises CaseError if some have mistakes; the message has a line for each.
     """
     inside = text.strip()
     if inside.count('"') % 2:

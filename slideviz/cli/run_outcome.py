@@ -21,10 +21,8 @@ if TYPE_CHECKING:
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
 
-CELLS = "quality of each cell"
-"""What the summary calls the file of qualities."""
-QUALITY_BYTES = 20
-"""Most bytes of a line in the file of qualities: 16 or 17 digits."""
+CELLS = "quality of each cell"  # what the summary calls the file of qualities
+QUALITY_BYTES = 20  # most bytes of a line in the file of qualities: 16 or 17 digits
 _ROWS = 1 << 18
 
 
@@ -127,12 +125,8 @@ def save_report(arguments: argparse.Namespace, report: dict) -> bool:
 def report_warnings(report: dict, folded: Folded, advice: str, *, quiet: bool) -> int:
     """Print the warnings of a run and its inverted cells to stderr; return the exit code.
 
-    Parameters
-    ----------
-    report, folded, advice
-        As `report_outcome` gets them.
-    quiet : bool
-        Leave out notes; warnings stay.
+    ``report``, ``folded``, ``advice``: as `report_outcome` gets them. ``quiet``: leave out notes;
+    warnings stay.
     """
     from slideviz.cli.report import print_remarks
     from slideviz.cli.terminal import INVERTED

@@ -84,14 +84,7 @@ class Actions:
 
 
 class ToolBar(QToolBar):
-    """The tool bar: the commands used most, the quantity to color by, and the zone.
-
-    Attributes
-    ----------
-    color, zone : Choice
-    range : QToolButton
-        Opens the menu of the color range.
-    """
+    """The tool bar: the commands used most, the quantity to color by, and the zone."""
 
     def __init__(self, window: MainWindow, actions: Actions) -> None:
         super().__init__("Tools")

@@ -46,13 +46,8 @@ class InteriorDisplacer:
 
         Raises DeformError if coordinates became infinite, or a node would go far beyond the motion,
         and MeshError if a node is outside of the sector that the skin spans in a cylindrical frame.
-
-        Parameters
-        ----------
-        nodes : (m,)
-            Their numbers in the whole mesh, ascending.
-        points : (m, d)
-            Their undeformed points.
+        ``nodes`` (m,): their numbers in the whole mesh, ascending. ``points`` (m, d): their
+        undeformed points.
         """
         frame = self.setup.frame
         start = frame.coords(points)

@@ -80,21 +80,12 @@ class ZonePlace:
 class BinaryFile:
     """An open ``.su2b`` file: reads arrays, from any thread, and makes errors that name the byte.
 
-    Attributes
-    ----------
-    name : str
-        The file, for messages.
-    width : int
-        Bytes of a count or an index, 4 or 8.
-
-    Raises
-    ------
-    MeshError
-        The file does not begin as an SU2 binary mesh.
+    Raises MeshError if the file does not begin as an SU2 binary mesh.
     """
 
     def __init__(self, path: Path, file: BinaryIO) -> None:
-        self.name, self._file, self._lock = printable(path), file, Lock()
+        self.name = printable(path)  # for messages
+        self._file, self._lock = file, Lock()
         self.size = os.fstat(file.fileno()).st_size
         """Number of bytes."""
         head = file.read(2 * _INT)
@@ -105,6 +96,7 @@ class BinaryFile:
                 f"{head[:_INT].hex(' ') or 'nothing'}; give the file the ending of its format",
             )
         self.width, sign = MAGIC[head[:_INT]]
+        """Bytes of a count or an index, 4 or 8."""
         self.order: Literal["<", ">"] = "<" if sign == "<" else ">"
         """The byte order."""
         self.zones = self.integer(_INT, "the number of zones")

@@ -212,14 +212,8 @@ def read_su2b(path: Path, zone: int | None, progress: Tick) -> Mesh:
     """Return one zone of an SU2 binary mesh.
 
     Raises MeshError if the file has a mistake; the message has its byte; and OSError if it cannot
-    be read.
-
-    Parameters
-    ----------
-    zone : int or None
-        The zone, from 1; None for the first.
-    progress : callable
-        Called with the fraction done; may raise to stop.
+    be read. ``zone``: the zone, from 1; None for the first. ``progress``: called with the fraction
+    done; may raise to stop.
     """
     with open_zone(path, zone) as (source, place):
         whole = place.cells.count + place.n_points + sum(m.elements.count for m in place.markers)

@@ -137,21 +137,9 @@ class NumberField(TextField):
 
     It shows six digits, and all of them while it is edited. An invalid text is marked at once, and
     stays when the field is left; its value is the one from before the editing (not a valid
-    beginning of what was typed), which Escape writes again.
-
-    Parameters
-    ----------
-    allowed : callable, optional
-        Returns why a value is not allowed; empty if it is.
-    words : mapping of float to str, optional
-        Texts for some values; the first letters of one are enough to type it.
-
-    Attributes
-    ----------
-    fault : str
-        Why the field is marked as invalid; empty if it is not.
-    together : str
-        Why it is invalid together with the fields beside it, set by these.
+    beginning of what was typed), which Escape writes again. ``allowed``: returns why a value is not
+    allowed; empty if it is. ``words``: texts for some values; the first letters of one are enough
+    to type it.
     """
 
     changed = Signal(float)
@@ -171,7 +159,9 @@ class NumberField(TextField):
         self._allowed = allowed or (lambda _: "")
         self._value = self._before = float(value)
         self._scale = 0.0
-        self._tip, self.fault, self.together = tip, "", ""
+        self._tip = tip
+        self.fault = ""  # why the field is marked as invalid; empty if it is not
+        self.together = ""  # why it is invalid together with the fields beside it, set by these
         self.setToolTip(wrapped(tip))
         self._whole = False
         self._twice_ms = float("-inf")

@@ -152,11 +152,6 @@ class PlotCanvas(QWidget):
     drawing : callable
         Returns a function that fills a figure with the present data. It is called in the GUI
         thread; the function it returns is called in another one, and must not use widgets.
-
-    Attributes
-    ----------
-    figure : Figure
-        The figure that is shown; its axes convert between data and pixels.
     """
 
     drawn = Signal()
@@ -189,7 +184,7 @@ class PlotCanvas(QWidget):
 
     @property
     def figure(self) -> Figure:
-        """Return the figure that is shown."""
+        """Return the figure that is shown; its axes convert between data and pixels."""
         return self._picture.figure
 
     @property
