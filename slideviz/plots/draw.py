@@ -12,35 +12,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from slideviz.plots.histogram import histogram
-from slideviz.plots.series import GreedyRun, Outcome, QualityRun, StepRun
-from slideviz.plots.style import (
-    ON_DARK,
-    ON_LIGHT,
-    PRINT,
-    Style,
-    add_legend,
-    series_number,
-    style_axes,
-)
+from slideviz.plots.series import GreedyRun, Outcome, StepRun
+from slideviz.plots.style import PRINT, Style, add_legend, series_number, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = [
-    "ON_DARK",
-    "ON_LIGHT",
-    "PRINT",
-    "GreedyRun",
-    "Outcome",
-    "QualityRun",
-    "StepRun",
-    "Style",
-    "against_steps",
-    "convergence",
-    "histogram",
-    "quality_by_step",
-]
 
 What = Literal["minimum", "mean", "seconds", "control_nodes", "max_error"]
 

@@ -12,11 +12,10 @@ import numpy as np
 from slideviz.case.motion_words import deformation
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import FINE, INVERTED
-from slideviz.plots.draw import GreedyRun, StepRun
 from slideviz.plots.histogram import draw_distribution
 from slideviz.plots.section_curve import Colors, CurveRow, curve_of, position_label
 from slideviz.plots.section_paint import Paint
-from slideviz.plots.series import Bars, Distribution, Outline
+from slideviz.plots.series import Bars, Distribution, GreedyRun, Outline, StepRun
 from slideviz.plots.spanwise import Profile, along, along_radius
 from slideviz.plots.style import Style
 from slideviz.plots.ticks import rounded_out

@@ -14,8 +14,10 @@ from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.quality import INVERTED
-from slideviz.plots import draw as plots
+from slideviz.plots.draw import against_steps, convergence, quality_by_step
 from slideviz.plots.figure_io import empty_figure, write_figure
+from slideviz.plots.histogram import histogram
+from slideviz.plots.series import GreedyRun, Outcome, QualityRun, StepRun
 from slideviz.plots.spanwise import Profile, along, along_radius, spanwise
 from slideviz.plots.style import PRINT
 from slideviz.plots.ticks import rounded_out
@@ -175,13 +177,13 @@ def save_figure(
 _Draw = Callable[["Axes", Sequence[FacetLine]], None]
 
 
-def _outcomes(lines: Sequence[FacetLine]) -> list[plots.Outcome]:
+def _outcomes(lines: Sequence[FacetLine]) -> list[Outcome]:
     """Return the results of lines as plots against steps take them."""
     outcomes = []
     for line in lines:
         result = result_of(line)
         outcomes.append(
-            plots.Outcome(
+            Outcome(
                 line.label,
                 result.steps,
                 result.quality.min,
@@ -197,15 +199,15 @@ def _outcomes(lines: Sequence[FacetLine]) -> list[plots.Outcome]:
 
 
 def _minimum(axes: Axes, lines: Sequence[FacetLine]) -> None:
-    plots.against_steps(axes, _outcomes(lines), "minimum", _QUIET)
+    against_steps(axes, _outcomes(lines), "minimum", _QUIET)
 
 
 def _mean(axes: Axes, lines: Sequence[FacetLine]) -> None:
-    plots.against_steps(axes, _outcomes(lines), "mean", _QUIET)
+    against_steps(axes, _outcomes(lines), "mean", _QUIET)
 
 
 def _seconds(axes: Axes, lines: Sequence[FacetLine]) -> None:
-    plots.against_steps(axes, _outcomes(lines), "seconds", _QUIET)
+    against_steps(axes, _outcomes(lines), "seconds", _QUIET)
 
 
 def _histogram(every: Sequence[FacetLine]) -> _Draw:
@@ -215,11 +217,10 @@ def _histogram(every: Sequence[FacetLine]) -> _Draw:
 
     def draw(axes: Axes, lines: Sequence[FacetLine]) -> None:
         runs = [
-            plots.QualityRun(line.label, _values(line), _inverted(line), line.series)
-            for line in lines
+            QualityRun(line.label, _values(line), _inverted(line), line.series) for line in lines
         ]
         # Logarithmic: few bad cells matter among many good ones.
-        plots.histogram(axes, runs, edges=edges, log=True, style=_QUIET)
+        histogram(axes, runs, edges=edges, log=True, style=_QUIET)
 
     return draw
 
@@ -239,8 +240,8 @@ def _by_step(axes: Axes, lines: Sequence[FacetLine]) -> None:
     for line in lines:
         result = result_of(line)
         numbers = np.arange(1, result.steps + 1)
-        runs.append(plots.StepRun(line.label, numbers, result.minimum, result.mean, line.series))
-    plots.quality_by_step(axes, runs, _QUIET)
+        runs.append(StepRun(line.label, numbers, result.minimum, result.mean, line.series))
+    quality_by_step(axes, runs, _QUIET)
 
 
 def _convergence(axes: Axes, lines: Sequence[FacetLine]) -> None:
@@ -250,7 +251,7 @@ def _convergence(axes: Axes, lines: Sequence[FacetLine]) -> None:
             continue
         cycles = [cycle for step, cycle in result_of(line).history if step == 1]
         runs.append(
-            plots.GreedyRun(
+            GreedyRun(
                 line.label,
                 np.array([cycle.control_nodes for cycle in cycles]),
                 np.array([cycle.error for cycle in cycles]),
@@ -259,7 +260,7 @@ def _convergence(axes: Axes, lines: Sequence[FacetLine]) -> None:
                 line.series,
             )
         )
-    plots.convergence(axes, runs, style=_QUIET)
+    convergence(axes, runs, style=_QUIET)
 
 
 def _span(make: Profiler, what: Literal["minimum", "mean"]) -> _Draw:

@@ -8,19 +8,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from slideviz.plots.draw import (
-    ON_DARK,
-    ON_LIGHT,
-    PRINT,
-    GreedyRun,
-    Outcome,
-    QualityRun,
-    StepRun,
-    against_steps,
-    convergence,
-    histogram,
-    quality_by_step,
-)
+from slideviz.plots.draw import against_steps, convergence, quality_by_step
+from slideviz.plots.histogram import histogram
+from slideviz.plots.series import GreedyRun, Outcome, QualityRun, StepRun
+from slideviz.plots.style import ON_DARK, ON_LIGHT, PRINT
 
 
 @pytest.fixture

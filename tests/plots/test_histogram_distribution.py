@@ -8,10 +8,10 @@ from matplotlib.patches import Rectangle, StepPatch
 
 from slideviz.color_scheme import PAPER
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.plots.draw import ON_DARK, PRINT
 from slideviz.plots.histogram import BAND, draw_distribution
 from slideviz.plots.series import Bars, Distribution, Outline
 from slideviz.plots.session_plots import BINS, distribution
+from slideviz.plots.style import ON_DARK, PRINT
 from slideviz.session.state import StepFrame
 
 

@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.mesh.quality import quality
-from slideviz.plots.draw import ON_LIGHT
 from slideviz.plots.session_plots import MOST_COMPARED, FrameCounts, compared, draw_histogram
+from slideviz.plots.style import ON_LIGHT
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.state import Run, StepFrame

@@ -24,8 +24,8 @@ from slideviz.gui.responsiveness.timers import LOOK_MS, MOST_REST, REST_MS, REST
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import hint_label
 from slideviz.gui.widgets.services import folder_of, main_window
-from slideviz.plots.draw import PRINT, Style
 from slideviz.plots.figure_io import figure_bytes
+from slideviz.plots.style import PRINT, Style
 from slideviz.system.atomic import atomic_write
 
 DPI = 100  # resolution of a figure on a screen with a device pixel ratio of 1
