@@ -151,7 +151,7 @@ class InvertedLayer(Layer):
         if limit is not None:
             first = len(frame.mesh.cells) if frame.extra is not None else 0
             cells = np.sort(limit.cells[limit.cells >= first]) - first
-            count, word, color = len(limit.cells), f"not {limit.limit}", SELECTED_COLOR
+            count, word, color = len(limit.cells), "fail", SELECTED_COLOR
         if cut:
             cells = cells[np.isin(cells, np.concatenate(cut))]
             count = len(cells)
