@@ -40,8 +40,10 @@ def with_drawable_colors(session: Session) -> Session:
 
 def usual_range(session: Session) -> str:
     """Return the default color range in words."""
-    far = session.view.color_by == "displacement"
-    return "0 to the largest of all runs" if far else "0 to 1"
+    if session.view.color_by == "displacement":
+        return "0 to the largest of all runs"
+    low, high = set_view(session, color_range=None).color_range
+    return f"{low:g} to {high:g}"
 
 
 def _limits(session: Session, every: bool) -> tuple[float, float] | None:

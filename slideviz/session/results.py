@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -81,9 +82,21 @@ class StepFrame:
         status = self.quality.status if cells is None else self.quality.status[cells]
         return np.where(status == INVERTED, np.nan, self.values(what, undeformed, cells))
 
+    def largest(self, what: ColorBy, undeformed: Mesh) -> float:
+        """Return the largest finite value of a quantity in all cells, 0 where there is none."""
+        known = _LARGEST.setdefault(self, {})
+        if what not in known:
+            values = self.values(what, undeformed)
+            known[what] = float(values[np.isfinite(values)].max(initial=0.0))
+        return known[what]
+
     def largest_displacement(self, undeformed: Mesh) -> float:
         """Return the largest displacement of a node, in the mesh's length unit."""
         return largest_displacement(self.mesh.points, undeformed.points)
+
+
+_LARGEST: WeakKeyDictionary[StepFrame, dict[ColorBy, float]] = WeakKeyDictionary()
+"""Results of `StepFrame.largest`."""
 
 
 @dataclass(frozen=True, eq=False)

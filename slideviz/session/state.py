@@ -15,7 +15,7 @@ from slideviz.case.model import Case
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.session.results import CheckedLimits, Run, StepFrame, cell_displacement
-from slideviz.terms import SHOWN, ColorBy, PointsShown, Role, Shown
+from slideviz.terms import METRICS, SHOWN, ColorBy, PointsShown, Role, Shown
 
 if TYPE_CHECKING:
     from slideviz.case.limits import LimitResult
@@ -268,9 +268,16 @@ class Session:
         """Return the values at the ends of the color bar."""
         if self.view.color_range is not None:
             return self.view.color_range
-        if self.view.color_by != "displacement":
+        what = self.view.color_by
+        if what == "role":
             return 0.0, 1.0
-        return 0.0, round_up(self.largest_displacement) or 1.0
+        if what == "displacement":
+            return 0.0, round_up(self.largest_displacement) or 1.0
+        low, high = METRICS[what].colors or METRICS[what].range
+        if high == np.inf and self.mesh is not None:
+            ends = {self.frames[0], self.frames[-1]}
+            high = round_up(max(frame.largest(what, self.mesh) for frame in ends))
+        return low, high if low < high < np.inf else low + 1.0
 
     @cached_property
     def largest_displacement(self) -> float:

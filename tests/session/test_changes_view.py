@@ -389,3 +389,15 @@ def test_invalid_fields_of_two_panels_do_not_change_in_turns(session):
     assert changes.set_invalid(both, "motion", ("a",)) is both
     assert changes.set_invalid(both, "method", ("b",)) is both
     assert changes.set_invalid(both, "motion", ()).invalid == (("method", "b"),)
+
+
+def test_the_color_range_of_a_metric_is_that_of_its_values(square):
+    session = open_mesh(StepFrame(square, quality(square)), None)
+    for what, expected in (("skew", (0, 1)), ("orthogonality", (0, 90)), ("skewness", (0, 4))):
+        assert changes.set_view(session, color_by=what).color_range == expected
+    low, high = changes.set_view(session, color_by="expansion").color_range
+    assert low == 1
+    stretched = square.with_points(np.exp(3 * square.points))
+    frame = StepFrame(stretched, quality(stretched, square))
+    session = changes.add_frames(changes.start_run(session), [frame])
+    assert changes.set_view(session, color_by="expansion").color_range[1] > high
