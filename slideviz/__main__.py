@@ -8,10 +8,7 @@ import os
 import signal
 import sys
 
-_ENDS = {
-    signal.SIGINT: "cancelled",
-    signal.SIGTERM: "ended by SIGTERM",
-}
+_ENDS = {signal.SIGINT: "cancelled", signal.SIGTERM: "ended by SIGTERM"}
 """Signals that end any command at any moment, with words for a message; the exit code is 128 plus
 the number of the signal."""
 if hasattr(signal, "SIGHUP"):  # Windows has none

@@ -232,7 +232,7 @@ SECTION_SHAPES = {
                     flat="Show the cone unrolled, its apex at 0, beside the 3D view.",
                     flat_name="Unrolled",
                     look="Look at the cone from outside, at the middle of the cells that it cuts.",
-                ),
+                )
             },
         ),
     )

@@ -34,9 +34,7 @@ def add_compare(calls: argparse._SubParsersAction) -> None:
     )
     add_shared(call, "case")
     call.add_argument(
-        "--methods",
-        metavar="LIST",
-        help="of none,ps,ds,idw,elastic, or all (default: none,ps,ds)",
+        "--methods", metavar="LIST", help="of none,ps,ds,idw,elastic, or all (default: none,ps,ds)"
     )
     call.add_argument(
         "--periodic",

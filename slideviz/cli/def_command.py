@@ -139,14 +139,7 @@ def _run_def(arguments: argparse.Namespace) -> int:
     seconds["total"] = time.perf_counter() - begin
     folded = folded_cells(steps, mesh, measured)
     report = run_report(
-        case,
-        mesh,
-        steps,
-        seconds,
-        quality=measured,
-        undeformed=before,
-        folded=folded,
-        walls=layers,
+        case, mesh, steps, seconds, quality=measured, undeformed=before, folded=folded, walls=layers
     )
     advice = advice_for(case, steps[-1].layers, mesh, measured, report["limits"])
     report["design"] = {
@@ -178,11 +171,7 @@ def variable_rows(surface: MovingSurface) -> list[dict[str, Any]]:
     """Return the entry of the report for each value of the design variables."""
     variables, idle = surface.config.variables, surface.idle
     return [
-        {
-            "kind": variables[place].kind,
-            "value": variables[place].values[part],
-            "idle": idle[place],
-        }
+        {"kind": variables[place].kind, "value": variables[place].values[part], "idle": idle[place]}
         for place, part in surface.values
     ]
 

@@ -42,10 +42,7 @@ SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
         ("-q", "--quiet"),
         {"action": "store_true", "help": "print nothing but warnings and errors"},
     ),
-    "json": (
-        ("--json",),
-        {"type": Path, "metavar": "FILE", "help": "as JSON; - is the terminal"},
-    ),
+    "json": (("--json",), {"type": Path, "metavar": "FILE", "help": "as JSON; - is the terminal"}),
     "stream": (
         ("--stream",),
         {"action": "store_true", "help": "for meshes larger than memory (SU2)"},

@@ -43,12 +43,7 @@ def sample(arguments: argparse.Namespace) -> int:
         return DONE
     folder = arguments.output or Path(arguments.name)
     paths = write_sample(
-        arguments.name,
-        folder,
-        arguments.size,
-        arguments.variant,
-        arguments.force,
-        arguments.format,
+        arguments.name, folder, arguments.size, arguments.variant, arguments.force, arguments.format
     )
     for path in paths:
         print(path)

@@ -69,10 +69,7 @@ class MainWindow(Services):
     """
 
     def __init__(
-        self,
-        settings: QSettings | None = None,
-        multi_samples: int = 4,
-        kept: Path | None = None,
+        self, settings: QSettings | None = None, multi_samples: int = 4, kept: Path | None = None
     ) -> None:
         super().__init__()
         self.settings = settings or QSettings("slideviz", "slideviz")

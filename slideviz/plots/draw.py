@@ -99,10 +99,7 @@ def convergence(
 
 
 def against_steps(
-    axes: Axes,
-    rows: Sequence[Outcome],
-    what: What = "minimum",
-    style: Style = PRINT,
+    axes: Axes, rows: Sequence[Outcome], what: What = "minimum", style: Style = PRINT
 ) -> None:
     """Draw results of runs against their number of steps, a line for each label.
 

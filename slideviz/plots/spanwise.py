@@ -78,12 +78,7 @@ def along_radius(
     """
     local = in_axis_frame(mesh.points, axis, origin)
     return _profile(
-        mesh,
-        values,
-        np.hypot(local[:, 0], local[:, 1]),
-        coordinate="r",
-        layers=layers,
-        label=label,
+        mesh, values, np.hypot(local[:, 0], local[:, 1]), coordinate="r", layers=layers, label=label
     )
 
 

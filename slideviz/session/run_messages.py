@@ -9,12 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.case.keys import KEYS
-from slideviz.case.model import (
-    Case,
-    FromFile,
-    Motion,
-    applies_to,
-)
+from slideviz.case.model import Case, FromFile, Motion, applies_to
 from slideviz.errors import Note
 from slideviz.mesh.model import Mesh
 from slideviz.session.state import PanelPlace, Run, Session

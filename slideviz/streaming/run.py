@@ -281,12 +281,7 @@ def about_run(case: Case) -> str:
     """
     path = case.mesh_file
     assert path is not None
-    text = repr(
-        (
-            __version__,
-            replace(case, mesh_out=None, view={}, warnings=()),
-        )
-    )
+    text = repr((__version__, replace(case, mesh_out=None, view={}, warnings=())))
     for file in sorted(case.inputs()):
         if file not in (path, case.source):
             text += hashlib.sha256(file.read_bytes()).hexdigest()
@@ -306,8 +301,7 @@ def _steps_of_whole_mesh(displacer: InteriorDisplacer, farthest: Farthest) -> tu
     steps = (*displacer.steps[:-1], replace(last, warnings=(*last.warnings, *stray)))
     return tuple(
         replace(
-            step,
-            node_counts={**step.node_counts, "internal": step.node_counts["internal"] + more},
+            step, node_counts={**step.node_counts, "internal": step.node_counts["internal"] + more}
         )
         for step in steps
     )

@@ -109,11 +109,7 @@ def _streamable(path: Path, zone: int | None, tick: Tick) -> Text:
 
 @contextmanager
 def open_read_only(
-    path: Path,
-    zone: int | None,
-    tick: Tick,
-    folder: Path,
-    file_format: FileFormat | None = None,
+    path: Path, zone: int | None, tick: Tick, folder: Path, file_format: FileFormat | None = None
 ) -> Iterator[StreamInput]:
     """Context with a mesh that is only read; the binary copy of a text is in ``folder``.
 

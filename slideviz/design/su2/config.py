@@ -52,10 +52,7 @@ def radial_keys(rows: Mapping[str, Entry]) -> set[str]:
 
 
 def radial_settings(
-    case: Case,
-    rows: Mapping[str, Entry],
-    note: Callable[[Entry, str], None],
-    warnings: list[str],
+    case: Case, rows: Mapping[str, Entry], note: Callable[[Entry, str], None], warnings: list[str]
 ) -> Case:
     """Return the case with SU2's settings of radial functions, where slideviz's own are not given.
 

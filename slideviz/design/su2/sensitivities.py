@@ -175,10 +175,7 @@ def sensitivity_file(config: Su2Config) -> Path:
 
 
 def match(
-    found: Sensitivities,
-    mesh: Mesh,
-    moving: IntArray,
-    design: Callable[[], FloatArray] | None,
+    found: Sensitivities, mesh: Mesh, moving: IntArray, design: Callable[[], FloatArray] | None
 ) -> Matched:
     """Return sensitivities in the order of the mesh's points, and whether they are at the design.
 

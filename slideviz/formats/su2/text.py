@@ -207,8 +207,7 @@ class _Walk:
             meant = misspelt(self.sections, key)
             why = "" if meant else "; perhaps the file is cut off, so write it again" + remedy
             raise self.lines.error(
-                self.bounds.end - 1,
-                f"the mesh ends here, but has no line {key}={meant}{why}",
+                self.bounds.end - 1, f"the mesh ends here, but has no line {key}={meant}{why}"
             )
         if len(matches) > 1:
             raise self.lines.error(

@@ -206,10 +206,7 @@ PointsOf = Callable[[int, int], FloatArray]
 
 
 def text_of_parts(
-    dim: int,
-    cells: tuple[int, CellsOf],
-    points: tuple[int, PointsOf],
-    markers: Sequence[Marker],
+    dim: int, cells: tuple[int, CellsOf], points: tuple[int, PointsOf], markers: Sequence[Marker]
 ) -> Iterator[bytes]:
     """Yield the SU2 file of a mesh whose parts are made by functions, called from several threads.
 

@@ -28,11 +28,7 @@ from slideviz.session import changes
 from slideviz.session.state import IN_FILE, Session
 from slideviz.session.store import Store
 
-KINDS = {
-    "steps": "Quality by step",
-    "greedy": "Convergence",
-    "span": "Along the span",
-}
+KINDS = {"steps": "Quality by step", "greedy": "Convergence", "span": "Along the span"}
 """The plots that can be chosen."""
 
 TIPS = {

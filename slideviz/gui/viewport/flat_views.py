@@ -334,11 +334,7 @@ class CurveView(QWidget):
 
 
 def _draw(
-    rows: Sequence[CurveRow],
-    labels: tuple[str, str],
-    colors: Colors,
-    figure: Figure,
-    style: Style,
+    rows: Sequence[CurveRow], labels: tuple[str, str], colors: Colors, figure: Figure, style: Style
 ) -> None:
     if rows:
         draw_curves(figure.add_subplot(), rows, labels, style, colors)

@@ -118,11 +118,7 @@ class Banner(QFrame):
             self.hide()
 
     def ask(
-        self,
-        text: str,
-        answers: Answers,
-        full: str = "",
-        later: Callable[[], object] | None = None,
+        self, text: str, answers: Answers, full: str = "", later: Callable[[], object] | None = None
     ) -> None:
         """Show a question, with a button for each of ``answers``, which calls its function.
 
