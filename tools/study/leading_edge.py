@@ -15,6 +15,7 @@ import numpy as np
 import slideviz as sv
 from slideviz.mesh.walls import find_columns
 from slideviz.plots.figure_io import empty_figure
+from tools.shots import shrink
 from tools.study.contest import METHODS, TURNED_BY, turned_row
 
 PANELS = {
@@ -24,7 +25,7 @@ PANELS = {
     "auto": "Relaxed, layers kept",
 }
 """Methods of the contest, and the titles of their panels."""
-INCHES, DPI = (10.0, 3.0), 200
+INCHES, DPI = (10.0, 3.0), 160
 LOW, HIGH = 0.8, 1.2
 """Ratios of heights at the ends of the color scale."""
 LAYERS = 30
@@ -45,14 +46,13 @@ def draw(path: Path, size: int = 20_000) -> Path:
     for panel, (method, title) in zip(axes, PANELS.items(), strict=True):
         moved, label = mesh, f"first heights 1\n{len(mesh.cells):,} cells"
         if method != "undeformed":
-            *_, last = sv.deform(
-                case.change(**{k: v for k, v in METHODS[method].items() if hasattr(case, k)}), mesh
-            )
+            *_, last = sv.deform(case.change(**METHODS[method]), mesh)
             moved = last.mesh.with_points((last.mesh.points - centre) @ turn + centre)
             wall = sv.walls(last.mesh, mesh, ["BLADE"]).summary()["BLADE"]
             ratio, angle = wall["height_ratio"], wall["angle_change"]["max"]
+            low, high = f"{ratio['min']:.2f}", f"{ratio['max']:.2f}"
             label = (
-                f"first heights × {ratio['min']:.2f} to {ratio['max']:.2f}\n"
+                f"first heights × {low}{f' to {high}' if low != high else ''}\n"
                 f"first edges turned by up to {angle:.{0 if angle > 1 else 1}f}°"
             )
         image = _panel(panel, moved, _ratios(columns, mesh, moved))
@@ -64,6 +64,7 @@ def draw(path: Path, size: int = 20_000) -> Path:
     bar.set_label("height of the layers' cells, after / before", fontsize=9)
     bar.ax.tick_params(labelsize=9)
     figure.savefig(path)
+    shrink(path)
     return path
 
 
