@@ -274,7 +274,8 @@ def idle_settings(case: Case) -> tuple[str, ...]:
     idle = [
         _with_switch(key, case)
         for key in KEYS.values()
-        if key.method not in (None, case.method) and key.get(case) not in (key.get(usual), "NO")
+        if key.method not in (None, case.method)
+        and key.get(case) not in (key.get(usual), "NO", "auto")
     ]
     notes = [_SLIDES[case.method, case.sliding]] if (case.method, case.sliding) in _SLIDES else []
     if idle:

@@ -176,3 +176,33 @@ def test_the_numbering_does_not_matter():
     points = deformed(mesh, motion, **settings)[1].mesh.points
     shuffled = deformed(other, motion, **settings)[1].mesh.points
     np.testing.assert_allclose(shuffled, points[order], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("motion", ["turned", "stretched", "twisted"])
+def test_in_3d_with_nodes_that_slide_on_hub_and_shroud(motion):
+    """Nodes of the zone on hub and shroud slide as the wall takes them."""
+    mesh = builders.layered_cylinder(10, 24, 1e-3)
+    nodes = mesh.marker("wall").nodes
+    x = mesh.points[nodes]
+    angle = np.radians(8.0 if motion == "turned" else 8.0 * x[:, 2] * (motion == "twisted"))
+    c, s = np.cos(angle), np.sin(angle)
+    turned = np.stack([c * x[:, 0] - s * x[:, 1], s * x[:, 0] + c * x[:, 1], x[:, 2]], axis=1)
+    turned[:, 0] *= 1.1 if motion == "stretched" else 1.0
+    roles = {"wall": "moving", "hub": "sliding", "shroud": "sliding"}
+    case = Case(
+        roles=roles,
+        motions=(Prescribed(nodes, turned - x, "wall"),),
+        sliding="ps",
+        layers="auto",
+        steps=2,
+    )
+    setup = make_setup(case, mesh)
+    assert len(setup.zone.sliding) >= 48
+    *_, last = sv.deform(case, mesh)
+    walls = sv.walls(last.mesh, mesh).summary()["wall"]
+    assert walls["height_ratio"]["min"] > 0.999
+    assert walls["height_ratio"]["max"] < 1.001
+    assert walls["angle_change"]["max"] < 0.5
+    for name in ("hub", "shroud"):
+        on = mesh.marker(name).nodes
+        assert np.array_equal(last.mesh.points[on, 2], mesh.points[on, 2])
