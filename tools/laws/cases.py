@@ -44,7 +44,11 @@ def random_run(seed: int) -> Run:
     settings["curved"] = bool(rng.random() < 0.3)
     if rng.random() < 0.1:
         settings["feature_angle_deg"] = float(rng.uniform(10, 80))
-    case = Case(roles=roles, motions=_motions(rng, made.mesh, moving, period), **settings)
+    motions = _motions(rng, made.mesh, moving, period)
+    if rng.random() < 0.2:
+        thickness = float(rng.uniform(0.02, 0.3)) * made.mesh.extent
+        settings |= {"layers": "keep", "layer_thickness": thickness}
+    case = Case(roles=roles, motions=motions, **settings)
     return Run(seed, made, case, period)
 
 

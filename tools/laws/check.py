@@ -21,6 +21,7 @@ PLAIN = (
     "kernel",
     "influence_factor",
     "curved",
+    "layers",
     "feature_angle_deg",
     "method",
     "sliding",

@@ -182,14 +182,15 @@ def out_of_reach_keep_every_bit(run: Run, steps: list[Step]) -> Iterator[str]:
     """Yield which node moved though no support can reach it.
 
     Moving nodes reach others of the boundary by the support radius, these again others, and so on;
-    the correction reaches as far as its factor times the largest error.
+    the correction reaches as far as its factor times the largest error, walls with layers as far as
+    these are thick.
     """
     case, mesh, radius = run.case, run.mesh, steps[-1].support_radius
     if radius is None or run.period is not None or not KERNELS[case.kernel].compact:
         return
     gamma = GAMMA if case.reduction is None else case.reduction.gamma
     way = np.abs([step.mesh.points - mesh.points for step in steps]).max(axis=0)
-    reach = max(radius, gamma * max(step.max_error for step in steps))
+    reach = max(radius, gamma * max(step.max_error for step in steps), case.layer_thickness)
     reach = 1.001 * reach + 4.0 * float(way.max())
     if reach > np.linalg.norm(np.ptp(mesh.points, axis=0)):
         return
