@@ -250,6 +250,10 @@ def applies_to(motion: Motion, marker: str) -> bool:
     return not motion.marker or marker in named(motion.marker)
 
 
+NEW: dict[str, Any] = {"relax": "auto", "layers": "auto"}
+"""Settings of new cases where those of a file without their keys are others, for its results."""
+
+
 @dataclass(frozen=True)
 class Case(CheckedFields):
     """A deformation case, the content of a ``.cfg`` file.

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from slideviz.case.model import BoxMotion, Case
+from slideviz.case.model import NEW, BoxMotion, Case
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.rbf.reduction import Reduction
@@ -149,7 +149,7 @@ def _is_box(mesh: Mesh, pairs: Sequence[Pair]) -> bool:
 def guess_case(mesh: Mesh, guesses: dict[str, Guess], pairs: Sequence[Pair]) -> Case:
     """Return the case with the guessed roles; periodic where a pair of periodic ones matches."""
     roles = {name: guesses[name].role if name in guesses else "fixed" for name in mesh.marker_names}
-    case = Case(roles=roles, zone=mesh.zone if mesh.zones > 1 else None)
+    case = Case(roles=roles, zone=mesh.zone if mesh.zones > 1 else None, **NEW)
     if "sliding" in roles.values():
         # Without a sliding method the role would have no effect.
         case = case.change(sliding="ps", steps=STEPS)
