@@ -32,6 +32,10 @@ ELASTIC_BYTES = {2: 2_000, 3: 8_000}
 quadrilaterals and hexahedra, whose matrix has the most entries."""
 
 
+RELAX_BYTES = 3_000
+"""Bytes of memory that relaxation takes for each node: measured on hexahedra."""
+
+
 @check_types
 def deform(
     case: Case,
@@ -184,6 +188,12 @@ def require_memory(setup: Setup, case: Case, *, lasting: bool = False) -> None:
             ELASTIC_BYTES[setup.coords.shape[1]] * len(setup.coords),
             f"linear elasticity of {len(setup.coords)} nodes needs",
             "use METHOD= rbf with DATA_REDUCTION= YES, METHOD= idw, or a coarser mesh",
+        )
+    if setup.relaxation is not None:
+        _require_free(
+            RELAX_BYTES * len(setup.coords),
+            f"relaxation of {len(setup.coords)} nodes needs",
+            "use RELAX= NO, or a coarser mesh",
         )
     if case.method != "rbf" or setup.reduction is not None:
         return  # nothing is dense; the selection keeps no matrix of all candidates

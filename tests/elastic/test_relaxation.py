@@ -13,7 +13,8 @@ from slideviz.cli import run
 from slideviz.elastic import relaxation
 from slideviz.elastic.laplacian import LaplacianCycle, laplacian
 from slideviz.elastic.stiffness import blocks
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, DeformError
+from slideviz.session.opening import guess_case, guess_roles
 from slideviz.solver.setup import RELAXED_CELLS
 from tests import builders
 
@@ -153,3 +154,17 @@ def test_the_report_says_how_the_mesh_was_relaxed(tmp_path, capsys):
     assert set(report) == {"rounds", "residual", "theta", "limited"}
     with pytest.raises(CaseError, match="RELAX= YES has no derivatives"):
         sv.Deformer(mesh, case)
+
+
+def test_relaxation_asks_for_memory_before_it_begins(monkeypatch):
+    mesh, case = airfoil(relax="yes")
+    monkeypatch.setattr("slideviz.solver.deform.free_memory", lambda: 1000.0)
+    with pytest.raises(DeformError, match=r"relaxation of 440 nodes needs .* use RELAX= NO"):
+        last(case, mesh)
+
+
+def test_cases_that_the_window_begins_are_relaxed():
+    mesh = builders.airfoil(8, 2)
+    case = guess_case(mesh, guess_roles(mesh), ())
+    assert (case.relax, case.layers) == ("auto", "auto")
+    assert (sv.Case().relax, sv.Case().layers) == ("no", "no")
