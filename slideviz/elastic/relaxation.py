@@ -113,7 +113,7 @@ class Relaxation:
             )
             start = self.body.frame.coords(self.mesh.points)
             free = self._conditions(problem, start, held, constraints).free
-            kept = self._kept(problem, given.place, free, tick)
+            kept = self._prepared(problem, given.place, free, tick)
             moved, residual = self._iterated(problem, displacement, kept, given, tie, tick)
             theta: FloatArray = problem.choose(
                 "theta", lambda: self._kept_part(problem, displacement, moved, tie)
@@ -130,7 +130,7 @@ class Relaxation:
         there = replace(problem, coords=at, normal_nodes=nodes, normals=normals)
         return conditions(there, self.body, held, np.zeros((len(held), at.shape[1])))
 
-    def _kept(self, problem: Problem, place: IntArray, free: FloatArray, tick: Tick) -> _Kept:
+    def _prepared(self, problem: Problem, place: IntArray, free: FloatArray, tick: Tick) -> _Kept:
         """Return what is kept of this mesh, with the preconditioner for these conditions.
 
         ``place`` (n,) and ``free`` (k, d, d) are those of undeformed conditions.
@@ -338,7 +338,7 @@ def _size(
 class _Unknowns:
     """Maps between unknowns (k, d) and vectors of nodes (n, d), as conditions have them."""
 
-    given: Conditions
+    conditions: Conditions
     inside: IntArray
     """Nodes with unknowns."""
     owner: IntArray
@@ -362,19 +362,19 @@ class _Unknowns:
 
     def within(self, unknown: Array) -> Array:
         """Return unknowns (k, d) without their part in directions that are held."""
-        free = transform(self.given.free[self.held], take(unknown, self.held))
+        free = transform(self.conditions.free[self.held], take(unknown, self.held))
         return put(unknown, self.held, free)
 
     def moved(self, unknown: Array) -> Array:
         """Return the Cartesian displacement (n, d) of unknowns (k, d); zero for known nodes."""
-        given = self.given
+        given = self.conditions
         nothing = np.zeros_like(given.known)
         out = put(nothing, self.inside, take(unknown, given.place[self.inside]), overwrite=True)
         return put(out, self.turned, transform(given.turn[self.turned], take(out, self.turned)))
 
     def collected(self, forces: Array) -> Array:
         """Return the forces (k, d) on the unknowns, of forces (n, d) on nodes."""
-        given = self.given
+        given = self.conditions
         back = np.swapaxes(given.turn[self.turned], 1, 2)
         forces = put(forces, self.turned, transform(back, take(forces, self.turned)))
         return add_at(take(forces, self.owner), given.place[self.others], take(forces, self.others))
