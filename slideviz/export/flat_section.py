@@ -207,7 +207,9 @@ def section(
     painted = replace(paint(mesh, measured, color, reference), color_map=color_map)
     cutter = Cutter.of(mesh)
     pieces = show_passages(cutter, mesh.points, at, matrices)
-    note = "" if reference is not None or painted.label == "skew" else NO_REFERENCE
+    note = (
+        "" if reference is not None or painted.label not in ("size-skew", "size") else NO_REFERENCE
+    )
     around = surroundings(cutter, mesh.points, matrices)
     shown = SectionInRun(pieces, painted, around, note=note)
     if not shown.drawn:
@@ -215,7 +217,7 @@ def section(
         raise CaseError(f"{mesh.name}: the {at.describe(mesh.dim)} {why}")
     if color_range:
         shown = replace(shown, paint=painted.within(*color_range))
-    elif painted.label == "displacement":
+    elif painted.unbounded:
         shown = replace(shown, paint=painted.up_to(shown.ids))
     style = style or SectionStyle(trimmed=True, name=Path(mesh.name).name)
     section_picture([shown], at, path, style)

@@ -15,7 +15,7 @@ from slideviz.gui.widgets.build import tool_button
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.command import CommandState, Menu, colored_by_value
 from slideviz.session import changes
-from slideviz.session.colors import NO_DISPLACEMENT, lacks_displacement
+from slideviz.session.colors import not_drawable
 from slideviz.session.motions import support_case, support_key, support_words
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -62,8 +62,9 @@ class Actions:
                     group.addAction(act)
 
     def _explain_colors(self, old: Session, new: Session) -> None:
-        if lacks_displacement(new) and not lacks_displacement(old):
-            self.window.show_status(NO_DISPLACEMENT)
+        why = not_drawable(new)
+        if why and why != not_drawable(old):
+            self.window.show_status(why)
 
     def _explain_support(self, old: Session, new: Session) -> None:
         """Say the support radius when it is switched on, and when it changes while it is drawn."""

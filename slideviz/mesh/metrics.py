@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from threading import Lock
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 
 _CACHE: WeakKeyDictionary[Mesh, dict[object, FloatArray]] = WeakKeyDictionary()
 """Values of metrics computed last, by mesh, metric and signs."""
+_LOCK = Lock()
+"""Guards `_CACHE`: the window computes in several threads."""
 _OUTER: WeakKeyDictionary[Cells, tuple[tuple[Marker, ...], list[IntArray]]] = WeakKeyDictionary()
 """Results of `_outer_facets`, with the markers they belong to."""
 _CACHED = 1 << 26
@@ -119,7 +122,7 @@ def metrics(
         The mesh has no cells or unusable ones, coordinates too large, or the reference is another
         mesh.
     CaseError
-        There is no such metric.
+        There is no such metric, or it compares neighbouring cells and the mesh is a part.
 
     Examples
     --------
@@ -141,33 +144,47 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
         found = quality(mesh, reference)
         values = {"size": found.size, "skew": found.skew}.get(name, found.values)
         return MetricValues(name, values, values, found.counted)
+    if mesh.part is not None and not METRICS[name].alone:
+        raise CaseError(f"{name} compares neighbouring cells: expected the whole mesh in memory")
     check_cells(mesh)
     check_size(mesh)
     signs = reference_of(mesh if reference is None else reference)[1]
     turned = hash(signs.tobytes()) if (signs < 0).any() else 0
-    cache = _CACHE.pop(mesh, {})
-    if (name, turned) not in cache:
-        _make_room()
-        made = _FAMILIES[name](mesh, signs)
-        cache |= {(each, turned): sealed(values) for each, values in made.items()}
-    _CACHE[mesh] = cache  # the last one
-    values = cache[name, turned]
+    values = _cached(mesh, (name, turned), lambda: _computed(mesh, name, turned, signs))
     if METRICS[name].where == "cells":
         return MetricValues(
             name, values, values, slice(None) if mesh.halo is None else ~mesh.halo.cells
         )
-    if ("cells", name, turned) not in cache:
-        cache["cells", name, turned] = sealed(_worst_of_nodes(mesh, values, METRICS[name].best))
-    counted = np.isfinite(values) | np.isinf(values)
+    key, best = ("cells", name, turned), METRICS[name].best
+    of_cells = _cached(mesh, key, lambda: {key: _worst_of_nodes(mesh, values, best)})
+    counted = ~np.isnan(values)
     if mesh.halo is not None:
         counted[mesh.halo.outer] = False
-    return MetricValues(name, values, cache["cells", name, turned], counted)
+    return MetricValues(name, values, of_cells, counted)
 
 
-def _make_room() -> None:
-    """Remove the results of the meshes used longest ago from the cache, if it is full."""
-    while sum(len(v) for cache in _CACHE.values() for v in cache.values()) > _CACHED:
-        del _CACHE[next(iter(_CACHE))]
+def _computed(
+    mesh: Mesh, name: Metric, turned: int, signs: NDArray[np.int8]
+) -> dict[object, FloatArray]:
+    """Return a metric and those that are computed with it, by key of the cache."""
+    return {(each, turned): values for each, values in _FAMILIES[name](mesh, signs).items()}
+
+
+def _cached(mesh: Mesh, key: object, compute: Callable[[], dict[object, FloatArray]]) -> FloatArray:
+    """Return what the cache has for a mesh, or compute it; for any number of threads.
+
+    Two threads that need the same values at once both compute them. The results of the meshes used
+    longest ago are removed if the cache is full.
+    """
+    with _LOCK:
+        found = _CACHE.get(mesh, {}).get(key)
+    made = {} if found is not None else {each: sealed(v) for each, v in compute().items()}
+    with _LOCK:
+        cache = _CACHE.pop(mesh, {})
+        while made and sum(len(v) for old in _CACHE.values() for v in old.values()) > _CACHED:
+            del _CACHE[next(iter(_CACHE))]
+        _CACHE[mesh] = {**made, **cache}  # the last one
+    return made[key] if found is None else found
 
 
 def _worst_of_nodes(mesh: Mesh, values: FloatArray, best: str) -> FloatArray:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from slideviz.color_scheme import COLOR_MAP
 from slideviz.errors import CaseError, not_one_of
+from slideviz.mesh.metrics import metric
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
-from slideviz.terms import QUANTITIES, Quantity
+from slideviz.terms import METRICS, QUANTITIES, Quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,17 +42,35 @@ class Paint:
         return replace(self, limits=(low, high))
 
     def up_to(self, cells: IntArray) -> Paint:
-        """Return the paint with limits from 0 to the largest value of cells (c,)."""
-        return replace(self, limits=(0.0, float(self.values[cells].max(initial=0.0)) or 1.0))
+        """Return the paint with limits up to the largest finite value of cells (c,)."""
+        low, values = self.limits[0], self.values[cells]
+        high = float(values[np.isfinite(values)].max(initial=low))
+        return replace(self, limits=(low, high if high > low else low + 1.0))
+
+    @property
+    def unbounded(self) -> bool:
+        """Return whether the quantity has no largest value, so that limits follow the cells."""
+        if self.label == "displacement":
+            return True
+        term = METRICS[self.label]
+        return term.colors is None and np.isinf(term.range[1])
 
     def shown(self, cells: IntArray) -> FloatArray:
         """Return the values (c,) of cells (c,), clipped to the limits; NaN if inverted."""
         return np.where(self.inverted[cells], np.nan, np.clip(self.values[cells], *self.limits))
 
+    @property
+    def worst(self) -> Literal["min", "max"]:
+        """Return the end that counts: the worst values, or the largest displacement."""
+        if self.label == "displacement" or METRICS[self.label].best == "low":
+            return "max"
+        return "min"
+
     def summary(self, cells: IntArray) -> dict[str, float | int]:
         """Return number, min, mean, max, inverted and worst cell of cells (c,), c > 0."""
         mine = self.values[cells]
-        worst = cells[np.argmin(np.where(self.inverted[cells], -1.0, mine))]
+        rated = -mine if self.worst == "max" and self.label != "displacement" else mine
+        worst = cells[np.argmin(np.where(self.inverted[cells], -np.inf, rated))]
         return {
             "cells": len(cells),
             "min": float(mine.min()),
@@ -66,8 +86,8 @@ class Paint:
         If they are only those of ``of`` cells that a threshold leaves, ``shown`` is its text.
         """
         facts = self.summary(cells)
-        end = "max" if self.label == "displacement" else "min"
-        number = ".4g" if self.label == "displacement" else ".4f"
+        end = self.worst
+        number = ".4g" if end == "max" else ".4f"
         count = f"{len(cells):,} cell{'s' if len(cells) > 1 else ''} cut"
         if of is not None:
             count = f"{len(cells):,} of {of:,} cells cut (shown: {shown})"
@@ -88,8 +108,10 @@ def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = N
         raise CaseError(f"color: {not_one_of(by, QUANTITIES)}")
     inverted = quality.status == INVERTED
     if by != "displacement":
-        values = {"size-skew": quality.values, "size": quality.size, "skew": quality.skew}[by]
-        return Paint(by, values, inverted, (0.0, 1.0))
+        rated = {"size-skew": quality.values, "size": quality.size, "skew": quality.skew}
+        values = rated[by] if by in rated else metric(mesh, by, reference).of_cells
+        painted = Paint(by, values, inverted, METRICS[by].colors or METRICS[by].range)
+        return painted.up_to(np.arange(len(values))) if painted.unbounded else painted
     if reference is None or reference.points.shape != mesh.points.shape:
         raise CaseError(
             "the displacement is measured from the undeformed mesh; give that mesh as reference"

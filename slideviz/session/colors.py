@@ -8,6 +8,7 @@ from slideviz.mesh.quality import INVERTED
 from slideviz.session.changes import second_view, set_view, undoable
 from slideviz.session.results import StepFrame
 from slideviz.session.state import Session
+from slideviz.terms import METRICS
 
 _PARTS = 100.0
 """A color range is rounded outwards to a power of ten, about its length over this number."""
@@ -33,9 +34,20 @@ def lacks_displacement(session: Session) -> bool:
     return session.view.color_by == "displacement" and not any(run.frames for run in session.runs)
 
 
+def not_drawable(session: Session) -> str:
+    """Return why the view cannot be colored by what is chosen, or ""."""
+    what = session.view.color_by
+    if session.in_file and what in METRICS and not METRICS[what].alone:
+        return (
+            f"The {METRICS[what].label} compares neighbouring cells, which stay in the file. The "
+            "roles are shown."
+        )
+    return NO_DISPLACEMENT if lacks_displacement(session) else ""
+
+
 def with_drawable_colors(session: Session) -> Session:
-    """Return the session to draw: colored by roles where there is no displacement yet."""
-    return set_view(session, color_by="role") if lacks_displacement(session) else session
+    """Return the session to draw: colored by roles where `not_drawable` has a reason."""
+    return set_view(session, color_by="role") if not_drawable(session) else session
 
 
 def usual_range(session: Session) -> str:

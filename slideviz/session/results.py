@@ -63,14 +63,20 @@ class StepFrame:
     ) -> FloatArray:
         """Return the values of a quantity ``what`` in all cells (m,), or in ``cells`` (k,).
 
-        A metric of nodes has the worst of each cell's nodes. The displacement of a cell is the mean
+        A metric of nodes has the worst of each cell's nodes, one that compares neighbouring cells
+        is NaN where only the skin is in memory. The displacement of a cell is the mean
         distance of its nodes from where they are in ``undeformed``, in the mesh's length unit.
         """
         if what == "displacement":
             return cell_displacement(self.mesh, self.base or undeformed or self.mesh, cells)
         names = {"size": self.quality.size, "skew": self.quality.skew}
         if what in METRICS and what not in SIZE_SKEW:
-            every = metric(self.mesh, what, self.base or undeformed).of_cells
+            known = self.mesh.part is None or METRICS[what].alone
+            every = (
+                metric(self.mesh, what, self.base or undeformed).of_cells
+                if known
+                else np.full(len(self.mesh.cells), np.nan)
+            )
         else:
             every = names.get(what, self.quality.values)
         return every if cells is None else every[cells]

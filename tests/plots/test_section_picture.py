@@ -12,6 +12,7 @@ from PIL import Image
 
 from slideviz.color_scheme import COLOR_MAP, INVERTED_COLOR
 from slideviz.errors import CaseError
+from slideviz.mesh.metrics import metric
 from slideviz.mesh.periodic import match
 from slideviz.mesh.quality import quality
 from slideviz.plots import cells as plot_cells
@@ -26,7 +27,7 @@ from slideviz.plots.section_picture import (
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session.passages import passages, show_passages
-from slideviz.terms import QUANTITIES
+from slideviz.terms import METRICS, QUANTITIES
 from tests.builders import cube, passage, square
 from tests.slow import one_of_each_fast
 
@@ -266,14 +267,16 @@ def test_every_number_can_be_drawn(by):
     figure, _, painted = drawn(mesh, Section("plane", (0, 0, 0.4)), base=base, by=by)
     assert words_of(figure)[-1].startswith(f"{by}: ")
     assert bar_of(figure).get_ylabel() == by
-    found = quality(mesh, base)
     if by == "displacement":
         length = np.linalg.norm(mesh.points - base.points, axis=1)
         assert painted.values == pytest.approx(length[base.cells.by_type[12][1]].mean(axis=1))
         assert painted.limits == (0.0, painted.values.max())
     else:
-        wanted = {"size-skew": found.values, "size": found.size, "skew": found.skew}[by]
-        assert np.array_equal(painted.values, wanted)
+        assert np.array_equal(painted.values, metric(mesh, by, base).of_cells)
+        low = METRICS[by].best == "low"
+        assert f"{by}: {'max' if low else 'min'} " in words_of(figure)[-1]
+        worst = painted.values[painted.summary(np.arange(len(mesh.cells)))["worst_cell"]]
+        assert worst == (painted.values.max() if low else painted.values.min())
 
 
 def test_a_range_ends_the_colors_but_no_valid_cell_turns_red():
