@@ -125,9 +125,8 @@ def _further(
             control = np.concatenate([control, more[~np.isin(more, control)]])
         timer = PhaseTimer(partial(_report, report, k + 1, total))
         goal = setup.coords[setup.known] + setup.target * part
-        begun = replace(
-            setup.at_step(k == total - 1), solve=partial(_continued, setup, solution.stages)
-        )
+        # Relaxation, after the last step, chooses no control nodes.
+        begun = replace(setup.at_step(False), solve=partial(_continued, setup, solution.stages))
         made.append(
             one_step(
                 begun, coords, goal, timer, replace(solution, control=control, carried=carried)

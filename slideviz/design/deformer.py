@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from slideviz.design.checks import (
 from slideviz.design.choosing import choose_steps
 from slideviz.design.frozen.step import FrozenStep, StepState
 from slideviz.design.known_nodes import known_node_map
-from slideviz.errors import CaseError, DeformError, not_one_of
+from slideviz.errors import CaseError, DeformError, Note, not_one_of
 from slideviz.mesh.interfaces import torn_interfaces
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 from slideviz.mesh.quality import quality
@@ -38,6 +38,9 @@ from slideviz.solver.setup import make_setup
 
 TOGETHER = 128
 """Designs that are deformed together, so that each radial function is computed once for all."""
+
+RELAXING = ("alpha", "beta", "theta")
+"""How the names of relaxation's coefficients begin among the choices."""
 
 Report = Callable[[Progress], None]
 
@@ -151,11 +154,6 @@ class Deformer:
         ConditionWarning
             The system is so badly conditioned that derivatives, or points too, have few digits.
         """
-        if case.relax == "yes":
-            raise CaseError(
-                "RELAX= YES has no derivatives; use RELAX= NO, or AUTO, which is NO here"
-            )
-        case = case.change(relax="no")
         if displacements is not None and not case.motions:
             case = case.change(motions=(Translate("", (0.0,) * mesh.dim),))
         asked = motion.displacements(case, mesh)
@@ -191,6 +189,8 @@ class Deformer:
         self._as_run = None if refined else points
         # What is discrete is chosen at the first design, and kept.
         states = self._run(targets[0])
+        if setup.relaxation is not None and not targets[0].any():
+            self._relax_from_rest(targets)
         facets = facets_of(setup, value(states[-1].coords))
         least = max(float(sizes.max()), usual_edge(setup))
         self._checks = Checks(mesh, setup, self._steps, facets, least)
@@ -312,6 +312,17 @@ class Deformer:
             return Constraint(slope.minimum, slope.of_minimum, start, end)
         return Constraint(slope.mean, slope.of_mean, start, end)
 
+    def _relax_from_rest(self, targets: list[FloatArray]) -> None:
+        """Take the coefficients of relaxation from the second design: the first one has none."""
+        *before, last = self._steps
+        if len(targets) > 1:
+            last.forget(RELAXING)
+            self._run(targets[1])
+            return
+        self._steps = (*before, replace(last, setup=last.setup.at_step(False)))
+        text = "nothing is relaxed: the reference has no displacement; give `displacements`"
+        self.warnings += (Note(text),)
+
     def as_run(self) -> FloatArray | None:
         """Return the points (n, d) that ``sv.deform`` gives at the reference, to the bit.
 
@@ -366,7 +377,8 @@ class Deformer:
             error_estimate = np.max([state.error_estimate for state in states], axis=0)
             return value(states[-1].points), self._checks.errors(target, states), error_estimate
         points = np.empty((len(displacement), *self.mesh.points.shape))
-        if len(self._steps) > 1 or self.mesh.halo is not None:
+        alone = self.mesh.halo is not None or self._setup.relaxation is not None
+        if len(self._steps) > 1 or alone:
             errors, error_estimate = np.empty((2, len(points)))
             for k, each in enumerate(displacement):
                 points[k], errors[k], error_estimate[k] = self._deformed(each)

@@ -90,13 +90,16 @@ class Corotated:
             rotations = np.tile(np.eye(p.shape[1]), (count, 1, 1))
         return self._summed(p, rotations, 0.0)
 
-    def pushed(self, x: FloatArray, t: FloatArray) -> FloatArray:
-        """Return the change (n, d) of the forces as positions x (n, d) change by t (n, d)."""
-        return self._changed(x, t, reverse=False)
+    def pushed(self, x: FloatArray, t: FloatArray, turns: FloatArray | None = None) -> FloatArray:
+        """Return the change (n, d) of the forces as positions x (n, d) change by t (n, d).
 
-    def pulled(self, x: FloatArray, g: FloatArray) -> FloatArray:
+        ``turns`` (c, d, d) are the rotations at x, if they are known.
+        """
+        return self._changed(x, t, turns, reverse=False)
+
+    def pulled(self, x: FloatArray, g: FloatArray, turns: FloatArray | None = None) -> FloatArray:
         """Return the gradient (n, d) of ``(g * forces).sum()`` with respect to positions x."""
-        return self._changed(x, g, reverse=True)
+        return self._changed(x, g, turns, reverse=True)
 
     def _slices(self) -> list[tuple[slice, ShapeBlock, FloatArray]]:
         """Return the elements, block and moduli of each part."""
@@ -115,8 +118,11 @@ class Corotated:
 
         return self._gathered(add)
 
-    def _changed(self, x: FloatArray, along: FloatArray, *, reverse: bool) -> FloatArray:
-        turn, at, t = _plain(self.rotations(x)), _plain(x), _plain(along)
+    def _changed(
+        self, x: FloatArray, along: FloatArray, turns: FloatArray | None, *, reverse: bool
+    ) -> FloatArray:
+        turn = _plain(self.rotations(x) if turns is None else turns)
+        at, t = _plain(x), _plain(along)
 
         def add(elements: Elements, rows: slice, out: FloatArray) -> None:
             changed(elements, turn[rows], at, t, reverse, out)

@@ -83,7 +83,7 @@ class Equilibrium:
     def __init__(self, problem: Problem, body: Body, nodes: IntArray, *, name: str) -> None:
         assert problem.frozen is not None
         self._body, self._coords, self._same = body, problem.coords, problem.same_as
-        self._nodes, self._choose, self._name = nodes, problem.frozen.choose, name
+        self._nodes, self._name = nodes, name
         self._place, self._turn = unknowns(problem, body, nodes)
         self._inside = np.flatnonzero(self._place >= 0)
         self._count = int(self._place.max(initial=-1)) + 1
@@ -202,7 +202,7 @@ class Equilibrium:
                 )
                 left = left - multiply(before, dot(left, before))
             size = length(left)
-            new = self._choose(
+            new = problem.choose(
                 f"{self._name} held {k}", partial(_longer, value(size), RANK_TOLERANCE)
             )
             out.append((at[new], unit(take(left, new))))

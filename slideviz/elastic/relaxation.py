@@ -177,7 +177,8 @@ class Relaxation:
             steep = unknowns.within(_preconditioned(cycle, -force))
             energies.append(-_inner(force, steep))
             if k:
-                turned = max(0.0, (energies[-1] + _inner(before, steep)) / energies[-2])
+                last = max(energies[-2], 1e-300)
+                turned = max(0.0, (energies[-1] + _inner(before, steep)) / last)
                 steep = steep + multiply(along, problem.choose(f"beta {k}", partial(_one, turned)))
             along = steep
             size = partial(_size, unknowns, forces, turns, value(along), value(force))
@@ -302,8 +303,8 @@ def _force(forces: Corotated, at: Array, turns: FloatArray) -> Array:
         forces.forces(x, turns),
         (
             at,
-            partial(each_of, lambda t: forces.pushed(x, t)),
-            partial(each_of, lambda g: forces.pulled(x, g)),
+            partial(each_of, lambda t: forces.pushed(x, t, turns)),
+            partial(each_of, lambda g: forces.pulled(x, g, turns)),
         ),
     )
 

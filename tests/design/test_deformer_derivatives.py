@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import lzma
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -115,6 +116,47 @@ def test_flat_boundaries(frame, method, dim, steps, reduction):
         check(box_case(mesh, method, motions(mesh, "BLOCK"), **settings), mesh)
 
 
+def check_relaxed(case, mesh):
+    """As ``check``, of a deformer that relaxes; every design alone gives the bits of several."""
+    deformer = check(case.change(relax="yes"), mesh)
+    assert deformer._steps[-1].choices.items["theta"].any()
+    designs = np.stack([deformer.displacement, 0.7 * deformer.displacement])
+    np.testing.assert_array_equal(
+        pickle.loads(pickle.dumps(deformer)).deform(designs),
+        np.stack([deformer.deform(each) for each in designs]),
+    )
+    return deformer
+
+
+def relaxed_table():
+    """Every frame, dimension and way of sliding, with one step and three, and with layers."""
+    frames, ways = ("cartesian", "translational", "rotational"), ("none", "ps", "ds")
+    several = {"none": "periodic", "ps": "fixed", "ds": "moving"}
+    rows = []
+    for k, cell in enumerate(itertools.product(frames, ways, (2, 3), (1, 3), ("no", "keep"))):
+        frame, sliding, dim, steps, layers = cell
+        method = sliding, "none" if frame == "cartesian" else several[sliding]
+        reduction = REDUCED if (k // 2 + k // 4) % 2 else None
+        marks = () if k % 13 == 4 else pytest.mark.slow
+        name = "-".join([frame, *method, f"{dim}d", str(steps), layers])
+        row = frame, dim, method, steps, layers, reduction
+        rows.append(pytest.param(*row, id=name, marks=marks))
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("frame", "dim", "method", "steps", "layers", "reduction"), relaxed_table()
+)
+def test_relaxation(frame, dim, method, steps, layers, reduction):
+    settings = {"steps": steps, "reduction": reduction, "layers": layers}
+    if layers == "keep":
+        settings["layer_thickness"] = 0.15
+    mesh = sector(dim) if frame == "rotational" else box(dim)
+    make = sector_case if frame == "rotational" else box_case
+    marker = "blade" if (frame, dim) == ("rotational", 3) else "BLOCK"
+    check_relaxed(make(mesh, method, motions(mesh, marker), **settings), mesh)
+
+
 def annulus():
     mesh = builders.annulus(24, 5, 2)
     roles = {"wall": "moving", "far0": "sliding", "far1": "sliding"}
@@ -172,6 +214,58 @@ def test_curved_boundaries_nodes_on_the_axis_and_coinciding_ones(shape, sliding,
 def test_curved_boundaries_in_several_steps(shape):
     mesh, roles, motion = SHAPES[shape]()
     check(Case(roles=roles, motions=motion, sliding="ds", steps=3), mesh)
+
+
+@pytest.mark.parametrize(
+    ("steps", "sliding"), [(2, "ds"), pytest.param(1, "ps", marks=pytest.mark.slow)]
+)
+@pytest.mark.parametrize(
+    "shape",
+    [pytest.param(s, marks=() if s == "on_axis" else pytest.mark.slow) for s in SHAPES],
+)
+def test_relaxation_with_curved_boundaries(shape, steps, sliding):
+    mesh, roles, motion = SHAPES[shape]()
+    case = Case(roles=roles, motions=motion, sliding=sliding, steps=steps)
+    if shape == "on_axis":
+        case = case.change(periodic="moving", periodic_type="rotational")
+    check_relaxed(case, mesh)
+
+
+@pytest.mark.parametrize(("name", "layers"), one_of_each_fast(list(MESHES), ["no", "keep"]))
+def test_relaxation_with_halo_layers(tmp_path, name, layers):
+    mesh, _, roles = both(name, tmp_path)
+    case = case_of(mesh, roles, 0.05, sliding="ds", periodic="moving", steps=2)
+    if layers == "keep":
+        case = case.change(layers="keep", layer_thickness=0.1)
+    check_relaxed(case, mesh)
+
+
+def test_relaxation_that_is_held_back_at_some_nodes():
+    mesh = builders.airfoil(40, 10, 1e-3)
+    motion = (Rotate("airfoil", 60.0, (0.5, 0.0)), Translate("airfoil", (0.02, 0.1)))
+    deformer = check_relaxed(Case(roles={"airfoil": "moving"}, motions=motion), mesh)
+    theta = deformer._steps[-1].choices.items["theta"]
+    assert len(np.unique(theta)) > 2
+
+
+def test_a_deformer_made_at_rest_relaxes_by_the_steps_of_its_next_design():
+    mesh = builders.airfoil(40, 10, 1e-3)
+    case = Case(roles={"airfoil": "moving"}, motions=(Rotate("airfoil", 10.0, (0.5, 0.0)),))
+    turned = sv.Deformer(mesh, case).displacement
+    designs = np.stack([0.0 * turned, turned])
+    plain, relaxed = (
+        sv.Deformer(mesh, case.change(relax=relax), designs) for relax in ("no", "auto")
+    )
+    np.testing.assert_allclose(relaxed.deform(designs[0]), mesh.points, rtol=0, atol=1e-12)
+    *_, run = sv.deform(case.change(relax="yes"), mesh)
+    gaps = [np.abs(each.deform(turned) - run.mesh.points).max() for each in (plain, relaxed)]
+    assert gaps[1] < 0.1 * gaps[0]
+    forward = relaxed.jvp(designs[0], turned)
+    change = relaxed.deform(1e-4 * turned) - relaxed.deform(-1e-4 * turned)
+    np.testing.assert_allclose(forward, change / 2e-4, rtol=0, atol=1e-6)
+    alone = sv.Deformer(mesh, case.change(relax="yes"), designs[0])
+    assert alone.deform(turned).tobytes() == sv.Deformer(mesh, case).deform(turned).tobytes()
+    assert any("the reference has no displacement" in text for text in alone.warnings)
 
 
 def test_every_way_of_sliding_has_a_function():

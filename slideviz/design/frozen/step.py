@@ -202,6 +202,11 @@ class FrozenStep:
             self.last.items["at"] = coords.copy(), kept
         return kept
 
+    def forget(self, names: tuple[str, ...]) -> None:
+        """Make the choices whose names begin with one of ``names`` anew when the step runs next."""
+        for name in [name for name in self.choices.items if name.startswith(names)]:
+            del self.choices.items[name]
+
     def run(self, before: StepState, target: Array) -> StepState:
         """Return the state after this step.
 
@@ -256,9 +261,22 @@ class _Run:
 
     def __init__(self, step: FrozenStep, coords: Array, out: FloatArray | None) -> None:
         self._step, self._setup, self._coords = step, step.setup, coords
-        self.out, self.choose = out, step.choices
+        self.out, self._kept = out, step.choices
         self._projections = count()
         self._stages = ((f"stage {k}", levels) for k, levels in enumerate(step.stages))
+
+    def choose(self, name: str, make: Callable[[], Any]) -> Any:
+        """Return the choice of this name, made the first time."""
+        return self._step.choices(name, partial(self._tried, make))
+
+    def _tried(self, make: Callable[[], Any]) -> Any:
+        """Return what ``make`` returns; projections that it tries are not kept."""
+        before = self._kept, self._projections
+        self._kept, self._projections = ChoiceCache(), count()
+        try:
+            return make()
+        finally:
+            self._kept, self._projections = before
 
     def fixed(self, name: str, make: Callable[[], Any]) -> Any:
         """Return what depends on positions only: kept in the first step."""
@@ -305,12 +323,12 @@ class _Run:
         """
         setup, base = self._setup, take(self._coords, nodes)
         name = f"project {next(self._projections)}"
-        anchor, matrix = self.choose(name, partial(self._tracked, nodes, value(base), value(free)))
+        anchor, matrix = self._kept(name, partial(self._tracked, nodes, value(base), value(free)))
         away = transform(matrix - np.eye(matrix.shape[-1]), base - anchor)
         slid = _plus_unless_rounding(
             transform(matrix, free), away, ROUNDING * largest_coordinate(setup.coords)
         )
-        copy, origin, turn = self.choose(f"ties of {name}", lambda: self._ties(nodes))
+        copy, origin, turn = self._kept(f"ties of {name}", lambda: self._ties(nodes))
         if len(copy):
             slid = put(slid, copy, transform(turn, take(slid, origin)))
         held = np.ones((len(nodes), matrix.shape[-1]))
