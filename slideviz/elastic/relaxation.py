@@ -93,8 +93,10 @@ class Relaxation:
         constraints: Constraints,
         tie: Callable[[Array], Array],
         timer: PhaseTimer,
-    ) -> tuple[Array, Relaxed]:
+    ) -> tuple[Array, Relaxed | None]:
         """Return the displacement (..., n, d) of a step after relaxation, in the frame.
+
+        And how it went; None for a mesh at rest, and one without nodes that could move.
 
         Parameters
         ----------
@@ -105,12 +107,16 @@ class Relaxation:
         tie
             Gives periodic images the displacement of the node that represents them.
         """
+        if problem.frozen is None and not value(displacement).any():
+            return displacement, None  # at rest, where rounding is all that would move
         with timer.phase("relax") as tick:
             at = value(problem.coords) + value(displacement)
             held = np.concatenate([problem.known, rigid])
             given: Conditions = problem.choose(
                 "conditions", lambda: self._conditions(problem, at, held, constraints)
             )
+            if not len(given.free):
+                return displacement, None
             start = self.body.frame.coords(self.mesh.points)
             free = self._conditions(problem, start, held, constraints).free
             kept = self._prepared(problem, given.place, free, tick)

@@ -166,3 +166,15 @@ def test_cases_that_the_window_begins_are_relaxed():
     case = guess_case(mesh, guess_roles(mesh), ())
     assert (case.relax, case.layers) == ("auto", "auto")
     assert (sv.Case().relax, sv.Case().layers) == ("no", "no")
+
+
+def test_a_mesh_at_rest_and_one_without_inner_nodes_are_not_relaxed():
+    mesh, case = airfoil(0.0, relax="yes")
+    step = last(case, mesh)
+    assert step.relaxed is None
+    np.testing.assert_array_equal(step.mesh.points, mesh.points)
+    mesh = builders.grid((1, 1))
+    motions = (sv.Translate("x_p", (0.2, 0.0)),)
+    assert (
+        last(sv.Case(roles={"x_p": "moving"}, motions=motions, relax="yes"), mesh).relaxed is None
+    )
