@@ -17,7 +17,7 @@ import numpy as np
 from slideviz.argument_types import CheckedFields
 from slideviz.case.values import Kind
 from slideviz.case.words import name_text, number
-from slideviz.errors import CaseError, not_one_of, shown
+from slideviz.errors import CaseError, nearest, not_one_of, shown
 from slideviz.mesh.metrics import metric
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, PIECE, UNPROVEN, Quality
@@ -174,12 +174,17 @@ class Limit(CheckedFields):
         super().__post_init__()
         row = NUMBERS.get(self.name)
         if row is None:
+            likely = nearest(self.name, NUMBERS)
+            if likely:
+                raise CaseError(
+                    f"LIMITS has no number {shown(self.name)}{likely} (`slideviz keys` lists all)"
+                )
             raise CaseError(not_one_of(self.name, NUMBERS))
         if self.sign not in OPERATORS:
             raise CaseError(f"{self}: {not_one_of(self.sign, OPERATORS)}")
         if self.sign[0] not in row.signs:
-            signs = " and ".join(row.signs)
-            raise CaseError(f"{self}: the limits of {self.name} ({row.meaning}) are with {signs}")
+            signs = " or ".join(row.signs)
+            raise CaseError(f"{self}: a limit of {self.name} ({row.meaning}) needs {signs}")
         if self.marker and not row.on_boundary:
             raise CaseError(f"{self}: {self.name} is of the whole mesh; leave out @{self.marker}")
         if not np.isfinite(self.value):

@@ -371,7 +371,8 @@ def wall_words(row: dict) -> str:
         )
     ratio, change = row["height_ratio"], row["angle_change"]
     heights = f"first heights {ratio['min']:.3f} to {ratio['max']:.3f} times those before"
-    return f"{heights}, edges within {change['max']:.2g}°"
+    turned = f"by up to {turn:.2g}°" if (turn := change["max"]) >= 0.01 else "by less than 0.01°"
+    return f"{heights}, first edges turned {turned}"
 
 
 def _statistics(values: FloatArray) -> dict[str, float | None]:

@@ -88,7 +88,8 @@ def _tip(entry: dict) -> str:
 def height_ratios(frame: StepFrame | None, case: Case) -> tuple[float, float] | tuple[None, None]:
     """Return lowest and highest ratio of first heights, after a step over before.
 
-    Of the boundaries of a case with layers; (None, None) where there are none.
+    Of moving and fixed boundaries with layers, or of sliding ones if there are only these;
+    (None, None) where there are none.
     """
     ends = [entry["height_ratio"] for entry in _layered(frame, case)]
     lows, highs = ([end[k] for end in ends if end[k] is not None] for k in ("min", "max"))
@@ -112,6 +113,8 @@ def _layered(frame: StepFrame | None, case: Case) -> list[dict]:
         return []
     layered = frame.walls.layered
     names = [name for name in case.walls(frame.mesh.marker_names) if name in layered]
+    # Flat cells at inflow and outflow are no boundary layers; LAYERS leaves them alone.
+    names = [name for name in names if case.roles.get(name) != "sliding"] or names
     return list(frame.walls.of(names).summary().values())
 
 

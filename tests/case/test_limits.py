@@ -56,12 +56,16 @@ def test_no_limits(text):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("mni > 0.3", r"'mni' is not one of min \| .*; did you mean min\?"),
+        (
+            "mni > 0.3",
+            r"LIMITS has no number 'mni'; did you mean min\? \(`slideviz keys` lists all",
+        ),
+        ("foo > 0.3", r"'foo' is not one of min \| "),
         ("min", r"'min' is no limit; expected NAME > NUMBER, as min > 0.3"),
         ("min > 0,3", r"'3' is no limit"),
         ("min > high", r"'high' is not a number"),
-        ("min < 0.3", r"min < 0.3: the limits of min \(lowest quality\) are with >"),
-        ("inverted >= 1", r"inverted >= 1: the limits of inverted .* are with < and ="),
+        ("min < 0.3", r"min < 0.3: a limit of min \(lowest quality\) needs >"),
+        ("inverted >= 1", r"inverted >= 1: a limit of inverted .* needs < or ="),
         ("min => 0.3", r"min => 0.3: '=>' is not one of > \| >="),
         ("min@blade > 0.3", r"min@blade > 0.3: min is of the whole mesh; leave out @blade"),
         ("( min > 0.3", r"a bracket of '\( min > 0.3' is missing"),
@@ -158,7 +162,7 @@ def test_every_metric_can_be_limited(measured, name):
     np.testing.assert_array_equal(np.sort(result.cells), np.flatnonzero(failing))
     assert result.cells[0] in np.flatnonzero(values == result.actual)
     assert result.limit.name == field_of(name)
-    with pytest.raises(CaseError, match="the limits of"):
+    with pytest.raises(CaseError, match="a limit of"):
         Limit(field_of(name), "<>"[not high], bound)
 
 

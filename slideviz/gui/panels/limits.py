@@ -27,7 +27,7 @@ NAME = Qt.ItemDataRole.UserRole
 EXAMPLE = "min > 0.3, inverted = 0"
 FIELD_TIP = (
     "What the deformed mesh must meet (LIMITS): names of numbers with >, >=, <, <= or = and a "
-    "value, with commas between. `slideviz keys LIMITS` lists the names."
+    "value, with commas between. `slideviz keys` lists the names."
 )
 LIMIT_TIPS = (
     "A click marks the cells that fail the limit with rings, and flies to the worst of them.",
