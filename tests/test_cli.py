@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +23,7 @@ from slideviz.errors import CaseError
 from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import write_sample
 from slideviz.solver.steps import Trial
-from tests.builders import layered
+from tests.builders import grid, layered
 
 SECONDS = {
     *("read", "classify", "select", "solve", "evaluate", "project", "quality", "write", "total"),
@@ -253,6 +253,40 @@ def test_quality_against_reference(square, tmp_path, capsys):
     assert min(float(row.split(",")[1]) for row in rows[1:]) == report["min"]
     assert run(argv) == 0
     assert "worst cells" in capsys.readouterr().out
+
+
+def test_metrics_are_printed_reported_and_written_where_they_are_asked_for(tmp_path, capsys):
+    base = grid((3, 3))
+    points = base.points.copy()
+    points[5] += (0.1, 0.05)
+    sv.write(tmp_path / "bent.su2", replace(base, points=points))
+    call = ["quality", str(tmp_path / "bent.su2"), "--metrics"]
+    found = sv.metrics(sv.read(tmp_path / "bent.su2"))
+    assert (
+        run([*call, "all", "--json", str(tmp_path / "q.json"), "-o", str(tmp_path / "q.csv")]) == 0
+    )
+    printed = capsys.readouterr().out
+    report = json.loads((tmp_path / "q.json").read_text())["metrics"]
+    table = np.genfromtxt(tmp_path / "q.csv", delimiter=",", names=True)
+    for name, values in found.items():
+        field = name.replace("-", "_")
+        assert report[field] == values.summary()
+        assert values.values[report[field]["worst_at"]] == values.worst
+        assert re.search(rf"^  {field} .*{values.max:.6g} ", printed, re.MULTILINE)
+        assert np.array_equal(table[field], values.of_cells)
+    assert run([*call, "warpage"]) == 2
+    assert "'warpage' is not one of all | size_skew" in capsys.readouterr().err
+    assert run([*call, "skewness", "--stream"]) == 1
+    assert "--metrics needs the mesh in memory" in capsys.readouterr().err
+
+
+def test_a_run_reports_metrics_before_and_after(square, tmp_path, capsys):
+    call = ["run", str(square / "square.cfg"), "--metrics", "skewness"]
+    assert run([*call, "--json", str(tmp_path / "r.json")]) == 0
+    report = json.loads((tmp_path / "r.json").read_text())["metrics"]
+    before, after = report["before"]["skewness"], report["after"]["skewness"]
+    assert before["max"] < after["max"]
+    assert re.search(r"skewness .*\n    undeformed", capsys.readouterr().out)
 
 
 def test_quality_says_what_it_is_measured_against(square, capsys):

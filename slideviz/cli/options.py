@@ -7,7 +7,8 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz.terms import NO_REFERENCE
+from slideviz.errors import not_one_of
+from slideviz.terms import METRICS, NO_REFERENCE, Metric, field_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -35,6 +36,18 @@ def reference_words(reference: Path | None) -> str:
     return f"{NO_REFERENCE}; {REMEDY}" if reference is None else f"reference: {reference}"
 
 
+def metric_names(text: str) -> tuple[Metric, ...]:
+    """Return the metrics of a text: "all", or names separated by commas, with - or _."""
+    fields = {field_of(name): name for name in METRICS}
+    if text.strip() == "all":
+        return tuple(METRICS)
+    wanted = [field_of(word.strip()) for word in text.split(",")]
+    for word in wanted:
+        if word not in fields:
+            raise argparse.ArgumentTypeError(not_one_of(word, ("all", *fields)))
+    return tuple(fields[word] for word in wanted)
+
+
 SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "case": (("case",), {"type": Path, "help": "the case file (.cfg)"}),
     "zone": (("--zone",), {"type": int, "metavar": "N", "help": "zone of the mesh file, from 1"}),
@@ -43,6 +56,15 @@ SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
         {"action": "store_true", "help": "print nothing but warnings and errors"},
     ),
     "json": (("--json",), {"type": Path, "metavar": "FILE", "help": "as JSON; - is the terminal"}),
+    "metrics": (
+        ("--metrics",),
+        {
+            "type": metric_names,
+            "default": (),
+            "metavar": "NAMES",
+            "help": "other numbers too: all, or names with commas, as skewness,expansion",
+        },
+    ),
     "stream": (
         ("--stream",),
         {"action": "store_true", "help": "for meshes larger than memory (SU2)"},

@@ -11,12 +11,14 @@ from slideviz.formats.table import own_endings
 from slideviz.terms import SKEW_METRICS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from slideviz.case.limits import Limit, MeasuredMesh
     from slideviz.case.model import Case
+    from slideviz.mesh.metrics import MetricValues
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
+    from slideviz.terms import Metric
 
 
 def add_quality(calls: argparse._SubParsersAction) -> None:
@@ -38,6 +40,7 @@ def add_quality(calls: argparse._SubParsersAction) -> None:
         help='limits as of the key LIMITS, as "min > 0.3, inverted = 0": exit code 4 if one is '
         "not met",
     )
+    add_shared(call, "metrics")
     add_shared(call, "zone")
     add_shared(call, "json")
     call.add_argument(
@@ -67,7 +70,7 @@ def quality(arguments: argparse.Namespace) -> int:
 
     Returns the exit code.
     """
-    from slideviz import write
+    from slideviz import metrics, write
     from slideviz.case.limits import MeasuredMesh, require_streamed
     from slideviz.cli.mesh_source import open_mesh
     from slideviz.cli.output_paths import OutputPath, require_output_paths
@@ -78,6 +81,8 @@ def quality(arguments: argparse.Namespace) -> int:
     output = arguments.output
     if arguments.stream and output is not None:
         raise CaseError("-o needs the mesh in memory; leave it out, or --stream")
+    if arguments.stream and arguments.metrics:
+        raise CaseError("--metrics needs the mesh in memory; leave it out, or --stream")
     if arguments.stream:
         require_streamed(arguments.limits)
     is_table = output is not None and output.suffix.lower() == ".csv"
@@ -90,7 +95,8 @@ def quality(arguments: argparse.Namespace) -> int:
     with open_mesh(arguments, case) as opened:
         mesh, found = opened.source.mesh, opened.quality(arguments)
         if is_table:
-            _write_csv(output, found)
+            extra = metrics(mesh, arguments.metrics, opened.read_base())
+            _write_csv(output, found, extra)
         elif output:
             write(output, mesh, cell_data=quality_data(output, found))
         worst = found.worst(WORST)
@@ -119,6 +125,8 @@ def _report(
         histogram_lines,
         limit_lines,
         limits_report,
+        metric_lines,
+        metrics_report,
         quality_lines,
         quality_report,
         save_json,
@@ -131,6 +139,8 @@ def _report(
     found = measured.quality
     report = quality_report(name, found, worst)
     report |= {"walls": walls, "reference": str(reference) if reference else None}
+    assert measured.mesh is not None
+    report["metrics"] = metrics_report(measured.mesh, arguments.metrics, measured.reference)
     report["limits"] = limits_report(check_limits(arguments.limits, measured))
     if not save_json(arguments.json, report):
         print(f"{arguments.mesh}: size-skew, metric {found.metric}")
@@ -140,6 +150,8 @@ def _report(
         print(table([(w["cell"], w["type"], f"{w['quality']:.6f}") for w in report["worst"]]))
         print("cells by quality:")
         print(histogram_lines(found))
+        if report["metrics"]:
+            print(f"metrics:\n{metric_lines(report['metrics'])}")
         if report["limits"]:
             print(f"limits:\n{limit_lines(report['limits'])}")
     code = report_limits(report["limits"])
@@ -160,16 +172,19 @@ def _walls(mesh: Mesh, reference: Mesh | None, case: Case | None) -> dict[str, d
     return found.summary()
 
 
-def _write_csv(path: Path, found: Quality) -> None:
-    """Write number, size-skew, size, skew and status of each cell as CSV."""
+def _write_csv(path: Path, found: Quality, metrics: Mapping[Metric, MetricValues]) -> None:
+    """Write number, size-skew, size, skew, status and other metrics of each cell as CSV."""
     from slideviz.errors import CaseError
     from slideviz.system.atomic import atomic_write
-    from slideviz.terms import CELL_STATES
+    from slideviz.terms import CELL_STATES, SIZE_SKEW, field_of
 
-    columns = zip(found.values, found.size, found.skew, found.status, strict=True)
-    lines = ["cell,size_skew,size,skew,status"]
-    for cell, (value, size, skew, status) in enumerate(columns):
+    more = {field_of(k): one.of_cells for k, one in metrics.items() if k not in SIZE_SKEW}
+    columns = zip(found.values, found.size, found.skew, found.status, *more.values(), strict=True)
+    lines = [",".join(("cell,size_skew,size,skew,status", *more))]
+    for cell, (value, size, skew, status, *others) in enumerate(columns):
         numbers = f"{float(value)!r},{float(size)!r},{float(skew)!r}"
-        lines.append(f"{cell},{numbers},{CELL_STATES[status]}")
+        lines.append(
+            ",".join((f"{cell},{numbers},{CELL_STATES[status]}", *(repr(float(v)) for v in others)))
+        )
     with atomic_write(path, CaseError) as file:
         file.write(("\n".join(lines) + "\n").encode())

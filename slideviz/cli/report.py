@@ -17,6 +17,7 @@ from slideviz.case.model import Case
 from slideviz.case.words import counted
 from slideviz.errors import CaseError, Note
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.metrics import metrics
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.walls import Walls, wall_words
@@ -24,6 +25,7 @@ from slideviz.rbf.problem import Relaxed
 from slideviz.solver.deform import Step, folded_at
 from slideviz.streaming.quality import CellCounts
 from slideviz.system.atomic import atomic_write
+from slideviz.terms import Metric, field_of
 
 LISTED = 100
 """Most inverted cells listed in a report."""
@@ -150,6 +152,30 @@ def limits_report(
         }
         for result, old in zip_longest(results, before)
     ]
+
+
+def metrics_report(
+    mesh: Mesh, names: Sequence[Metric], reference: Mesh | None = None
+) -> dict[str, Any]:
+    """Return the summaries of metrics of a mesh, by the names of their fields."""
+    if not names:
+        return {}
+    found = metrics(mesh, names, reference)
+    return {field_of(name): values.summary() for name, values in found.items()}
+
+
+def metric_lines(after: Mapping[str, Any], before: Mapping[str, Any] | None = None) -> str:
+    """Return metrics of a mesh, and of the undeformed one, as a text table."""
+    rows: list[tuple[str, ...]] = [("", "min", "mean", "max", "worst at", "beyond limit")]
+    for name, entry in after.items():
+        for label, one in ((name, entry), ("  undeformed", (before or {}).get(name))):
+            if one is None:
+                continue
+            numbers = ("inf" if one[k] is None else f"{one[k]:.6g}" for k in ("min", "mean", "max"))
+            beyond = "" if one["limit"] is None else f"{one['beyond']} ({one['limit']:g})"
+            unit = f" [{one['unit']}]" if one["unit"] and one is entry else ""
+            rows.append((f"{label}{unit}", *numbers, f"{one['of'][:-1]} {one['worst_at']}", beyond))
+    return table(rows)
 
 
 def limit_lines(report: Sequence[Mapping[str, Any]]) -> str:

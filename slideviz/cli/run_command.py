@@ -52,6 +52,7 @@ def add_run(calls: argparse._SubParsersAction) -> None:
     call.add_argument("-o", "--output", type=Path, metavar="MESH", help="deformed mesh to write")
     add_changes(call)
     add_shared(call, "json", help="report as JSON; - is the terminal")
+    add_shared(call, "metrics")
     call.add_argument(
         "--history", type=Path, metavar="FILE", help="convergence of the data reduction (CSV)"
     )
@@ -90,7 +91,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run(arguments: argparse.Namespace) -> int:
     from slideviz.cli.output_paths import REPLACED, qualities_path
-    from slideviz.cli.report import run_report
+    from slideviz.cli.report import metrics_report, run_report
+    from slideviz.errors import CaseError
 
     begin = time.perf_counter()
     case = read_case(arguments)
@@ -101,6 +103,8 @@ def _run(arguments: argparse.Namespace) -> int:
     require_streamable(arguments, case, output, kind)
     _require_output_paths(arguments, case, output, qualities)
     streamed = is_to_be_streamed(arguments, case, output, kind)
+    if streamed and arguments.metrics:
+        raise CaseError("--metrics needs the mesh in memory; leave it out for a streamed run")
     about = _about(case) if streamed else ""
     results = [path for path in (output, qualities) if path]
     if arguments.resume and (known := finished(about, results)):
@@ -145,6 +149,11 @@ def _run(arguments: argparse.Namespace) -> int:
         folded=folded,
         walls=done.walls,
     )
+    if arguments.metrics:
+        report["metrics"] = {
+            "before": metrics_report(done.mesh, arguments.metrics, done.mesh),
+            "after": metrics_report(done.steps[-1].mesh, arguments.metrics, done.mesh),
+        }
     in_memory = None if streamed else done.mesh
     advice = advice_for(case, done.steps[-1].layers, in_memory, found, report["limits"])
     if streamed:

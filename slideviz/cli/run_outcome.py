@@ -174,7 +174,7 @@ def _print_run(
 ) -> None:
     """Print the summary of a run; ``found`` and ``before`` are its quality after and before."""
     from slideviz.case.words import counted
-    from slideviz.cli.report import limit_lines, quality_lines, table, wall_lines
+    from slideviz.cli.report import limit_lines, metric_lines, quality_lines, table, wall_lines
 
     counts, spent = report["node_counts"], report["seconds"]
     method = "" if report["method"] == "rbf" else f"method {report['method']}, "
@@ -210,6 +210,8 @@ def _print_run(
     print(table(rows))
     if report["limits"]:
         print(f"limits:\n{limit_lines(report['limits'])}")
+    if rated := report.get("metrics"):
+        print(f"metrics:\n{metric_lines(rated['after'], rated['before'])}")
     if report["tried"]:
         print(f"  steps tried: {', '.join(map(_trial_words, report['tried']))}")
     parts = {k: v for k, v in spent.items() if k != "total"}

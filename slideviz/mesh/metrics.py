@@ -87,6 +87,14 @@ class MetricValues:
         mask[self.counted] = worse[self.counted]
         return np.flatnonzero(mask)
 
+    @property
+    def worst_at(self) -> int:
+        """Return the number of the cell or node with the worst value, the first of several."""
+        values = -self.values if self.term.best == "low" else self.values
+        rated = np.full(len(values), np.inf)
+        rated[self.counted] = values[self.counted]
+        return int(rated.argmin())
+
     def summary(self) -> dict[str, object]:
         """Return the numbers for a report, as plain Python values; None for an infinite one."""
         limit = self.term.limit
@@ -95,6 +103,7 @@ class MetricValues:
             for name in ("min", "mean", "max")
         }
         numbers |= {"unit": self.term.unit.strip("[]"), "of": self.term.where, "limit": limit}
+        numbers["worst_at"] = self.worst_at
         if limit is not None:
             numbers["beyond"] = len(self.beyond(limit))
         return numbers
