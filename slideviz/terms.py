@@ -366,7 +366,10 @@ Metric = Literal[
     "largest-angle",
     "aspect-ratio",
 ]
-Quantity = Literal[Metric, "displacement"]
+WallValue = Literal[
+    "first-height", "height-ratio", "growth", "equal-layers", "wall-angle", "angle-change"
+]
+Quantity = Literal[Metric, WallValue, "displacement"]
 ColorBy = Literal["role", Quantity]
 
 
@@ -497,7 +500,29 @@ METRICS: dict[Metric, MetricTerm] = {
 SIZE_SKEW: tuple[Metric, ...] = ("size-skew", "size", "skew")
 """Those of `slideviz.mesh.quality`: 0 to 1, relative to the undeformed cell."""
 
-QUANTITIES: dict[Quantity, ColorByTerm] = dict(METRICS.items())
+WALL_VALUES: dict[WallValue, MetricTerm] = {
+    "first-height": MetricTerm(
+        "first height", "Distance of the first node from the wall.", unit="[mesh units]"
+    ),
+    "height-ratio": MetricTerm("height ratio", "First height after over before. 1 is best."),
+    "growth": MetricTerm(
+        "growth", "Largest ratio of two successive edges that leave the wall.", best="low"
+    ),
+    "equal-layers": MetricTerm("equal layers", "Number of first edges that are equal within 1 %."),
+    "wall-angle": MetricTerm(
+        "wall angle", "Angle of the first edge to the wall. 90 is best.", unit="[°]"
+    ),
+    "angle-change": MetricTerm(
+        "angle change", "Change of the angle of the first edge.", unit="[°]", best="low"
+    ),
+}
+"""The numbers of `slideviz.mesh.walls`: values of the cells at walls with layers, or at all walls
+where none has; other cells have none. They have no usual range."""
+
+RATED: dict[Quantity, MetricTerm] = dict(METRICS.items())
+"""The quantities of which one end is better."""
+RATED.update(WALL_VALUES.items())
+QUANTITIES: dict[Quantity, ColorByTerm] = dict(RATED.items())
 """The quantities that are values of cells; the first is the default."""
 QUANTITIES["displacement"] = ColorByTerm("displacement", unit="[mesh units]")
 COLOR_BY: dict[ColorBy, ColorByTerm] = {"role": ColorByTerm("role")}

@@ -30,7 +30,7 @@ from slideviz.session.panes import shown_views
 from slideviz.session.passages import show_passages
 from slideviz.session.runs_words import run_words
 from slideviz.session.state import Session
-from slideviz.terms import COLOR_MAPS, NO_REFERENCE, ColorMap, Quantity, quantity_of
+from slideviz.terms import COLOR_MAPS, NO_REFERENCE, WALL_VALUES, ColorMap, Quantity, quantity_of
 
 _SHOWN = "shown: "  # begin of the note about a threshold
 
@@ -99,6 +99,8 @@ def _shown(session: Session, name: str, section: Section) -> SectionInRun:
     assert frame is not None
     by = session.view.color_by
     painted = paint(frame.mesh, frame.quality, quantity_of(by), session.mesh)
+    if by in WALL_VALUES:  # of the boundaries that the case has as walls
+        painted = replace(painted, values=frame.values(by, session.mesh))
     painted = replace(painted, color_map=session.view.color_map)
     if by != "role":
         painted = painted.within(*session.color_range)

@@ -21,7 +21,7 @@ from slideviz.session.runs_words import (
     run_words,
 )
 from slideviz.session.state import Session, StepFrame
-from slideviz.terms import ColorBy
+from slideviz.terms import WALL_VALUES, ColorBy
 
 if TYPE_CHECKING:
     from slideviz.scene.scene import Scene
@@ -182,6 +182,8 @@ def mark_words(session: Session) -> str:
     if session.view.color_by == "role" or session.mesh is None:
         return words
     value = float(frame.values(session.view.color_by, session.mesh)[cell])
+    if session.view.color_by in WALL_VALUES and np.isnan(value):
+        return f"{words}: at no wall"
     number = ".4g" if session.view.color_by == "displacement" else ".4f"
     return f"{words}: {value:{number}}"
 

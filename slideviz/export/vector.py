@@ -14,9 +14,11 @@ from slideviz.export.offscreen import CAPTION_AT, TITLE
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions, headings, panes
 from slideviz.export.titles import draw_marked_cell
-from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.cached_boundary import boundary_of
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.plots.cells import color_bar, color_scale, draw_cells
 from slideviz.plots.figure_io import empty_figure, write_figure
+from slideviz.plots.section_paint import clipped
 from slideviz.scene.color_legend import OPACITY, STRIP
 from slideviz.scene.mesh import FADED, is_faded
 from slideviz.scene.sections import BAND, NAME, RIM, WIDTHS, shown_sections
@@ -24,7 +26,7 @@ from slideviz.sections.cut import Cutter
 from slideviz.sections.line import box_around, trace
 from slideviz.sections.polygons import CellsInRange, Polygons
 from slideviz.session.state import Session
-from slideviz.terms import COLOR_BY, ROLES
+from slideviz.terms import COLOR_BY, ROLES, WALL_VALUES
 
 SUFFIXES = (".svg", ".pdf")  # suffixes of such pictures
 MOST_CELLS = 100_000  # most cells of such a picture: viewers take minutes to show more
@@ -110,10 +112,14 @@ class _Paint:
 
     def lines(self, cut: Polygons) -> dict[str, Any]:
         """Return the color arguments of a LineCollection of the lines that a section cuts."""
+        return self.at(cut.cells)
+
+    def at(self, cells: IntArray) -> dict[str, Any]:
+        """Return the color arguments of a LineCollection with a line for each of cells (k,)."""
         if self.values is None:
             return {"colors": PAPER.cell}
         scale = self.colors
-        return {"array": self.values[cut.cells], "cmap": scale.cmap, "norm": scale.norm}
+        return {"array": self.values[cells], "cmap": scale.cmap, "norm": scale.norm}
 
 
 def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: float) -> None:
@@ -128,7 +134,10 @@ def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: f
     paint = _Paint(None, None, edge)
     if view.color_by != "role":
         values = frame.shown_values(view.color_by, session.mesh)
-        paint = _Paint(values, color_scale(view.color_map, session.color_range), edge)
+        at_walls = view.color_by in WALL_VALUES
+        colors = color_scale(view.color_map, session.color_range, at_walls)
+        shown = clipped(values, session.color_range) if at_walls else values
+        paint = _Paint(shown, colors, edge)
         only = None if view.threshold is None else CellsInRange.of(values, view.threshold)
     cells = cutter.all_cells(mesh.points)
     faint = FADED if is_faded(session) else None
@@ -158,7 +167,11 @@ def _draw_mesh(axes: Any, session: Session, options: PictureOptions, pixel_pt: f
         axes.add_collection(LineCollection(parts, **style))
     for name in mesh.marker_names:
         if name not in view.hidden:
-            style = {"colors": ROLES[session.role(name)].color, "linewidths": _LINE * pixel_pt}
+            style = {"colors": ROLES[session.role(name)].color}
+            if view.color_by in WALL_VALUES:  # layers may be too thin to be seen
+                boundary = boundary_of(mesh)
+                style = paint.at(boundary.owner[boundary.marker == boundary.names.index(name)])
+            style["linewidths"] = _LINE * pixel_pt
             axes.add_collection(LineCollection(list(_lines(mesh, name)), **style))
     if options.marked:
         draw_marked_cell(axes, session, pixel_pt)

@@ -303,6 +303,10 @@ class Walls:
         """Return the same for other boundaries to be reported."""
         return replace(self, markers=tuple(markers))
 
+    def with_layers(self) -> Walls:
+        """Return the same with those of ``markers`` that have layers; with all where none has."""
+        return self.of([name for name in self.markers if name in self.layered] or self.markers)
+
     def summary(self) -> dict[str, dict]:
         """Return what the report says, by boundary.
 

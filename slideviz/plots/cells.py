@@ -26,13 +26,18 @@ _HAIR = 0.15
 _AMBIENT = 0.7  # brightness of a surface seen edge-on, relative to one seen face-on, with ``lit``
 
 
-def color_scale(color_map: str, limits: tuple[float, float]) -> Any:
-    """Return the ScalarMappable of a color map and its limits; NaN has the inverted color."""
+def color_scale(color_map: str, limits: tuple[float, float], at_walls: bool = False) -> Any:
+    """Return the ScalarMappable of a color map and its limits; NaN has the inverted color.
+
+    With ``at_walls``, values above the limits are those of cells at no wall, without a color.
+    """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    table = colormaps[color_map].with_extremes(bad=INVERTED_COLOR)
+    table = colormaps[color_map].with_extremes(
+        bad=INVERTED_COLOR, over=PAPER.cell if at_walls else None
+    )
     return ScalarMappable(Normalize(*limits), table)
 
 

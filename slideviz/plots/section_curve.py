@@ -98,7 +98,8 @@ def draw_curves(
     """
     style_axes(axes, style, *labels)
     good = np.concatenate([row.curve.values for row in rows])
-    low, high = rounded_out(float(good.min()), float(good.max()))
+    good = good[np.isfinite(good)]  # a cell at no wall has none of the numbers of walls
+    low, high = rounded_out(float(good.min()), float(good.max())) if len(good) else (0.0, 1.0)
     margin = 0.06 * (high - low)
     axes.set_ylim(low - margin, high + margin)
     ends = np.concatenate([row.curve.ends for row in rows])

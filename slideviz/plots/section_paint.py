@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
@@ -12,7 +12,14 @@ from slideviz.errors import CaseError, not_one_of
 from slideviz.mesh.metrics import metric
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
-from slideviz.terms import METRICS, QUANTITIES, Quantity
+from slideviz.mesh.walls import walls
+from slideviz.plots.ticks import rounded_out
+from slideviz.terms import QUANTITIES, RATED, WALL_VALUES, Metric, Quantity, field_of
+
+
+def clipped(values: FloatArray, limits: tuple[float, float]) -> FloatArray:
+    """Return values (k,) clipped to limits; NaN and inf stay (inverted, at no wall)."""
+    return np.where(np.isinf(values), values, np.clip(values, *limits))
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,31 +59,42 @@ class Paint:
         """Return whether the quantity has no largest value, so that limits follow the cells."""
         if self.label == "displacement":
             return True
-        term = METRICS[self.label]
+        if self.label in WALL_VALUES:
+            return False
+        term = RATED[self.label]
         return term.colors is None and np.isinf(term.range[1])
 
     def shown(self, cells: IntArray) -> FloatArray:
-        """Return the values (c,) of cells (c,), clipped to the limits; NaN if inverted."""
-        return np.where(self.inverted[cells], np.nan, np.clip(self.values[cells], *self.limits))
+        """Return the values (c,) of cells (c,), clipped to the limits.
+
+        Of an inverted cell NaN, of one without a number of walls inf.
+        """
+        values = np.clip(self.values[cells], *self.limits)
+        if self.label in WALL_VALUES:
+            values[np.isnan(values)] = np.inf
+        return np.where(self.inverted[cells], np.nan, values)
 
     @property
     def worst(self) -> Literal["min", "max"]:
         """Return the end that counts: the worst values, or the largest displacement."""
-        if self.label == "displacement" or METRICS[self.label].best == "low":
+        if self.label == "displacement" or RATED[self.label].best == "low":
             return "max"
         return "min"
 
     def summary(self, cells: IntArray) -> dict[str, float | int]:
         """Return number, min, mean, max, inverted and worst cell of cells (c,), c > 0."""
+        count, bad = len(cells), int(np.count_nonzero(self.inverted[cells]))
+        if self.label in WALL_VALUES and not np.isnan(self.values[cells]).all():
+            cells = cells[~np.isnan(self.values[cells])]
         mine = self.values[cells]
         rated = -mine if self.worst == "max" and self.label != "displacement" else mine
         worst = cells[np.argmin(np.where(self.inverted[cells], -np.inf, rated))]
         return {
-            "cells": len(cells),
+            "cells": count,
             "min": float(mine.min()),
             "mean": float(mine.mean()),
             "max": float(mine.max()),
-            "inverted": int(np.count_nonzero(self.inverted[cells])),
+            "inverted": bad,
             "worst_cell": int(worst),
         }
 
@@ -93,6 +111,8 @@ class Paint:
             count = f"{len(cells):,} of {of:,} cells cut (shown: {shown})"
         if facts["inverted"]:
             count += f", {facts['inverted']:,} inverted"
+        if np.isnan(facts["min"]) and self.label in WALL_VALUES:
+            return f"{RATED[self.label].label}: no cell at a wall; {count}"
         return f"{self.label}: {end} {facts[end]:{number}}, mean {facts['mean']:{number}}; {count}"
 
 
@@ -107,10 +127,19 @@ def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = N
     if by not in QUANTITIES:
         raise CaseError(f"color: {not_one_of(by, QUANTITIES)}")
     inverted = quality.status == INVERTED
+    if by in WALL_VALUES:
+        name = field_of(by)
+        layers = walls(mesh, reference).with_layers()
+        if name not in layers.values:
+            raise CaseError(f"{by} compares with the undeformed mesh; give that mesh as reference")
+        values = layers.at_cells(name)
+        known = values[np.isfinite(values)]
+        ends = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+        return Paint(by, values, inverted, rounded_out(*ends))
     if by != "displacement":
         rated = {"size-skew": quality.values, "size": quality.size, "skew": quality.skew}
-        values = rated[by] if by in rated else metric(mesh, by, reference).of_cells
-        painted = Paint(by, values, inverted, METRICS[by].colors or METRICS[by].range)
+        values = rated[by] if by in rated else metric(mesh, cast(Metric, by), reference).of_cells
+        painted = Paint(by, values, inverted, RATED[by].colors or RATED[by].range)
         return painted.up_to(np.arange(len(values))) if painted.unbounded else painted
     if reference is None or reference.points.shape != mesh.points.shape:
         raise CaseError(

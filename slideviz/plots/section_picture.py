@@ -31,7 +31,7 @@ from slideviz.plots.style import PRINT
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons, joined
 from slideviz.sections.shape import Label
-from slideviz.terms import QUANTITIES
+from slideviz.terms import QUANTITIES, WALL_VALUES
 
 TITLE, LETTERS = 10.0, 9.0  # size in points of the title's letters, and of all others
 _LETTER_WIDTH = 0.075  # width of a label's letter in inches
@@ -345,7 +345,7 @@ def _cells(
             words, size = fitted(text, available, LETTERS)
             axes.set_title(words, fontsize=size)
     paint = shown[0].paint
-    colors = color_scale(paint.color_map, paint.limits)
+    colors = color_scale(paint.color_map, paint.limits, paint.label in WALL_VALUES)
     folded = [
         one.paint.inverted[piece.cells].any() for one in shown for piece in one.drawn.values()
     ]

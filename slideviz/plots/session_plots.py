@@ -23,7 +23,7 @@ from slideviz.sections.model import Section
 from slideviz.session.changes import show_frame
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Run, Session, StepFrame
-from slideviz.terms import QUANTITIES, ColorBy, Quantity, quantity_of
+from slideviz.terms import QUANTITIES, WALL_VALUES, ColorBy, Quantity, quantity_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -239,6 +239,8 @@ class FrameCounts:
             min((e[0] for e in spreads), default=0.0),
             max((e[1] for e in spreads), default=1.0),
         )
+        if what in WALL_VALUES:
+            return rounded_out(low, high)
         if what != "displacement":
             # A smaller range would enlarge meaningless differences.
             return (0.0, 1.0) if full_range else rounded_out(min(low, high - LEAST_SPREAD), high)
@@ -274,7 +276,7 @@ def draw_histogram(
     shown, run = counts.of(session, session.frame, limits), session.run_shown
     label = "undeformed" if session.view.frame == 0 or run is None else run.label
     term = QUANTITIES[what]
-    metric = term.axis if term.unit else f"{term.label} quality [-]"
+    metric = term.axis if term.unit or what in WALL_VALUES else f"{term.label} quality [-]"
     runs, left_out = compared(session)
     outlines = [
         Outline(other.label, counts.of(session, other.last, limits), series_of(other))
@@ -374,5 +376,9 @@ def spread(
 
 
 def _values(frame: StepFrame, what: ColorBy, undeformed: Mesh | None) -> FloatArray:
-    """Return the values of a frame's counted cells (those of a halo are not); NaN if inverted."""
-    return np.asarray(frame.shown_values(what, undeformed)[frame.quality.counted])
+    """Return the values of a frame's counted cells (those of a halo are not); NaN if inverted.
+
+    Of numbers of walls only those of cells at walls.
+    """
+    values = frame.shown_values(what, undeformed)[frame.quality.counted]
+    return values[~np.isinf(values)] if what in WALL_VALUES else values

@@ -194,6 +194,7 @@ def add_color_bar(stage: Stage, mapper: Any, what: ColorByTerm, inverted: bool) 
     bar.SetUseCustomLabels(True)
     bar.SetDrawNanAnnotation(inverted)
     bar.SetNanAnnotation("")
+    bar.SetDrawAboveRangeSwatch(False)
     if inverted:  # VTK's own annotation would be to the bar's left, over the mesh
         word, right = pv.Text("inverted"), STRIP - 14 - _BAR - _GAP - _INDENT
         word.GetPositionCoordinate().SetReferenceCoordinate(_corner(1.0, _BOTTOM))

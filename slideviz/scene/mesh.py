@@ -17,7 +17,7 @@ from slideviz.scene.actors import CELL, POINT, VALUES, Band, DrawnBoundary, part
 from slideviz.scene.stage import Layer, Stage
 from slideviz.sections.polygons import cells_in_range
 from slideviz.session.state import Session, StepFrame
-from slideviz.terms import ROLES
+from slideviz.terms import ROLES, WALL_VALUES
 
 if TYPE_CHECKING:
     from slideviz.scene.sections import SectionLayer
@@ -37,6 +37,7 @@ def recolored(old: Session | None, new: Session) -> bool:
         or old.frame is not new.frame
         or old.view.color_by != new.view.color_by
         or old.mesh is not new.mesh
+        or (new.view.color_by in WALL_VALUES and old.color_range != new.color_range)
     )
 
 
@@ -109,7 +110,7 @@ class CellLayer(Layer):
             if new.mesh.dim == 3:
                 values = self.stage.values_of(new, self.shape.cell_data[CELL])
             else:
-                values = self.stage.values(new)
+                values = self.stage.drawn(new, self.stage.values(new))
                 values = values if self.order is None else values[self.order]
             self.shape.cell_data[VALUES] = values
         self.actor.mapper.scalar_visibility = by_value
@@ -179,7 +180,10 @@ class BoundaryLayer(Layer):
             return
         if old is None or old.frame is not new.frame:
             self._place(new.frame.mesh.points)
-        by_value = new.view.color_by != "role" and new.mesh.dim == 3
+        # In 2D, first layers of cells may be thinner than a pixel.
+        by_value = new.view.color_by in WALL_VALUES or (
+            new.view.color_by != "role" and new.mesh.dim == 3
+        )
         if by_value and recolored(old, new):
             for one in self.drawn.values():
                 one.shape.cell_data[VALUES] = self.stage.values_of(new, one.surface.owner)
@@ -226,7 +230,7 @@ class BoundaryLayer(Layer):
         one.actor.prop.color = ROLES[session.role(name)].color
         one.actor.mapper.scalar_visibility = by_value
         if one.surface.flat:
-            one.actor.prop.line_width = 4.5 if view.color_by == "role" else 3.0
+            one.actor.prop.line_width = 4.5 if view.color_by == "role" or by_value else 3.0
         else:
             self.stage.edges(one.actor.prop, "edges" in view.drawn)
             inside, glass = looks_inside(session), name in self.glass
@@ -406,7 +410,7 @@ class CoarseLayer(Layer):
         assert session.frame is not None
         if not self.drawn:
             self.drawn = {name: self._add(one) for name, one in self.surfaces.items()}
-        made_of = session.frame, session.view.color_by
+        made_of = session.frame, session.view.color_by, session.color_range
         again, self._made_of = made_of != self._made_of, made_of
         for name, one in self.drawn.items():
             full = self._boundaries.drawn[name].actor

@@ -10,10 +10,12 @@ import numpy as np
 from slideviz.color_scheme import LIGHT, VALUE_EDGE, ColorScheme
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface
+from slideviz.plots.section_paint import clipped
 from slideviz.scene.actors import LIFT, VALUES, draw_fine_edges, lookup_table
 from slideviz.scene.color_legend import STRIP
 from slideviz.sections.polygons import CellsInRange
 from slideviz.session.state import Session, StepFrame
+from slideviz.terms import WALL_VALUES
 
 USUAL_DPI = 72.0  # VTK's dots per inch of a screen with a device pixel ratio of 1
 
@@ -150,7 +152,7 @@ class Stage:
     def values(self, session: Session) -> FloatArray:
         """Return the values (m,) that color the cells of the shown frame, cached.
 
-        They are NaN for inverted cells.
+        As `StepFrame.shown_values` has them: see `drawn` for their colors.
         """
         frame, what = session.frame, session.view.color_by
         assert frame is not None
@@ -158,6 +160,12 @@ class Stage:
         if self._values is None or self._values[0] != key:
             self._values = key, frame.shown_values(what, session.mesh)
         return self._values[1]
+
+    @staticmethod
+    def drawn(session: Session, values: FloatArray) -> FloatArray:
+        """Return `values` as the table of colors takes them: of no wall above its range."""
+        by_wall = session.view.color_by in WALL_VALUES
+        return clipped(values, session.color_range) if by_wall else values
 
     def values_of(
         self, session: Session, cells: IntArray, of: StepFrame | None = None
@@ -169,8 +177,8 @@ class Stage:
         frame, what = of or session.frame, session.view.color_by
         assert frame is not None
         if self._values is not None and self._values[0] == (frame, what):
-            return self._values[1][cells]
-        return frame.shown_values(what, session.mesh, cells)
+            return self.drawn(session, self._values[1][cells])
+        return self.drawn(session, frame.shown_values(what, session.mesh, cells))
 
     def value_of(self, session: Session, cell: int) -> float:
         """Return the value of one cell, which may be a worst cell of a mesh in its file."""
@@ -194,6 +202,8 @@ class Stage:
         """Set color map and range of the table of colors to those of the session."""
         low, high = session.color_range
         self.table.scalar_range = (low, high)
+        at_walls = session.view.color_by in WALL_VALUES
+        self.table.above_range_color = self.scheme.cell if at_walls else None
         if session.view.color_map != self.table.cmap.name:
             self.table.apply_cmap(session.view.color_map, 256)
 

@@ -7,11 +7,8 @@ import numpy as np
 from slideviz.mesh.quality import INVERTED
 from slideviz.session.changes import second_view, set_view, undoable
 from slideviz.session.results import StepFrame
-from slideviz.session.state import Session
+from slideviz.session.state import Session, outwards
 from slideviz.terms import METRICS
-
-_PARTS = 100.0
-"""A color range is rounded outwards to a power of ten, about its length over this number."""
 
 
 @undoable("color range")
@@ -71,7 +68,7 @@ def _limits(session: Session, every: bool) -> tuple[float, float] | None:
             highs.append(float(values.max()))
     if not lows or not min(lows) < max(highs):
         return None
-    return _outwards(min(lows), max(highs))
+    return outwards(min(lows), max(highs))
 
 
 def _frames(session: Session, every: bool) -> set[StepFrame]:
@@ -85,11 +82,3 @@ def _frames(session: Session, every: bool) -> set[StepFrame]:
             far = one.view.color_by == "displacement"
             shown.update((*one.frames[:1], *one.frames[-1:]) if far else one.frames)
     return shown
-
-
-def _outwards(low: float, high: float) -> tuple[float, float]:
-    """Return two numbers rounded to few digits, the lower one down and the upper one up."""
-    unit = float(10.0 ** np.floor(np.log10((high - low) / _PARTS)))
-    first, last = np.floor(low / unit + 1e-6) * unit, np.ceil(high / unit - 1e-6) * unit
-    digits = max(0, round(-np.log10(unit))) + 1
-    return round(float(first), digits), round(float(last), digits)

@@ -272,7 +272,9 @@ def prepare(
 
     if mesh.part is None:
         measured = quality(mesh, metric=metric, going_on=going_on)
-        first = StepFrame(mesh, measured, walls=_walls(mesh, mesh))
+        periodic = {name for pair in pairs for name in (pair.first, pair.second)}
+        names = [name for name in mesh.marker_names if name not in periodic]
+        first = StepFrame(mesh, measured, walls=_walls(mesh, mesh, names))
     else:
         first = first_frame(mesh, metric, measuring)
     going_on()
@@ -296,10 +298,10 @@ def _precompute(frame: StepFrame) -> None:
     _ = measured.min, measured.mean, measured.inverted, measured.cells
 
 
-def _walls(mesh: Mesh, undeformed: Mesh) -> Walls | None:
-    """Return the layers at the boundaries; None where a boundary is no side of the cells."""
+def _walls(mesh: Mesh, undeformed: Mesh, names: Sequence[str]) -> Walls | None:
+    """Return the layers at boundaries; None where a boundary is no side of the cells."""
     try:
-        return walls(mesh, undeformed)
+        return walls(mesh, undeformed, names)
     except MeshError:
         return None
 
@@ -325,7 +327,7 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
             tried = f"{now.total} step{'s' if now.total > 1 else ''}"
             report(JobProgress(f"Trying {tried}: step {now.step}, {phase}"))
 
-    unfinished = True
+    unfinished, names = True, case.walls(mesh.marker_names)
 
     def going_on() -> None:
         # The last step is not dropped, even if the job is asked to stop.
@@ -336,7 +338,7 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         unfinished = step.index < step.total
         report(JobProgress(f"Step {step.index} of {step.total}: quality", step.index / step.total))
         measured = quality(step.mesh, mesh, case.quality_metric, going_on)
-        frame = StepFrame(step.mesh, measured, step, walls=_walls(step.mesh, mesh))
+        frame = StepFrame(step.mesh, measured, step, walls=_walls(step.mesh, mesh, names))
         _precompute(frame)
         report(frame)
         going_on()

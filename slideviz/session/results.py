@@ -11,15 +11,16 @@ import numpy as np
 
 from slideviz.case.limits import Limit, LimitResult
 from slideviz.case.model import Case
+from slideviz.errors import MeshError
 from slideviz.mesh.metrics import metric
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
+from slideviz.mesh.walls import Walls, walls
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
-from slideviz.terms import METRICS, SIZE_SKEW, ColorBy
+from slideviz.terms import METRICS, SIZE_SKEW, WALL_VALUES, ColorBy, field_of
 
 if TYPE_CHECKING:
-    from slideviz.mesh.walls import Walls
     from slideviz.solver.deform import Step
 
 
@@ -43,8 +44,8 @@ class StepFrame:
     file: Path | None = None
     """The file of the whole mesh, if only the skin is in memory."""
     walls: Walls | None = None
-    """The layers at all boundaries, compared with those of the undeformed mesh; None where only the
-    skin is in memory."""
+    """The layers at boundaries, compared with those of the undeformed mesh; None where only the
+    skin is in memory. Colors show those of its ``markers``."""
 
     def has(self, cell: int | None) -> bool:
         """Return whether the frame has a cell of that number, its own or of ``extra``."""
@@ -65,10 +66,14 @@ class StepFrame:
 
         A metric of nodes has the worst of each cell's nodes, one that compares neighbouring cells
         is NaN where only the skin is in memory. The displacement of a cell is the mean
-        distance of its nodes from where they are in ``undeformed``, in the mesh's length unit.
+        distance of its nodes from where they are in ``undeformed``, in the mesh's length unit. A
+        number of walls is NaN in cells that are not at a wall.
         """
         if what == "displacement":
             return cell_displacement(self.mesh, self.base or undeformed or self.mesh, cells)
+        if what in WALL_VALUES:
+            every = self._at_walls(field_of(what), self.base or undeformed or self.mesh)
+            return every if cells is None else every[cells]
         names = {"size": self.quality.size, "skew": self.quality.skew}
         if what in METRICS and what not in SIZE_SKEW:
             known = self.mesh.part is None or METRICS[what].alone
@@ -84,9 +89,32 @@ class StepFrame:
     def shown_values(
         self, what: ColorBy, undeformed: Mesh | None = None, cells: IntArray | None = None
     ) -> FloatArray:
-        """Return `values` for colors: nan where a cell is inverted."""
+        """Return `values` for colors: nan where a cell is inverted, inf where it is at no wall."""
         status = self.quality.status if cells is None else self.quality.status[cells]
-        return np.where(status == INVERTED, np.nan, self.values(what, undeformed, cells))
+        values = self.values(what, undeformed, cells)
+        if what in WALL_VALUES:
+            values = np.where(np.isnan(values), np.inf, values)
+        return np.where(status == INVERTED, np.nan, values)
+
+    def _at_walls(self, name: str, undeformed: Mesh) -> FloatArray:
+        """Return a number of the walls in all cells (m,), cached: nan where it has none."""
+        known = _AT_WALLS.setdefault(self, {})
+        if name not in known:
+            try:
+                whole = self.mesh.part is None
+                layers = self.walls or (walls(self.mesh, undeformed) if whole else None)
+            except MeshError:
+                layers = None
+            known.clear()  # one is enough, as they are large
+            none = np.full(len(self.mesh.cells), np.nan)
+            known[name] = none if layers is None else layers.with_layers().at_cells(name)
+        return known[name]
+
+    def ends(self, what: ColorBy, undeformed: Mesh) -> tuple[float, float] | None:
+        """Return the smallest and largest finite value of a quantity; None where there is none."""
+        values = self.values(what, undeformed)
+        values = values[np.isfinite(values)]
+        return (float(values.min()), float(values.max())) if len(values) else None
 
     def largest(self, what: ColorBy, undeformed: Mesh) -> float:
         """Return the largest finite value of a quantity in all cells, 0 where there is none."""
@@ -103,6 +131,8 @@ class StepFrame:
 
 _LARGEST: WeakKeyDictionary[StepFrame, dict[ColorBy, float]] = WeakKeyDictionary()
 """Results of `StepFrame.largest`."""
+_AT_WALLS: WeakKeyDictionary[StepFrame, dict[str, FloatArray]] = WeakKeyDictionary()
+"""The number of walls that was asked for last, in the cells of frames."""
 
 
 @dataclass(frozen=True, eq=False)

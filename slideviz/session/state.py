@@ -15,7 +15,7 @@ from slideviz.case.model import Case
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.session.results import CheckedLimits, Run, StepFrame, cell_displacement
-from slideviz.terms import METRICS, SHOWN, ColorBy, PointsShown, Role, Shown
+from slideviz.terms import RATED, SHOWN, WALL_VALUES, ColorBy, PointsShown, Role, Shown
 
 if TYPE_CHECKING:
     from slideviz.case.limits import LimitResult
@@ -273,11 +273,27 @@ class Session:
             return 0.0, 1.0
         if what == "displacement":
             return 0.0, round_up(self.largest_displacement) or 1.0
-        low, high = METRICS[what].colors or METRICS[what].range
+        if what in WALL_VALUES:
+            return self._wall_range
+        low, high = RATED[what].colors or RATED[what].range
         if high == np.inf and self.mesh is not None:
             ends = {self.frames[0], self.frames[-1]}
             high = round_up(max(frame.largest(what, self.mesh) for frame in ends))
         return low, high if low < high < np.inf else low + 1.0
+
+    @cached_property
+    def _wall_range(self) -> tuple[float, float]:
+        """Return round numbers around the values at walls of the first and the last frame."""
+        ends = [
+            pair
+            for frame in ({self.frames[0], self.frames[-1]} if self.frames else ())
+            if self.mesh is not None
+            and (pair := frame.ends(self.view.color_by, self.mesh)) is not None
+        ]
+        low, high = min((a for a, _ in ends), default=0.0), max((b for _, b in ends), default=1.0)
+        if low < high:
+            return outwards(low, high)
+        return (0.0, 2.0 * low) if low > 0 else (low, low + 1.0)
 
     @cached_property
     def largest_displacement(self) -> float:
@@ -302,6 +318,18 @@ def round_up(value: float) -> float:
     power = float(10.0 ** np.floor(np.log10(value)))
     fit = (n for n in (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0) if n * power >= value)
     return float(f"{next(fit, 10.0) * power:.3g}")
+
+
+_PARTS = 100.0
+"""A color range is rounded outwards to a power of ten, about its length over this number."""
+
+
+def outwards(low: float, high: float) -> tuple[float, float]:
+    """Return two numbers rounded to few digits, the lower one down and the upper one up."""
+    unit = float(10.0 ** np.floor(np.log10((high - low) / _PARTS)))
+    first, last = np.floor(low / unit + 1e-6) * unit, np.ceil(high / unit - 1e-6) * unit
+    digits = max(0, round(-np.log10(unit))) + 1
+    return round(float(first), digits), round(float(last), digits)
 
 
 def result_settings(case: Case) -> Case:

@@ -67,7 +67,8 @@ def test_it_shows_the_step_the_undeformed_mesh_and_other_runs(full, qtbot):
 
 
 def test_it_follows_the_colors_of_the_view(full, qtbot):
-    for by, word in (("skew", "skew quality"), ("displacement", "displacement")):
+    numbers = {"skew": "skew quality", "wall-angle": "wall angle", "displacement": "displacement"}
+    for by, word in numbers.items():
         with qtbot.waitSignal(full.canvas.drawn):
             full.store.change(changes.set_view, color_by=by)
         assert full.canvas.figure.axes[0].get_xlabel().startswith(word)

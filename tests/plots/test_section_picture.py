@@ -27,7 +27,7 @@ from slideviz.plots.section_picture import (
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session.passages import passages, show_passages
-from slideviz.terms import METRICS, QUANTITIES
+from slideviz.terms import METRICS, QUANTITIES, WALL_VALUES
 from tests.builders import cube, passage, square
 from tests.slow import one_of_each_fast
 
@@ -260,7 +260,7 @@ def test_a_2d_mesh_is_drawn_in_its_plane():
     assert len(shapes.get_paths()) == 6
 
 
-@pytest.mark.parametrize("by", QUANTITIES)
+@pytest.mark.parametrize("by", [by for by in QUANTITIES if by not in WALL_VALUES])
 def test_every_number_can_be_drawn(by):
     base = cube(4, block=False)
     mesh = bent(base)
@@ -277,6 +277,22 @@ def test_every_number_can_be_drawn(by):
         assert f"{by}: {'max' if low else 'min'} " in words_of(figure)[-1]
         worst = painted.values[painted.summary(np.arange(len(mesh.cells)))["worst_cell"]]
         assert worst == (painted.values.max() if low else painted.values.min())
+
+
+@pytest.mark.parametrize("by", WALL_VALUES)
+def test_numbers_of_walls_have_colors_beside_walls_only(by):
+    base = cube(4, block=False)
+    moved = bent(base)
+    found = paint(moved, quality(moved, base), by, base)
+    inside = np.isnan(found.values)
+    assert 0 < inside.sum() < len(inside)
+    shown = found.shown(np.arange(len(inside)))
+    assert np.isinf(shown[inside]).all()
+    assert (shown[~inside] <= found.limits[1]).all()
+    facts = found.summary(np.arange(len(inside)))
+    assert facts["mean"] == pytest.approx(found.values[~inside].mean())
+    assert facts["cells"] == len(inside)
+    assert "no cell at a wall" in found.sentence(np.flatnonzero(inside))
 
 
 def test_a_range_ends_the_colors_but_no_valid_cell_turns_red():

@@ -11,6 +11,7 @@ from slideviz.ffd.section import with_boxes
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.samples.table import sample
+from slideviz.scene.actors import VALUES
 from slideviz.scene.ghosts import circles
 from slideviz.scene.legend import COLORS, SIZE
 from slideviz.scene.mesh import ThresholdLayer
@@ -386,3 +387,24 @@ def test_a_sphere_of_the_support_radius_is_three_circles():
     for body, middle in zip(points, ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0]), strict=True):
         np.testing.assert_allclose(np.linalg.norm(body - middle, axis=2), 2.0)
         assert (np.ptp(body, axis=1) == 0).sum() == 3
+
+
+def test_numbers_of_walls_color_the_walls_and_other_cells_are_plain(scene, row):
+    session = opened(scene, row, color_by="first-height")
+    blade = scene.drawn["BLADE"]
+    at, stage = row.mesh.points[blade.surface.nodes[len(blade.surface.nodes) // 2]], scene.stage
+    low, high = session.color_range
+    drawn = np.asarray(blade.shape.cell_data[VALUES])
+    assert ((drawn >= low) & (drawn <= high)).all()
+    colors = {tuple(stage.table.map_value(value)[:3]) for value in np.unique(drawn)}
+    plain = pv.Color(scene.scheme.cell).int_rgb
+    assert plain not in {tuple(round(255 * part) for part in color) for color in colors}
+    assert np.isinf(scene.drawn["PER1"].shape.cell_data[VALUES]).any()
+    assert stage.table.above_range_color == pv.Color(scene.scheme.cell)
+    spots = near(scene, at, 1)
+    assert (np.abs(spots - plain).sum(axis=1) > 100).any()
+    # A narrower range clips the values at walls: they do not turn plain.
+    scene.update(changes.set_view(session, color_range=(low, (low + high) / 2)))
+    assert np.asarray(blade.shape.cell_data[VALUES]).max() == pytest.approx((low + high) / 2)
+    scene.update(changes.set_view(session, color_by="size-skew"))
+    assert stage.table.above_range_color is None

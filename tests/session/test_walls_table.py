@@ -8,6 +8,8 @@ import pytest
 
 from slideviz.mesh.quality import quality
 from slideviz.mesh.walls import walls
+from slideviz.plots.session_plots import distribution
+from slideviz.sections.polygons import ONLY_INVERTED, cells_in_range
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
 from slideviz.session.results import StepFrame
@@ -55,3 +57,27 @@ def test_runs_have_heights_of_walls_with_layers_only():
     texts = {column.title: column.text(run) for column in COLUMNS}
     assert texts["lowest first height, ratio"] == texts["highest first height, ratio"] == "0.500"
     assert texts["largest change of a wall angle"] == "45"
+
+
+def test_colors_show_the_numbers_at_walls_with_layers_only():
+    session = changes.set_view(sheared_session({}), color_by="height-ratio", frame=1)
+    frame, low = session.frame, [0, 5]  # the cells at y_m
+    values = frame.values("height-ratio", session.mesh)
+    assert values[low] == pytest.approx(0.5)
+    assert np.isnan(np.delete(values, low)).all()
+    assert np.isinf(np.delete(frame.shown_values("height-ratio", session.mesh), low)).all()
+    assert session.color_range == (0.5, 1.0)
+    turned = changes.set_view(session, color_by="wall-angle")
+    assert turned.frame.values("wall-angle", session.mesh)[low] == pytest.approx(45)
+    assert turned.color_range == (45.0, 90.0)
+
+
+def test_thresholds_and_histograms_leave_out_cells_at_no_wall():
+    session = changes.set_view(sheared_session({}), color_by="height-ratio", frame=1)
+    values = session.frame.shown_values("height-ratio", session.mesh)
+    assert cells_in_range(values, (0.0, 2.0)).tolist() == [0, 5]
+    assert len(cells_in_range(values, ONLY_INVERTED)) == 0
+    counts = distribution(session.frame, "height-ratio", (0.0, 1.0), session.mesh)
+    assert (counts.counts.sum(), counts.inverted) == (2, 0)
+    kept = changes.set_view(session, threshold=(0.5, 1.0))
+    assert changes.set_view(kept, color_by="growth").view.threshold is None

@@ -21,6 +21,7 @@ from slideviz.sections.polygons import ONLY_INVERTED, cells_in_range, range_word
 from slideviz.session import changes
 from slideviz.session.state import IN_FILE, Session, StepFrame
 from slideviz.session.store import Store
+from slideviz.terms import WALL_VALUES
 
 END_PX = 6  # distance in pixels up to which a press moves an end of the range
 
@@ -190,6 +191,8 @@ class HistogramPanel(Panel):
         counted = session.frame.quality.counted
         quality = session.frame.quality
         plain = session.frame.values(what, session.mesh)[counted]
+        if what in WALL_VALUES:
+            plain = plain[~np.isnan(plain)] if not np.isnan(plain).all() else np.array([np.nan])
         bad = quality.inverted
         low = "highest" if what == "displacement" else "min"
         mean = quality.mean if what == "size-skew" else plain.mean()

@@ -278,10 +278,10 @@ def plain(rich: str) -> str:
 
 
 def result_parts(session: Session) -> list[list[str]]:
-    """Return two forms of the shown step's numbers, as rich text, the longest form first.
+    """Return three forms of the shown step's numbers, as rich text, the longest form first.
 
     Each form is the list of inverted cells, minimum and mean quality, and of a step the ratios of
-    first heights where walls have layers: in full, and with a shorter word. No number has fewer
+    first heights where walls have layers: in full, and with shorter words. No number has fewer
     decimals: it would look cut off. Empty if no mesh is open.
     """
     frame = session.frame
@@ -293,12 +293,12 @@ def result_parts(session: Session) -> list[list[str]]:
     heights = heights_words(frame, run.case) if deformed and run is not None else ""
     color = f" style='color:{alarm()}'" if quality.inverted else ""
 
-    def form(word: str) -> list[str]:
+    def form(word: str, first: str = "first heights") -> list[str]:
         return [
             f"<span{color}><b>{quality.inverted:,}</b> {word}</span>",
             f"min <b>{quality.min:.4f}</b>",
             f"mean <b>{quality.mean:.4f}</b>",
-            *([f"first heights <b>{heights}</b>"] if heights else []),
+            *([f"{first} <b>{heights}</b>"] if heights else []),
         ]
 
-    return [form("inverted"), form("inv.")]
+    return [form("inverted"), form("inv."), form("inv.", "heights")]
