@@ -278,10 +278,11 @@ def _outer(fixed: FloatArray, x: Array) -> Array:
 
     def times(t: FloatArray) -> FloatArray:
         out = fixed[:, :, None] * t[..., None, :]
-        return out.reshape(*t.shape[:-1], -1)
+        return out.reshape(*out.shape[:-2], out.shape[-2] * out.shape[-1])
 
     def back(g: FloatArray) -> FloatArray:
-        return np.einsum("nb,...nba->...na", fixed, g.reshape(*g.shape[:-1], *fixed.shape[1:], -1))
+        d = fixed.shape[1]
+        return np.einsum("nb,...nba->...na", fixed, g.reshape(*g.shape[:-1], d, g.shape[-1] // d))
 
     return recorded(times(value(x)), (x, times, back))
 

@@ -16,7 +16,7 @@ from slideviz.case.check import unknown_markers
 from slideviz.case.key import MOTION
 from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text, require_no_mesh
-from slideviz.case.model import Case
+from slideviz.case.model import NEW, Case
 from slideviz.case.values import YES_NO, integer, real
 from slideviz.case.words import list_of, number
 from slideviz.design.su2.variables import DesignVariable, misspelt, read_variables, supported
@@ -337,7 +337,7 @@ class _Reader:
 
     def case(self) -> tuple[Case, tuple[str, ...]]:
         """Return the case with roles and settings, and the markers that move."""
-        case = Case(generate_quality=False)
+        case = Case(generate_quality=False, layers=NEW["layers"])
         roles: dict[str, Role] = {}
         for key, role in ROLE_KEYS.items():
             names = self.names(key)
