@@ -192,7 +192,7 @@ class Relaxation:
             moved = moved + difference_from(frame, at, step)
             if problem.curved or k == ITERATIONS - 1:
                 moved = _slid(problem, moved, tie)
-        return moved, float(np.sqrt(max(energies[-1], 0.0) / max(energies[0], 1e-300)))
+        return moved, float(np.sqrt(max(0.0, energies[-1]) / max(energies[0], 1e-300)))
 
     def _kept_part(
         self, problem: Problem, before: Array, after: Array, tie: Callable[[Array], Array]

@@ -69,7 +69,8 @@ def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
                 Wall(
                     tuple(boundary.names[m] for m in np.unique(boundary.marker[some])),
                     boundary.facets[some],
-                    case.layer_thickness or min(SIZE * float(extent), float(thickness)),
+                    min(case.layer_thickness, mesh.extent)
+                    or min(SIZE * float(extent), float(thickness)),
                     float(np.median(height[flat])) if len(flat) else 0.0,
                     role == "moving",
                 )

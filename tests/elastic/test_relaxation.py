@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numba
 import numpy as np
@@ -81,6 +82,28 @@ def test_sliding_nodes_stay_on_curved_walls_and_images_together():
         nodes = np.unique(mesh.marker(marker).nodes)
         np.testing.assert_array_equal(step.mesh.points[nodes, 2], mesh.points[nodes, 2])
     assert np.abs(step.mesh.points - last(case.change(relax="no"), mesh).mesh.points).max() > 1e-4
+
+
+@pytest.mark.parametrize("make", [airfoil, passage])
+@pytest.mark.parametrize("steps", [1, 2, 0])
+def test_without_motion_no_bit_changes(make, steps):
+    mesh, case = make(relax="yes", layers="keep", steps=steps)
+    (motion,) = case.motions
+    step = last(case.change(motions=(replace(motion, angle_deg=0.0),)), mesh)
+    np.testing.assert_array_equal(step.mesh.points, mesh.points)
+    assert step.relaxed is None
+
+
+@pytest.mark.parametrize("shape", [(1, 4), (1, 1, 3)])
+def test_a_mesh_without_free_nodes_is_left_alone(shape):
+    mesh = builders.grid(shape)
+    lower, *others = mesh.marker_names
+    case = sv.Case(
+        roles=dict.fromkeys(others, "fixed") | {lower: "moving"},
+        motions=(sv.Translate(lower, (0.02,) * mesh.dim),),
+    )
+    step = last(case.change(relax="yes", layers="keep"), mesh)
+    np.testing.assert_array_equal(step.mesh.points, last(case, mesh).mesh.points)
 
 
 def test_the_bits_do_not_depend_on_threads_nor_on_what_was_kept(monkeypatch):
