@@ -84,6 +84,31 @@ def test_sliding_nodes_stay_on_curved_walls_and_images_together():
     assert np.abs(step.mesh.points - last(case.change(relax="no"), mesh).mesh.points).max() > 1e-4
 
 
+@pytest.mark.parametrize("sliding", ["ps", "ds"])
+@pytest.mark.parametrize("steps", [1, 3])
+@pytest.mark.parametrize("held_back", [False, True])
+def test_sliding_nodes_are_on_the_facets_of_their_curved_wall(
+    sliding, steps, held_back, monkeypatch
+):
+    mesh, part = builders.annulus(24, 5), np.linspace(0.3, 1.0, 144)[:, None]
+    if held_back:
+        monkeypatch.setattr(relaxation.Relaxation, "_kept_part", lambda *_: part)
+    motions = (sv.Rotate("wall", 20.0, (0.1, 0.0)),)
+    case = sv.Case(roles={"wall": "moving", "far0": "sliding"}, motions=motions, sliding=sliding)
+    plain, relaxed = (
+        last(case.change(relax=relax, steps=steps), mesh).mesh.points for relax in ("no", "yes")
+    )
+    one, two = np.swapaxes(mesh.points[mesh.marker("far0").cells.by_type[3][1]], 0, 1)
+    nodes, along = np.unique(mesh.marker("far0").nodes), two - one
+    away = relaxed[nodes, None] - one
+    place = np.einsum("nfd,fd->nf", away, along) / np.einsum("fd,fd->f", along, along)
+    off = np.linalg.norm(away - np.clip(place, 0.0, 1.0)[:, :, None] * along, axis=2).min(axis=1)
+    assert off.max() < 1e-12 * mesh.extent
+    assert np.abs(relaxed[nodes] - plain[nodes]).max() > 0.02
+    known = np.unique(mesh.marker("wall").nodes)
+    np.testing.assert_array_equal(relaxed[known], plain[known])
+
+
 @pytest.mark.parametrize("make", [airfoil, passage])
 @pytest.mark.parametrize("steps", [1, 2, 0])
 def test_without_motion_no_bit_changes(make, steps):
