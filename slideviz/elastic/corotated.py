@@ -19,7 +19,7 @@ bits for any number of threads.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -66,6 +66,12 @@ class Corotated:
     def of(cls, points: FloatArray, parts: list[ShapeBlock]) -> Corotated:
         """Return the body with undeformed ``points`` (n, d), as stiff as its cells are small."""
         volume = cell_volumes(points, parts)
+        if not volume.all():  # cells without volume have no stiffness
+            solid = [np.flatnonzero(volume[part.cell]) for part in parts]
+            parts = [
+                replace(part, nodes=sealed(part.nodes[some]), cell=part.cell[some])
+                for part, some in zip(parts, solid, strict=True)
+            ]
         moduli = tuple(sealed(part.share / volume[part.cell]) for part in parts)
         return cls(frozen_array(points, np.float64), parts, moduli)
 

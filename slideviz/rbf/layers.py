@@ -10,7 +10,9 @@ the wall nodes i near it (at X_i, displaced by d_i, turned by M_i) would carry i
 where h is the height of the wall's first layer, smooth(t) = t^3 (10 - 15 t + 6 t^2), and i are the
 `NEAREST` nodes of the wall that see the node: s_i rises from 0 to 1 with the cosine of the angle
 between the wall's normal and X - X_i, so that the two sides of a thin body do not mix. Of several
-walls whose zones overlap each has the weight b / distance^6, and 1 - b is the product of theirs.
+walls k, j whose zones overlap each has the weight b / distance^6, 1 - b is the product of theirs,
+and b_k is (1 - b_j smooth(2 d_k / (d_k + d_j)))^2 times as much, so that in a gap thinner than
+the zones the nodes between are left to the radial functions.
 All of this is found from the undeformed mesh; u is linear in d and M. M is the rotation nearest to
 the map of the directions of the facets at the wall node (lines in 2D, normals and edges in 3D).
 """
@@ -94,6 +96,10 @@ class Wall:
     the mesh's length unit."""
     moves: bool
     """Whether its nodes are moving ones; others stay."""
+
+
+Reached = tuple[IntArray, FloatArray, FloatArray, FloatArray]
+"""Points (z,) in the zone of a wall, their distances from it, shares and weights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,15 +193,15 @@ class WallNodes:
         point does not depend on the others.
         """
         outside, weight = np.ones(len(targets)), np.zeros(len(targets))
-        parts = [self._reached(k, targets) for k in range(len(self.walls))]
-        for some, share, each in parts:
+        parts = _shared([self._reached(k, targets) for k in range(len(self.walls))])
+        for some, _, share, each in parts:
             outside[some] *= 1.0 - share
             weight[some] += each
         hit = np.flatnonzero(outside < 1.0)
         place = np.empty(len(targets), np.int64)
         place[hit] = np.arange(len(hit))
         found = []
-        for k, (some, _, each) in enumerate(parts):
+        for k, (some, *_, each) in enumerate(parts):
             nearest, carrier = self._carriers(k, targets[some])
             carrier *= (each * (1.0 - outside[some]) / weight[some])[:, None]
             row, column = np.nonzero(carrier)
@@ -213,8 +219,8 @@ class WallNodes:
             csr_array(by_rotation, shape=(count, total * dim)),
         )
 
-    def _reached(self, k: int, targets: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Return which points (m, d) are in the zone of wall k, (z,), their shares, and weights."""
+    def _reached(self, k: int, targets: FloatArray) -> Reached:
+        """Return the points (m, d) in the zone of wall k; weights without shares."""
         wall, (tree, closest) = self.walls[k][0], self._trees[k]
         limit, near = wall.first + wall.thickness, np.zeros(len(targets), bool)
         size = np.linalg.norm(np.ptp(closest.corners, axis=1), axis=1).max(initial=0.0)
@@ -229,7 +235,8 @@ class WallNodes:
         some, gap = some[gap < limit], gap[gap < limit]
         share = 1.0 - smooth((gap - wall.first) / wall.thickness)
         least = max(1e-9 * limit, TINY)
-        return some, share, share * (limit / np.maximum(gap, least)) ** POWER
+        gap = np.maximum(gap, least)
+        return some, gap, share, (limit / gap) ** POWER
 
     def _carriers(self, k: int, targets: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return the sources of wall k near points (m, d), and their weights, both (m, c)."""
@@ -251,6 +258,24 @@ class WallNodes:
 
         in_parts(find, len(targets))
         return nearest, weight
+
+
+def _shared(parts: list[Reached]) -> list[Reached]:
+    """Return the parts of the walls with less share where another wall is as near, or nearer."""
+    size = [len(part[0]) for part in parts]
+    point, gap, share, each = (np.concatenate(x) for x in zip(*parts, strict=True))
+    order, left = np.argsort(point, kind="stable"), np.ones(len(point))
+    apart = 1
+    while len(at := np.flatnonzero(point[order[apart:]] == point[order[: len(order) - apart]])):
+        one, two = order[at], order[at + apart]
+        middle = gap[one] + gap[two]
+        left[one] *= 1.0 - share[two] * smooth(2.0 * gap[one] / middle)
+        left[two] *= 1.0 - share[one] * smooth(2.0 * gap[two] / middle)
+        apart += 1
+    share = share * left**2
+    cuts = np.cumsum(size)[:-1]
+    split = (np.split(x, cuts) for x in (point, gap, share, share * each))
+    return list(zip(*split, strict=True))
 
 
 def _faded(gap: FloatArray, seen: np.ndarray, more: bool) -> FloatArray:

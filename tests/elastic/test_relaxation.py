@@ -84,6 +84,17 @@ def test_sliding_nodes_stay_on_curved_walls_and_images_together():
     assert np.abs(step.mesh.points - last(case.change(relax="no"), mesh).mesh.points).max() > 1e-4
 
 
+def test_a_cell_without_area_does_not_stop_the_others():
+    mesh, case = airfoil()
+    points = mesh.points.copy()
+    (one, two, three, four), *_ = mesh.cells.by_type[9][1][200:]
+    points[two], points[three] = points[one], points[four]
+    flat = mesh.with_points(points)
+    before, after = (last(case.change(relax=relax), flat) for relax in ("no", "yes"))
+    assert 0.0 < after.relaxed.residual < 0.2
+    assert sv.quality(after.mesh, flat).mean > sv.quality(before.mesh, flat).mean
+
+
 @pytest.mark.parametrize("sliding", ["ps", "ds"])
 @pytest.mark.parametrize("steps", [1, 3])
 @pytest.mark.parametrize("held_back", [False, True])

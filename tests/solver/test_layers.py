@@ -127,6 +127,21 @@ def test_a_fixed_wall_keeps_its_layers_in_place():
     assert plain["top"]["height_ratio"]["min"] < 0.95
 
 
+@pytest.mark.parametrize("thickness", [0.0, 0.05, 1.0])
+def test_walls_nearer_than_their_zones_share_the_gap(thickness):
+    mesh = builders.grid((39, 5), place=lambda p: p * [1 / 39, 0.02 / 5])
+    roles = {"y_m": "moving", "y_p": "fixed", "x_m": "sliding", "x_p": "sliding"}
+    case = Case(
+        roles=roles,
+        motions=(Translate("y_m", (0.0, 0.01)),),
+        sliding="ps",
+        layers="keep",
+        layer_thickness=thickness,
+    )
+    *_, last = sv.deform(case, mesh)
+    assert sv.quality(last.mesh, mesh).inverted == 0
+
+
 def test_walls_without_layers_carry_nothing_unless_they_are_asked_to():
     mesh = around(ellipse, 12, 80, first=0.05)
     case, last = deformed(mesh, MOTIONS["bent"])
