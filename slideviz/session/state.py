@@ -291,6 +291,8 @@ class Session:
             and (pair := frame.ends(self.view.color_by, self.mesh)) is not None
         ]
         low, high = min((a for a, _ in ends), default=0.0), max((b for _, b in ends), default=1.0)
+        if self.view.color_by == "first-height" and low >= 0:
+            return 0.0, round_up(high)  # numbers with many digits have no room at the bar
         if low < high:
             return outwards(low, high)
         return (0.0, 2.0 * low) if low > 0 else (low, low + 1.0)

@@ -743,7 +743,7 @@ def ended_badly(driver, texts=(), inverted=38):
 def test_large_numbers_have_separators_in_the_status_bar(ready, monkeypatch):
     monkeypatch.setattr(Quality, "inverted", 1911)
     ended_badly(ready)
-    assert ready.window.statusBar().currentMessage().endswith("1,911 inverted")
+    assert "1,911 inverted" in ready.window.statusBar().currentMessage()
 
 
 def test_inverted_cells_are_told_in_red_with_what_would_help(ready):

@@ -70,6 +70,7 @@ def test_colors_show_the_numbers_at_walls_with_layers_only():
     turned = changes.set_view(session, color_by="wall-angle")
     assert turned.frame.values("wall-angle", session.mesh)[low] == pytest.approx(45)
     assert turned.color_range == (45.0, 90.0)
+    assert changes.set_view(session, color_by="first-height").color_range == (0.0, 0.1)
 
 
 def test_thresholds_and_histograms_leave_out_cells_at_no_wall():
