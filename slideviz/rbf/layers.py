@@ -25,7 +25,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
@@ -53,6 +52,7 @@ from slideviz.rbf.tape import (
 from slideviz.system.threads import in_parts
 
 if TYPE_CHECKING:
+    from scipy.sparse import csr_array
     from scipy.spatial import cKDTree
 
 NEAREST = 12
@@ -192,6 +192,8 @@ class WallNodes:
         The matrices (z, s) and (z, s d) take what `motion` returns to b u, (z, d). The result for a
         point does not depend on the others.
         """
+        from scipy.sparse import csr_array  # takes long to load
+
         outside, weight = np.ones(len(targets)), np.zeros(len(targets))
         parts = _shared([self._reached(k, targets) for k in range(len(self.walls))])
         for some, _, share, each in parts:

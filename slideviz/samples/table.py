@@ -155,8 +155,7 @@ SAMPLES: Mapping[str, SampleKind] = {
         _turbine_row,
     ),
     "turbine-row-3d": SampleKind(
-        "3D: the vane of turbine-row from hub to shroud, twisted; prisms, hexahedra at the wall; "
-        "size: cells (25000)",
+        "3D: that vane from hub to shroud, twisted; hexahedra and prisms; size: cells (25000)",
         25_000,
         _extruded_row,
     ),

@@ -25,7 +25,8 @@ SETTINGS = [
     if key.group in (PERIODICITY, METHOD, REDUCTION, QUALITY)
     # DOUBLE_EDGE is another word for SELECTION; of STEPS those that were made are told; the others
     # change nothing of a run.
-    and key.name not in ("DOUBLE_EDGE", "STEPS", "GENERATE_QUALITY", "CURVED", "PERIODIC_DIRECTION")
+    and key.name
+    not in ("DOUBLE_EDGE", "STEPS", "GENERATE_QUALITY", "CURVED", "PERIODIC_DIRECTION", "LIMITS")
 ]
 
 

@@ -227,6 +227,7 @@ def test_the_command_writes_the_same_files_and_report(tmp_path, monkeypatch, cap
         report = json.loads(capsys.readouterr().out)
         assert all(part >= 0 for part in report.pop("seconds").values())
         assert len(report.pop("condition")) == 2  # an estimate, which differs from run to run
+        assert bool(report.pop("walls")) == (not more)  # streamed runs do not measure them
         texts.append((report, Path("out.su2").read_bytes(), Path("out_qual.txt").read_bytes()))
     assert texts[0] == texts[1]
     assert run([*call, "-o", "mesh.su2", "--stream"]) == 1
