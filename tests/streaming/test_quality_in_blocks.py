@@ -1,6 +1,7 @@
 """Commands that look at a mesh, with --stream: the words and numbers of one in memory."""
 
 import errno
+import json
 import os
 from dataclasses import replace
 from pathlib import Path
