@@ -113,7 +113,8 @@ class StartPage(QScrollArea):
             button = Card()
             button.setObjectName(f"sample_{name}")
             button.setProperty("card", True)
-            button.setText(f"{name} · {text[:2]}")
+            dim = text[:2]
+            button.setText(name if name.endswith(dim.lower()) else f"{name} · {dim}")
             button.setToolTip(text)
             button.setAccessibleDescription(text)
             button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
