@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, IntArray, sealed
@@ -40,8 +41,8 @@ class Sides:
 
     first: IntArray
     """(m + 1,): number of the first side of each cell."""
-    neighbour: IntArray
-    """(s,): the cell that shares the side, or `NONE` or `SEVERAL`."""
+    neighbour: NDArray[np.int32]
+    """(s,) int32: the cell that shares the side, or `NONE` or `SEVERAL`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +51,10 @@ class CellsAround:
 
     offsets: IntArray
     """(n + 1,): the entries of node ``i`` are ``offsets[i]`` to ``offsets[i + 1]``."""
-    cells: IntArray
-    """(k,): the cell of each entry."""
-    local: IntArray
-    """(k,): the local number of the node in that cell."""
+    cells: NDArray[np.int32]
+    """(k,) int32: the cell of each entry."""
+    local: NDArray[np.int8]
+    """(k,) int8: the local number of the node in that cell."""
 
 
 def sides_of(cells: Cells) -> Sides:
@@ -67,7 +68,7 @@ def sides_of(cells: Cells) -> Sides:
         in_parts(lambda part: _write_least(*table, part.start, part.stop, least), len(least))
         begins, order = np.zeros(n_nodes + 1, np.int64), np.empty(first[-1], np.int64)
         _sort(least, begins, order)
-        neighbour = np.full(first[-1], NONE)
+        neighbour = np.full(first[-1], NONE, np.int32)
         in_parts(
             lambda part: _match(*table, begins, order, part.start, part.stop, neighbour), n_nodes
         )
@@ -82,8 +83,8 @@ def cells_around(cells: Cells, n_points: int) -> CellsAround:
         offsets = np.zeros(n_points + 1, np.int64)
         order = np.empty(len(cells.connectivity), np.int64)
         _sort(cells.connectivity, offsets, order)
-        owner = np.repeat(np.arange(len(cells)), np.diff(cells.offsets))[order]
-        local = order - cells.offsets[owner]
+        owner = np.repeat(np.arange(len(cells), dtype=np.int32), np.diff(cells.offsets))[order]
+        local = (order - cells.offsets[owner]).astype(np.int8)
         known = _AROUND[cells] = CellsAround(sealed(offsets), sealed(owner), sealed(local))
     return known
 

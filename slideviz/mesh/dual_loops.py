@@ -45,7 +45,7 @@ for _vtk, _row in ELEMENTS.items():
 
 @njit(**OPTIONS)
 def write_middles(points, offsets, connectivity, begin, middles):  # type: ignore[no-untyped-def]
-    """Write the means (m, d) of the nodes of cells, from number ``begin`` on."""
+    """Write the means (m, 3) of the nodes of cells, from number ``begin`` on."""
     for i in range(len(middles)):
         first, last = offsets[begin + i], offsets[begin + i + 1]
         for axis in range(points.shape[1]):
@@ -57,20 +57,20 @@ def write_middles(points, offsets, connectivity, begin, middles):  # type: ignor
 
 @njit(inline="always", **OPTIONS)
 def _point(points, k):  # type: ignore[no-untyped-def]
-    """Return a point, a triple; in 2D with a third coordinate of zero."""
-    return points[k, 0], points[k, 1], points[k, 2] if points.shape[1] == 3 else 0.0
+    """Return a point, a triple."""
+    return points[k, 0], points[k, 1], points[k, 2]
 
 
 @njit(inline="always", **OPTIONS)
-def _middle_of(points, connectivity, begin, row):  # type: ignore[no-untyped-def]
+def _middle_of(points, connectivity, begin, side_nodes, vtk, side):  # type: ignore[no-untyped-def]
     """Return the mean, a triple, of the nodes of a side of the cell that begins at ``begin``."""
-    total = add3(
-        _point(points, connectivity[begin + row[0]]), _point(points, connectivity[begin + row[1]])
-    )
-    total = add3(total, _point(points, connectivity[begin + row[2]]))
-    if row[3] < 0:
+    a = _point(points, connectivity[begin + side_nodes[vtk, side, 0]])
+    b = _point(points, connectivity[begin + side_nodes[vtk, side, 1]])
+    c = _point(points, connectivity[begin + side_nodes[vtk, side, 2]])
+    total = add3(add3(a, b), c)
+    if side_nodes[vtk, side, 3] < 0:
         return total[0] / 3.0, total[1] / 3.0, total[2] / 3.0
-    total = add3(total, _point(points, connectivity[begin + row[3]]))
+    total = add3(total, _point(points, connectivity[begin + side_nodes[vtk, side, 3]]))
     return 0.25 * total[0], 0.25 * total[1], 0.25 * total[2]
 
 
@@ -82,6 +82,8 @@ def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ign
 
     Parameters
     ----------
+    points : (N, 3)
+        In 2D with third coordinates of zero.
     mesh
         Types, offsets, connectivity, signs, and means of nodes (by `write_middles`) of all cells.
     tables
@@ -103,30 +105,34 @@ def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ign
         for entry in range(starts[k], starts[k + 1]):
             cell, at = cells[entry], local[entry]
             first, vtk = offsets[cell], types[cell]
+            flat = vtk < 10
             sign, to_middle = float(signs[cell]), minus3(_point(middles, cell), x)
-            face = x
-            if points.shape[1] == 3:
-                side = side_nodes[vtk, around[vtk, at, 0, 1]]
-                face = minus3(_middle_of(points, connectivity, first, side), x)
-            for row in around[vtk, at]:
-                if row[0] < 0:
+            start = x
+            if not flat:
+                side = around[vtk, at, 0, 1]
+                start = minus3(_middle_of(points, connectivity, first, side_nodes, vtk, side), x)
+            face, across = start, cross3(start, to_middle)
+            for ray in range(4):
+                if around[vtk, at, ray, 0] < 0:
                     break
-                other = connectivity[first + row[0]]
+                other, turn = connectivity[first + around[vtk, at, ray, 0]], around[vtk, at, ray, 1]
                 half = minus3(_point(points, other), x)
                 half = 0.5 * half[0], 0.5 * half[1], 0.5 * half[2]
                 inward = minus3(to_middle, half)
-                if points.shape[1] == 2:
-                    normal = row[1] * inward[1], -row[1] * inward[0], 0.0
+                if flat:
+                    normal = turn * inward[1], -turn * inward[0], 0.0
                     size = 0.5 * abs(half[0] * to_middle[1] - half[1] * to_middle[0])
                     small, large = min(small, size), max(large, size)
                 else:
-                    after = minus3(
-                        _middle_of(points, connectivity, first, side_nodes[vtk, row[2]]), x
-                    )
+                    side, after = around[vtk, at, ray, 2], start
+                    if side != around[vtk, at, 0, 1]:
+                        after = _middle_of(points, connectivity, first, side_nodes, vtk, side)
+                        after = minus3(after, x)
                     normal = cross3(inward, minus3(face, after))
                     normal = 0.5 * normal[0], 0.5 * normal[1], 0.5 * normal[2]
-                    for one in (face, after):
-                        size = abs(dot3(half, cross3(one, to_middle))) / 6.0
+                    before, across = across, cross3(after, to_middle)
+                    for one in (before, across):
+                        size = abs(dot3(half, one))  # six times the volume: ratios are wanted
                         small, large = min(small, size), max(large, size)
                     face = after
                 place = 0
@@ -134,7 +140,7 @@ def write_nodes(points, mesh, tables, nodes, limits, begin, found):  # type: ign
                     place += 1
                 if place == count:
                     others[place], count = other, count + 1
-                    normals[place] = 0.0
+                    normals[place, 0] = normals[place, 1] = normals[place, 2] = 0.0
                 for axis in range(3):
                     normals[place, axis] += sign * normal[axis]
         found[0, i], found[1, i] = _of_edges(points, x, others[:count], normals, limits[k])

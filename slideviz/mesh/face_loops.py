@@ -115,63 +115,83 @@ def write_faces(points, nodes, ids, signs, sides, adjacent, rated, angle, skewne
     angle, skewness, expansion : (M,)
         Written, at ``ids``: non-orthogonality in degrees, skewness, ratio of volumes.
     """
-    (first, neighbour), (centres, volumes) = adjacent, rated
     at = np.empty((3, nodes.shape[1], LANES))
-    area, middle = np.empty((2, 3, LANES))
+    area, middle, across = np.empty((3, 3, LANES))
+    share, ratio, worst = np.empty(LANES), np.empty(LANES), np.empty((3, LANES))
     for start in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - start)
+        cells = ids[start : start + count]
         gather3(points, nodes, start, count, at)
-        for c in range(count):
-            cell = ids[start + c]
-            angle[cell], skewness[cell], expansion[cell] = 1.0, 0.0, 1.0
+        worst[0], worst[1], worst[2] = 1.0, 0.0, 1.0
         for k in range(len(sides)):
             _face(at, sides[k], count, area, middle)
+            _across(cells, k, adjacent, rated, area, middle, across, share, ratio)
             for c in range(count):
-                cell = ids[start + c]
-                other = neighbour[first[cell] + k]
-                s = area[0, c], area[1, c], area[2, c]
-                f = middle[0, c], middle[1, c], middle[2, c]
-                p = minus3(f, (centres[cell, 0], centres[cell, 1], centres[cell, 2]))
-                size = np.sqrt(dot3(s, s))
-                if other >= 0:
-                    d = (
-                        centres[other, 0] - centres[cell, 0],
-                        centres[other, 1] - centres[cell, 1],
-                        centres[other, 2] - centres[cell, 2],
-                    )
-                    least = 0.2 * np.sqrt(dot3(d, d))
-                    scale = 5.0 * least * size
-                    cosine = signs[start + c] * dot3(s, d) / scale if scale > 0.0 else 0.0
-                    angle[cell] = min(angle[cell], cosine)
-                    here, there = volumes[cell], volumes[other]
-                    ratio = max(here / there, there / here) if min(here, there) > 0.0 else np.inf
-                    expansion[cell] = max(expansion[cell], ratio)
-                else:
-                    along = dot3(s, p) / (size * size) if size > 0.0 else 0.0
-                    d = along * s[0], along * s[1], along * s[2]
-                    least = 0.4 * np.sqrt(dot3(d, d))
-                skewness[cell] = max(skewness[cell], _skewness(at, sides[k], c, s, f, p, d, least))
+                worst[2, c] = max(worst[2, c], ratio[c])
+                s, d = (
+                    (area[0, c], area[1, c], area[2, c]),
+                    (across[0, c], across[1, c], across[2, c]),
+                )
+                scale = np.sqrt(dot3(d, d) * dot3(s, s))
+                cosine = signs[start + c] * dot3(s, d) / scale if scale > 0.0 else 0.0
+                worst[0, c] = min(worst[0, c], cosine if share[c] < 0.3 else 1.0)
+            _raise_skewness(at, sides[k], cells, rated[0], area, middle, across, share, worst[1])
         for c in range(count):
-            cell = ids[start + c]
-            angle[cell] = np.degrees(np.arccos(min(max(angle[cell], -1.0), 1.0)))
+            cosine = min(max(worst[0, c], -1.0), 1.0)
+            angle[cells[c]] = np.degrees(np.arccos(cosine))
+            skewness[cells[c]], expansion[cells[c]] = worst[1, c], worst[2, c]
 
 
-@njit(inline="always", **OPTIONS)
-def _skewness(at, row, c, s, f, p, d, least):  # type: ignore[no-untyped-def]
-    """Return the skewness of a face with area vector ``s`` and centre ``f``.
+@njit(**OPTIONS)
+def _across(cells, k, adjacent, rated, area, middle, across, share, ratio):  # type: ignore[no-untyped-def]
+    """Write what is across side ``k`` of ``cells`` (c,).
 
-    ``p`` leads from the cell's centre to that of the face, ``d`` to the neighbour's centre; the
-    scale is at least ``least``.
+    The vector ``across`` (3, …) from centre to centre, its least share of the scale of skewness,
+    and the ratio of the volumes. At a boundary the vector leads to the plane of the face.
     """
-    through = dot3(s, d)
-    if through == 0.0:
-        return np.inf if dot3(s, s) > 0.0 else 0.0
-    part = dot3(s, p) / through
-    v = p[0] - part * d[0], p[1] - part * d[1], p[2] - part * d[2]
-    length = np.sqrt(dot3(v, v))
-    if length == 0.0:
-        return 0.0
+    (first, neighbour), (centres, volumes) = adjacent, rated
+    for c in range(len(cells)):
+        cell = cells[c]
+        other = neighbour[first[cell] + k]
+        if other >= 0:
+            share[c], here, there = 0.2, volumes[cell], volumes[other]
+            ratio[c] = max(here / there, there / here) if min(here, there) > 0.0 else np.inf
+            for axis in range(3):
+                across[axis, c] = centres[other, axis] - centres[cell, axis]
+        else:
+            share[c], ratio[c] = 0.4, 1.0
+            through, square = 0.0, 0.0
+            for axis in range(3):
+                through += area[axis, c] * (middle[axis, c] - centres[cell, axis])
+                square += area[axis, c] * area[axis, c]
+            for axis in range(3):
+                across[axis, c] = through / square * area[axis, c] if square > 0.0 else 0.0
+
+
+@njit(**OPTIONS)
+def _raise_skewness(at, row, cells, centres, area, middle, across, share, worst):  # type: ignore[no-untyped-def]
+    """Raise ``worst`` (…) to the skewness of a face of ``cells`` (c,), local nodes ``row``."""
+    v, reach, own = np.empty((3, LANES)), np.zeros(LANES), np.empty((3, LANES))
+    for c in range(len(cells)):
+        for axis in range(3):
+            own[axis, c] = centres[cells[c], axis]
+    for c in range(len(cells)):
+        s, d = (area[0, c], area[1, c], area[2, c]), (across[0, c], across[1, c], across[2, c])
+        p = middle[0, c] - own[0, c], middle[1, c] - own[1, c], middle[2, c] - own[2, c]
+        part = dot3(s, p) / dot3(s, d)
+        v[0, c], v[1, c], v[2, c] = p[0] - part * d[0], p[1] - part * d[1], p[2] - part * d[2]
     for k in row:
         if k >= 0:
-            least = max(least, abs(dot3(v, minus3(node(at, k, c), f))) / length)
-    return length / least
+            for c in range(len(cells)):
+                x, y = at[0, k, c] - middle[0, c], at[1, k, c] - middle[1, c]
+                along = v[0, c] * x + v[1, c] * y + v[2, c] * (at[2, k, c] - middle[2, c])
+                reach[c] = max(reach[c], abs(along))
+    for c in range(len(cells)):
+        s, d = (area[0, c], area[1, c], area[2, c]), (across[0, c], across[1, c], across[2, c])
+        square = dot3((v[0, c], v[1, c], v[2, c]), (v[0, c], v[1, c], v[2, c]))
+        length = np.sqrt(square)
+        skewness = square / max(share[c] * length * np.sqrt(dot3(d, d)), reach[c])
+        skewness = skewness if length > 0.0 else 0.0
+        if dot3(s, d) == 0.0:
+            skewness = np.inf if dot3(s, s) > 0.0 else 0.0
+        worst[c] = max(worst[c], skewness)

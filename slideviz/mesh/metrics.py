@@ -23,7 +23,7 @@ from slideviz.mesh.check import check_size
 from slideviz.mesh.jacobians import check_cells
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
-from slideviz.mesh.quality import quality
+from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.topology import find_boundary, vertex_normals
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
@@ -141,7 +141,14 @@ def metrics(
     >>> round(found["smallest-angle"].min, 6), found["aspect-ratio"].max
     (45.0, 2.0)
     """
-    return {name: metric(mesh, name, reference) for name in (METRICS if names is None else names)}
+    wanted = list(METRICS if names is None else names)
+    rated = quality(mesh, reference) if set(wanted) & set(SIZE_SKEW) else None
+    return {
+        name: metric(mesh, name, reference)
+        if rated is None or name not in SIZE_SKEW
+        else _of_quality(rated, name)
+        for name in wanted
+    }
 
 
 @check_types
@@ -150,9 +157,7 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
     if name not in METRICS:
         raise CaseError(f"metric: {not_one_of(name, METRICS)}")
     if name in SIZE_SKEW:
-        found = quality(mesh, reference)
-        values = {"size": found.size, "skew": found.skew}.get(name, found.values)
-        return MetricValues(name, values, values, found.counted)
+        return _of_quality(quality(mesh, reference), name)
     if mesh.part is not None and not METRICS[name].alone:
         raise CaseError(f"{name} compares neighbouring cells: expected the whole mesh in memory")
     check_cells(mesh)
@@ -170,6 +175,12 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
     if mesh.halo is not None:
         counted[mesh.halo.outer] = False
     return MetricValues(name, values, of_cells, counted)
+
+
+def _of_quality(found: Quality, name: Metric) -> MetricValues:
+    """Return one of the metrics that a quality has."""
+    values = {"size": found.size, "skew": found.skew}.get(name, found.values)
+    return MetricValues(name, values, values, found.counted)
 
 
 def _computed(
@@ -274,9 +285,10 @@ def _nodes(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
     cells, found = mesh.cells, np.empty((3, len(mesh.points)))
     around, limits = cells_around(cells, len(mesh.points)), _boundary_areas(mesh)
     arrays = cells.offsets, cells.connectivity
-    middles = np.empty((len(cells), mesh.dim))
+    points = mesh.points if mesh.dim == 3 else np.pad(mesh.points, ((0, 0), (0, 1)))
+    middles = np.empty((len(cells), 3))
     in_parts(
-        lambda part: dual_loops.write_middles(mesh.points, *arrays, part.start, middles[part]),
+        lambda part: dual_loops.write_middles(points, *arrays, part.start, middles[part]),
         len(cells),
     )
 
@@ -285,7 +297,7 @@ def _nodes(mesh: Mesh, signs: NDArray[np.int8]) -> Made:
         tables = dual_loops.AROUND, SIDE_NODES
         of_nodes = around.offsets, around.cells, around.local
         last = limits, part.start, found[:, part]
-        dual_loops.write_nodes(mesh.points, of_cells, tables, of_nodes, *last)
+        dual_loops.write_nodes(points, of_cells, tables, of_nodes, *last)
 
     in_parts(of_part, len(mesh.points))
     return {"orthogonality": found[0], "area-ratio": found[1], "volume-ratio": found[2]}

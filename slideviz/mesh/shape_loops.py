@@ -66,7 +66,7 @@ def write_shapes(vtk, points, nodes, signs, corners, edges, polygons, found):  #
         gather3(points, nodes, start, count, at)
         _lengths(at, edges, count, lengths, ends)
         _scaled_jacobians(vtk, at, corners, count, lengths, found[0, here])
-        _angles(at, polygons, count, angles)
+        _angles(at, polygons, count, lengths, angles)
         for c in range(count):
             found[0, start + c] *= signs[start + c]
             found[1, start + c] = _equiangle_skew(angles, c)
@@ -146,28 +146,34 @@ def _scaled_in_the_middle(at, count, found):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _angles(at, polygons, count, angles):  # type: ignore[no-untyped-def]
+def _angles(at, polygons, count, lengths, angles):  # type: ignore[no-untyped-def]
     """Write least and largest angle of triangles, then of quadrilaterals, into ``angles`` (4, …).
 
     An angle is given by a number that rises with it, from 0 for 0° to 4 for 360° (`_degrees`), to
     spare the arc cosines. An edge without length makes angles of 0.
     """
     angles[0], angles[1], angles[2], angles[3] = np.inf, -np.inf, np.inf, -np.inf
+    normal = np.empty((3, LANES))
     for row in polygons:
-        n = 4 if row[3] >= 0 else 3
-        low = 0 if n == 3 else 2
+        a, b, d, e = row
+        n = 4 if e >= 0 else 3
+        if n == 4:
+            for c in range(count):
+                normal[0, c], normal[1, c], normal[2, c] = cross3(
+                    edge(at, a, d, c), edge(at, b, e, c)
+                )
+        least, largest = (angles[2], angles[3]) if n == 4 else (angles[0], angles[1])
         for k in range(n):
             o, i, j = row[k], row[(k + 1) % n], row[k - 1 if k else n - 1]
             for c in range(count):
                 x, y = edge(at, o, i, c), edge(at, o, j, c)
-                scale = np.sqrt(dot3(x, x) * dot3(y, y))
+                scale = lengths[o, i, c] * lengths[o, j, c]
                 cosine = dot3(x, y) / scale if scale > 0.0 else 1.0
                 angle = min(max(1.0 - cosine, 0.0), 2.0)
                 if n == 4:
-                    normal = cross3(edge(at, row[0], row[2], c), edge(at, row[1], row[3], c))
-                    angle = angle if dot3(normal, cross3(x, y)) >= 0.0 else 4.0 - angle
-                angles[low, c] = min(angles[low, c], angle)
-                angles[low + 1, c] = max(angles[low + 1, c], angle)
+                    turn = dot3((normal[0, c], normal[1, c], normal[2, c]), cross3(x, y))
+                    angle = angle if turn >= 0.0 else 4.0 - angle
+                least[c], largest[c] = min(least[c], angle), max(largest[c], angle)
 
 
 @njit(inline="always", **OPTIONS)
