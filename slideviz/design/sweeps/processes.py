@@ -287,10 +287,9 @@ class Processes(Executor):
                 continue
             problem: BaseException | None
             try:
-                if process is None or not process.is_alive():
+                if process is None or connection is None or connection.poll():  # its pipe ended
                     process = None
                     process, connection = self._start()
-                assert connection is not None
                 connection.send(call.work)
                 result, problem = connection.recv()
             except (EOFError, OSError) as ended:
