@@ -18,14 +18,10 @@ from typing import Any, Literal
 class Term:
     """The words for one value of an enumeration."""
 
-    label: str
-    """Its words in a list with a heading."""
-    tip: str = ""
-    """Its meaning, as a tip."""
-    color: str = ""
-    """The color it is drawn in, ``#rrggbb``; empty for none."""
-    standalone: str = ""
-    """Its words without a heading, where they differ from ``label``."""
+    label: str  # its words in a list with a heading
+    tip: str = ""  # its meaning, as a tip
+    color: str = ""  # the color it is drawn in, ``#rrggbb``; empty for none
+    standalone: str = ""  # its words without a heading, where they differ from ``label``
 
     @property
     def name(self) -> str:
@@ -389,10 +385,8 @@ class ColorByTerm(Term):
 class MetricTerm(ColorByTerm):
     """The facts about a number that rates the cells or nodes of a mesh."""
 
-    range: tuple[float, float] = (0.0, 1.0)
-    """The values that are possible."""
-    best: Literal["high", "low"] = "high"
-    """Which end of the range is good."""
+    range: tuple[float, float] = (0.0, 1.0)  # the values that are possible
+    best: Literal["high", "low"] = "high"  # which end of the range is good
     limit: float | None = None
     """The value beyond which solvers or their manuals call it poor; None where none is usual."""
     where: Literal["cells", "nodes"] = "cells"
@@ -576,16 +570,11 @@ Shown = Literal[
 class ShownTerm(Term):
     """The words for a thing in the view that the user can switch on and off."""
 
-    shortcut: str = ""
-    """The key that switches it."""
-    at_first: bool = False
-    """Whether it is drawn by default."""
-    needs: Literal["", "boxes", "3d"] = ""
-    """What it needs: nothing, FFD boxes, or a 3D mesh."""
-    why_not: str = ""
-    """The tip where this is missing."""
-    in_bar: bool = True
-    """Whether the tool bar has a button for it."""
+    shortcut: str = ""  # the key that switches it
+    at_first: bool = False  # whether it is drawn by default
+    needs: Literal["", "boxes", "3d"] = ""  # what it needs: nothing, FFD boxes, or a 3D mesh
+    why_not: str = ""  # the tip where this is missing
+    in_bar: bool = True  # whether the tool bar has a button for it
 
 
 SHOWN: dict[Shown, ShownTerm] = {

@@ -34,10 +34,8 @@ COINCIDES = 1e-8
 class SolverSurface:
     """The nodes of a solver's surface, as nodes of a mesh."""
 
-    mesh: Mesh
-    """Undeformed."""
-    moving: IntArray
-    """(m,): the moving nodes of the case, ascending."""
+    mesh: Mesh  # undeformed
+    moving: IntArray  # (m,): the moving nodes of the case, ascending
     nodes: IntArray
     """(N,): the nodes of the surface, in the solver's order: all moving nodes and perhaps others,
     each once or several times."""

@@ -31,8 +31,7 @@ if TYPE_CHECKING:
     from slideviz.design.deformer import Deformer
     from slideviz.mesh.model import FloatArray, IntArray
 
-Slope = tuple[float, "FloatArray"]
-"""A number, and its derivative by the points (n, d)."""
+Slope = tuple[float, "FloatArray"]  # a number, and its derivative by the points (n, d)
 SURFACE = MPhysVariables.Aerodynamics.Surface.COORDINATES
 MESH_SURFACE = MPhysVariables.Aerodynamics.Surface.Mesh.COORDINATES
 VOLUME = "aero_vol_coords"

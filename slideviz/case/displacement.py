@@ -28,12 +28,10 @@ PART = 4000  # lines that are turned into numbers at a time, so that other threa
 class Columns:
     """The columns of a file with a line for each node, such as displacements or coordinates."""
 
-    what: str
-    """What the numbers of a node are together, for messages."""
+    what: str  # what the numbers of a node are together, for messages
     names: tuple[str, str, str]
     """(str, str, str): the names of the columns after that of the node, for messages."""
-    flat: bool = False
-    """Whether files for a 2D mesh may have a third number, which is 0."""
+    flat: bool = False  # whether files for a 2D mesh may have a third number, which is 0
 
     def heading(self, dim: int) -> str:
         """Return the names of all columns for a mesh of ``dim`` dimensions, with blanks between."""
@@ -47,12 +45,9 @@ DISPLACEMENT = Columns("displacement", ("dx", "dy", "dz"))
 class Displacements:
     """Prescribed displacements of nodes."""
 
-    nodes: IntArray
-    """(k,): node indices, sorted, each once."""
-    vectors: FloatArray
-    """(k, d): Cartesian displacements, in the mesh's length unit."""
-    warnings: tuple[str, ...] = ()
-    """What the user should know about them."""
+    nodes: IntArray  # (k,): node indices, sorted, each once
+    vectors: FloatArray  # (k, d): Cartesian displacements, in the mesh's length unit
+    warnings: tuple[str, ...] = ()  # what the user should know about them
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "nodes", frozen_array(self.nodes, np.int64))
@@ -70,17 +65,10 @@ def read_displacements(
 
     Raises CaseError if the file cannot be read, or has mistakes: a line ``file:line: sentence`` for
     each.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    nodes : (k,) int64
-        The nodes that the file may list, sorted, each once.
-    shape : (n, d)
-        Shape of the points of the mesh: number of nodes and dimension.
-    of : str
-        What the nodes lie on, for messages: ``a moving marker``, ``marker 'BLADE'``.
+    ``path``: the file.
+    ``nodes`` (k,) int64: the nodes that the file may list, sorted, each once.
+    ``shape`` (n, d): shape of the points of the mesh: number of nodes and dimension.
+    ``of``: what the nodes lie on, for messages: ``a moving marker``, ``marker 'BLADE'``.
     """
     text, warnings = read_text(path, "displacement file")
     read = parse_displacements(text, path, nodes, shape, of)

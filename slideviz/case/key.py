@@ -28,18 +28,14 @@ class Key:
     group: str
     """`name`, `group`: the key in upper case, and the heading above it in files and in the
     reference."""
-    kind: Kind
-    """How its value is read and written."""
-    meaning: str
-    """What it does, in a sentence."""
+    kind: Kind  # how its value is read and written
+    meaning: str  # what it does, in a sentence
     put: Put
     get: Get
     """`put`, `get`: ``put`` returns a case with a value in it, or raises ``CaseError`` where the
     value contradicts the case; ``get`` returns the value, or None where a file need not have it."""
-    default: str = NO_DEFAULT
-    """The text of the value where the file does not have the key."""
-    rbf_slide: bool = False
-    """Whether RBF-SliDe has the key too."""
+    default: str = NO_DEFAULT  # the text of the value where the file does not have the key
+    rbf_slide: bool = False  # whether RBF-SliDe has the key too
     field: str = ""
     """The field of ``Case``, or of its ``Reduction``, that is the value; empty where the value is
     made of several fields, or is only a part of one."""
@@ -49,13 +45,11 @@ class Key:
     form: Form | None = None
     """Whether the method panel has a field for it: among the first ones, below "More settings", or
     not."""
-    tip: str = ""
-    """The tip of that field; empty: ``meaning``."""
+    tip: str = ""  # the tip of that field; empty: ``meaning``
     run_label: str | None = None
     """Words in the label of a run whose value differs from those of other runs, with ``{}`` for the
     value. None: the key's label and the value; empty: no words."""
-    method: Method | None = None
-    """The only method that uses it."""
+    method: Method | None = None  # the only method that uses it
     idle_reason: Callable[[Case], str] = lambda _: ""
     """Returns why the key has no effect in a case with that method; empty where it has one."""
     no_effect: str = ""

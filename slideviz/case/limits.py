@@ -64,18 +64,14 @@ class LimitNumber:
     """A number that can be limited: of the whole mesh (``total``), of each cell, or both."""
 
     meaning: str
-    signs: str
-    """The first characters of the operators that make sense."""
+    signs: str  # the first characters of the operators that make sense
     values: Callable[[MeasuredMesh, str], Values] | None = None
     """Returns the values of cells; the text is the boundary after ``@``, or "" for all."""
-    total: Callable[[Quality], float] | None = None
-    """Returns the number of the whole mesh."""
-    status: int | None = None
-    """The status of the cells that ``total`` counts."""
+    total: Callable[[Quality], float] | None = None  # returns the number of the whole mesh
+    status: int | None = None  # the status of the cells that ``total`` counts
     on_boundary: bool = False
     """Whether it is measured at boundaries, so that one can be named after ``@``."""
-    streamed: bool = False
-    """Whether it is known of a mesh in a file."""
+    streamed: bool = False  # whether it is known of a mesh in a file
 
 
 def _of_quality(name: str) -> Callable[[MeasuredMesh, str], Values]:
@@ -207,8 +203,7 @@ class LimitResult:
     actual: float
     """The number; of one of each cell, the value farthest beyond the limit, or nearest to it. NaN
     where no cell has a value."""
-    cells: IntArray
-    """(k,): the cells that fail, the worst first; none for a mean."""
+    cells: IntArray  # (k,): the cells that fail, the worst first; none for a mean
 
     @property
     def passed(self) -> bool:

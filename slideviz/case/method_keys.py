@@ -214,8 +214,7 @@ REDUCTION_ROWS = (
 
 
 _WAYS = " or ".join(f"{name} ({way})" for way, name in names(SLIDING).items() if way != "none")
-FACTORS = 1e-6, 1e6
-"""Limits of the support radius over the extent of the mesh."""
+FACTORS = 1e-6, 1e6  # limits of the support radius over the extent of the mesh
 
 
 def nothing_slides(case: Case) -> str:

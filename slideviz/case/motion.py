@@ -329,17 +329,11 @@ def displacement_of(
 ) -> FloatArray:
     """Return the displacement (k, d) of the nodes of one marker after all motions, in sequence.
 
-    Parameters
-    ----------
-    motions : iterable of Motion
-        The motions of this marker.
-    points : (k, d) float64
-        Undeformed positions of its nodes.
-    nodes : (k,) int64
-        Their indices; needed for displacements of files, boxes and programs only.
-    files : mapping of object to Displacements
-        The displacements of files, boxes and bumps, by `key_of` their motion; a
-        motion that is not among them displaces nothing.
+    ``motions``: the motions of this marker.
+    ``points`` (k, d) float64: undeformed positions of its nodes.
+    ``nodes`` (k,) int64: their indices; needed for displacements of files, boxes and programs only.
+    ``files``: the displacements of files, boxes and bumps, by `key_of` their motion; a motion that
+    is not among them displaces nothing.
     """
     total = np.zeros_like(points)
     for motion in motions:

@@ -13,17 +13,14 @@ from math import inf
 class Words:
     """The window's words for a shape, in 3D meshes or in 2D meshes."""
 
-    name: str
-    """Text of the button that adds a section of the shape."""
-    action: str
-    """Text of the menu that does so, with its mnemonic letter after "&"."""
+    name: str  # text of the button that adds a section of the shape
+    action: str  # text of the menu that does so, with its mnemonic letter after "&"
     add: str
     """`add`, `handle`, `flat`, `look`: tips: of the button that adds one, of its handle, of its
     flat view, and of the button that turns the camera to it."""
     handle: str
     flat: str
-    flat_name: str
-    """The name of the flat view."""
+    flat_name: str  # the name of the flat view
     look: str = ""
 
 
@@ -31,21 +28,14 @@ class Words:
 class Size:
     """A number of a shape besides its point and direction, such as a radius; always above 0."""
 
-    field: str
-    """Its name in `slideviz.sections.model.Section` and in reports."""
+    field: str  # its name in `slideviz.sections.model.Section` and in reports
     label: str
-    word: str
-    """`label`, `word`: what it is called in a form, and in a sentence."""
-    unit: str
-    """Its unit in words, for a tip."""
-    remedy: str
-    """What to give instead of a wrong value, for messages."""
-    example: str
-    """An example of the option of the command line, in words."""
-    high: float = inf
-    """Values must be below this."""
-    usual: float = 1.0
-    """The value where none is given."""
+    word: str  # `label`, `word`: what it is called in a form, and in a sentence
+    unit: str  # its unit in words, for a tip
+    remedy: str  # what to give instead of a wrong value, for messages
+    example: str  # an example of the option of the command line, in words
+    high: float = inf  # values must be below this
+    usual: float = 1.0  # the value where none is given
 
     def fault(self, value: float) -> str:
         """Return why a value is not allowed, as the end of a sentence; "" where it is."""
@@ -58,35 +48,25 @@ class Size:
 class ShapeTerms:
     """The names, numbers and words of a shape."""
 
-    value: str
-    """Its name in case files, on the command line and in reports."""
-    direction: str
-    """What its direction is called: normal or axis."""
+    value: str  # its name in case files, on the command line and in reports
+    direction: str  # what its direction is called: normal or axis
     point: str
     """The label of its point in a form; empty where a position along the direction is given
     instead."""
-    about: str
-    """What its point is, in words."""
+    about: str  # what its point is, in words
     size: Size | None
     """Its own number, which a slider moves; None: the slider moves its position along the
     direction."""
-    flat: str
-    """The word in a case file for a section that is shown in a flat view, too."""
+    flat: str  # the word in a case file for a section that is shown in a flat view, too
     numbers: str
-    meaning: str
-    """`numbers`, `meaning`: its numbers in a case file, as symbols and in words."""
-    option: str
-    """Help text of the option of the command line."""
-    tip_to_add: str
-    """Tip of the action that adds a section of the shape."""
+    meaning: str  # `numbers`, `meaning`: its numbers in a case file, as symbols and in words
+    option: str  # help text of the option of the command line
+    tip_to_add: str  # tip of the action that adds a section of the shape
     words: dict[int, Words]
     """The window's words, by the dimensions of meshes that the shape can cut."""
-    one_way: bool = False
-    """Whether the opposite direction gives another section."""
-    key: str = ""
-    """The shortcut that adds a section of the shape; empty for none."""
-    metavar: str | None = None
-    """The placeholder for its value in the help of the command line."""
+    one_way: bool = False  # whether the opposite direction gives another section
+    key: str = ""  # the shortcut that adds a section of the shape; empty for none
+    metavar: str | None = None  # the placeholder for its value in the help of the command line
 
     @property
     def count(self) -> int:

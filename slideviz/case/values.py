@@ -32,22 +32,17 @@ _SU2_PAIR, _SU2_GROUP = 2, 11
 class Kind:
     """A kind of value of a key."""
 
-    allowed: str
-    """The texts that are allowed, in words, for the reference and for messages."""
+    allowed: str  # the texts that are allowed, in words, for the reference and for messages
     read: Callable[[str], Any]
     """Returns the value of a text; raises ``CaseError`` with one sentence."""
-    write: Callable[[Any], str]
-    """Returns the text of a value; raises ``CaseError`` if it has none."""
+    write: Callable[[Any], str]  # returns the text of a value; raises ``CaseError`` if it has none
     remark: Callable[[str], str] = lambda _: ""
     """Returns a warning about a text, empty if there is none."""
-    details: tuple[str, ...] = ()
-    """Further lines for the reference."""
-    entry: Entry = "text"
-    """The kind of field in the window."""
+    details: tuple[str, ...] = ()  # further lines for the reference
+    entry: Entry = "text"  # the kind of field in the window
     words: Mapping[Any, str] = field(default_factory=dict)
     """The window's words for values, where they differ from those of a case file."""
-    tips: Mapping[Any, str] = field(default_factory=dict)
-    """The window's tips on values."""
+    tips: Mapping[Any, str] = field(default_factory=dict)  # the window's tips on values
     span: tuple[int, int] = (0, LARGEST_WHOLE)
     """(int, int): the smallest and the largest whole number that the window offers."""
 

@@ -25,12 +25,10 @@ class OpenMesh:
     """A mesh that a command reads, and the undeformed one if there is a reference."""
 
     source: MeshSource
-    reference: Path | None
-    """The file of the undeformed mesh."""
+    reference: Path | None  # the file of the undeformed mesh
     read_base: Callable[[], Mesh | None]
     """Returns the undeformed mesh or, of a mesh in its file, its boundary."""
-    stack: ExitStack
-    """Closes files, and removes temporary ones."""
+    stack: ExitStack  # closes files, and removes temporary ones
 
     def quality(self, arguments: argparse.Namespace, counts: CellCounts | None = None) -> Quality:
         """Return the quality of all cells; ``counts`` counts them, too."""

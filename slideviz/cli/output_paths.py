@@ -33,21 +33,16 @@ REPLACED = "there already, and replaced by this run"
 class OutputPath:
     """A file that a command writes, or a folder of files."""
 
-    path: Path | None
-    """None, or ``-`` for the terminal, where no file is written."""
-    option: str
-    """The option or the key of the case that gives it, for messages."""
+    path: Path | None  # none, or ``-`` for the terminal, where no file is written
+    option: str  # the option or the key of the case that gives it, for messages
     named: bool = True
     """Whether it is on the command line; if not, there is a note where an older file is
     replaced."""
     files: str = ""
     """For a folder: a regular expression for the names of the files in it; else empty."""
-    is_mesh: bool = False
-    """Whether its ending must be that of a mesh."""
-    replaces: Path | None = None
-    """The only input file that it may overwrite."""
-    remedy: str = ""
-    """The advice in the message where it is an input file."""
+    is_mesh: bool = False  # whether its ending must be that of a mesh
+    replaces: Path | None = None  # the only input file that it may overwrite
+    remedy: str = ""  # the advice in the message where it is an input file
 
 
 def input_paths(arguments: argparse.Namespace) -> dict[Path, str]:

@@ -27,12 +27,9 @@ from slideviz.streaming.quality import CellCounts
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import Metric, field_of
 
-LISTED = 100
-"""Most inverted cells listed in a report."""
-MOST_WALLS = 6
-"""Most boundaries whose layers a summary has."""
-WORST = 10
-"""Cells of lowest quality listed in a report."""
+LISTED = 100  # most inverted cells listed in a report
+MOST_WALLS = 6  # most boundaries whose layers a summary has
+WORST = 10  # cells of lowest quality listed in a report
 
 PHASES = (
     *("read", "classify", "select", "solve", "evaluate", "project", "correct"),
@@ -58,16 +55,10 @@ def run_report(
 ) -> dict[str, Any]:
     """Return the JSON object of ``run --json``.
 
-    Parameters
-    ----------
-    seconds : mapping of str to float
-        Seconds by phase, besides those of the steps.
-    quality, undeformed : Quality
-        Quality after the last step, and before the run.
-    folded : mapping of int to (int, int)
-        VTK type and first inverted step of the inverted cells with the lowest numbers.
-    walls : Walls, optional
-        The layers at the boundaries; None where the mesh is in a file.
+    ``seconds``: seconds by phase, besides those of the steps.
+    ``quality`` and ``undeformed``: quality after the last step, and before the run.
+    ``folded``: VTK type and first inverted step of the inverted cells with the lowest numbers.
+    ``walls``: the layers at the boundaries; None where the mesh is in a file.
     """
     last = steps[-1]
     spent = dict.fromkeys(PHASES, 0.0) | dict(seconds)

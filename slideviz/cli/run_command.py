@@ -232,10 +232,8 @@ def require_streamable(
 ) -> None:
     """Raise where ``--stream`` or ``--resume`` is given for a run that cannot be streamed.
 
-    Raises
-    ------
-    CaseError, MeshError
-        An option or the method needs the mesh in memory, or mesh or output are no SU2 meshes.
+    Raises CaseError or MeshError if an option or the method needs the mesh in memory, or mesh or
+    output are no SU2 meshes.
     """
     if not (arguments.stream or arguments.resume):
         return
@@ -391,12 +389,8 @@ def _series(
     """Context with a function that adds the mesh of a step to the file of all steps.
 
     The undeformed mesh is in it already. Each mesh has the quality of its cells and the
-    displacement of its points. Without a ``path`` the function does nothing.
-
-    Raises
-    ------
-    MeshError
-        The file cannot be written; none is left.
+    displacement of its points. Without a ``path`` the function does nothing. Raises MeshError if
+    the file cannot be written; none is left.
     """
     if path is None:
         yield lambda _: None

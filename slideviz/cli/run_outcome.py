@@ -94,16 +94,10 @@ def report_outcome(
 ) -> int:
     """Write the report of a run, print its summary and warnings, and return the exit code.
 
-    Parameters
-    ----------
-    files : dict of str to Path or None
-        The files written so far, by their words in the summary.
-    found, before : Quality
-        Quality after and before the run.
-    folded : mapping of int to (int, int)
-        VTK type and first inverted step of the inverted cells with the lowest numbers.
-    advice : str
-        What may help against inverted cells or missed limits, from `advice_for`.
+    ``files``: the files written so far, by their words in the summary.
+    ``found`` and ``before``: quality after and before the run.
+    ``folded``: VTK type and first inverted step of the inverted cells with the lowest numbers.
+    ``advice``: what may help against inverted cells or missed limits, from `advice_for`.
     """
     if not save_report(arguments, report) and not arguments.quiet:
         files |= {"report": arguments.json, "picture": arguments.picture}

@@ -99,15 +99,12 @@ class _Scene:
     base: Mesh | None
     """`mesh`, `base`: the mesh and, where there is a reference, the undeformed one; with
     ``--stream`` only the cells that the section can cut."""
-    quality: Quality
-    """Quality of the cells of ``mesh``."""
+    quality: Quality  # quality of the cells of ``mesh``
     chosen: Section
     matrices: dict[int, FloatArray]
     """dict of int to (4, 4) float64: the transformation of each passage, by number."""
-    outer: FloatArray
-    """(n, d): points that have the extent of the whole mesh."""
-    reference: Path | None
-    """The file of the undeformed mesh."""
+    outer: FloatArray  # (n, d): points that have the extent of the whole mesh
+    reference: Path | None  # the file of the undeformed mesh
 
 
 def section(arguments: argparse.Namespace) -> int:

@@ -54,8 +54,7 @@ class Constraint:
     """A number of a deformed mesh, with exact derivatives by the design."""
 
     value: float
-    of_points: FloatArray
-    """(n, d): its derivative by the points of the mesh."""
+    of_points: FloatArray  # (n, d): its derivative by the points of the mesh
     _start: Variable
     _end: Variable
 

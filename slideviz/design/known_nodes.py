@@ -24,8 +24,7 @@ class KnownNodeMap:
 
     mesh: Mesh
     setup: Setup
-    nodes: IntArray
-    """(m,): the moving nodes, ascending."""
+    nodes: IntArray  # (m,): the moving nodes, ascending
     points: FloatArray
     """(s, d): the sources, undeformed: nodes whose displacement all their periodic images have."""
     rows: IntArray

@@ -168,10 +168,8 @@ CORNERS = np.array(
 class Embedding:
     """Nodes in a box, with their weights of the control points (I, J, K)."""
 
-    nodes: IntArray
-    """(m,): sorted."""
-    uvw: FloatArray
-    """(m, 3): parametric coordinates of the nodes."""
+    nodes: IntArray  # (m,): sorted
+    uvw: FloatArray  # (m, 3): parametric coordinates of the nodes
     factors: tuple[FloatArray, FloatArray, FloatArray]
     """tuple of (m, I), (m, J), (m, K) float64: blending functions at the nodes in each direction;
     their products are the weights."""
@@ -198,17 +196,13 @@ class Box:
     """A box for free-form deformation."""
 
     name: str
-    points: FloatArray
-    """(I, J, K, 3): the control points, in the mesh's length unit."""
-    orders: Index | None
-    """(int, int, int) or None: orders of the uniform B-splines; None: Bézier."""
-    corners: FloatArray
-    """(8, 3): corners of the undeformed box, in SU2's order (`CORNERS`)."""
+    points: FloatArray  # (I, J, K, 3): the control points, in the mesh's length unit
+    orders: Index | None  # (int, int, int) or None: orders of the uniform B-splines; None: Bézier
+    corners: FloatArray  # (8, 3): corners of the undeformed box, in SU2's order (`CORNERS`)
     embedded: Mapping[str, tuple[IntArray, FloatArray]] = field(default_factory=dict)
     """mapping of str to (nodes, uvw): for each marker that the mesh file lists for the box, nodes
     (m,) and parametric coordinates (m, 3)."""
-    system: CoordinateSystem = CARTESIAN
-    """Of the coordinates q in which control points are blended."""
+    system: CoordinateSystem = CARTESIAN  # of the coordinates q in which control points are blended
     level: int = 0
     parent: str = ""
     """`level`, `parent`: of a nested box: 1 or more, and the name of the box whose control points

@@ -158,8 +158,7 @@ def uvw_step(slopes: FloatArray, rest: FloatArray) -> FloatArray:
 class Limits:
     """What keeps boxes from being deformed too much."""
 
-    bound: float = np.inf
-    """OPT_LINE_SEARCH_BOUND: largest displacement of a node by a box."""
+    bound: float = np.inf  # OPT_LINE_SEARCH_BOUND: largest displacement of a node by a box
     iterations: int = 0
     depth: int = 3
     """`iterations`, `depth`: FFD_INTPREV_ITER and FFD_INTPREV_DEPTH; 0 iterations: boxes may
@@ -172,10 +171,8 @@ class DrivenMove:
 
     box: str
     move: Move
-    value: int
-    """Place of the value in the design."""
-    relaxed: bool = True
-    """Whether the relaxation factor multiplies it."""
+    value: int  # place of the value in the design
+    relaxed: bool = True  # whether the relaxation factor multiplies it
 
 
 @dataclass(eq=False)
@@ -194,20 +191,14 @@ class _Rates:
 class BoxDeformation:
     """The displacement of nodes by boxes that a design deforms."""
 
-    boxes: Sequence[Box]
-    """Undeformed, in the order of the file."""
-    inside: dict[str, Embedding]
-    """Nodes in each box, by their place in 0..m-1."""
+    boxes: Sequence[Box]  # undeformed, in the order of the file
+    inside: dict[str, Embedding]  # nodes in each box, by their place in 0..m-1
     drives: Sequence[DrivenMove]
-    values: FloatArray
-    """(v,): the design."""
-    relax: float
-    """OPT_RELAX_FACTOR."""
-    count: int
-    """m, the number of nodes."""
+    values: FloatArray  # (v,): the design
+    relax: float  # OPT_RELAX_FACTOR
+    count: int  # m, the number of nodes
     limits: Limits = Limits()
-    nodes: FloatArray = field(init=False)
-    """(m, 3): the displacement."""
+    nodes: FloatArray = field(init=False)  # (m, 3): the displacement
     change: dict[str, FloatArray] = field(init=False)
     """dict of str to (I, J, K, 3): change of the control points of each box, in its coordinates
     q."""

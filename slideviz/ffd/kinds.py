@@ -164,14 +164,10 @@ NONE: Planes = (frozenset(), frozenset(), frozenset())
 class Request:
     """What an FFD variable asks of its box."""
 
-    kind: str
-    """A key of `KINDS`."""
-    index: tuple[int, ...]
-    """The indices among its parameters, as SU2 lists them; -1 means all."""
-    numbers: tuple[float, ...]
-    """Its other parameters."""
-    length: float = 1.0
-    """REF_LENGTH, over which the value of FFD_TWIST is a slope."""
+    kind: str  # a key of `KINDS`
+    index: tuple[int, ...]  # the indices among its parameters, as SU2 lists them; -1 means all
+    numbers: tuple[float, ...]  # its other parameters
+    length: float = 1.0  # REF_LENGTH, over which the value of FFD_TWIST is a slope
 
     @property
     def direct(self) -> bool:

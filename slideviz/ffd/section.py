@@ -316,14 +316,9 @@ def with_boxes(
 ) -> Mesh:
     """Return the mesh with boxes in the section that its SU2 file will have.
 
-    Parameters
-    ----------
-    boxes : sequence of Box
-        Changed boxes, matched by name, and new ones; the mesh's other boxes stay.
-    anew : bool
-        Whether all boxes that the mesh had are dropped.
-    renewed : collection of str
-        Names of boxes whose surface points have other parametric coordinates than before.
+    ``boxes``: changed boxes, matched by name, and new ones; the mesh's other boxes stay.
+    ``anew``: whether all boxes that the mesh had are dropped.
+    ``renewed``: names of boxes whose surface points have other parametric coordinates than before.
     """
     lines = [] if anew else _lines(mesh)
     entries = entries_of(lines)

@@ -47,19 +47,14 @@ class BinaryLayout:
     `slideviz.formats.su2b.layout` describes the format.
     """
 
-    text: Text
-    """The text mesh."""
-    width: int
-    """Bytes of a count or an index, 4 or 8."""
-    named: bool
-    """Whether the file gets the names of the markers; else numbers, which always fit."""
+    text: Text  # the text mesh
+    width: int  # bytes of a count or an index, 4 or 8
+    named: bool  # whether the file gets the names of the markers; else numbers, which always fit
     before: IntArray
     """(p + 1, t): number of elements of each type before each of the p pieces, and in the last row
     of all. Types are in the order of ``SORTED``."""
-    begin: int = HEAD
-    """First byte of its zone."""
-    number: int = 1
-    """Number of its zone."""
+    begin: int = HEAD  # first byte of its zone
+    number: int = 1  # number of its zone
 
     @property
     def conn(self) -> np.dtype:

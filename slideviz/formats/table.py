@@ -31,12 +31,9 @@ _UNSURE = ("", ".txt", ".dat", ".mesh", ".grid")
 class WriteOptions:
     """What a writer gets besides path and mesh."""
 
-    cell_data: Mapping[str, NDArray]
-    """(n_cells,) or (n_cells, k): values on the cells by name."""
-    point_data: Mapping[str, NDArray]
-    """(n,) or (n, d): values on the points by name."""
-    replaces: Path | None = None
-    """The input file that may be overwritten."""
+    cell_data: Mapping[str, NDArray]  # (n_cells,) or (n_cells, k): values on the cells by name
+    point_data: Mapping[str, NDArray]  # (n,) or (n, d): values on the points by name
+    replaces: Path | None = None  # the input file that may be overwritten
     going_on: Callable[[], object] = lambda: None
     """Called between blocks of a file; what it raises stops the writing."""
 
@@ -45,38 +42,30 @@ class WriteOptions:
 class MeshFormat:
     """A mesh format. Its functions are named as ``module:function``, below this package."""
 
-    ending: str
-    """File name ending, with its dot."""
-    name: str
-    """Name and strengths, in file dialogs."""
+    ending: str  # file name ending, with its dot
+    name: str  # name and strengths, in file dialogs
     reader: str = "meshio.bridge:read_with_meshio"
     """Returns a mesh: ``read(path, zone, tick)``, or ``read(path)`` if isolated; "" for none."""
     writer: str = "meshio.write:write_with_meshio"
     """Writes a mesh: ``write(path, mesh, options)``, `WriteOptions`."""
     isolated: bool = True
     """Whether it is read in a process of its own, with limits of time and memory."""
-    quality: bool = False
-    """Whether cells can have values."""
+    quality: bool = False  # whether cells can have values
     boundaries: Literal["names", "numbers"] = "names"
     """Whether boundaries keep their names, or get numbers."""
-    dims: tuple[int, ...] = (2, 3)
-    """Dimensions of the meshes that it can store."""
-    solver: bool = False
-    """Whether it is a solver's: cells have no values, and nobody expects any."""
+    dims: tuple[int, ...] = (2, 3)  # dimensions of the meshes that it can store
+    solver: bool = False  # whether it is a solver's: cells have no values, and nobody expects any
     sections: bool = False
     """Whether it keeps other sections of SU2 texts, such as FFD boxes and halos."""
     copies: bool = False
     """Whether a file can be written only as a copy of the one that the mesh was read from."""
-    require: str = ""
-    """Raises MeshError where a file cannot hold a mesh: ``require(mesh, path)``."""
+    require: str = ""  # raises MeshError where a file cannot hold a mesh: ``require(mesh, path)``
     zones: str = ""
     """Yields a file with several zones, block by block: ``blocks(*meshes)``; "" for one zone."""
     series: str = ""
     """Context with a file that holds all steps: ``series(path, mesh)``; "" where it holds one."""
-    detects: str = ""
-    """Returns whether a file is of this format, by its content: ``detects(path)``."""
-    term: Term | None = None
-    """Its words as a value of MESH_FORMAT; None where it is none."""
+    detects: str = ""  # returns whether a file is of this format, by its content: ``detects(path)``
+    term: Term | None = None  # its words as a value of MESH_FORMAT; None where it is none
 
     @property
     def value(self) -> FileFormat | None:

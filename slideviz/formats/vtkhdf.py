@@ -42,13 +42,10 @@ Values = Mapping[str, NDArray]  # arrays by name, a row for each cell or point
 class _Block:
     """A block of the collection."""
 
-    group: h5py.Group
-    """Its group in the file."""
-    nodes: IntArray
-    """(n,): the mesh nodes of its points, one partition after the other."""
+    group: h5py.Group  # its group in the file
+    nodes: IntArray  # (n,): the mesh nodes of its points, one partition after the other
     partitions: int
-    count: int
-    """`partitions`, `count`: numbers of its partitions and of its cells."""
+    count: int  # `partitions`, `count`: numbers of its partitions and of its cells
 
 
 class StepSeries:

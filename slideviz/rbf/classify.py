@@ -34,10 +34,8 @@ class FansAround:
     fan_node: IntArray
     """`node`, `fan_node` (m,): the node that represents the fan's node and its periodic images, and
     the fan's node itself."""
-    role: np.ndarray
-    """(m,) str: role of the fan's marker."""
-    normals: FloatArray
-    """(m, d): unit normals."""
+    role: np.ndarray  # (m,) str: role of the fan's marker
+    normals: FloatArray  # (m, d): unit normals
     smooth: float
     merge: float
     """`smooth`, `merge`: fans of one role are one surface when the cosine of the angle between
@@ -108,13 +106,8 @@ def _clusters(around: FansAround, local: IntArray, size: IntArray) -> IntArray:
     Fans of one role at a small angle are one surface, and fans in one plane whatever their roles.
     So are fans connected by others between them: the order of the fans does not matter. Clusters
     are numbered 0, 1, ... at each node.
-
-    Parameters
-    ----------
-    local : (m,)
-        The fans, those of a node together.
-    size : (g,)
-        The number of fans of each node.
+    ``local`` (m,): the fans, those of a node together.
+    ``size`` (g,): the number of fans of each node.
     """
     label = np.empty(len(local), np.int64)
     role = np.unique(around.role[local].astype(str), return_inverse=True)[1]
@@ -397,11 +390,7 @@ def directions(classes: Classes, normals: FloatArray) -> tuple[IntArray, FloatAr
     The directions of one node are orthonormal and span the normals of its clusters. Periodic
     images have the same directions, from the fans of all of them, because surfaces continue beyond
     the periodic boundary.
-
-    Parameters
-    ----------
-    normals : (m, d)
-        Of all fans, in the working frame.
+    ``normals`` (m, d): of all fans, in the working frame.
     """
     total = np.zeros((len(classes.cluster_node), normals.shape[1]))
     np.add.at(total, classes.row_cluster, normals[classes.row_fan])

@@ -14,10 +14,8 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.system.jit_cache import njit
 
-LEAF = 4
-"""Triangles in a leaf of the tree, at most."""
-TIE = 1e-12
-"""Squared distances with a smaller relative difference are equal but for rounding."""
+LEAF = 4  # triangles in a leaf of the tree, at most
+TIE = 1e-12  # squared distances with a smaller relative difference are equal but for rounding
 ON = 1e-30
 """A point is on its guessed triangle when its squared distance from it is at most this part of its
 squared distance from the origin."""
@@ -268,12 +266,8 @@ class ClosestPoints:
     def __init__(self, corners: FloatArray, shift: FloatArray | None = None) -> None:
         """Build the tree.
 
-        Parameters
-        ----------
-        corners : (n, c, d)
-            Segments (c = 2) or triangles (c = 3) in d = 2 or 3 dimensions.
-        shift : (d,), optional
-            One period; None: there are no images.
+        ``corners`` (n, c, d): segments (c = 2) or triangles (c = 3) in d = 2 or 3 dimensions.
+        ``shift`` (d,): one period; None: there are no images.
         """
         self.corners = corners
         """(n, c, d): the simplices. Their images are not stored, to save memory."""

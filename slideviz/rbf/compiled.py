@@ -22,11 +22,9 @@ from numba import get_num_threads, prange, set_num_threads
 from slideviz.rbf.kernels import SHAPE
 from slideviz.system.jit_cache import njit
 
-LOCK = threading.Lock()
-"""Held by `one_at_a_time` while a compiled loop runs."""
+LOCK = threading.Lock()  # held by `one_at_a_time` while a compiled loop runs
 
-SMALL = 2_000_000
-"""Pairs below which waking other threads costs more than it saves."""
+SMALL = 2_000_000  # pairs below which waking other threads costs more than it saves
 
 
 @contextmanager

@@ -43,12 +43,10 @@ boundaries, far below any angle that a mesh could mean."""
 class ConstraintRows:
     """Scalar constraints: the displacement of ``nodes`` along ``normals`` is ``right``."""
 
-    nodes: IntArray
-    """(r,): rows of one node are neighbours."""
+    nodes: IntArray  # (r,): rows of one node are neighbours
     normals: Array | None
     """(r, d): None: every row stands for all axes, and ``right`` has a column for each."""
-    right: Array
-    """(r, m): m = d without normals, and 1 with them."""
+    right: Array  # (r, m): m = d without normals, and 1 with them
 
     def followed_by(self, more: ConstraintRows) -> ConstraintRows:
         """Return these rows followed by ``more``; neither may have normals."""
@@ -176,15 +174,8 @@ def _above(size: FloatArray, least: float) -> np.ndarray:
 def merge(problem: Problem, nodes: IntArray, values: Array) -> tuple[IntArray, Array]:
     """Return one node (c,) for each group of coinciding nodes (m,), and the mean of its values.
 
-    Parameters
-    ----------
-    nodes, values : (m,), (..., m, d)
-        Nodes, and their displacements in the frame.
-
-    Raises
-    ------
-    DeformError
-        Coinciding nodes are asked to move differently.
+    Raises DeformError if coinciding nodes are asked to move differently.
+    ``nodes`` and ``values`` (m,), (..., m, d): nodes, and their displacements in the frame.
     """
     controls, group, count = np.unique(
         problem.same_as[nodes], return_inverse=True, return_counts=True

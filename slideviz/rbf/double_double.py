@@ -34,14 +34,11 @@ FUNCTIONS: dict[str, tuple[int, tuple[float, ...]]] = {
 """The radial functions that are (1 - xi)^p times a polynomial: p, and the polynomial's coefficients
 from the constant on. The same functions are in `kernels` and `compiled`."""
 
-PAIRS = 1_000_000
-"""Pairs between two calls of ``tick``: some tens of milliseconds."""
+PAIRS = 1_000_000  # pairs between two calls of ``tick``: some tens of milliseconds
 
-ROWS, STRIP = 16, 256
-"""Rows and columns of a factor that a thread computes at once."""
+ROWS, STRIP = 16, 256  # rows and columns of a factor that a thread computes at once
 
-KEPT = 2000
-"""Rows of the largest system whose matrix is kept for further residuals: 64 MB."""
+KEPT = 2000  # rows of the largest system whose matrix is kept for further residuals: 64 MB
 
 
 @njit(inline="always", **_OPTIONS)
@@ -262,8 +259,7 @@ def _solve(u, ul, x, xl):  # type: ignore[no-untyped-def]
 class Residuals:
     """Computes residuals of an interpolation system with twice the digits of a float64."""
 
-    basis: Basis
-    """Its kernel is one of ``FUNCTIONS``."""
+    basis: Basis  # its kernel is one of ``FUNCTIONS``
     place: tuple[FloatArray, FloatArray | None]
     """Features (k, n) of the node of each row, and its unit direction (n, d) or None."""
     _cache: dict[int, tuple[FloatArray, FloatArray]] = made_by(default_factory=dict)
@@ -273,10 +269,8 @@ class Residuals:
     ) -> FloatArray:
         """Return the residual ``right - G (weights + low)`` (n, m), rounded once.
 
-        Parameters
-        ----------
-        right, weights, low : (n, m)
-            ``low`` is the rest of weights beyond the digits of a float64.
+        ``right``, ``weights``, ``low`` (n, m): ``low`` is the rest of weights beyond the digits of
+        a float64.
         """
         out, n = np.empty_like(right), len(right)
         w, wl = np.ascontiguousarray(weights.T), np.ascontiguousarray(low.T)

@@ -12,8 +12,7 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf import compiled
 from slideviz.rbf.kernels import KERNELS
 
-CHUNK = 25_000_000
-"""Pairs between two calls of ``tick``: some tens of milliseconds."""
+CHUNK = 25_000_000  # pairs between two calls of ``tick``: some tens of milliseconds
 
 Tick = Callable[[float], None]
 """A progress callback: takes the fraction done, and may raise to stop the work."""
@@ -27,12 +26,10 @@ def no_tick(fraction: float) -> None:
 class Basis:
     """A radial function: kernel, support radius and rule of distance."""
 
-    radius: float
-    """Support radius R, in the mesh's length unit."""
+    radius: float  # support radius R, in the mesh's length unit
     period: float = 0.0
     """Angle in radians of a rotational periodic distance (Eq. 2.15); 0: Euclidean features."""
-    kernel: str = "wendland-c2"
-    """A key of ``KERNELS``."""
+    kernel: str = "wendland-c2"  # a key of ``KERNELS``
 
     @property
     def period_over_pi(self) -> float:
@@ -92,8 +89,7 @@ def evaluate(
 WIDER = 4
 """Targets are looked at one by one where they are so many times as many as the control nodes."""
 
-BOX = 0.5
-"""Edge of a box over the support radius: a box of four dimensions has no diagonal above R."""
+BOX = 0.5  # edge of a box over the support radius: a box of four dimensions has no diagonal above R
 
 SLACK = 1.0 + 1e-9
 """Factor of the support radius beyond which a sum is zero, whatever rounding does to distances."""

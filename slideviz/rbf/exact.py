@@ -122,13 +122,8 @@ class ExactFit:
 
         Refined weights meet all rows, also those that the pivot guard left out. Sets
         ``error_estimate`` and ``refined``.
-
-        Parameters
-        ----------
-        right, found : (n, m)
-            Right-hand sides, and the weights that the factor gives.
-        largest
-            Largest component of the data of all blocks, by which errors are judged.
+        ``right`` and ``found`` (n, m): right-hand sides, and the weights that the factor gives.
+        ``largest``: largest component of the data of all blocks, by which errors are judged.
         """
         trials = [(right, found, largest)]
         if self._problem.lasting:

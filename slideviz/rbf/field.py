@@ -53,8 +53,7 @@ class Correction:
     """The sources: Cartesian positions of the boundary nodes and of their periodic images."""
     lacking: FloatArray
     """(s, d): the error of each source: prescribed less interpolated displacement, in the frame."""
-    radius: float
-    """Distance at which the correction ends, in the mesh's length unit (Eq. 2.31)."""
+    radius: float  # Distance at which the correction ends, in the mesh's length unit (Eq. 2.31).
 
     def near(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return which points (m, d) are within reach of a source, (h,), and their part, (h, d).
@@ -139,14 +138,11 @@ class RadialField:
     """A sum of radial functions and, for some kernels, a linear polynomial, with its correction."""
 
     basis: Basis
-    controls: FloatArray
-    """(k, c): features of the control nodes."""
-    weights: FloatArray
-    """(c, d)."""
+    controls: FloatArray  # (k, c): features of the control nodes
+    weights: FloatArray  # (c, d)
     tail: FloatArray | None = None
     """(q, d): coefficients of the polynomial's terms (`linear_terms`)."""
-    correction: Correction | None = None
-    """None: errors at the boundary are not spread."""
+    correction: Correction | None = None  # none: errors at the boundary are not spread
 
     def at(self, features: FloatArray, points: FloatArray, /, tick: Tick = no_tick) -> FloatArray:
         """Return the displacement (m, d) at Cartesian points (m, d) with features (k, m)."""

@@ -28,8 +28,7 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.periodic import Pair
 from slideviz.system.threads import PART, in_parts
 
-ON_AXIS = 1e-9
-"""Nodes nearer to the axis than this part of the reference radius stay on it."""
+ON_AXIS = 1e-9  # nodes nearer to the axis than this part of the reference radius stay on it
 
 TILT = 0.02
 """A surface whose unit normal has a larger component along the axis fixes its nodes on the axis."""
@@ -48,15 +47,9 @@ def corners(coords: FloatArray, facets: IntArray, axis: np.ndarray) -> FloatArra
     In the coordinates a facet with a node on the axis has no corner there, but all angles of its
     other nodes: a corner on the axis takes the angle of the node beside it, and a triangle with
     one corner on the axis is a quadrilateral.
-
-    Parameters
-    ----------
-    coords : (n, d)
-        In the frame.
-    facets : (f, k)
-        k = 2, or 4, where a triangle repeats its last node.
-    axis : (n,) bool
-        Nodes on the axis.
+    ``coords`` (n, d): in the frame.
+    ``facets`` (f, k): k = 2, or 4, where a triangle repeats its last node.
+    ``axis`` (n,) bool: nodes on the axis.
     """
     x = coords[facets]
     touching = axis[facets]
@@ -197,19 +190,14 @@ SECTORS = 1 << 12
 class Frame:
     """The coordinates and the distance of the interpolation, and the maps from and to points."""
 
-    dim: int
-    """2 or 3."""
+    dim: int  # 2 or 3
     direction: FloatArray | None = None
     """(d,): unit vector of a translational period; None: there is none."""
-    period: float = 0.0
-    """Translational: length. Rotational: angle in radians. 0: not periodic."""
+    period: float = 0.0  # Translational: length. Rotational: angle in radians. 0: not periodic.
     axis: FloatArray | None = None
-    origin: FloatArray | None = None
-    """`axis`, `origin` (3,): set for a cylindrical frame."""
-    theta0: float = 0.0
-    """Angle from which theta is counted, opposite the largest empty sector."""
-    radius: float = 1.0
-    """The reference radius rho, which turns angles into lengths."""
+    origin: FloatArray | None = None  # `axis`, `origin` (3,): set for a cylindrical frame
+    theta0: float = 0.0  # angle from which theta is counted, opposite the largest empty sector
+    radius: float = 1.0  # the reference radius rho, which turns angles into lengths
 
     @property
     def cylindrical(self) -> bool:

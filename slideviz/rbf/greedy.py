@@ -62,11 +62,8 @@ class GreedyFit:
     ) -> None:
         """Begin without rows; ``problem`` must have a reduction.
 
-        Parameters
-        ----------
-        history, done
-            Cycles, and number of calls of ``add``, of an earlier fit in the same step (the first
-            of the two of direct sliding).
+        ``history`` and ``done``: cycles, and number of calls of ``add``, of an earlier fit in the
+        same step (the first of the two of direct sliding).
         """
         assert problem.reduction is not None
         self._problem, self._timer, self._settings = problem, timer, problem.reduction
@@ -220,12 +217,8 @@ class GreedyFit:
     def _grow(self, target: FloatArray, residual: FloatArray, errors: FloatArray) -> bool:
         """Pick nodes and solve with them, which sets ``interpolant``; return whether any could be.
 
-        Parameters
-        ----------
-        target, residual : (r, m)
-            What the level has to meet, and what it still lacks.
-        errors : (c,)
-            Error of each candidate.
+        ``target`` and ``residual`` (r, m): what the level has to meet, and what it still lacks.
+        ``errors`` (c,): error of each candidate.
         """
         level, among = self._level, self._among
         open_ = among.has_row(~level.excluded)

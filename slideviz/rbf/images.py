@@ -23,8 +23,7 @@ from slideviz.rbf.classify import Classes, directions
 from slideviz.rbf.constraint_rows import refuse
 from slideviz.rbf.frames import Frame
 
-COINCIDENT = 1e-12
-"""Nodes nearer than this part of the mesh's extent are in one place."""
+COINCIDENT = 1e-12  # nodes nearer than this part of the mesh's extent are in one place
 
 ROUNDING = 1e-12
 """Part of the mesh's extent by which images may move differently: ten thousand times the
@@ -43,15 +42,9 @@ def find_images(
     nodes of the pairs, and boundary nodes that coincide with another one after one period without
     being on a periodic boundary, as in layers of cells beyond it. A node without images represents
     itself.
-
-    Parameters
-    ----------
-    coords : (n, d)
-        Undeformed, in the frame.
-    nodes : (b,)
-        All nodes of the boundary.
-    extent
-        Of the mesh, in its length unit.
+    ``coords`` (n, d): undeformed, in the frame.
+    ``nodes`` (b,): all nodes of the boundary.
+    ``extent``: of the mesh, in its length unit.
     """
     count = len(coords)
     if not pairs:
@@ -77,10 +70,8 @@ def find_images(
 class ImageDisplacements:
     """Copies the displacements of given nodes to their periodic images."""
 
-    prescribed: IntArray
-    """(k,): sorted, each once."""
-    vectors: FloatArray
-    """(k, d): the displacements of the given nodes in the frame."""
+    prescribed: IntArray  # (k,): sorted, each once
+    vectors: FloatArray  # (k, d): the displacements of the given nodes in the frame
     representative: IntArray
     """(n,): for each node, the number of the periodic image that represents it."""
 
@@ -122,16 +113,10 @@ def require_free(
 ) -> None:
     """Raise DeformError when the boundary does not let nodes move as their given images do.
 
-    Parameters
-    ----------
-    nodes : (m,)
-        Nodes that move only because an image is given.
-    classes
-        The classes of all nodes, found as if there were no images.
-    normals : (f, d)
-        Of all fans, in the frame.
-    allowed
-        Largest displacement across the constraints, in the mesh's length unit.
+    ``nodes`` (m,): nodes that move only because an image is given.
+    ``classes``: the classes of all nodes, found as if there were no images.
+    ``normals`` (f, d): of all fans, in the frame.
+    ``allowed``: largest displacement across the constraints, in the mesh's length unit.
     """
     off = np.zeros(classes.total)
     held = classes.fixed[np.isin(classes.fixed, nodes)]
@@ -146,14 +131,9 @@ def require_free(
 def misfits(frame: Frame, coords: FloatArray, points: FloatArray, images: IntArray) -> FloatArray:
     """Return the difference of the displacements of images, (k,), in the mesh's length unit.
 
-    Parameters
-    ----------
-    coords : (n, d)
-        Undeformed, in the frame.
-    points : (n, d)
-        Cartesian, as they are now.
-    images : (k, 2)
-        Nodes and their images.
+    ``coords`` (n, d): undeformed, in the frame.
+    ``points`` (n, d): Cartesian, as they are now.
+    ``images`` (k, 2): nodes and their images.
     """
     one, two = (frame.coords(points[column]) for column in images.T)
     gap = (two - one) - (coords[images[:, 1]] - coords[images[:, 0]])
@@ -169,10 +149,7 @@ def largest_misfit(
 ) -> float | None:
     """Return the largest of `misfits`, in the mesh's length unit; None where there are no images.
 
-    Raises
-    ------
-    DeformError
-        Images moved differently by more than rounding.
+    Raises DeformError if images moved differently by more than rounding.
     """
     if not len(images):
         return None

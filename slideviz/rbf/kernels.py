@@ -17,22 +17,17 @@ import numpy as np
 from slideviz import terms
 from slideviz.mesh.model import FloatArray
 
-SHAPE = 0.05
-"""The parameter a of the multiquadrics, in parts of R."""
+SHAPE = 0.05  # the parameter a of the multiquadrics, in parts of R
 
 
 @dataclass(frozen=True)
 class Kernel:
     """A radial function."""
 
-    name: str
-    """The value of RBF_KERNEL."""
-    code: int
-    """Its number in the compiled loops."""
-    compact: bool
-    """Whether it has compact support: is 0 from xi = 1 on."""
-    polynomial: bool
-    """Whether it needs the linear polynomial of Eq. 2.1."""
+    name: str  # the value of RBF_KERNEL
+    code: int  # its number in the compiled loops
+    compact: bool  # whether it has compact support: is 0 from xi = 1 on
+    polynomial: bool  # Whether it needs the linear polynomial of Eq. 2.1.
     function: Callable[[FloatArray], FloatArray]
     """phi(xi) on arrays, as printed: the definition that the compiled loops are tested against."""
 
@@ -74,8 +69,7 @@ _FUNCTIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
 }
 """phi(xi) by the value of RBF_KERNEL; the order gives the numbers in the compiled loops."""
 
-PLAIN = "wendland-c2"
-"""The default kernel."""
+PLAIN = "wendland-c2"  # the default kernel
 
 KERNELS: dict[str, Kernel] = {
     name: Kernel(name, code, terms.KERNELS[name].compact, terms.KERNELS[name].polynomial, function)

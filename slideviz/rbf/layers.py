@@ -55,25 +55,21 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
     from scipy.spatial import cKDTree
 
-NEAREST = 12
-"""Wall nodes that carry a node."""
+NEAREST = 12  # wall nodes that carry a node
 
-CANDIDATES = 2 * NEAREST
-"""Nearest wall nodes among which those that see the node are looked for."""
+CANDIDATES = 2 * NEAREST  # nearest wall nodes among which those that see the node are looked for
 
 POWER = 6
 """Power of the inverse distance in the weights of wall nodes, and of walls. Cells at a small edge
 may be as long as high; with 3 their heights would change by up to 2 %."""
 
-GRAZING = 0.3
-"""Cosine from which a wall node sees a node fully; below minus this not at all."""
+GRAZING = 0.3  # cosine from which a wall node sees a node fully; below minus this not at all
 
 CORNER = 0.6
 """Largest distance from a point of a facet to its nearest corner over the diagonal of its box; in
 an equilateral triangle it is 1 / sqrt(3) of an edge."""
 
-EDGES = 0.01
-"""Weight of the edges of the facets at a wall node over that of their normals, in 3D."""
+EDGES = 0.01  # weight of the edges of the facets at a wall node over that of their normals, in 3D
 
 
 def smooth(t: FloatArray) -> FloatArray:
@@ -86,16 +82,13 @@ def smooth(t: FloatArray) -> FloatArray:
 class Wall:
     """A connected wall with layers."""
 
-    names: tuple[str, ...]
-    """The boundaries that it consists of."""
-    facets: IntArray
-    """(f, 2 or 4): its facets, nodes ordered so that normals point out of the mesh."""
+    names: tuple[str, ...]  # the boundaries that it consists of
+    facets: IntArray  # (f, 2 or 4): its facets, nodes ordered so that normals point out of the mesh
     thickness: float
     first: float
     """`thickness`, `first`: of its zone, and of the first layer of cells, which is wholly in it, in
     the mesh's length unit."""
-    moves: bool
-    """Whether its nodes are moving ones; others stay."""
+    moves: bool  # whether its nodes are moving ones; others stay
 
 
 Reached = tuple[IntArray, FloatArray, FloatArray, FloatArray]
@@ -109,14 +102,11 @@ class WallNodes:
     frame: Frame
     known: IntArray
     """(w,): the nodes, by their places among the known nodes; nodes of two walls are here twice."""
-    start: FloatArray
-    """(w, d): undeformed Cartesian points."""
-    facets: IntArray
-    """(f, 2 or 4): of moving walls, by places of nodes here."""
+    start: FloatArray  # (w, d): undeformed Cartesian points
+    facets: IntArray  # (f, 2 or 4): of moving walls, by places of nodes here
     walls: tuple[tuple[Wall, slice, IntArray], ...]
     """Each wall, with its sources, and its facets and their images by places of sources."""
-    origin: IntArray
-    """(s,): the place here of the node that each source is, or is an image of."""
+    origin: IntArray  # (s,): the place here of the node that each source is, or is an image of
     turn: FloatArray | None
     """(s, d, d): rotations from it to the source; None: images are only shifted."""
     places: FloatArray
@@ -141,11 +131,7 @@ class WallNodes:
         """Return displacement (..., s, d) and rotation less identity (..., s d, d) of all sources.
 
         Of the latter row (i, b) has the column b of M_i - 1, Cartesian as all.
-
-        Parameters
-        ----------
-        goal : (..., a, d)
-            Where the known nodes are, in the frame.
+        ``goal`` (..., a, d): where the known nodes are, in the frame.
         """
         now = points(self.frame, take(goal, self.known))
         dim = self.start.shape[1]
@@ -319,12 +305,8 @@ def wall_nodes(
 ) -> WallNodes:
     """Return the nodes of walls.
 
-    Parameters
-    ----------
-    coords : (n, d)
-        Undeformed, in the frame.
-    known : (a,)
-        The nodes whose displacement is known: all of the walls' among them.
+    ``coords`` (n, d): undeformed, in the frame.
+    ``known`` (a,): the nodes whose displacement is known: all of the walls' among them.
     """
     place = np.full(len(coords), -1)
     place[known] = np.arange(len(known))
@@ -384,8 +366,7 @@ class KeptLayers:
 
     walls: tuple[tuple[tuple[str, ...], float], ...]
     """The boundaries of each connected wall, and the thickness of its zone, in the mesh's unit."""
-    nodes: int
-    """Nodes of the zone; of a streamed mesh those of its skin."""
+    nodes: int  # nodes of the zone; of a streamed mesh those of its skin
 
     def report(self) -> dict[str, Any]:
         """Return the same as values of JSON."""
@@ -398,12 +379,9 @@ class LayerZone:
     """Nodes that go with walls, and how."""
 
     walls: WallNodes
-    nodes: IntArray
-    """(z,): nodes in the zone."""
-    start: FloatArray
-    """(z, d): their undeformed Cartesian points."""
-    sliding: IntArray
-    """(k,): places of those that slide."""
+    nodes: IntArray  # (z,): nodes in the zone
+    start: FloatArray  # (z, d): their undeformed Cartesian points
+    sliding: IntArray  # (k,): places of those that slide
     share: FloatArray
     by_displacement: csr_array
     by_rotation: csr_array
@@ -417,12 +395,9 @@ class LayerZone:
     def displacement(self, coords: Array, by: Array, carried: Array) -> Array:
         """Return the displacement (..., z, d) of the nodes of the zone in a step, in the frame.
 
-        Parameters
-        ----------
-        coords, by : (..., z, d)
-            Their coordinates before the step, and their displacement in the step so far.
-        carried : (..., z, d)
-            As `carried` returns it.
+        ``coords`` and ``by`` (..., z, d): their coordinates before the step, and their displacement
+        in the step so far.
+        ``carried`` (..., z, d): as `carried` returns it.
         """
         frame = self.walls.frame
         here = points(frame, coords + by)

@@ -19,28 +19,23 @@ from slideviz.rbf.reduction import Reduction
 from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise, solve_lower
 from slideviz.rbf.tape import value
 
-POOL = 768
-"""Largest number of rows in the pool of a block."""
+POOL = 768  # largest number of rows in the pool of a block
 
-POOL_START = 192
-"""Number of candidates in the first pools, at least."""
+POOL_START = 192  # number of candidates in the first pools, at least
 
 POOL_SHARE = 6
 """Candidates in the pool for each node to pick: as good, measured by the number of control nodes,
 as the largest pool from the start, and cheaper."""
 
-BLOCK_LIMIT = 128
-"""Largest number of nodes picked in a cycle."""
+BLOCK_LIMIT = 128  # largest number of nodes picked in a cycle
 
 TIE = 1e-4
 """Errors with a smaller relative difference may count as equal: far above their rounding, far
 below what matters for the choice. `tie_breaker` decides between them."""
 
-FALL = 0.9
-"""An error has fallen when it is below this part of the lowest one before."""
+FALL = 0.9  # an error has fallen when it is below this part of the lowest one before
 
-LOSSES = 8
-"""Number of levels in a row without a fall of the error that end a selection in levels."""
+LOSSES = 8  # number of levels in a row without a fall of the error that end a selection in levels
 
 
 def newton(
@@ -112,11 +107,7 @@ def tie_breaker(coords: FloatArray) -> FloatArray:
 
     It grows from 1 to 1 + TIE along a direction that no symmetry of a mesh is likely to have: no
     sum of whole multiples of its components is zero, so no two points of a grid get the same.
-
-    Parameters
-    ----------
-    coords : (c, d)
-        Positions of the candidates in the frame.
+    ``coords`` (c, d): positions of the candidates in the frame.
     """
     if not len(coords):
         return np.empty(0)
@@ -137,17 +128,11 @@ def pool(
     """Return how many nodes to pick, and the candidates (k,) to pick them from.
 
     0 and none where no error is above the tolerance.
-
-    Parameters
-    ----------
-    errors : (c,)
-        Of each candidate, times its ``tie_breaker``; negative where it cannot be picked.
-    vectors : (c, d)
-        The errors as vectors in the frame.
-    chosen, chosen_in_level
-        Nodes picked so far: in all levels, and in this one.
-    per_node
-        Rows of a candidate, on average.
+    ``errors`` (c,): of each candidate, times its ``tie_breaker``; negative where it cannot be
+    picked.
+    ``vectors`` (c, d): the errors as vectors in the frame.
+    ``chosen`` and ``chosen_in_level``: nodes picked so far: in all levels, and in this one.
+    ``per_node``: rows of a candidate, on average.
     """
     eligible = np.count_nonzero(errors > settings.tolerance)
     if not eligible:
@@ -201,13 +186,8 @@ class LevelLimit:
 
         It should where the error did not fall `LOSSES` times in a row, or where more rows were
         chosen than ``budget``.
-
-        Parameters
-        ----------
-        error : float
-            The largest error after this level, in the mesh's length unit.
-        cost : float
-            How many rows it chose.
+        ``error``: the largest error after this level, in the mesh's length unit.
+        ``cost``: how many rows it chose.
         """
         fell = error < FALL * self._lowest
         self._lowest = error if fell else self._lowest
@@ -220,14 +200,10 @@ class LevelLimit:
 class Candidates:
     """The nodes that may be chosen, with their constraint rows; rows of one node are neighbours."""
 
-    rows: ConstraintRows
-    """Sorted by position, so that the numbering of the mesh changes no choice."""
-    block: IntArray
-    """(r,): the block of the system that each row is in."""
-    candidate: IntArray
-    """(r,): the candidate, from 0 to c - 1, that each row belongs to."""
-    first: IntArray
-    """(c,): the first row of each candidate."""
+    rows: ConstraintRows  # sorted by position, so that the numbering of the mesh changes no choice
+    block: IntArray  # (r,): the block of the system that each row is in
+    candidate: IntArray  # (r,): the candidate, from 0 to c - 1, that each row belongs to
+    first: IntArray  # (c,): the first row of each candidate
     tie_breaker: FloatArray
     """(c,): factor of each candidate's error, which decides between equal errors
     (`level.tie_breaker`)."""

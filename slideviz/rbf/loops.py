@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
 
 
-BLOCK = 256
-"""Nodes of a task. A task does all designs, so that what they share stays in the cache."""
+BLOCK = 256  # nodes of a task; it does all designs, so that what they share stays in the cache
 
 
 @njit(parallel=True, **_OPTIONS)
@@ -151,8 +150,7 @@ def _turn(coords, start, before, basis, origin, rate, theta0):  # type: ignore[n
                     )
 
 
-PARTS = 64
-"""Parts of the nodes in ``farthest``, which run in parallel."""
+PARTS = 64  # parts of the nodes in ``farthest``, which run in parallel
 
 
 def shift(start: FloatArray, by: FloatArray) -> FloatArray:
@@ -167,14 +165,9 @@ def add_correction(
 ) -> None:
     """Add the boundary correction to ``out`` (k, n, d), k designs, at the targets (h,).
 
-    Parameters
-    ----------
-    means : (h, b)
-        The weights of boundary nodes in the mean that each target takes over.
-    part : (h,)
-        The share of that mean that it takes over.
-    lacking : (k, b, d)
-        The errors at the boundary nodes.
+    ``means`` (h, b): the weights of boundary nodes in the mean that each target takes over.
+    ``part`` (h,): the share of that mean that it takes over.
+    ``lacking`` (k, b, d): the errors at the boundary nodes.
     """
     with one_at_a_time(len(out) * means.nnz * out.shape[-1]):
         lacking = np.ascontiguousarray(lacking)
@@ -186,10 +179,8 @@ def keep_undeformed(
 ) -> FloatArray:
     """Return points ``at`` (..., n, d), with those of nodes at rest overwritten by ``before``.
 
-    Parameters
-    ----------
-    moved, start : (..., n, d), (n, d)
-        Coordinates now, and those of the undeformed points ``before`` (n, d).
+    ``moved`` and ``start`` (..., n, d), (n, d): coordinates now, and those of the undeformed points
+    ``before`` (n, d).
     """
     before = before.view()
     before.flags.writeable = False  # as those of a mesh are: the loop is compiled once

@@ -47,12 +47,10 @@ LOST = 1e-9
 spread around the nodes: badly conditioned systems have weights so large that their sum loses
 digits, which no refinement of the weights brings back."""
 
-NEGLIGIBLE = 1e-14
-"""Errors below this part of the support radius are rounding, and are not spread."""
+NEGLIGIBLE = 1e-14  # errors below this part of the support radius are rounding, and are not spread
 
 
-IMAGES = (0, -1, 1)
-"""Periods by which the sources of the correction are shifted, in this order."""
+IMAGES = (0, -1, 1)  # periods by which the sources of the correction are shifted, in this order
 
 
 class Fit(Protocol):
@@ -255,11 +253,8 @@ def correction_of(problem: Problem, nodes: IntArray, errors: FloatArray) -> Corr
     """Return the correction that spreads errors at boundary nodes; None where they are rounding.
 
     Its radius is ``gamma`` times the largest error (Eq. 2.31).
-
-    Parameters
-    ----------
-    nodes, errors : (b,), (b, d)
-        Boundary nodes with known displacement, and the errors there, in the frame.
+    ``nodes`` and ``errors`` (b,), (b, d): boundary nodes with known displacement, and the errors
+    there, in the frame.
     """
     largest = float(np.linalg.norm(errors, axis=1).max(initial=0.0))
     if largest <= NEGLIGIBLE * problem.basis.radius:

@@ -20,8 +20,7 @@ PAIRS = 1_000_000
 """Pairs whose radial functions are in memory at a time, in each thread, when many columns of
 weights share them: the functions and their products stay in the cache."""
 
-ROWS = 256
-"""Largest number of targets that are in memory at a time."""
+ROWS = 256  # largest number of targets that are in memory at a time
 
 
 def flat(rows: FloatArray) -> FloatArray:

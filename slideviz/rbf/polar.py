@@ -24,11 +24,9 @@ from slideviz.system.threads import in_parts
 
 OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy"}
 
-SWEEPS = 12
-"""Most sweeps of Jacobi's eigenvalue algorithm; it needs up to six."""
+SWEEPS = 12  # most sweeps of Jacobi's eigenvalue algorithm; it needs up to six
 
-UNIQUE = 1e-12
-"""Where R is not unique to this precision (relative), its derivative is taken as 0."""
+UNIQUE = 1e-12  # where R is not unique to this precision (relative), its derivative is taken as 0
 
 
 def nearest_rotations(matrices: Array, d: int) -> Array:

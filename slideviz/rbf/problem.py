@@ -51,21 +51,16 @@ class Cycle:
     """One cycle of the selection: its number, its level, and what it found."""
 
     cycle: int
-    level: int
-    """`cycle`, `level`: numbers from 1."""
-    error: float
-    """Largest error at the candidates, in the mesh's length unit."""
-    control_nodes: int
-    """Nodes chosen so far."""
-    seconds: float
-    """Since the selection began."""
+    level: int  # `cycle`, `level`: numbers from 1
+    error: float  # largest error at the candidates, in the mesh's length unit
+    control_nodes: int  # nodes chosen so far
+    seconds: float  # since the selection began
 
 
 class FrozenChoices(Protocol):
     """The discrete choices of a step, kept for any displacement (`slideviz.design.frozen`)."""
 
-    out: FloatArray | None
-    """(..., n, d): an array for the displacement of all nodes, to be reused."""
+    out: FloatArray | None  # (..., n, d): an array for the displacement of all nodes, to be reused
 
     def choose(self, name: str, make: Callable[[], Any]) -> Any:
         """Return the cached choice ``name``; the first call makes it with ``make``."""
@@ -95,10 +90,8 @@ class Problem:
     """
 
     basis: Basis
-    features: Array
-    """(k, n): of all nodes, at their current positions."""
-    known: IntArray
-    """(a,): nodes whose displacement is given, by ``values`` (a, d)."""
+    features: Array  # (k, n): of all nodes, at their current positions
+    known: IntArray  # (a,): nodes whose displacement is given, by ``values`` (a, d)
     values: Array
     edge: IntArray
     surface: IntArray
@@ -111,20 +104,16 @@ class Problem:
     same_as: IntArray
     """(n,): for each node, the node that represents all that coincide with it under the periodic
     distance (its images); itself, if there are none."""
-    project: Project
-    """Projects displacements of sliding nodes (`Project`)."""
-    curved: bool
-    """Whether slid nodes must be projected after direct sliding."""
+    project: Project  # projects displacements of sliding nodes (`Project`)
+    curved: bool  # whether slid nodes must be projected after direct sliding
     cartesian: Callable[[FloatArray], FloatArray]
     """Returns the Cartesian points (m, d) of coordinates (m, d)."""
     coords: Array
     shift: FloatArray
     """`coords`, `shift` (n, d), (d,): current positions in the frame, and one period in it (zero:
     none), for the correction."""
-    reduction: Reduction | None = None
-    """None: all candidates are control nodes."""
-    before: Solution | None = None
-    """Of the step before; None in the first step."""
+    reduction: Reduction | None = None  # none: all candidates are control nodes
+    before: Solution | None = None  # of the step before; None in the first step
     stages: tuple[Levels, ...] = ()
     """The rows that were chosen for other data, of each system: a selection in levels takes them
     first."""
@@ -184,10 +173,8 @@ class Problem:
 class CarriedError:
     """The errors that the interpolants of all previous steps left at boundary nodes."""
 
-    nodes: IntArray
-    """(b,): sorted, each once."""
-    values: Array
-    """(..., b, d): prescribed less interpolated displacement, in the frame."""
+    nodes: IntArray  # (b,): sorted, each once
+    values: Array  # (..., b, d): prescribed less interpolated displacement, in the frame
 
     def at(self, nodes: IntArray) -> Array:
         """Return the errors (..., m, d) at nodes (m,); zero at nodes that are not in ``nodes``."""
@@ -201,35 +188,25 @@ class CarriedError:
 class Relaxed:
     """How a step was relaxed (`slideviz.elastic.relaxation`)."""
 
-    rounds: int
-    """Iterations."""
-    residual: float
-    """Last residual over the first, in the norm of the preconditioner."""
-    theta: float
-    """The smallest part of the relaxation that the safeguard left anywhere, 0 to 1."""
-    limited: int
-    """Nodes where it left less than all."""
+    rounds: int  # iterations
+    residual: float  # last residual over the first, in the norm of the preconditioner
+    theta: float  # the smallest part of the relaxation that the safeguard left anywhere, 0 to 1
+    limited: int  # nodes where it left less than all
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
     """The result of one step: displacements, control nodes and errors."""
 
-    displacement: Array
-    """(..., n, d): of all nodes, in the frame."""
-    control_nodes: int
-    """Nodes in the final system, coinciding ones counted once."""
+    displacement: Array  # (..., n, d): of all nodes, in the frame
+    control_nodes: int  # nodes in the final system, coinciding ones counted once
     max_error: float
     """Largest misfit at the nodes whose displacement is known or projected, before the correction
     sets these exactly; with data reduction that of all steps so far."""
-    dropped: IntArray
-    """(m,): nodes that the pivot guard left out."""
-    condition: float
-    """Estimated condition number of the final system."""
-    history: tuple[Cycle, ...] = ()
-    """Convergence of the selection; empty without data reduction."""
-    warnings: tuple[str, ...] = ()
-    """What the user should know."""
+    dropped: IntArray  # (m,): nodes that the pivot guard left out
+    condition: float  # estimated condition number of the final system
+    history: tuple[Cycle, ...] = ()  # convergence of the selection; empty without data reduction
+    warnings: tuple[str, ...] = ()  # what the user should know
     control: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
     """(c,): the nodes in the final system; empty where a method has no such system."""
     carried: CarriedError | None = None
@@ -251,8 +228,7 @@ class Solution:
     else 0."""
     field: Field | None = None
     """The field that displaced the nodes inside the mesh; None where a method has no such field."""
-    relaxed: Relaxed | None = None
-    """None where the step was not relaxed."""
+    relaxed: Relaxed | None = None  # none where the step was not relaxed
     stages: tuple[Levels, ...] = ()
     """The rows of each system that was solved, in order: pseudo sliding has up to three, direct
     sliding one or two; empty where a method has no such systems."""
@@ -262,14 +238,11 @@ class Solution:
 class Interpolant:
     """A sum of radial functions and, for some kernels, a linear polynomial (Eq. 2.1)."""
 
-    nodes: IntArray
-    """(c,): the control nodes."""
+    nodes: IntArray  # (c,): the control nodes
     weights: Array
     """(..., c, d): coefficients alpha, ``sum_a w_a n_a`` over the constraints of each node."""
-    tail: Array | None = None
-    """(..., q, d): coefficients beta of the polynomial's terms."""
-    levels: Levels = ()
-    """The rows that it meets, of each level."""
+    tail: Array | None = None  # (..., q, d): coefficients beta of the polynomial's terms
+    levels: Levels = ()  # the rows that it meets, of each level
 
     def at(
         self,

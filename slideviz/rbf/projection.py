@@ -36,19 +36,14 @@ within this part of the node's distance from it. So a node that slides along a l
 a flat boundary is on a facet, whatever rounding says, and the choice of the search among equally
 near facets does not matter."""
 
-ROUNDING = 1e-9
-"""Part of the facet's size by which that limit is increased."""
+ROUNDING = 1e-9  # part of the facet's size by which that limit is increased
 
 
 def projection_matrices(corners: FloatArray, x: FloatArray, closest: FloatArray) -> FloatArray:
     """Return the derivatives P (m, d, d) of closest points with respect to their nodes.
 
-    Parameters
-    ----------
-    corners : (m, c, d)
-        Of the segment (c = 2) or triangle (c = 3) that each closest point is on.
-    x, closest : (m, d)
-        Nodes, and their closest points on the simplices.
+    ``corners`` (m, c, d): of the segment (c = 2) or triangle (c = 3) that each closest point is on.
+    ``x`` and ``closest`` (m, d): nodes, and their closest points on the simplices.
     """
     m, count, d = corners.shape
     size = np.ptp(corners, axis=1).max(axis=1)
@@ -100,14 +95,9 @@ def surface_extension(
 ) -> FloatArray:
     """Return simplices (s, d, d) that continue a surface (3D) or curve (2D) beyond its moving rim.
 
-    Parameters
-    ----------
-    member : (f,) bool
-        Facets of the surface (3D) or curve (2D).
-    moving : (n,) bool
-        Nodes of the moving boundaries.
-    reach : float
-        Length of the extension, in the mesh's length unit.
+    ``member`` (f,) bool: facets of the surface (3D) or curve (2D).
+    ``moving`` (n,) bool: nodes of the moving boundaries.
+    ``reach``: length of the extension, in the mesh's length unit.
     """
     one, two = boundary.joints.T
     rim = np.flatnonzero(member[one] != member[two])
@@ -133,12 +123,8 @@ def edge_extension(
 ) -> FloatArray:
     """Return segments (s, 2, d) that continue a chain of segments (m, 2) beyond its moving ends.
 
-    Parameters
-    ----------
-    moving : (n,) bool
-        Nodes of the moving boundaries.
-    reach : float
-        Length of each segment, in the mesh's length unit.
+    ``moving`` (n,) bool: nodes of the moving boundaries.
+    ``reach``: length of each segment, in the mesh's length unit.
     """
     node, count = np.unique(segments, return_counts=True)
     last = node[(count == 1) & moving[node]]
@@ -159,10 +145,8 @@ ROLE_NUMBER: dict[str, int] = {role: number for number, role in enumerate(ROLES)
 class Tracks:
     """The tracks (curves and surfaces on which nodes slide), and the track of each sliding node."""
 
-    tracks: tuple[ClosestPoints, ...]
-    """The curves and surfaces on which nodes slide."""
-    of_node: IntArray
-    """(n,): index of the node's track; -1 for nodes that do not slide."""
+    tracks: tuple[ClosestPoints, ...]  # the curves and surfaces on which nodes slide
+    of_node: IntArray  # (n,): index of the node's track; -1 for nodes that do not slide
     curved: bool
     """Whether any track bends or has an end within reach of its own tangent plane: whether
     projection does more than removing the normal component."""
@@ -202,16 +186,12 @@ def find_tracks(
 ) -> Tracks:
     """Return the tracks of all sliding nodes.
 
-    Parameters
-    ----------
-    place : callable
-        Corners (f, k, d) of facets or segments (f, k) in the undeformed working frame.
-    roles
-        Role of each marker, by its name.
-    shift : (d,) or None
-        One period, by which tracks are continued beyond periodic boundaries; None: they end there.
-    reach
-        How far tracks are continued at the rims of moving boundaries, in the mesh's length unit.
+    ``place``: corners (f, k, d) of facets or segments (f, k) in the undeformed working frame.
+    ``roles``: role of each marker, by its name.
+    ``shift`` (d,) or None: one period, by which tracks are continued beyond periodic boundaries;
+    None: they end there.
+    ``reach``: how far tracks are continued at the rims of moving boundaries, in the mesh's length
+    unit.
     """
     of_node = np.full(classes.total, -1, np.int64)
     simplices: list[FloatArray] = []
@@ -278,15 +258,10 @@ def _surface_labels(
     """Return a label for each facet, (f,), equal for facets of one smooth surface.
 
     Surfaces continue over markers of one role (`slideviz.rbf.classify.MERGE_FRACTION`).
-
-    Parameters
-    ----------
-    vectors : (f, d)
-        Normals of the facets, of any length.
-    angle_deg
-        The feature angle.
-    across : (j, 2) or None
-        Pairs of facets that meet across a periodic boundary; None: surfaces end there.
+    ``vectors`` (f, d): normals of the facets, of any length.
+    ``angle_deg``: the feature angle.
+    ``across`` (j, 2) or None: pairs of facets that meet across a periodic boundary; None: surfaces
+    end there.
     """
     normal = unit(vectors)
     a, b = boundary.joints.T
@@ -314,13 +289,9 @@ def _by_surfaces(
 
     Most nodes slide on one surface. Where surfaces of two roles meet in one plane, the nodes
     between slide on both.
-
-    Parameters
-    ----------
-    wanted
-        The nodes to be grouped.
-    row_node, row_label : (p,)
-        Pairs of a node and the label of a surface that it slides on.
+    ``wanted``: the nodes to be grouped.
+    ``row_node`` and ``row_label`` (p,): pairs of a node and the label of a surface that it slides
+    on.
     """
     rows = np.isin(row_node, wanted)
     pairs = np.unique(np.stack([row_node[rows], row_label[rows]], axis=1), axis=0)

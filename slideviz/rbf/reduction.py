@@ -40,5 +40,4 @@ class Reduction(CheckedFields):
     numbers)."""
 
 
-AUTO = Reduction(auto=True)
-"""DATA_REDUCTION= AUTO, the default."""
+AUTO = Reduction(auto=True)  # DATA_REDUCTION= AUTO, the default

@@ -30,8 +30,7 @@ TRUSTED = 1e-5
 """Largest error of a field between control nodes, as a part of the largest displacement. Above it
 the solution is refined, and where refinement does not help the user is warned."""
 
-NOTED = 1e-3
-"""Up to this part the warning is a note."""
+NOTED = 1e-3  # up to this part the warning is a note
 
 SETTLED, VERIFIED = 1e-4 * TRUSTED, 1e-3 * TRUSTED
 """Conjugate gradients end when a step changes the field by less than the first part of the largest
@@ -44,8 +43,7 @@ are little but rounding; the diagonal of a system is 1."""
 ROUNDING = 4.0 * float(np.finfo(float).eps)
 """Rounding error of a field, over the sum of the absolute weights: a few times the one measured."""
 
-DENSE = 4000
-"""Rows of the largest system that is factorised with twice the digits: 256 MB."""
+DENSE = 4000  # rows of the largest system that is factorised with twice the digits: 256 MB
 
 SLOW = 0.3
 """Refinement ends after a round whose error is above this part of the error of the round before."""
@@ -58,23 +56,20 @@ MARGIN = 10.0
 """Factor of an error that conjugate gradients measure: up to seven times too small where nodes
 nearly coincide, for the preconditioner does not see them."""
 
-CHECKS = 60
-"""Number of points between control nodes at each of four distances (`check_points`)."""
+CHECKS = 60  # number of points between control nodes at each of four distances (`check_points`)
 
 
 @dataclass(frozen=True, eq=False)
 class Refined:
     """A refined solution."""
 
-    weights: FloatArray
-    """(n, m)."""
+    weights: FloatArray  # (n, m)
     error_estimate: FloatArray
     """(m,): error of each column's field, as a part of its largest data: a bound where ``exact``,
     an estimate times `MARGIN` else."""
     before: FloatArray
     """(m,): the same of the solution that was refined, measured in the first round."""
-    exact: bool
-    """Whether the system was factorised with twice the digits."""
+    exact: bool  # whether the system was factorised with twice the digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +79,7 @@ class System:
     basis: Basis
     place: tuple[FloatArray, FloatArray | None]
     """Features (k, n) of the node of each row, and its unit direction (n, d) or None."""
-    factor: Factor
-    """Without the rows that the pivot guard left out."""
+    factor: Factor  # without the rows that the pivot guard left out
     _cache: dict[str, Any] = made_by(default_factory=dict)
 
     def rough_data(self) -> FloatArray:
@@ -103,10 +97,7 @@ class System:
     def field_error(self, right: FloatArray, weights: FloatArray) -> FloatArray:
         """Return the largest error (m,) of the field of weights (n, m) at some `check_points`.
 
-        Parameters
-        ----------
-        right : (n, m)
-            Right-hand sides that the weights solve for; m = 1 with directions.
+        ``right`` (n, m): right-hand sides that the weights solve for; m = 1 with directions.
         """
         features, normals = self.place
         along = weights if normals is None else normals * weights

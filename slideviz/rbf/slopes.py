@@ -23,8 +23,7 @@ from slideviz.rbf.evaluate import Basis, padded_rows
 from slideviz.rbf.kernels import KERNELS, SHAPE
 from slideviz.system.jit_cache import njit
 
-NEAR = 1e-12
-"""Nodes coincide when their distance over R is at most this."""
+NEAR = 1e-12  # nodes coincide when their distance over R is at most this
 
 INVERSE = len(KERNELS)
 """The code of xi^-power, the weight of inverse distance weighting, among those of kernels."""
@@ -232,12 +231,8 @@ def push_positions(
 ) -> FloatArray:
     """Return the derivative (N, d) of s as the features of targets and controls change.
 
-    Parameters
-    ----------
-    moved, moved_controls : (k, N), (k, n), optional
-        The changes; None: zero.
-    power
-        As of ``pull_positions``.
+    ``moved`` and ``moved_controls`` (k, N), (k, n), optional: the changes; None: zero.
+    ``power``: as of ``pull_positions``.
     """
     x, c = padded_rows(targets, 4), padded_rows(controls, 4)
     dx = np.zeros_like(x) if moved is None else padded_rows(moved, 4)

@@ -33,10 +33,8 @@ QR is at most this part of the largest one."""
 class Saddle:
     """Solution of a system with a polynomial (Eq. 2.4)."""
 
-    weights: FloatArray
-    """(n, m)."""
-    tail: FloatArray
-    """(q, m): coefficients of the polynomial's terms."""
+    weights: FloatArray  # (n, m)
+    tail: FloatArray  # (q, m): coefficients of the polynomial's terms
     rank_deficient: bool
     """Whether the system was singular, so that this is its least-squares solution."""
 
@@ -45,7 +43,7 @@ def solve_saddle(matrix: FloatArray, terms: FloatArray, right: FloatArray) -> Sa
     """Return weights and polynomial of ``[[G, P], [P^T, 0]] [w, c] = [b, 0]``.
 
     Symmetric indefinite, solved with Bunch and Kaufman's pivoting. Terms that are dependent at
-    the given nodes (all in one plane) are left out.
+    the given nodes (all in one plane) are left out. Raises DeformError if numbers are not finite.
 
     Parameters
     ----------
@@ -53,11 +51,6 @@ def solve_saddle(matrix: FloatArray, terms: FloatArray, right: FloatArray) -> Sa
     terms : (n, q)
         The polynomial's terms in each row.
     right : (n, m)
-
-    Raises
-    ------
-    DeformError
-        Numbers are not finite.
     """
     require_finite(matrix)
     system, use = saddle_system(matrix, terms)
@@ -125,14 +118,11 @@ PIVOT_GUARD = 1e-12
 is 1: phi(0) = 1 for all kernels that need no polynomial, and directions are unit vectors. `saddle`
 has it as a part of the largest eigenvalue; ``refine.SHIFT`` is added to the rows left out."""
 
-BLOCK = 512
-"""Columns of the matrix factorised between two calls of ``tick``."""
+BLOCK = 512  # columns of the matrix factorised between two calls of ``tick``
 
-TRIANGLE = 512
-"""Rows of a triangular solve that hold the interpreter lock: some milliseconds."""
+TRIANGLE = 512  # rows of a triangular solve that hold the interpreter lock: some milliseconds
 
-NORM_CYCLES = 5
-"""Most cycles of the estimate of a norm, which is mostly done after two."""
+NORM_CYCLES = 5  # most cycles of the estimate of a norm, which is mostly done after two
 
 SMALL_FLOPS = 50_000_000
 """Work below which the threads of the linear algebra library wait longer than they work."""
@@ -155,12 +145,9 @@ def enough_threads(flops: float) -> AbstractContextManager[object]:
 class Factor:
     """The Cholesky factor L of the ``retained`` rows and columns of a system G (n, n)."""
 
-    lower: FloatArray
-    """(k, k): L."""
-    retained: IntArray
-    """(k,): the rows of G that are in the system, in order."""
-    dropped: IntArray
-    """(n - k,): rows left out because their remaining pivot is below the guard."""
+    lower: FloatArray  # (k, k): L
+    retained: IntArray  # (k,): the rows of G that are in the system, in order
+    dropped: IntArray  # (n - k,): rows left out because their remaining pivot is below the guard
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the weights (n, m) for right-hand sides (n, m); zero in dropped rows."""
@@ -249,10 +236,7 @@ def _norm(apply: Callable[[FloatArray], FloatArray], n: int) -> float:
 def factorise(matrix: FloatArray, tick: Tick = no_tick) -> Factor:
     """Return the factor of a symmetric matrix (n, n) with unit diagonal.
 
-    Raises
-    ------
-    DeformError
-        The matrix has numbers that are not finite.
+    Raises DeformError if the matrix has numbers that are not finite.
     """
     return extend(NOTHING, matrix, tick)
 
@@ -261,17 +245,9 @@ def extend(before: Factor, rows: FloatArray, tick: Tick = no_tick) -> Factor:
     """Return the factor of a matrix whose leading block has the factor ``before``.
 
     Left-looking by blocks of columns, so that ``tick`` is called, and may stop the work, every
-    few tens of milliseconds even for 10,000 unknowns.
-
-    Parameters
-    ----------
-    rows : (m, n + m)
-        The last m rows of the symmetric matrix; ``before`` is of the first n.
-
-    Raises
-    ------
-    DeformError
-        The matrix has numbers that are not finite.
+    few tens of milliseconds even for 10,000 unknowns. Raises DeformError if the matrix has numbers
+    that are not finite.
+    ``rows`` (m, n + m): the last m rows of the symmetric matrix; ``before`` is of the first n.
     """
     require_finite(rows)
     done, more = len(before.lower), len(rows)

@@ -20,8 +20,7 @@ from slideviz.mesh.model import FloatArray, IntArray
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-Linear = Callable[[FloatArray], FloatArray]
-"""A linear map of arrays (..., n, c)."""
+Linear = Callable[[FloatArray], FloatArray]  # a linear map of arrays (..., n, c)
 
 Link = tuple[Any, Linear, Linear]
 """An argument of an operation, and the operation's derivative with respect to it: from tangents of
@@ -32,11 +31,9 @@ the argument to those of the result, and from adjoints of the result to those of
 class Variable:
     """The result of an operation on a tape."""
 
-    value: FloatArray
-    """(n, c)."""
+    value: FloatArray  # (n, c)
     tape: Tape
-    place: int
-    """Its number on the tape."""
+    place: int  # its number on the tape
 
     __array_ufunc__ = None
 
@@ -323,10 +320,7 @@ def mixed(matrix: csr_array, x: Array) -> Array:
 def put(x: Array, rows: IntArray, new: Array, *, overwrite: bool = False) -> Array:
     """Return x (..., n, c) with some rows (m,), each named once, replaced by ``new``.
 
-    Parameters
-    ----------
-    overwrite
-        Whether nothing else needs the values of x, so that they may be overwritten.
+    ``overwrite``: whether nothing else needs the values of x, so that they may be overwritten.
     """
     v, w = value(x), value(new)
     ahead = np.broadcast_shapes(v.shape[:-2], w.shape[:-2])
@@ -377,16 +371,11 @@ def solution(
     """Return ``found`` (n, m), the solution of A x = b, recorded with its derivative -A^-1 dr.
 
     A is symmetric.
-
-    Parameters
-    ----------
-    residual : (n, m)
-        r = A x - b on the tape, for the constant x = ``found``: its value does not matter.
-    found
-        The solution.
-    solve, adjoint : callable
-        Multiply with the inverse of A; ``adjoint`` in the reverse pass, if it needs another
-        accuracy.
+    ``residual`` (n, m): r = A x - b on the tape, for the constant x = ``found``: its value does not
+    matter.
+    ``found``: the solution.
+    ``solve`` and ``adjoint``: multiply with the inverse of A; ``adjoint`` in the reverse pass, if
+    it needs another accuracy.
     """
     back = adjoint or solve
     return recorded(found, (residual, lambda t: -solve(t), lambda g: -back(g)))

@@ -43,10 +43,8 @@ class BladeSection:
     thickness: tuple[float, float, float] = (0.1, 0.2, 1.4)
     """(float, float, float): a, b, c of the half thickness sqrt(x (1 - x)) (a + b (1 - x)^c). The
     root rounds both ends: the radii are (a + b)^2 / 2 in front and a^2 / 2 behind."""
-    pitch: float = 0.75
-    """Distance of the periodic sides in y."""
-    ends: tuple[float, float] = (-0.5, 1.6)
-    """(float, float): x of inflow and outflow."""
+    pitch: float = 0.75  # distance of the periodic sides in y
+    ends: tuple[float, float] = (-0.5, 1.6)  # (float, float): x of inflow and outflow
     hole: tuple[float, float, float] = (-0.1, 1.12, 0.14)
     """(float, float, float): first and last x of the hole that the O-grid fills, before smoothing,
     and its half height about the camber line."""
@@ -130,8 +128,7 @@ class GridCounts:
     beside: int
     above: int
     """`below`, `beside`, `above`: in the channel along y: below, beside and above the hole."""
-    layers: int
-    """In the O-grid, away from the blade."""
+    layers: int  # in the O-grid, away from the blade
     nose: int
     tail: int
     """`nose`, `tail`: on the first and last side of the hole, from the lower corner to the grid
@@ -202,15 +199,12 @@ _EDGES = np.array(
 class Grid:
     """The node numbers of O-grid and channel, which do not depend on the shape of the blade."""
 
-    n: GridCounts
-    """Numbers of cells."""
-    number: IntArray
-    """(i, j) int: node at each place of the channel, -1 inside the hole."""
+    n: GridCounts  # numbers of cells
+    number: IntArray  # (i, j) int: node at each place of the channel, -1 inside the hole
     ring: IntArray
     """(layers + 1, k) int: nodes of the O-grid, from the blade out, counter-clockwise; the last are
     the hole's rim."""
-    quads: IntArray
-    """(m, 4) int: nodes of the cells, counter-clockwise."""
+    quads: IntArray  # (m, 4) int: nodes of the cells, counter-clockwise
 
     def sides(self) -> dict[str, IntArray]:
         """Return the edges (k, 2) of blade, inflow, outflow and periodic sides, by name."""

@@ -182,12 +182,9 @@ def stator_zone(size: int) -> tuple[ZoneContent, Displacements]:
 class Stack:
     """A `Structured` grid of smoothed grids at three radii, stacked between hub and shroud."""
 
-    grid: Grid
-    """Node numbers of a plane."""
-    planes: FloatArray
-    """(3, m, 2): z and theta of the nodes at ``RADII``."""
-    layers: int
-    """Number of cells in r."""
+    grid: Grid  # node numbers of a plane
+    planes: FloatArray  # (3, m, 2): z and theta of the nodes at ``RADII``
+    layers: int  # number of cells in r
     dim: ClassVar[int] = 3
 
     @property

@@ -25,12 +25,9 @@ from slideviz.terms import FileFormat
 class Sample:
     """A mesh and a case that deforms it."""
 
-    name: str
-    """One of ``SAMPLES``."""
-    mesh: Mesh
-    """The undeformed mesh."""
-    case: Case
-    """The case; its files are named as if they were in the current folder."""
+    name: str  # one of ``SAMPLES``
+    mesh: Mesh  # the undeformed mesh
+    case: Case  # the case; its files are named as if they were in the current folder
     displacement: Displacements | None = None
     """The content of the case's displacement file; None if it has none."""
 
@@ -51,12 +48,9 @@ class StreamedSample:
 class SampleKind:
     """A kind of sample, a row of ``SAMPLES``."""
 
-    about: str
-    """What it is, in words for users."""
-    size: int
-    """The default size."""
-    make: Callable[[str, int, str], Sample]
-    """Returns the sample of a name, a size and a variant."""
+    about: str  # what it is, in words for users
+    size: int  # the default size
+    make: Callable[[str, int, str], Sample]  # returns the sample of a name, a size and a variant
     variants: tuple[str, ...] = ("motion",)
     """Names of its motions, the default first. ``file``: by a displacement file; ``motion``: the
     same by MOTION keys; ``translate``: that of thesis Figure 4.4, which moves the block close to
@@ -173,6 +167,8 @@ SAMPLES: Mapping[str, SampleKind] = {
 def sample(name: str, size: int | None = None, variant: str | None = None) -> Sample:
     """Return a sample case.
 
+    Raises CaseError if there is no such sample or variant, or the size is out of range.
+
     Parameters
     ----------
     name : str
@@ -182,11 +178,6 @@ def sample(name: str, size: int | None = None, variant: str | None = None) -> Sa
         around it; of turbine rows and stator: all cells. The usual size when left out.
     variant : str, optional
         One of ``SAMPLES[name].variants``; the first when left out.
-
-    Raises
-    ------
-    CaseError
-        There is no such sample or variant, or the size is out of range.
     """
     row, kind = _row(name, variant)
     return row.make(name, row.size if size is None else size, kind)
@@ -219,19 +210,10 @@ def write_sample(
 
     Parameters are those of ``sample`` and:
 
-    Parameters
-    ----------
-    folder : str or Path
-        Where to; made if there is none.
-    overwrite : bool
-        Whether to replace files that exist.
-    file_format : {"su2", "su2b"}
-        The format of the mesh.
-
-    Raises
-    ------
-    CaseError, MeshError
-        As of ``sample``; or a file exists or cannot be written.
+    Raises CaseError or MeshError as `sample` does, or if a file exists or cannot be written.
+    ``folder``: where to; made if there is none.
+    ``overwrite``: whether to replace files that exist.
+    ``file_format``: the format of the mesh.
     """
     from slideviz.case.cfg import write_case
     from slideviz.formats.files import write

@@ -182,8 +182,7 @@ class HollowGrid:
     outside the box, in the same order.
     """
 
-    m: int
-    """Places in each direction."""
+    m: int  # places in each direction
     start: tuple[int, ...]
     stop: tuple[int, ...]
     """`start`, `stop`: the box has the places ``start[a]`` to ``stop[a] - 1`` along axis a."""
@@ -224,13 +223,11 @@ class Layout:
     """A `Structured` grid of n x n (x n) cells, without those of a block."""
 
     n: int
-    dim: int
-    """`n`, `dim`: cells in each direction; dimension."""
+    dim: int  # `n`, `dim`: cells in each direction; dimension
     start: tuple[int, ...]
     stop: tuple[int, ...]
     """`start`, `stop`: the block has the cells ``start[a]`` to ``stop[a] - 1`` along axis a."""
-    polar: bool
-    """Whether it is a sector of 30 degrees instead of a square or a cube."""
+    polar: bool  # whether it is a sector of 30 degrees instead of a square or a cube
 
     @property
     def n_points(self) -> int:

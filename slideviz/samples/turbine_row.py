@@ -26,26 +26,18 @@ from slideviz.rbf.reduction import Reduction
 from slideviz.samples.vane import AHEAD, CHORD, LENGTH, camber, camber_line, pitch, vane_layers
 from slideviz.system.jit_cache import njit
 
-ROUNDS, SWEEPS = 8, 6
-"""Number of triangulations in `relax`, and of moves of all points with each."""
+ROUNDS, SWEEPS = 8, 6  # number of triangulations in `relax`, and of moves of all points with each
 
-SLOPE = 350.0
-"""k in the formula, per unit of length: the slope of h / h0 at D = 0."""
-WAKE = 0.3
-"""D on the wake, divided by the way from the trailing edge."""
-SHAPE = (150, 250)
-"""Grid points in x and y of the table of edge lengths."""
+SLOPE = 350.0  # k in the formula, per unit of length: the slope of h / h0 at D = 0
+WAKE = 0.3  # d on the wake, divided by the way from the trailing edge
+SHAPE = (150, 250)  # grid points in x and y of the table of edge lengths
 
 
 def triangulate(points: FloatArray, edges: IntArray) -> IntArray:
     """Return the Delaunay triangles (m, 3) of a domain, counter-clockwise.
 
-    Parameters
-    ----------
-    points : (n, 2)
-        Points of the boundary and inside.
-    edges : (e, 2)
-        The boundary, closed, with the domain on its left.
+    ``points`` (n, 2): points of the boundary and inside.
+    ``edges`` (e, 2): the boundary, closed, with the domain on its left.
     """
     triangles = Delaunay(points).simplices.astype(np.int64)
     at = points[triangles]
@@ -111,8 +103,7 @@ class Sizing:
     low: FloatArray
     step: FloatArray
     """`low`, `step` (2,): first grid point, and distances of grid points in x and y."""
-    table: FloatArray
-    """(nx, ny): edge length at the grid points."""
+    table: FloatArray  # (nx, ny): edge length at the grid points
 
     def at(self, points: FloatArray) -> FloatArray:
         """Return the edge length (k,) at points (k, 2), bilinear between grid points."""
@@ -124,12 +115,8 @@ class Sizing:
 def find_sizing(rim: FloatArray, triangles: float) -> Sizing:
     """Return edge lengths with which about so many triangles fill the channel, choosing m.
 
-    Parameters
-    ----------
-    rim : (k, 2)
-        The outermost nodes of the layer around the vane, in order.
-    triangles : float
-        Number of equilateral triangles in the channel outside the layer.
+    ``rim`` (k, 2): the outermost nodes of the layer around the vane, in order.
+    ``triangles``: number of equilateral triangles in the channel outside the layer.
     """
     shortest = float(np.mean(np.hypot(*(np.roll(rim, -1, axis=0) - rim).T)))
     x = np.linspace(-AHEAD, LENGTH - AHEAD, SHAPE[0])
@@ -180,15 +167,13 @@ def _distance(points: FloatArray, rim: FloatArray) -> FloatArray:
     return best
 
 
-LINE, TRIANGLE, QUADRILATERAL, HEXAHEDRON, PRISM = 3, 5, 9, 12, 13
-"""VTK identifiers."""
+LINE, TRIANGLE, QUADRILATERAL, HEXAHEDRON, PRISM = 3, 5, 9, 12, 13  # VTK identifiers
 CELLS, AROUND, LAYERS = 224_180, 1315, 25
 """Cells of the mesh, nodes around the vane, and layers of quadrilaterals at the default size.
 
 The first two are those of thesis Tables 4.7 and 4.8; the third follows by Euler's formula.
 """
-SIZES = (5_000, 5_000_000)
-"""Least and largest number of cells."""
+SIZES = (5_000, 5_000_000)  # least and largest number of cells
 SPAN, TWIST_DEG = CHORD, 10.0
 """Length of the vane from hub to shroud in 3D, and by how much its case turns the shroud's end."""
 VANE_BOX, VANE_AXIS = ((-0.002, -0.034), (0.03, 0.006)), (0.016, -0.012)
@@ -199,11 +184,9 @@ CALIBRATION = 1.035
 """Number of equilateral triangles to ask for, divided by that which the front then makes."""
 TOLERANCE = 1e-6
 """Tolerance of the data reduction: half the height of the thinnest cells at the default size."""
-MANY = 50_000
-"""Number of cells above which the case has data reduction."""
+MANY = 50_000  # number of cells above which the case has data reduction
 
-NEAREST = 0.78
-"""Least distance of two points, divided by the wanted edge length there."""
+NEAREST = 0.78  # least distance of two points, divided by the wanted edge length there
 # Directions of a point's proposals in the order of trial, from that of its parent to it.
 _TURNS = np.radians([0.0, 60.0, -60.0, 120.0, -120.0, 180.0, 30.0, -30.0, 90.0, -90.0, 150.0])
 
@@ -211,10 +194,7 @@ _TURNS = np.radians([0.0, 60.0, -60.0, 120.0, -120.0, 180.0, 30.0, -30.0, 90.0, 
 def row_mesh(size: int) -> Mesh:
     """Return the mesh of the sample ``turbine-row``, of about ``size`` cells.
 
-    Raises
-    ------
-    CaseError
-        ``size`` is not within ``SIZES``.
+    Raises CaseError if ``size`` is not within ``SIZES``.
     """
     from slideviz.samples.turbine_row import front_points
 
@@ -267,12 +247,8 @@ def row_case(size: int) -> Case:
 def extruded_row(size: int) -> Mesh:
     """Return the mesh of the sample ``turbine-row-3d``: `row_mesh` from hub to shroud, along z.
 
-    It has about ``size`` cells: hexahedra at the vane, prisms outside.
-
-    Raises
-    ------
-    CaseError
-        ``size`` is not within ``SIZES_3D``.
+    It has about ``size`` cells: hexahedra at the vane, prisms outside. Raises CaseError if ``size``
+    is not within ``SIZES_3D``.
     """
     low, high = SIZES_3D
     if not low <= size <= high:
@@ -372,16 +348,10 @@ def front_points(
 ) -> FloatArray:
     """Return points (k, 2) that fill the inside of a domain, by an advancing front.
 
-    Parameters
-    ----------
-    fixed : (n, 2)
-        Nodes of the boundary, at distances by ``sizing``.
-    edges : (e, 2)
-        Edges of the boundary, with the domain on their left.
-    sizing : Sizing
-        The edge length, tabulated over a rectangle that contains the domain.
-    triangles : float
-        About how many equilateral triangles of these edge lengths fill the domain.
+    ``fixed`` (n, 2): nodes of the boundary, at distances by ``sizing``.
+    ``edges`` (e, 2): edges of the boundary, with the domain on their left.
+    ``sizing``: the edge length, tabulated over a rectangle that contains the domain.
+    ``triangles``: about how many equilateral triangles of these edge lengths fill the domain.
     """
     first, second = fixed[edges[:, 0]], fixed[edges[:, 1]]
     along = second - first

@@ -24,16 +24,14 @@ from slideviz.solver.steps import Progress, Step, Trial
 
 __all__ = ["Progress", "Step", "Trial", "deform", "folded_at"]
 
-COUNTS = (1, 2, 3, 5, 8, 13, 21, 34)
-"""Numbers of steps that STEPS= auto tries, in this order."""
+COUNTS = (1, 2, 3, 5, 8, 13, 21, 34)  # numbers of steps that STEPS= auto tries, in this order
 
 ELASTIC_BYTES = {2: 2_000, 3: 8_000}
 """Bytes of memory that linear elasticity takes for each node, by dimension: measured on
 quadrilaterals and hexahedra, whose matrix has the most entries."""
 
 
-RELAX_BYTES = 3_000
-"""Bytes of memory that relaxation takes for each node: measured on hexahedra."""
+RELAX_BYTES = 3_000  # bytes of memory that relaxation takes for each node: measured on hexahedra
 
 
 @check_types
@@ -119,10 +117,8 @@ def _automatic(stepping: Stepping) -> Iterator[Step]:
       steps are small just where it matters: equal steps catch up only with a larger number, and
       because cells that fold with some number of steps need not fold with the next.
 
-    Raises
-    ------
-    DeformError
-        A step cannot be solved, or no trial before the end of the search has a sound result.
+    Raises DeformError if a step cannot be solved, or no trial before the end of the search has a
+    sound result.
     """
     tried: list[Trial] = []
     best: tuple[Trial, list[Step]] | None = None
@@ -159,14 +155,9 @@ def _automatic(stepping: Stepping) -> Iterator[Step]:
 def folded_at(steps: Sequence[Step], mesh: Mesh, cells: IntArray) -> IntArray:
     """Return the number of the step after which each cell is first inverted, (k,); 0 where never.
 
-    Parameters
-    ----------
-    steps
-        All steps of a run, with their meshes.
-    mesh
-        The undeformed mesh.
-    cells : (k,)
-        Cells to follow, such as those inverted in the end.
+    ``steps``: all steps of a run, with their meshes.
+    ``mesh``: the undeformed mesh.
+    ``cells`` (k,): cells to follow, such as those inverted in the end.
     """
     first = np.zeros(len(cells), np.int64)
     if not len(cells):

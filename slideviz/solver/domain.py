@@ -28,32 +28,21 @@ from slideviz.terms import Role
 class Domain:
     """A mesh with the roles of its boundaries: all that is computed before a motion is known."""
 
-    roles: Mapping[str, Role]
-    """Role of each marker; of halo copies, that of what they copy."""
-    boundary: Boundary
-    """Facets of the boundary."""
-    fans: Fans
-    """The facets around each of its nodes, by marker and between edges."""
-    pairs: tuple[Pair, ...]
-    """Periodic pairs of markers."""
+    roles: Mapping[str, Role]  # role of each marker; of halo copies, that of what they copy
+    boundary: Boundary  # facets of the boundary
+    fans: Fans  # the facets around each of its nodes, by marker and between edges
+    pairs: tuple[Pair, ...]  # periodic pairs of markers
     frame: Frame
-    coords: FloatArray
-    """(n, d): undeformed positions in the frame."""
-    axis: np.ndarray
-    """(n,) bool: nodes on the axis of a cylindrical frame."""
-    normals: FloatArray
-    """Undeformed unit normals of the fans, in the frame."""
+    coords: FloatArray  # (n, d): undeformed positions in the frame
+    axis: np.ndarray  # (n,) bool: nodes on the axis of a cylindrical frame
+    normals: FloatArray  # undeformed unit normals of the fans, in the frame
     classes: Classes
-    held: IntArray
-    """(h,): sliding nodes on the axis that stay in place."""
+    held: IntArray  # (h,): sliding nodes on the axis that stay in place
     images: IntArray
     """(p, 2): pairs of periodic images, which move alike; the first represents the second."""
-    same_as: IntArray
-    """(n,): for each node the one that represents all that coincide with it."""
-    halo: Halo | None
-    """Copies that follow their donors."""
-    warnings: tuple[str, ...]
-    """What the user should know of mesh and roles."""
+    same_as: IntArray  # (n,): for each node the one that represents all that coincide with it
+    halo: Halo | None  # copies that follow their donors
+    warnings: tuple[str, ...]  # what the user should know of mesh and roles
 
     def once(self, nodes: IntArray) -> np.ndarray:
         """Return a mask (k,) of the nodes (k,) that represent their images, or have none."""
@@ -68,11 +57,8 @@ class Domain:
 def find_domain(case: Case, mesh: Mesh) -> Domain:
     """Return the domain of a mesh with the roles of a case.
 
-    Raises
-    ------
-    MeshError
-        Periodic markers do not match, a marker element is no side of a cell, or a coordinate is
-        not finite, or too large to compute with.
+    Raises MeshError if periodic markers do not match, a marker element is no side of a cell, or a
+    coordinate is not finite, or too large to compute with.
     """
     case, notes = roles_of_copies(case, mesh)
     _require_finite(mesh)
@@ -131,12 +117,8 @@ def find_period(
     """Return periodic pairs, frame, coordinates (n, d) in it, and representatives (n,) of nodes.
 
     The representative of a node is the one of its periodic images that stands for all of them in
-    the system; of a node without images, itself (`Classes.representative`).
-
-    Raises
-    ------
-    MeshError
-        Periodic markers do not match.
+    the system; of a node without images, itself (`Classes.representative`). Raises MeshError if
+    periodic markers do not match.
     """
     pairs = _pairs(case, without_halo(mesh)[0])
     periodic = case.periodic != "none"
@@ -194,13 +176,8 @@ def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntAr
 
     It is the first of them by position and not by number, because the selection of control nodes,
     where it represents all of them, must not depend on how nodes are numbered.
-
-    Parameters
-    ----------
-    boundary_nodes : (b,)
-        The nodes that are compared.
-    images : (p, 2)
-        Pairs of periodic images, which are taken to coincide.
+    ``boundary_nodes`` (b,): the nodes that are compared.
+    ``images`` (p, 2): pairs of periodic images, which are taken to coincide.
     """
     apart = COINCIDENT * mesh.extent
     some, links = boundary_nodes[near_duplicates(mesh.points[boundary_nodes], apart)], images

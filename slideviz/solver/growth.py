@@ -95,14 +95,9 @@ def overshoot_of_rest(
 ) -> str | None:
     """Return that a node outside of the skin overshoots, as the end of a sentence; None if not.
 
-    Parameters
-    ----------
-    mesh, after
-        The skin of a mesh, and its points (n, d) after the step.
-    part : float
-        The part of the whole displacement that is reached after the step, 0 to 1.
-    length : float
-        How far the node has gone, in the frame.
+    ``mesh`` and ``after``: the skin of a mesh, and its points (n, d) after the step.
+    ``part``: the part of the whole displacement that is reached after the step, 0 to 1.
+    ``length``: how far the node has gone, in the frame.
     """
     largest = part * setup.largest
     if length <= GROWTH * largest:
@@ -121,12 +116,9 @@ def overshoot_of_rest(
 class Farthest:
     """The node of a mesh that went farthest."""
 
-    length: float
-    """How far, in the mesh's length unit."""
-    node: int
-    """Its number; of several, the lowest."""
-    point: FloatArray
-    """(d,): its undeformed place."""
+    length: float  # how far, in the mesh's length unit
+    node: int  # its number; of several, the lowest
+    point: FloatArray  # (d,): its undeformed place
 
     def further(self, other: Farthest) -> Farthest:
         """Return the one of two that went farther."""
@@ -153,12 +145,8 @@ def farthest_node(
 def stray_warning(setup: Setup, mesh: Mesh, after: FloatArray, found: Farthest) -> list[str]:
     """Return the warning that a node strays from the motion, or [].
 
-    Parameters
-    ----------
-    mesh, after
-        The mesh, or its skin, and its points (n, d) after the step.
-    found : Farthest
-        Of the whole mesh.
+    ``mesh`` and ``after``: the mesh, or its skin, and its points (n, d) after the step.
+    ``found``: of the whole mesh.
     """
     nodes = np.concatenate([setup.known, setup.classes.sliding])
     most = float(np.linalg.norm(after[nodes] - mesh.points[nodes], axis=1).max(initial=0.0))
@@ -185,15 +173,9 @@ def _reach(setup: Setup, shift: FloatArray, largest: float, kinds: tuple[str, ..
     That is the largest displacement, or the largest strain of a boundary times the mesh's extent:
     a smooth function continues the turning or stretching of a body around it, so that a small
     profile turned in a large far field carries nodes the farther, the farther they are from it.
-
-    Parameters
-    ----------
-    shift : (n, d)
-        Displacement of all nodes in the frame.
-    largest : float
-        The largest displacement asked for.
-    kinds
-        Classes of boundary nodes that count: "moving", "fixed", "sliding".
+    ``shift`` (n, d): displacement of all nodes in the frame.
+    ``largest``: the largest displacement asked for.
+    ``kinds``: classes of boundary nodes that count: "moving", "fixed", "sliding".
     """
     chosen = np.zeros(len(shift), bool)
     for kind in kinds:

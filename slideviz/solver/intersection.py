@@ -28,17 +28,14 @@ MOST = 30_000
 """Most facets of moving boundaries that are tested for crossing each other: takes three seconds."""
 LOOKED_AT = 5
 """Facets of a moved body that are tested; the body is in the mesh where one of them is."""
-ARCS = 16
-"""Places on the way of nodes that move on arcs, between which it is taken as straight."""
+ARCS = 16  # places on the way of nodes that move on arcs, between which it is taken as straight
 ROUNDING = 1e-9
 """Part of the largest displacement by which an affine motion may differ from its matrix."""
-BESIDE = 1e-4
-"""Distance from a facet of a point in the cells beside it, over the size of the facet."""
+BESIDE = 1e-4  # distance from a facet of a point in the cells beside it, over the size of the facet
 OPEN = 0.1
 """The markers form a closed surface, but for small gaps, where their winding around a point inside
 differs from 1 by no more than this."""
-HALF = 0.5
-"""A point is outside of a surface that winds around it less often than this."""
+HALF = 0.5  # a point is outside of a surface that winds around it less often than this
 
 
 def intersection_message(
@@ -49,11 +46,7 @@ def intersection_message(
     None when it does neither. Boundaries that share nodes are not compared: a blade and the hub on
     which it slides have a common line, but the facets of a curved hub only come near to it.
     Nor are boundaries that give way: internal ones, and periodic ones that are displaced.
-
-    Parameters
-    ----------
-    nodes, vectors : (k,), (k, d)
-        The moving nodes and their displacement.
+    ``nodes`` and ``vectors`` (k,), (k, d): the moving nodes and their displacement.
     """
     after = np.array(mesh.points)
     after[nodes] += vectors

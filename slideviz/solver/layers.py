@@ -17,8 +17,7 @@ from slideviz.mesh.walls import find_columns
 from slideviz.rbf.layers import LayerZone, Wall, find_zone, wall_nodes
 from slideviz.solver.domain import Domain
 
-SIZE = 0.02
-"""Largest automatic thickness of a zone over the largest extent of its wall."""
+SIZE = 0.02  # largest automatic thickness of a zone over the largest extent of its wall
 
 
 def layer_zone(case: Case, mesh: Mesh, domain: Domain, known: IntArray) -> LayerZone | None:

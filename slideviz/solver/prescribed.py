@@ -39,17 +39,9 @@ its size needs a radius that fits the way."""
 def displaced(moved: Displacements, mesh: Mesh) -> Displacements:
     """Return the prescribed displacements, made to fit the halo of the mesh, if it has one.
 
-    Copies of moving nodes follow these; nodes beyond the sides of the domain are left out.
-
-    Parameters
-    ----------
-    moved : Displacements
-        The displacements of all nodes of the moving markers.
-
-    Raises
-    ------
-    CaseError
-        A copy and the node that it is a copy of have different prescribed displacements.
+    Copies of moving nodes follow these; nodes beyond the sides of the domain are left out. Raises
+    CaseError if a copy and the node that it is a copy of have different prescribed displacements.
+    ``moved``: the displacements of all nodes of the moving markers.
     """
     halo = mesh.halo
     if halo is None:
@@ -93,12 +85,9 @@ def image_tolerance(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> float:
 class BoundaryConditions:
     """What is prescribed: nodes of known displacement, and that displacement."""
 
-    known: IntArray
-    """(a,): moving and fixed nodes."""
-    target: FloatArray
-    """(a, d): their displacement in the frame after the last step."""
-    moved: Displacements
-    """Of moving nodes, as `displaced` returns it."""
+    known: IntArray  # (a,): moving and fixed nodes
+    target: FloatArray  # (a, d): their displacement in the frame after the last step
+    moved: Displacements  # of moving nodes, as `displaced` returns it
     warnings: tuple[str, ...]
 
     @cached_property
@@ -117,17 +106,10 @@ def prescribe(
 ) -> BoundaryConditions:
     """Return what a case prescribes at the moving and fixed nodes of a domain.
 
-    Parameters
-    ----------
-    moved : Displacements, optional
-        Displacements of moving nodes, as ``displaced`` returns them; None: by the case's motions.
-
-    Raises
-    ------
-    CaseError
-        The motion takes a boundary through another one, or out of the mesh.
-    DeformError
-        No node is moving or fixed, or images are asked to move differently.
+    Raises CaseError if the motion takes a boundary through another one, or out of the mesh, and
+    DeformError if no node is moving or fixed, or images are asked to move differently.
+    ``moved``: displacements of moving nodes, as ``displaced`` returns them; None: by the case's
+    motions.
     """
     tolerance = TOLERANCE if moved else image_tolerance(case, mesh, domain.pairs)
     moved = moved or displaced(displacements(case, mesh), mesh)
@@ -159,10 +141,7 @@ def prescribe(
 def support_radius(case: Case, mesh: Mesh, moved: Displacements) -> float:
     """Return the support radius R, in the mesh's length unit.
 
-    Parameters
-    ----------
-    moved : Displacements
-        The prescribed displacements.
+    ``moved``: the prescribed displacements.
     """
     if case.support_radius is not None:
         return case.support_radius

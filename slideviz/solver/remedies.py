@@ -15,8 +15,7 @@ from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.rbf.reduction import Reduction
 from slideviz.terms import SLIDES
 
-MOST_NAMES = 2
-"""Most boundaries that a remedy names; of more it has the number."""
+MOST_NAMES = 2  # most boundaries that a remedy names; of more it has the number
 
 
 @dataclass(frozen=True)
@@ -32,16 +31,10 @@ def remedies(
 ) -> tuple[Remedy, ...]:
     """Return the remedies that a case has not tried yet, the most promising first.
 
-    Parameters
-    ----------
-    case
-        The case of the run.
-    beside
-        Fixed boundaries with nodes of inverted cells, from `fixed_beside`.
-    pitch
-        Sentence from `beyond_pitch`.
-    layers
-        Of the ``Step`` with inverted cells.
+    ``case``: the case of the run.
+    ``beside``: fixed boundaries with nodes of inverted cells, from `fixed_beside`.
+    ``pitch``: sentence from `beyond_pitch`.
+    ``layers``: of the ``Step`` with inverted cells.
     """
     found, roles = [], set(case.roles.values())
     if case.method != "rbf":

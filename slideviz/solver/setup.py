@@ -49,11 +49,9 @@ SMALLEST = 1e-7
 """Smallest tolerance of DATA_REDUCTION= AUTO, as a part of the largest displacement: below it
 nearly all candidates are chosen, at a higher cost than that of all at once."""
 
-RELAXED_CELLS = 1_000_000
-"""Most cells of a mesh that RELAX= AUTO relaxes."""
+RELAXED_CELLS = 1_000_000  # most cells of a mesh that RELAX= AUTO relaxes
 
-LOOSE = 0.1
-"""A tolerance above this part of the largest displacement gets a warning."""
+LOOSE = 0.1  # a tolerance above this part of the largest displacement gets a warning
 
 
 def sliding_gap(points: FloatArray, facets: IntArray, classes: Classes) -> float:
@@ -85,14 +83,9 @@ def find_reduction(
 ) -> Reduction | None:
     """Return the settings of the selection of control nodes; None where all candidates are taken.
 
-    Parameters
-    ----------
-    extent, largest : float
-        The extent of the mesh, and the largest displacement.
-    candidates : int
-        Nodes that could be control nodes.
-    gap : float
-        The smallest distance between a moving and a sliding node (`sliding_gap`).
+    ``extent`` and ``largest``: the extent of the mesh, and the largest displacement.
+    ``candidates``: nodes that could be control nodes.
+    ``gap``: the smallest distance between a moving and a sliding node (`sliding_gap`).
     """
     reduction = case.reduction
     if reduction is None or case.method != "rbf":
@@ -147,25 +140,17 @@ that slide past the end of their surface have something to slide on."""
 class Setup(Domain):
     """A domain, its prescribed displacements, and the data that are the same in all steps."""
 
-    known: IntArray
-    """(a,): moving and fixed nodes."""
-    target: FloatArray
-    """(a, d): their displacement in the frame after the last step."""
+    known: IntArray  # (a,): moving and fixed nodes
+    target: FloatArray  # (a, d): their displacement in the frame after the last step
     basis: Basis
-    candidates: int
-    """Nodes that could be control nodes; periodic images count as one."""
+    candidates: int  # nodes that could be control nodes; periodic images count as one
     reduction: Reduction | None
     """Settings of the greedy selection; None: all candidates are control nodes."""
-    layers: float
-    """As of a ``Step``."""
-    tracks: Tracks
-    """The edges and surfaces along which nodes slide."""
-    solve: Callable[[Problem, PhaseTimer], Solution]
-    """Solves one step by the method of the case."""
-    zone: LayerZone | None
-    """The nodes that go with walls (LAYERS); None: there are none."""
-    fitted_radius: float
-    """The support radius that fits the motion, whatever the case says."""
+    layers: float  # as of a ``Step``
+    tracks: Tracks  # the edges and surfaces along which nodes slide
+    solve: Callable[[Problem, PhaseTimer], Solution]  # solves one step by the method of the case
+    zone: LayerZone | None  # the nodes that go with walls (LAYERS); None: there are none
+    fitted_radius: float  # the support radius that fits the motion, whatever the case says
     relaxation: Relaxation | None = None
     """What relaxes the last step; None where RELAX has no effect."""
 
@@ -210,15 +195,9 @@ class Setup(Domain):
         """Return the displacements (m, d) after which nodes are on their edge or surface.
 
         Nodes on the axis stay on it, and in place where another surface meets it.
-
-        Parameters
-        ----------
-        coords : (n, d)
-            Coordinates of all nodes before the step.
-        nodes : (m,)
-            Sliding nodes.
-        free : (m, d)
-            Their displacements in the step, which may lead off the boundary.
+        ``coords`` (n, d): coordinates of all nodes before the step.
+        ``nodes`` (m,): sliding nodes.
+        ``free`` (m, d): their displacements in the step, which may lead off the boundary.
         """
         out = self.tracks.project(coords, nodes, free)
         self._tie(nodes, out)

@@ -34,8 +34,7 @@ from slideviz.system.threads import in_parts
 RIGID = 0.99
 """Nodes that walls carry with a share above this stay where they carry them in relaxation."""
 
-HALVINGS = 3
-"""How often at most a step that folds a cell is halved: into eighths."""
+HALVINGS = 3  # how often at most a step that folds a cell is halved: into eighths
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,16 +57,9 @@ class Stepping:
     def steps(self, count: int, halve: bool = False) -> Iterator[Step]:
         """Yield the steps that divide the displacement into ``count`` equal parts.
 
-        Parameters
-        ----------
-        halve : bool
-            Whether a step that folds more cells or is unsound is replaced by two of half the
-            length, and these again, up to ``HALVINGS`` times.
-
-        Raises
-        ------
-        DeformError
-            A step cannot be solved, or its result cannot be right.
+        Raises DeformError if a step cannot be solved, or its result cannot be right.
+        ``halve``: whether a step that folds more cells or is unsound is replaced by two of half the
+        length, and these again, up to ``HALVINGS`` times.
         """
         setup, mesh = self.setup, self.mesh
         ahead = [(k / count, 0) for k in range(1, count + 1)]
@@ -143,10 +135,8 @@ class Stepping:
     def quality_of(self, steps: Sequence[Step]) -> Quality:
         """Return the quality after the last of some steps.
 
-        Raises
-        ------
-        UnsoundError
-            A node outside of the skin of a streamed mesh would go far beyond the motion.
+        Raises UnsoundError if a node outside of the skin of a streamed mesh would go far beyond the
+        motion.
         """
         if self.rate is not None:
             return self.rate(steps)
@@ -220,15 +210,9 @@ def one_step(
 
     Of periodic images only the representative is in the problem; its displacement is copied to the
     others.
-
-    Parameters
-    ----------
-    goal : (..., a, d)
-        Coordinates of the known nodes after the step.
-    before : Solution or None
-        The solution of the step before.
-    frozen : Frozen or None
-        The choices of a step whose derivatives are wanted; None in a run.
+    ``goal`` (..., a, d): coordinates of the known nodes after the step.
+    ``before``: the solution of the step before.
+    ``frozen``: the choices of a step whose derivatives are wanted; None in a run.
     """
     problem = problem_at(setup, coords, goal, before, frozen)
     solution = setup.solve(problem, timer)

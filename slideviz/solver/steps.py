@@ -27,13 +27,11 @@ class Progress:
     """How far a run is."""
 
     step: int
-    total: int
-    """`step`, `total`: the number of the current step, from 1, and of all steps."""
+    total: int  # `step`, `total`: the number of the current step, from 1, and of all steps
     phase: str
     """``classify``, ``select``, ``solve``, ``evaluate``, ``project``, ``correct``, ``layers`` or
     ``relax``; in a streamed run also ``read``, ``quality`` and ``write``."""
-    fraction: float
-    """The part of the phase that is done, 0 to 1."""
+    fraction: float  # the part of the phase that is done, 0 to 1
     left: float | None = None
     """Estimate of the seconds that the whole run will still take; None where there is none."""
 
@@ -47,10 +45,8 @@ class Trial:
     """`planned`, `steps`: steps planned, and made: more where steps that folded cells were
     halved."""
     min: float
-    mean: float
-    """`min`, `mean`: minimum and mean quality of the result."""
-    inverted: int
-    """Inverted cells of the result."""
+    mean: float  # `min`, `mean`: minimum and mean quality of the result
+    inverted: int  # inverted cells of the result
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +117,6 @@ class RunResult:
     folded: dict[int, tuple[int, int]]
     """dict of int to (int, int): VTK type of inverted cells, and the step after which they are
     first inverted, by cell number; at most ``listed``, those with the lowest numbers."""
-    seconds: dict[str, float]
-    """Spent by phase, besides those of the steps."""
+    seconds: dict[str, float]  # spent by phase, besides those of the steps
     walls: Walls | None = None
     """The layers at the boundaries, compared with those of ``mesh``; None of one in a file."""

@@ -27,12 +27,9 @@ from slideviz.solver.steps import Step
 class InteriorDisplacer:
     """Displaces any nodes of a mesh, by the steps of its skin."""
 
-    skin: Mesh
-    """The undeformed skin."""
-    setup: Setup
-    """The setup of the skin."""
-    steps: Sequence[Step]
-    """The steps of the skin, with their ``field``."""
+    skin: Mesh  # the undeformed skin
+    setup: Setup  # the setup of the skin
+    steps: Sequence[Step]  # the steps of the skin, with their ``field``
 
     def without_cells(self) -> InteriorDisplacer:
         """Return the same without the skin's cells and markers, which no displacement needs."""

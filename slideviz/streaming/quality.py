@@ -85,11 +85,8 @@ def quality_blocks(
     """Yield all cells of a mesh with their quality, in the order of the file.
 
     With ``may_fold``, it is not checked whether cells numbered in both directions are folded.
-
-    Raises
-    ------
-    MeshError
-        A file has a mistake, or cells are numbered in both directions and some are folded.
+    Raises MeshError if a file has a mistake, or cells are numbered in both directions and some are
+    folded.
     """
     signs = np.zeros(0, np.int8)
     for block in source.blocks(tick):
@@ -193,8 +190,7 @@ def measure_mesh(
 class MeasuredBlock:
     """The quality of a block of cells, undeformed and deformed, without its meshes."""
 
-    ids: Index
-    """(k,) int64 or slice: the numbers of the cells in the whole mesh."""
+    ids: Index  # (k,) int64 or slice: the numbers of the cells in the whole mesh
     values: FloatArray
     before: FloatArray
     """`values`, `before` (k,): quality of the deformed and of the undeformed cells."""
@@ -207,8 +203,7 @@ class MeasuredBlock:
     inverted: dict[int, tuple[int, IntArray]]
     """dict of int to (int, (n,) int64): VTK type and nodes of inverted cells, by their number:
     those with the lowest numbers."""
-    farthest: Farthest
-    """The node with the largest displacement."""
+    farthest: Farthest  # the node with the largest displacement
 
     @classmethod
     def of(cls, block: CellBlock, metric: SkewMetric, listed: int) -> MeasuredBlock:
@@ -284,19 +279,11 @@ def facet_sums(path: Path, zone: int | None) -> Iterator[Callable[[tuple[int, in
 def require_consistent_orientation(sums: Iterable[int], name: str, remedy: str = "") -> None:
     """Raise where the sums of the hashes of all parts of the cells do not add up to 0.
 
-    Parameters
-    ----------
-    sums : iterable of int
-        The sum of each part, of `facet_sums`.
-    name : str
-        The mesh, for the message.
-    remedy : str
-        One more remedy for the message.
-
-    Raises
-    ------
-    MeshError
-        The sum is not 0: some cell is folded, or a part of the boundary is in no marker.
+    Raises MeshError if the sum is not 0: some cell is folded, or a part of the boundary is in no
+    marker.
+    ``sums``: the sum of each part, of `facet_sums`.
+    ``name``: the mesh, for the message.
+    ``remedy``: one more remedy for the message.
     """
     if sum(sums) % 2**64:
         raise MeshError(
@@ -311,10 +298,7 @@ def folded_steps(
 ) -> dict[int, tuple[int, int]]:
     """Return VTK type and first step with an inverted cell, by cell number.
 
-    Parameters
-    ----------
-    cells : mapping of int to (int, (n,) int64)
-        VTK type and nodes of each cell to follow, by its number.
+    ``cells``: VTK type and nodes of each cell to follow, by its number.
     """
     if not cells:
         return {}

@@ -166,15 +166,13 @@ def _counting_progress(tick: Tick, begin: float, end: float, count: int) -> Call
 class _BoundaryCells:
     """Cells of a block of the file that may have a side on the boundary."""
 
-    first: int
-    """Place in the file of the block's first cell."""
+    first: int  # place in the file of the block's first cell
     types: NDArray[np.uint8]
     nodes: IntArray
     ids: IntArray
     """`types`, `nodes`, `ids` (k,), flat, (k,): of the cells that may have a side on the boundary:
     VTK identifiers, nodes, numbers."""
-    all_ids: Index
-    """slice or (b,): the numbers of all cells of the block."""
+    all_ids: Index  # slice or (b,): the numbers of all cells of the block
 
 
 @contextmanager

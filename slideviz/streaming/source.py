@@ -41,16 +41,12 @@ Zone = tuple[Path, int | None]  # a file and the number of a zone in it, the fir
 class CellBlock:
     """Some cells of a mesh with their points."""
 
-    ids: IntArray
-    """(k,): the numbers of the cells in the whole mesh."""
-    nodes: IntArray
-    """(n,): the numbers of the block's points in the whole mesh, ascending."""
-    mesh: Mesh
-    """These points and cells; of a mesh in a file, without boundaries."""
+    ids: IntArray  # (k,): the numbers of the cells in the whole mesh
+    nodes: IntArray  # (n,): the numbers of the block's points in the whole mesh, ascending
+    mesh: Mesh  # these points and cells; of a mesh in a file, without boundaries
     base: Mesh | None = None
     """The same cells in the undeformed mesh; None where there is no reference."""
-    quality: Quality | None = None
-    """The quality of the cells, where it was measured."""
+    quality: Quality | None = None  # the quality of the cells, where it was measured
 
     def take(self, which: IntArray) -> CellBlock:
         """Return the cells at the places ``which`` (k,), with their points alone."""
@@ -222,13 +218,11 @@ class FileSource:
     """A mesh in an SU2 binary file, of which one block is in memory at a time."""
 
     file: BinaryFile
-    place: ZonePlace
-    """`file`, `place`: its cells."""
+    place: ZonePlace  # `file`, `place`: its cells
     points: PointTable
     base: PointTable | None
     """`points`, `base`: its points, and the undeformed ones if there is a reference."""
-    zone: Zone
-    """The file of the undeformed mesh, or else of its points."""
+    zone: Zone  # the file of the undeformed mesh, or else of its points
     skin: Mesh | None = None
 
     @classmethod

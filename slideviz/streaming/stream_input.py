@@ -47,14 +47,10 @@ checksums of the copy are computed."""
 class StreamInput:
     """A mesh to be streamed, in an SU2 binary file."""
 
-    path: Path
-    """The binary file: the user's, or a copy of a text."""
-    zone: int | None
-    """The zone in it, from 1; the first where it is None."""
-    text: Text | None = None
-    """The text that ``path`` is a copy of."""
-    is_reused: bool = False
-    """Whether the copy was made by an earlier run that was stopped."""
+    path: Path  # the binary file: the user's, or a copy of a text
+    zone: int | None  # the zone in it, from 1; the first where it is None
+    text: Text | None = None  # the text that ``path`` is a copy of
+    is_reused: bool = False  # whether the copy was made by an earlier run that was stopped
 
     def text_size(self, place: ZonePlace) -> int:
         """Return about how many bytes the zone at ``place`` has as a text."""
@@ -216,14 +212,9 @@ def text_blocks(
 ) -> Iterator[bytes]:
     """Yield the text of ``mesh_input`` block by block, with the coordinates in the file ``after``.
 
-    Parameters
-    ----------
-    source, place
-        The binary copy of the text, and its zone.
-    after : Path
-        A file with the new points where the binary copy has the old ones.
-    ffd : bytes or None
-        Boxes for free-form deformation that replace those in the text; None keeps the latter.
+    ``source`` and ``place``: the binary copy of the text, and its zone.
+    ``after``: a file with the new points where the binary copy has the old ones.
+    ``ffd``: boxes for free-form deformation that replace those in the text; None keeps the latter.
     """
     text = mesh_input.text
     assert text is not None

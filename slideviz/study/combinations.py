@@ -41,8 +41,7 @@ class StudyColumn:
     """A column of the table."""
 
     meaning: str
-    value: Callable[[Result], Value]
-    """Returns the value of a result."""
+    value: Callable[[Result], Value]  # returns the value of a result
     head: str = ""
     form: str = ""
     """`head`, `form`: head and format on a terminal; columns with an empty head are not shown
@@ -202,32 +201,24 @@ class Combination:
 class Result:
     """The result of a combination: quality, errors and time."""
 
-    steps: int
-    """Steps made."""
+    steps: int  # steps made
     mesh: Mesh | None
     """After the last step; None where it was not kept, so that there is no picture of it."""
-    quality: Quality
-    """Of that mesh."""
+    quality: Quality  # of that mesh
     minimum: FloatArray
-    mean: FloatArray
-    """`minimum`, `mean` (steps,): lowest and mean quality after each step."""
-    control_nodes: int
-    """In the last step."""
-    max_error: float
-    """The largest of all steps, in the mesh's length unit."""
-    condition: float
-    """The largest of all steps; NaN where the method has no system."""
+    mean: FloatArray  # `minimum`, `mean` (steps,): lowest and mean quality after each step
+    control_nodes: int  # in the last step
+    max_error: float  # the largest of all steps, in the mesh's length unit
+    condition: float  # the largest of all steps; NaN where the method has no system
     seconds: float
     processor_seconds: float
     """`seconds`, `processor_seconds`: of the deformation: by the clock, and of all processors
     together."""
-    tolerance: float | None
-    """Of the greedy selection, in the mesh's length unit."""
+    tolerance: float | None  # of the greedy selection, in the mesh's length unit
     history: tuple[tuple[int, Cycle], ...]
     """tuple of (int, Cycle): number of the step, and a cycle of its greedy selection."""
     warnings: tuple[str, ...]
-    limits: str = ""
-    """Whether the limits of the case are met (`slideviz.case.limits.outcome`)."""
+    limits: str = ""  # whether the limits of the case are met (`slideviz.case.limits.outcome`)
 
 
 @dataclass(frozen=True, eq=False)

@@ -126,13 +126,9 @@ _QUIET = replace(PRINT, legend=False)
 def figures(rows: Sequence[CombinationRow], span: Profiler | None) -> Iterator[tuple[str, Figure]]:
     """Yield the names and figures of a comparison.
 
-    Parameters
-    ----------
-    rows : sequence of CombinationRow
-        Rows without a result are left out.
-    span : callable or None
-        Returns the profile of a row along the span, as `slideviz.study.plots.profiler` makes it;
-        None: no figures along the span.
+    ``rows``: rows without a result are left out.
+    ``span``: returns the profile of a row along the span, as `slideviz.study.plots.profiler` makes
+    it; None: no figures along the span.
     """
     numbers = list(dict.fromkeys(row.combination.steps for row in rows))
     if len({row.result.steps for row in rows if row.result}) > 1:

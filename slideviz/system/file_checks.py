@@ -41,17 +41,10 @@ def require_no_input(
     """Raise if a file that is to be written is an input, declared by `protected`.
 
     Raises SlidevizError if it is an input other than ``replaces``.
-
-    Parameters
-    ----------
-    path : Path
-        The file that is to be written.
-    error : type of SlidevizError
-        The class of error to raise.
-    replaces : Path, optional
-        The input that may be overwritten.
-    remedy : str
-        The remedy in the message; to choose another name when left out.
+    ``path``: the file that is to be written.
+    ``error``: the class of error to raise.
+    ``replaces``: the input that may be overwritten.
+    ``remedy``: the remedy in the message; to choose another name when left out.
     """
     if replaces is not None and same_file(path, replaces):
         return

@@ -67,8 +67,7 @@ SERIAL = SerialPool()  # the default where no ranks are given
 class Ranks(SerialPool):
     """Processes that MPI connects. Rank 0 works in ``with ranks:``; the others call `serve`."""
 
-    comm: Intracomm
-    """A communicator that only slideviz uses."""
+    comm: Intracomm  # a communicator that only slideviz uses
     threads: int
     """Threads of each rank, while all work: the cores of its machine, divided by the ranks
     there."""

@@ -98,8 +98,7 @@ class LeastSquares:
     values: FloatArray
     vectors: FloatArray
     """`values`, `vectors` (k,), (q, k): eigenvalues that are not zero, and their eigenvectors."""
-    rows: IntArray
-    """(q,): the rows that are in the system; the others of a solution are zero."""
+    rows: IntArray  # (q,): the rows that are in the system; the others of a solution are zero
 
     def __call__(self, right: FloatArray) -> FloatArray:
         """Return the solutions (..., n, m) for right-hand sides (..., n, m)."""

@@ -49,16 +49,14 @@ from slideviz.solver.stepping import one_step
 class FrozenCorrection:
     """Which nodes take over the errors of which boundary nodes."""
 
-    targets: IntArray
-    """(h,): the nodes that take over an error."""
+    targets: IntArray  # (h,): the nodes that take over an error
     row: IntArray
     source: IntArray
     weight: FloatArray
     """`row`, `source`, `weight` (k,): one entry for each pair of a target, by its place in
     ``targets``, and a boundary node, by its place in ``nodes`` (b,), with its weight
     in the mean of their errors."""
-    radius: float
-    """Distance at which the correction ends, in the mesh's length unit."""
+    radius: float  # distance at which the correction ends, in the mesh's length unit
     nearest: IntArray
     turn: IntArray
     """`nearest`, `turn` (h,): the boundary node nearest to each target, and the number of periods,
@@ -120,8 +118,7 @@ _SILENT = PhaseTimer(lambda _phase, _fraction: None)
 class StepState:
     """The state of a deformation after some steps."""
 
-    coords: Array
-    """(..., n, d): positions in the frame."""
+    coords: Array  # (..., n, d): positions in the frame
     solution: Solution | None = None
     """Of the step; its errors are arrays (...,). None before the first step."""
     points: Array = made_by(default_factory=lambda: np.empty((0, 0)))
@@ -161,23 +158,16 @@ class FrozenStep:
     """One step with its choices."""
 
     setup: Setup
-    mesh: Mesh
-    """Undeformed."""
-    part: float
-    """Part of the whole displacement that is made after this step, up to 1."""
-    first: bool
-    """Whether positions are those of the undeformed mesh, the same for all designs."""
-    stages: tuple[Levels, ...]
-    """Rows of the systems."""
-    dropped: IntArray
-    """(m,): nodes that the pivot guard left out of the systems."""
-    condition: float
-    """Estimated condition number of the last system, at the reference."""
+    mesh: Mesh  # undeformed
+    part: float  # part of the whole displacement that is made after this step, up to 1
+    first: bool  # whether positions are those of the undeformed mesh, the same for all designs
+    stages: tuple[Levels, ...]  # rows of the systems
+    dropped: IntArray  # (m,): nodes that the pivot guard left out of the systems
+    condition: float  # estimated condition number of the last system, at the reference
     refined: float = 0.0
     """Where systems are solved with twice the digits, as at the reference: the estimated error of
     ordinary solutions, as of a ``Solution``; else 0."""
-    error_estimate: float = 0.0
-    """As of a ``Solution``, at the reference."""
+    error_estimate: float = 0.0  # as of a ``Solution``, at the reference
     reuse: bool = False
     """Whether a later step keeps the factors of the last positions that it began at."""
     choices: ChoiceCache = made_by(default_factory=ChoiceCache)

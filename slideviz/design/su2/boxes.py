@@ -192,10 +192,8 @@ class MovedBoxes:
     nodes: IntArray
     boxes: tuple[Box, ...]
     """Those in which variables move nodes or that others carry, in the order of the file."""
-    embedded: dict[str, Embedding]
-    """The nodes in each box, by their place in ``nodes``."""
-    held: dict[str, Planes]
-    """Planes of control points of each box that do not move."""
+    embedded: dict[str, Embedding]  # the nodes in each box, by their place in ``nodes``
+    held: dict[str, Planes]  # planes of control points of each box that do not move
     warnings: tuple[str, ...]
 
     @property

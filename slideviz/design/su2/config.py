@@ -176,20 +176,14 @@ CONTINUITIES = {"NO_DERIVATIVE": 1, "1ST_DERIVATIVE": 2, "2ND_DERIVATIVE": 3, "U
 class Su2Config:
     """A configuration of SU2: the part about a deformation."""
 
-    case: Case
-    """Roles, settings and the files of the meshes, without motions."""
-    markers: tuple[str, ...]
-    """The boundaries that the design variables move."""
+    case: Case  # roles, settings and the files of the meshes, without motions
+    markers: tuple[str, ...]  # the boundaries that the design variables move
     variables: tuple[DesignVariable, ...]
     files: dict[str, Path]
-    words: dict[str, str]
-    """`files`, `words`: values of the keys in ``FILES`` and ``WORDS``."""
-    ignored: tuple[str, ...]
-    """The keys that are not read."""
-    named: dict[str, str]
-    """For each marker with a role, the key that lists it."""
-    present: frozenset[str]
-    """The keys that it has."""
+    words: dict[str, str]  # `files`, `words`: values of the keys in ``FILES`` and ``WORDS``
+    ignored: tuple[str, ...]  # the keys that are not read
+    named: dict[str, str]  # for each marker with a role, the key that lists it
+    present: frozenset[str]  # the keys that it has
 
     @property
     def source(self) -> Path:

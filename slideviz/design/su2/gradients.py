@@ -41,14 +41,11 @@ class Gradients:
     surface: FloatArray
     """(m, d): with respect to the displacement of each moving node, with all inner points
     following."""
-    variables: FloatArray
-    """(v,): with respect to each value of the design variables."""
-    points: FloatArray
-    """(m, d): positions of the moving nodes at the design."""
+    variables: FloatArray  # (v,): with respect to each value of the design variables
+    points: FloatArray  # (m, d): positions of the moving nodes at the design
     at_design: bool
     """Whether the design is that of the configuration; else it is the undeformed mesh."""
-    source: str
-    """Path of the sensitivities."""
+    source: str  # path of the sensitivities
     warnings: tuple[str, ...]
 
 

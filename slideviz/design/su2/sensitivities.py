@@ -118,8 +118,7 @@ class Sensitivities:
 class Matched:
     """Sensitivities in the order of a mesh's points."""
 
-    values: FloatArray
-    """(n, d)."""
+    values: FloatArray  # (n, d)
     at_design: bool
     """Whether they were computed at the design's points; else at those of the undeformed mesh."""
     warnings: tuple[str, ...] = ()

@@ -101,8 +101,7 @@ class Formula:
     """Displacement (m, d) of the nodes by an amount."""
     rate: Callable[[DesignVariable, MovedNodes, float], FloatArray] | None = None
     """Its derivative with respect to the amount; None: that of 1, since it is linear."""
-    relaxed: bool = True
-    """Whether OPT_RELAX_FACTOR multiplies its value."""
+    relaxed: bool = True  # whether OPT_RELAX_FACTOR multiplies its value
 
 
 def _shifted(variable: DesignVariable, on: MovedNodes, amount: float) -> FloatArray:

@@ -222,8 +222,7 @@ class MovingSurface:
 
     config: Su2Config
     mesh: Mesh
-    nodes: IntArray
-    """(m,): of all moving boundaries, or of the mesh (``*_GRID``), ascending."""
+    nodes: IntArray  # (m,): of all moving boundaries, or of the mesh (``*_GRID``), ascending
     displacer: Displacer
     warnings: tuple[str, ...]
 

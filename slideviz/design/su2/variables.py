@@ -29,12 +29,9 @@ class VariableKind:
     group: Group
     form: str = ""
     """Names of the parameters in DV_PARAM; BOX is the name of an FFD box, i, j, k are indices."""
-    order: int = 0
-    """Place among the passes over the variables of the group "surface"."""
-    several: str = ""
-    """Parameters that, where all are 0, are replaced by as many values."""
-    refused: str = ""
-    """Why the kind is not supported; empty where it is."""
+    order: int = 0  # place among the passes over the variables of the group "surface"
+    several: str = ""  # parameters that, where all are 0, are replaced by as many values
+    refused: str = ""  # why the kind is not supported; empty where it is
 
     @property
     def parameters(self) -> list[str]:
@@ -99,13 +96,10 @@ class DesignVariable:
     """A design variable."""
 
     kind: str
-    values: tuple[float, ...]
-    """One, or a value for each parameter in `VariableKind.several`."""
-    numbers: tuple[float, ...] = ()
-    """Its parameters without the box, as in `VariableKind.form`."""
+    values: tuple[float, ...]  # one, or a value for each parameter in `VariableKind.several`
+    numbers: tuple[float, ...] = ()  # its parameters without the box, as in `VariableKind.form`
     box: str = ""
-    ignored: bool = False
-    """Whether it does nothing, beside the others in the list."""
+    ignored: bool = False  # whether it does nothing, beside the others in the list
 
     @property
     def value(self) -> float:

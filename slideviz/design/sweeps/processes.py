@@ -63,19 +63,13 @@ class Packed:
 class Task:
     """A design as it is sent to a worker."""
 
-    design: int
-    """Its number, from 1."""
+    design: int  # its number, from 1
     case: Case
-    mesh: str
-    """Name of the packed mesh."""
-    version: str = __version__
-    """Of the slideviz that sends it."""
-    packed: Packed | None = None
-    """The mesh, for a worker that lacks it."""
-    output: Path | None = None
-    """Where the deformed mesh is written; None: it is not."""
-    file_format: FileFormat | None = None
-    """Of ``output``; None: as its ending says."""
+    mesh: str  # name of the packed mesh
+    version: str = __version__  # of the slideviz that sends it
+    packed: Packed | None = None  # the mesh, for a worker that lacks it
+    output: Path | None = None  # where the deformed mesh is written; None: it is not
+    file_format: FileFormat | None = None  # of ``output``; None: as its ending says
 
 
 @dataclass(frozen=True)

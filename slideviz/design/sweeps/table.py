@@ -24,34 +24,23 @@ from slideviz.system.csv_table import csv_rows
 class DesignRow:
     """The result of a design, or the reason why there is none."""
 
-    design: int
-    """Its number in the table of designs, from 1."""
-    values: Mapping[str, Value] = field(default_factory=dict)
-    """Its values, by column of that table."""
+    design: int  # its number in the table of designs, from 1
+    values: Mapping[str, Value] = field(default_factory=dict)  # its values, by column of that table
     min: float = nan
-    mean: float = nan
-    """`min`, `mean`: quality of the deformed mesh; NaN where there is none."""
-    inverted: int = 0
-    """Inverted cells."""
+    mean: float = nan  # `min`, `mean`: quality of the deformed mesh; NaN where there is none
+    inverted: int = 0  # inverted cells
     max_error: float = nan
     """Largest error of a boundary node before it is corrected, of all steps, in the mesh's length
     unit."""
     control_nodes: int = 0
-    steps: int = 0
-    """`control_nodes`, `steps`: control nodes in the last step, and steps made."""
-    seconds: float = 0.0
-    """Time that the worker spent on it."""
-    mesh: Path | None = None
-    """The file of the deformed mesh, where it was written."""
+    steps: int = 0  # `control_nodes`, `steps`: control nodes in the last step, and steps made
+    seconds: float = 0.0  # time that the worker spent on it
+    mesh: Path | None = None  # the file of the deformed mesh, where it was written
     warnings: tuple[str, ...] = ()
-    limits: str = ""
-    """Whether the limits of its case are met (`slideviz.case.limits.outcome`)."""
-    problem: str = ""
-    """Why there is no result; empty where there is one."""
-    lost: int = 0
-    """How often its worker was lost, so that it was done again."""
-    earlier: bool = False
-    """Whether it was done before the sweep was stopped and resumed."""
+    limits: str = ""  # whether the limits of its case are met (`slideviz.case.limits.outcome`)
+    problem: str = ""  # why there is no result; empty where there is one
+    lost: int = 0  # how often its worker was lost, so that it was done again
+    earlier: bool = False  # whether it was done before the sweep was stopped and resumed
 
 
 NUMBERS: Mapping[str, tuple[str, Callable[[str], float]]] = {

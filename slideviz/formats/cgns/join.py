@@ -26,18 +26,15 @@ _ONE_TO_ONE = "Abutting1to1"  # value of GridConnectivityType for interfaces tha
 class Interface:
     """An interface of a zone with another one, or with itself."""
 
-    node: Node
-    """Its place in the tree."""
+    node: Node  # its place in the tree
     zone: int
-    donor: int
-    """`zone`, `donor`: numbers of the zones."""
+    donor: int  # `zone`, `donor`: numbers of the zones
     pairs: tuple[IntArray, IntArray] | None
     """((m,), (m,)) or None: nodes of the zone and of the donor that are the same point; None if it
     is not to be joined."""
     period: tuple[float, ...] = ()
     """Centre and angles of the rotation, and translation; empty if it is not periodic."""
-    why: str = ""
-    """Reason why it cannot be joined, for a remark; empty if it can, or is periodic."""
+    why: str = ""  # reason why it cannot be joined, for a remark; empty if it can, or is periodic
 
     def gap(self, zones: Sequence[CgnsZone]) -> float:
         """Return the largest distance between the two nodes of a pair."""
@@ -51,14 +48,11 @@ class Interface:
 class Joined:
     """Zones joined to one mesh."""
 
-    points: FloatArray
-    """(n, p): points of the mesh."""
+    points: FloatArray  # (n, p): points of the mesh
     numbers: tuple[IntArray, ...]
     """tuple of (n_z,) int64: for each zone, the index in ``points`` of each of its vertices."""
-    open: tuple[Interface, ...]
-    """Interfaces that are not joined."""
-    parts: IntArray
-    """(z,): index of the connected part of the mesh that each zone is in."""
+    open: tuple[Interface, ...]  # interfaces that are not joined
+    parts: IntArray  # (z,): index of the connected part of the mesh that each zone is in
 
 
 def join(zones: Sequence[CgnsZone]) -> Joined:

@@ -40,8 +40,7 @@ class CgnsForm(Origin):
     numbers: tuple[IntArray, ...]
     """tuple of (n_z,) int64: for each zone the index of each of its vertices among the points of
     the mesh."""
-    points: FloatArray
-    """(n, d): the points as read."""
+    points: FloatArray  # (n, d): the points as read
 
 
 def read_cgns(path: Path) -> Mesh:

@@ -42,12 +42,9 @@ _MIXED = _NAMES.index("MIXED")
 class CgnsElements:
     """Elements of an unstructured zone."""
 
-    cells: Cells
-    """The m elements, of any dimension."""
-    numbers: IntArray
-    """(m,): their numbers in the zone, from 1, ascending."""
-    section: NDArray[np.int64]
-    """(m,): index of the section that each is in."""
+    cells: Cells  # the m elements, of any dimension
+    numbers: IntArray  # (m,): their numbers in the zone, from 1, ascending
+    section: NDArray[np.int64]  # (m,): index of the section that each is in
 
     def where(self, mask: NDArray[np.bool_]) -> CgnsElements:
         """Return the elements where the mask (m,) is true."""
@@ -190,20 +187,15 @@ _LABELS = ("IndexRange_t", "IndexArray_t")
 class CgnsZone:
     """A zone: its vertices, its cells, and where its coordinates are in the file."""
 
-    node: Node
-    """Its place in the tree."""
+    node: Node  # its place in the tree
     shape: tuple[int, ...]
     """Vertices along i, j (and k) of a structured zone; their number in an unstructured one."""
-    points: FloatArray
-    """(n, p): vertices, i running fastest; p is the number of coordinates."""
-    cells: Cells
-    """Its cells."""
+    points: FloatArray  # (n, p): vertices, i running fastest; p is the number of coordinates
+    cells: Cells  # its cells
     sides: CgnsElements | None
     """Elements of an unstructured zone with one dimension less; None for a structured zone."""
-    sections: tuple[Node, ...]
-    """Its sections of elements; empty for a structured zone."""
-    datasets: tuple[str, ...]
-    """Paths of the datasets of the p coordinates."""
+    sections: tuple[Node, ...]  # its sections of elements; empty for a structured zone
+    datasets: tuple[str, ...]  # paths of the datasets of the p coordinates
 
     @property
     def dim(self) -> int:

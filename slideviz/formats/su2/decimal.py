@@ -114,17 +114,10 @@ def decimal(text, at, bits, k):  # type: ignore[no-untyped-def]
 
     The result is -1, and nothing is written, if it is no plain number or `nearest_bits` is
     undecided.
-
-    Parameters
-    ----------
-    text : (b,) uint8
-        The text; its last byte is a line break.
-    at : int
-        Index of the first byte of the number.
-    bits : (v,) uint64
-        Receives the bits of the float64.
-    k : int
-        The place in ``bits``.
+    ``text`` (b,) uint8: the text; its last byte is a line break.
+    ``at``: index of the first byte of the number.
+    ``bits`` (v,) uint64: receives the bits of the float64.
+    ``k``: the place in ``bits``.
     """
     sign = np.uint64(text[at] == 45) << _U63
     at += (text[at] == 45) | (text[at] == 43)

@@ -185,11 +185,9 @@ class Piece:
     end: int
     """`begin`, `end`: its bytes, whole lines; those that are no rows are blank, comments or
     text."""
-    line: int
-    """Number of its first line in the file."""
+    line: int  # number of its first line in the file
     row: int
-    rows: int
-    """`row`, `rows`: number of its first row in the section, and number of rows."""
+    rows: int  # `row`, `rows`: number of its first row in the section, and number of rows
     node: int
     nodes: int
     """`node`, `nodes`: if the rows are elements: the number of nodes in the section before it, and
@@ -212,14 +210,12 @@ class Lines:
     file a new run begins, which may have no line of text.
     """
 
-    raw: Source
-    """The file."""
+    raw: Source  # the file
     begins: IntArray
     firsts: IntArray
     """`begins`, `firsts` (m + 1,): first byte and number of the first line of each run; last the
     size and number of lines of the file."""
-    kinds: IntArray
-    """(m,): ``ROWS``, ``TEXT`` or ``KEYWORD``, by the first line of each run."""
+    kinds: IntArray  # (m,): ``ROWS``, ``TEXT`` or ``KEYWORD``, by the first line of each run
     rows: IntArray
     nodes: IntArray
     """`rows`, `nodes` (m,): numbers of rows in each run, and of nodes on them if they are

@@ -32,17 +32,10 @@ def parse_cells(lines: Lines, rows: Rows, dim: int, n_points: int, progress: Tic
     """Parse elements, one per row: type, nodes, and an optional index, which is ignored.
 
     Raises MeshError if an element has a wrong type, dimension or nodes; the message has its line.
-
-    Parameters
-    ----------
-    rows : tuple of Piece
-        The rows, with one element each.
-    dim : int
-        The dimension that the elements must have.
-    n_points : int
-        Node indices must be below this.
-    progress : callable
-        Called with the fraction done after each block; may raise to stop.
+    ``rows``: the rows, with one element each.
+    ``dim``: the dimension that the elements must have.
+    ``n_points``: node indices must be below this.
+    ``progress``: called with the fraction done after each block; may raise to stop.
     """
     types = np.empty(number_of(rows), np.uint8)
     nodes = np.empty(rows[-1].node + rows[-1].nodes if rows else 0, np.int64)

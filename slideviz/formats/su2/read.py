@@ -190,18 +190,12 @@ class Document(Origin):
     """An SU2 file as it was read, with the places of its parts, so that it can be written again."""
 
     ending = ".su2"
-    raw: Source
-    """The whole file."""
-    rows: Rows
-    """The rows of the points in it."""
-    points: FloatArray
-    """(n, d): the points as read."""
-    cells: Cells
-    """The cells as read."""
-    markers: tuple[Marker, ...]
-    """The boundaries as read."""
-    zone: tuple[int, int]
-    """(int, int): first byte and end of the zone, without its ``IZONE`` line."""
+    raw: Source  # the whole file
+    rows: Rows  # the rows of the points in it
+    points: FloatArray  # (n, d): the points as read
+    cells: Cells  # the cells as read
+    markers: tuple[Marker, ...]  # the boundaries as read
+    zone: tuple[int, int]  # (int, int): first byte and end of the zone, without its ``IZONE`` line
     sends: tuple[tuple[int, int], ...]
     unknown: tuple[tuple[int, int], ...]
     """`sends`, `unknown`: first byte and end of each ``SEND_RECEIVE`` marker, and of each unknown

@@ -119,21 +119,15 @@ class SendRows:
 class TextZone:
     """Where the parts of one zone are in the file."""
 
-    bounds: Bounds
-    """Which zone, and its lines."""
-    dim: int
-    """2 or 3."""
+    bounds: Bounds  # which zone, and its lines
+    dim: int  # 2 or 3
     elements: Rows
-    points: Rows
-    """`elements`, `points`: the rows of the elements and of the points."""
-    markers: tuple[MarkerRows, ...]
-    """The boundaries."""
+    points: Rows  # `elements`, `points`: the rows of the elements and of the points
+    markers: tuple[MarkerRows, ...]  # the boundaries
     sends: tuple[SendRows, ...]
     """The ``SEND_RECEIVE`` markers, which list donors and receivers of a halo."""
-    unknown: tuple[KeywordBlock, ...]
-    """The unknown sections."""
-    remarks: tuple[str, ...] = ()
-    """Sentences on what is unusual."""
+    unknown: tuple[KeywordBlock, ...]  # the unknown sections
+    remarks: tuple[str, ...] = ()  # sentences on what is unusual
 
     @property
     def ffd_at(self) -> tuple[range, ...]:
@@ -314,12 +308,9 @@ BLOCK_BYTES = 1 << 20  # about how many bytes a block has: whole lines that are 
 class Text:
     """One zone of an SU2 text file, located but not read."""
 
-    lines: Lines
-    """The lines of the file."""
-    zone: TextZone
-    """Where the zone's parts are."""
-    sections: list[KeywordBlock]
-    """All sections of the file."""
+    lines: Lines  # the lines of the file
+    zone: TextZone  # where the zone's parts are
+    sections: list[KeywordBlock]  # all sections of the file
 
     @property
     def path(self) -> Path:

@@ -37,15 +37,11 @@ MAGIC = {
 class ElementTable:
     """Where the elements of a zone or marker are in the file."""
 
-    count: int
-    """Number of elements."""
+    count: int  # number of elements
     offsets: int
-    entries: int
-    """`offsets`, `entries`: first byte of the offsets, and of the list."""
-    length: int
-    """How many numbers the list has."""
-    numbered: bool
-    """Whether each element ends with its index."""
+    entries: int  # `offsets`, `entries`: first byte of the offsets, and of the list
+    length: int  # how many numbers the list has
+    numbered: bool  # whether each element ends with its index
 
 
 @dataclass(frozen=True)
@@ -61,20 +57,14 @@ class MarkerPlace:
 class ZonePlace:
     """Where a zone is in the file."""
 
-    number: int
-    """Number of the zone, from 1."""
+    number: int  # number of the zone, from 1
     begin: int
-    end: int
-    """`begin`, `end`: its first byte, and the one after its last."""
-    dim: int
-    """2 or 3."""
-    cells: ElementTable
-    """Its cells."""
+    end: int  # `begin`, `end`: its first byte, and the one after its last
+    dim: int  # 2 or 3
+    cells: ElementTable  # its cells
     n_points: int
-    points: int
-    """`n_points`, `points`: number of points, and the first byte of the first."""
-    markers: tuple[MarkerPlace, ...]
-    """Its markers."""
+    points: int  # `n_points`, `points`: number of points, and the first byte of the first
+    markers: tuple[MarkerPlace, ...]  # its markers
 
 
 class BinaryFile:

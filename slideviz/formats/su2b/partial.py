@@ -38,17 +38,11 @@ def copying(
 ) -> AbstractContextManager[Callable[[Tick], None]]:
     """Return a context with a function that waits until parts of a file are copied to another one.
 
-    Parameters
-    ----------
-    source, ours : Path
-        The file to copy from, and the existing one to copy to.
-    parts : sequence of Piece
-        The ranges of bytes to copy.
-    ranks : SerialPool or Ranks
-        The processes that copy.
-    is_left : bool
-        Whether they were copied before, by a stopped process: then only bytes that differ are
-        copied again.
+    ``source`` and ``ours``: the file to copy from, and the existing one to copy to.
+    ``parts``: the ranges of bytes to copy.
+    ``ranks``: the processes that copy.
+    ``is_left``: whether they were copied before, by a stopped process: then only bytes that differ
+    are copied again.
     """
     tasks = [piece for begin, end in parts for piece in _pieces(begin, end)]
     way = _beside if ranks.size == 1 else _together
@@ -197,14 +191,10 @@ HEAD = 8  # bytes that are zeros until the end
 class Partial:
     """A partial file."""
 
-    file: BinaryIO
-    """Open for reading and writing."""
-    path: Path
-    """Its hidden name."""
-    sums: list[int]
-    """Checksum of each part that is done; what a part is, the caller decides."""
-    mode: int | None
-    """Permissions of the target, None if it does not exist."""
+    file: BinaryIO  # open for reading and writing
+    path: Path  # its hidden name
+    sums: list[int]  # checksum of each part that is done; what a part is, the caller decides
+    mode: int | None  # permissions of the target, None if it does not exist
     _note: Path
     _about: str
     ready: Callable[[Tick], None] = lambda _: None

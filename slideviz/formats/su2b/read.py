@@ -37,14 +37,10 @@ BLOCK = 1 << 18  # most elements or points that are read at a time
 class ElementBlock:
     """Consecutive elements of a file."""
 
-    first: int
-    """Place of the first element."""
-    types: NDArray[np.uint8]
-    """(k,): VTK identifiers."""
-    nodes: IntArray
-    """(n,): nodes of all elements, one after the other."""
-    ids: IntArray
-    """(k,): index of each element; empty where elements have none (in markers)."""
+    first: int  # place of the first element
+    types: NDArray[np.uint8]  # (k,): VTK identifiers
+    nodes: IntArray  # (n,): nodes of all elements, one after the other
+    ids: IntArray  # (k,): index of each element; empty where elements have none (in markers)
 
 
 def element_blocks(
@@ -193,19 +189,15 @@ class BinaryForm(Origin):
     """The form of the ``.su2b`` file that a mesh was read from, to write it the same way."""
 
     ending = ".su2b"
-    width: int
-    """Bytes of an index, 4 or 8."""
-    byte_order: Literal["<", ">"]
-    """Little or big endian."""
+    width: int  # bytes of an index, 4 or 8
+    byte_order: Literal["<", ">"]  # little or big endian
     before: bytes
     after: bytes
     """`before`, `after`: the file before and after the zone: its head and the other zones."""
     order: IntArray | None
     """(m,): index of the cell at each place of the file; None where each is at its place."""
-    names: tuple[bytes, ...]
-    """Names of the markers with the bytes that pad them."""
-    cells: Cells
-    """The cells as read."""
+    names: tuple[bytes, ...]  # names of the markers with the bytes that pad them
+    cells: Cells  # the cells as read
 
 
 def read_su2b(path: Path, zone: int | None, progress: Tick) -> Mesh:

@@ -35,20 +35,15 @@ class ZoneContent:
     The functions get numbers i, j and return the k = j - i items from i on.
     """
 
-    dim: int
-    """2 or 3."""
+    dim: int  # 2 or 3
     n_cells: int
-    n_points: int
-    """`n_cells`, `n_points`: numbers of cells and points."""
+    n_points: int  # `n_cells`, `n_points`: numbers of cells and points
     cells: Callable[[int, int], tuple[NDArray[np.uint8], IntArray, IntArray]]
     """Returns cells in the order of the file: types (k,), nodes one after the other, and the index
     of each (k,)."""
-    types: Callable[[int, int], NDArray[np.uint8]]
-    """Returns the types (k,) of these cells."""
-    points: Callable[[int, int], FloatArray]
-    """Returns coordinates (k, d)."""
-    markers: tuple[Marker, ...]
-    """The boundaries."""
+    types: Callable[[int, int], NDArray[np.uint8]]  # returns the types (k,) of these cells
+    points: Callable[[int, int], FloatArray]  # returns coordinates (k, d)
+    markers: tuple[Marker, ...]  # the boundaries
 
 
 def write_su2b(path: Path, mesh: Mesh, options: WriteOptions) -> None:
