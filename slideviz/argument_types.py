@@ -137,7 +137,6 @@ def _annotations(owner: Any) -> dict[str, Any]:
 
 
 def _members(hint: Any) -> tuple[Any, ...]:
-    """Return the types of a union; of another type it alone."""
     is_union = origin_of(hint) in (Union, UnionType) and hint != ArrayLike
     return get_args(hint) if is_union else (hint,)
 
@@ -184,7 +183,6 @@ def _fits(value: Any, hint: Any, kind: Any, inner: tuple[Any, ...]) -> bool:
 
 
 def _is_series(value: object) -> bool:
-    """Return whether values can be taken from a value in an order; a text does not count."""
     unordered = str | bytes | Mapping | Set
     has_items = isinstance(value, Iterable) and getattr(value, "ndim", 1) != 0
     return has_items and not isinstance(value, unordered)
@@ -213,14 +211,12 @@ def _parts(value: Any, hint: Any, place: str) -> Iterator[tuple[object, Any, str
 
 
 def _value_words(value: object) -> str:
-    """Return a wrong argument in words: its value if that is short, else its type."""
     plain = isinstance(value, str | int | float | list | tuple | dict | None)
     is_short = plain and len(repr(value)) <= _SHORT
     return repr(value) if is_short else f"of type {type(value).__name__}"
 
 
 def _type_words(hint: Any) -> str:
-    """Return the words for a type in "expected ..."."""
     kind, inner = origin_of(hint) or hint, get_args(hint)
     if kind is Annotated:
         return str(inner[1])

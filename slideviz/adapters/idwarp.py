@@ -141,7 +141,6 @@ def surface_at(mesh: Mesh, moving: IntArray, given: FloatArray) -> SolverSurface
 
 
 def _lengths(vectors: FloatArray) -> FloatArray:
-    """Return the lengths (n,) of vectors (n, d)."""
     return np.asarray(np.linalg.norm(vectors, axis=1))
 
 

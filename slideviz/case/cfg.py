@@ -196,7 +196,6 @@ def _without_role(case: Case, role: str, names: tuple[str, ...]) -> Case:
 
 
 def _with_paths(case: Case, change: Callable[[Path], Path]) -> Case:
-    """Return the case with ``change`` applied to all its paths."""
     return case.change(
         mesh_file=change(case.mesh_file) if case.mesh_file else None,
         mesh_out=change(case.mesh_out) if case.mesh_out else None,

@@ -118,7 +118,6 @@ def put_boundaries(case: Case, names: tuple[str, ...]) -> Case:
 
 
 def _leading_file(case: Case) -> tuple[Motion, ...]:
-    """Return the first motion if it is a displacement file of all moving markers, (1,); else ()."""
     return tuple(m for m in case.motions[:1] if isinstance(m, FromFile) and not m.marker)
 
 

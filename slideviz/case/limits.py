@@ -79,7 +79,6 @@ def _of_quality(name: str) -> Callable[[MeasuredMesh, str], Values]:
 
 
 def _of_metric(name: Metric) -> Callable[[MeasuredMesh, str], Values]:
-    """Return the function of a metric; size-skew and its factors are in the quality already."""
     if name in SIZE_SKEW:
         return _of_quality({"size-skew": "values"}.get(name, name))
 
@@ -91,7 +90,6 @@ def _of_metric(name: Metric) -> Callable[[MeasuredMesh, str], Values]:
 
 
 def _margins(measured: MeasuredMesh) -> FloatArray:
-    """Return the margins (m,) of the cells; none without an undeformed mesh."""
     assert measured.mesh is not None
     if measured.reference is None:
         return np.empty(0)

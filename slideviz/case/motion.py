@@ -365,7 +365,6 @@ def _prescribed(motion: Prescribed, points: FloatArray, nodes: IntArray | None) 
 
 
 def _increment(motion: Translate | Rotate | Scale | Radial, points: FloatArray) -> FloatArray:
-    """Return the displacement (k, d) by a motion that is a formula, of points (k, d)."""
     if isinstance(motion, Translate):
         return np.broadcast_to(np.array(motion.vector, np.float64), points.shape)
     if isinstance(motion, Radial):
@@ -402,7 +401,6 @@ def _turned(arm: FloatArray, angle: float, axis: tuple[float, float, float]) -> 
 
 
 def _pushed(motion: Radial, points: FloatArray) -> FloatArray:
-    """Return the change (k, d) of points pushed away from an axis."""
     arm = points - np.array(motion.point, np.float64)
     if arm.shape[1] == 3:
         unit = np.array(motion.axis, np.float64) / math.hypot(*motion.axis)

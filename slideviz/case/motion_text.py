@@ -139,7 +139,6 @@ def _read_motion(group: list[Word]) -> Motion:
 
 
 def _read_target(items: list[Word]) -> tuple[Target, list[Word]]:
-    """Return the marker or markers that a motion moves, and the words after them."""
     head = items[0]
     if not head.is_sign("("):
         if not head.text or head.is_sign(")"):
@@ -340,7 +339,6 @@ def _read_twist(marker: Target, rest: list[Word]) -> FfdTwist:
 
 
 def _integers(words: list[Word]) -> list[int]:
-    """Return indices of control points, whole numbers from -1."""
     at = [number(word.text) for word in words]
     if any(value != int(value) or value < -1 for value in at):
         text = ", ".join(word.text for word in words)

@@ -107,7 +107,6 @@ def compare(arguments: argparse.Namespace) -> int:
 
 
 def _say(arguments: argparse.Namespace, text: str) -> None:
-    """Print a text and flush it, unless ``--quiet`` was given."""
     if not arguments.quiet:
         print(text, flush=True)
 
@@ -222,7 +221,6 @@ def _drawn(
     rows: Sequence[CombinationRow],
     folder: Path,
 ) -> list[Path]:
-    """Write plots and pictures, and return their paths."""
     from slideviz.study.plots import figures, profiler, save_figure, steps_name
 
     span = None if arguments.span == "none" else profiler(case, mesh, arguments.span)

@@ -68,7 +68,6 @@ def _is_to_be_streamed(arguments: argparse.Namespace) -> bool:
 
 
 def _convert_streamed(arguments: argparse.Namespace) -> int:
-    """Convert a mesh piece by piece; return the exit code."""
     from functools import partial
 
     from slideviz.cli.progress import Bar

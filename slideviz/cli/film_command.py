@@ -145,7 +145,6 @@ def _runs(arguments: argparse.Namespace, case: Case) -> tuple[StepFrame, list[Ru
 
 
 def _words(case: Case, keys: list[str]) -> str:
-    """Return the values of some keys in a case, as in a case file, but shortened."""
     from textwrap import shorten
 
     from slideviz.case.keys import KEYS
@@ -159,7 +158,6 @@ def _words(case: Case, keys: list[str]) -> str:
 
 
 def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[StepFrame, ...]:
-    """Deform a mesh, and return every step with its quality."""
     from slideviz import deform, quality
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import print_remarks

@@ -105,7 +105,6 @@ def require_output_paths(arguments: argparse.Namespace, *outputs: OutputPath) ->
 
 
 def _print_replaced(unnamed: list[OutputPath]) -> None:
-    """Print in one line which older files will be replaced by ``unnamed`` results."""
     old_files = []
     for one in unnamed:
         old = [path for path in _paths(one) if path.exists()]
@@ -117,7 +116,6 @@ def _print_replaced(unnamed: list[OutputPath]) -> None:
 
 
 def _paths(one: OutputPath) -> Iterator[Path]:
-    """Yield the path of a file, or the existing files of a folder."""
     assert one.path is not None
     if not one.files:
         yield one.path

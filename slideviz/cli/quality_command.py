@@ -159,7 +159,6 @@ def _report(
 
 
 def _walls(mesh: Mesh, reference: Mesh | None, case: Case | None) -> dict[str, dict]:
-    """Return a summary of the layers at the boundaries of a mesh in memory."""
     from slideviz import walls
     from slideviz.errors import MeshError
 
@@ -173,7 +172,6 @@ def _walls(mesh: Mesh, reference: Mesh | None, case: Case | None) -> dict[str, d
 
 
 def _write_csv(path: Path, found: Quality, metrics: Mapping[Metric, MetricValues]) -> None:
-    """Write number, size-skew, size, skew, status and other metrics of each cell as CSV."""
     from slideviz.errors import CaseError
     from slideviz.system.atomic import atomic_write
     from slideviz.terms import CELL_STATES, SIZE_SKEW, field_of

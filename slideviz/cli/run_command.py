@@ -171,7 +171,6 @@ def _about(case: Case) -> str:
 def _deform(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> RunResult:
-    """Deform a mesh in memory, and write it."""
     from slideviz import quality, read, walls, write
     from slideviz.cli.report import folded_cells
     from slideviz.formats.files import quality_data
@@ -205,7 +204,6 @@ def _deform(
 def _stream(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> RunResult:
-    """Deform a mesh from file to file, with only its boundary in memory."""
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import LISTED
     from slideviz.streaming.run import stream
@@ -281,7 +279,6 @@ def _is_su2(output: Path, kind: FileFormat | None) -> bool:
 def _require_output_paths(
     arguments: argparse.Namespace, case: Case, output: Path, qualities: Path | None
 ) -> None:
-    """Raise where a result could not be written, before the work begins."""
     from slideviz.cli.output_paths import OutputPath, require_output_paths
     from slideviz.system.file_checks import same_file
 
@@ -323,7 +320,6 @@ def _require_output_paths(
 
 
 def _require_series(path: Path) -> None:
-    """Raise CaseError where the file's ending is not that of a format for all steps."""
     from slideviz.errors import CaseError
 
     if not format_for(path).series:

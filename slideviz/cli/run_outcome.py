@@ -77,7 +77,6 @@ def _note_of(output: Path) -> Path:
 
 
 def _states(files: list[Path]) -> list[list[str | int]]:
-    """Return name, size in bytes and time of change of each file."""
     stats = [(path.name, path.stat()) for path in files]
     return [[name, state.st_size, state.st_mtime_ns] for name, state in stats]
 
@@ -166,7 +165,6 @@ def write_qualities(path: Path, found: Quality) -> None:
 def _print_run(
     report: dict, found: Quality, before: Quality, files: dict[str, Path | None]
 ) -> None:
-    """Print the summary of a run; ``found`` and ``before`` are its quality after and before."""
     from slideviz.case.words import counted
     from slideviz.cli.report import limit_lines, metric_lines, quality_lines, table, wall_lines
 
@@ -218,7 +216,6 @@ def _print_run(
 
 
 def _trial_words(trial: Mapping[str, Any]) -> str:
-    """Return the outcome of a number of steps, as ``2 (minimum 0.51)``."""
     halved = f", halved to {trial['steps']}" if trial["steps"] != trial["planned"] else ""
     result = f"{trial['inverted']} inverted" if trial["inverted"] else f"minimum {trial['min']:.3g}"
     return f"{trial['planned']} ({result}{halved})"
@@ -263,7 +260,6 @@ def advice_for(
 
 
 def _inverted_sentence(report: dict, folded: Folded, advice: str) -> str:
-    """Return a sentence with the number of inverted cells, the first of them, and remedies."""
     from slideviz.mesh.elements import ELEMENTS
 
     inverted, cells = report["quality"]["inverted"], report["quality"]["cells"]

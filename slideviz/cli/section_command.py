@@ -93,8 +93,6 @@ def add_section(calls: argparse._SubParsersAction) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """A mesh to be cut, and the section."""
-
     mesh: Mesh
     base: Mesh | None
     """`mesh`, `base`: the mesh and, where there is a reference, the undeformed one; with
@@ -202,7 +200,6 @@ def _report(arguments: argparse.Namespace, scene: _Scene, shown: SectionInRun) -
 
 
 def _check_usage(arguments: argparse.Namespace) -> None:
-    """Exit with code 2 where options contradict each other."""
     if arguments.color == "displacement" and not (arguments.reference or arguments.case):
         arguments.wrong_usage("--color displacement needs --reference UNDEFORMED")
     if arguments.unrolled and arguments.asked.section.shape.terms.flat != "unrolled":

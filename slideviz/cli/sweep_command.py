@@ -113,7 +113,6 @@ def sweep(arguments: argparse.Namespace) -> int:
 
 
 def _print_columns(case: Any) -> int:
-    """Print the possible columns of a table of designs, with the case's values; return the code."""
     from slideviz.case.key import FILES, VIEW
     from slideviz.case.keys import KEYS
     from slideviz.cli.report import table
@@ -186,7 +185,6 @@ def _pulled(
 def _report(
     arguments: argparse.Namespace, designs: Designs, rows: Sequence[DesignRow], seconds: float
 ) -> dict[str, Any]:
-    """Return the JSON object of a sweep."""
     done = sorted((row for row in rows if not row.problem), key=lambda row: (-row.min, row.design))
     fresh = [row for row in rows if not row.earlier]
     return {
@@ -222,12 +220,10 @@ def _number(row: DesignRow) -> int:
 
 
 def _named(row: DesignRow) -> dict[str, Any]:
-    """Return the entry of a report for a design: number, quality and values."""
     return {"design": row.design, "min": row.min, "mean": row.mean, "values": dict(row.values)}
 
 
 def _print_sweep(report: dict[str, Any]) -> None:
-    """Print the summary of a sweep."""
     from slideviz.case.words import counted
     from slideviz.cli.report import table
 

@@ -83,7 +83,6 @@ def choose_steps(
 def _continued(
     setup: Setup, stages: tuple[Levels, ...], problem: Problem, timer: PhaseTimer
 ) -> Solution:
-    """Solve a problem whose selection begins with the rows ``stages``."""
     return setup.solve(replace(problem, stages=stages), timer)
 
 

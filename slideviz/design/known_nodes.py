@@ -75,7 +75,6 @@ class KnownNodeMap:
             self._refuse(vectors)
 
     def _refuse(self, vectors: FloatArray) -> None:
-        """Raise the solver's error where nodes that must move alike do not; else return."""
         setup, mesh = self.setup, self.mesh
         for each in vectors.reshape(-1, *vectors.shape[-2:]):
             moved = displaced(Displacements(self.nodes, each), mesh)

@@ -177,8 +177,6 @@ class DrivenMove:
 
 @dataclass(eq=False)
 class _Rates:
-    """Derivatives of the state with respect to one value."""
-
     value: int
     nodes: FloatArray
     change: dict[str, FloatArray]
@@ -264,11 +262,9 @@ class BoxDeformation:
         return parent.embed(np.arange(len(points)), uvw)
 
     def _base(self, box: Box) -> FloatArray:
-        """Return where the undeformed box has its nodes, (k, 3)."""
         return box.system.points_of(self.inside[box.name].sums(box.q))
 
     def _deform(self, box: Box) -> None:
-        """Deform one box by its parent and by its moves, within the limits."""
         if box.level:
             self._carry(box)
         self._apply(box, 1.0)
@@ -302,7 +298,6 @@ class BoxDeformation:
         self._tape.append(rates_of)
 
     def _apply(self, box: Box, part: float) -> None:
-        """Apply the moves of a box, with the values times ``part``."""
         part *= self._factor
         for drive in self.drives:
             if drive.box != box.name:

@@ -215,7 +215,6 @@ def _leaves(move: Move, across: int) -> bool:
 
 
 def _is_polar(box: Box, kind: str) -> bool:
-    """Return whether the second index of a kind is k, not j."""
     return kind == "FFD_CONTROL_POINT_2D" and box.system.kind == "POLAR"
 
 
@@ -224,7 +223,6 @@ def _directions(box: Box, kind: str) -> tuple[int, ...]:
 
 
 def _is_held(index: tuple[int, ...], held: Planes) -> bool:
-    """Return whether any index (i, j, k) is that of a held plane."""
     return any(at in planes for at, planes in zip(index, held, strict=True))
 
 

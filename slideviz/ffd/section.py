@@ -340,7 +340,6 @@ def with_boxes(
 
 
 def _lines(mesh: Mesh) -> list[str]:
-    """Return the lines of the section, with their line breaks; empty without a section."""
     origin = mesh.origin
     if origin.ffd is not None:
         text = origin.ffd
@@ -373,7 +372,6 @@ def _update(lines: list[str], entries: Entries, box: Box, renewed: bool) -> None
 
 
 def _written(box: Box, dim: int) -> Iterator[str]:
-    """Yield all lines of a box."""
     letters = _LETTERS[:dim]
     axes = box.axes(dim)
     yield f"FFD_TAG= {box.name}\nFFD_LEVEL= 0\n"
@@ -410,5 +408,4 @@ def _surface_lines(box: Box) -> Iterator[str]:
 
 
 def _tabbed(values: Sequence[float]) -> str:
-    """Return numbers with all their digits, separated by tabs."""
     return "\t".join(repr(value) for value in values)

@@ -268,7 +268,6 @@ def _write_points(layout: BinaryLayout, out: int, k: int) -> IntArray:
 
 
 def _write_at(out: int, at: int, content: NDArray) -> None:
-    """Write the bytes of an array to the file descriptor ``out``, from byte ``at`` on."""
     left = content.view(np.uint8).data
     while left:
         written = os.pwrite(out, left, at)

@@ -110,7 +110,6 @@ def _started(
 
 
 def _limits(size: int) -> tuple[int, int]:
-    """Return the limits, seconds and bytes of memory, for reading a file of ``size`` bytes."""
     present = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     memory = min(_MEMORY + _MEMORY_PER_BYTE * size, 0.8 * present)
     return int(_SECONDS + _SECONDS_PER_BYTE * size), int(memory)
@@ -138,7 +137,6 @@ def _unpacked(path: Path, answer: bytes, code: int) -> Mesh:
 
 
 def _library(path: Path) -> str:
-    """Return the name of the library that reads a file, for messages."""
     return "meshio" if format_for(path).reader == MESHIO.reader else "HDF5"
 
 
@@ -187,7 +185,6 @@ def _die_with(parent: int) -> None:
 
 
 def _too_large(path: Path) -> MeshError:
-    """Return the error for a file whose reading needs more memory than the limit."""
     return path_error(
         path,
         "cannot be read: it needs more memory than a file of this size should; check its counts, "
@@ -262,7 +259,6 @@ def convert(
 
 
 def _warnings(source: Path, target: Path, mesh: Mesh, alone: bool) -> Iterator[str]:
-    """Yield a sentence for each loss of a conversion; ``alone``: one of several zones."""
     row = format_for(target)
     if alone and mesh.origin.ending == row.ending:
         yield (

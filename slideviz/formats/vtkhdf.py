@@ -40,8 +40,6 @@ Values = Mapping[str, NDArray]  # arrays by name, a row for each cell or point
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """A block of the collection."""
-
     group: h5py.Group  # its group in the file
     nodes: IntArray  # (n,): the mesh nodes of its points, one partition after the other
     partitions: int
@@ -204,7 +202,6 @@ def _typed(group: h5py.Group, kind: str) -> None:
 
 
 def _in_space(rows: NDArray) -> NDArray:
-    """Return points or vectors (n, 2) or (n, 3) as (n, 3), filled up with zeros."""
     return np.pad(rows, ((0, 0), (0, 3 - rows.shape[1]))) if rows.shape[1] < 3 else rows
 
 

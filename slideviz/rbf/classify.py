@@ -138,7 +138,6 @@ def _join(size, normals, role, own, smooth, merge, label):  # type: ignore[no-un
 
 @njit(nogil=True, cache=True)
 def _cosines(normals):  # type: ignore[no-untyped-def]
-    """Return the cosines of the angles between unit normals (c, d): (c, c)."""
     count = len(normals)
     alike = np.zeros((count, count))
     for i in range(count):
@@ -169,7 +168,6 @@ def _continuations(alike, roles, nodes, smooth):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True, cache=True)
 def _replace(labels, old, new):  # type: ignore[no-untyped-def]
-    """Replace label ``old`` by ``new``, in place."""
     for k in range(len(labels)):
         if labels[k] == old:
             labels[k] = new

@@ -167,7 +167,6 @@ def _orthonormalised(
 
 
 def _above(size: FloatArray, least: float) -> np.ndarray:
-    """Return a mask (m,) of ``size`` (m, 1) above ``least``."""
     return np.asarray(size[:, 0] > least)
 
 

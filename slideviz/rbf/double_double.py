@@ -68,7 +68,6 @@ def _joined(a, b):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _plus(a, al, b, bl):  # type: ignore[no-untyped-def]
-    """Return the sum of two double-double numbers."""
     s, e = _sum(a, b)
     t, f = _sum(al, bl)
     s, e = _joined(s, e + t)
@@ -77,14 +76,12 @@ def _plus(a, al, b, bl):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _times(a, al, b, bl):  # type: ignore[no-untyped-def]
-    """Return the product of two double-double numbers."""
     p, e = _product(a, b)
     return _joined(p, e + (a * bl + al * b))
 
 
 @njit(inline="always", **_OPTIONS)
 def _root(a, al):  # type: ignore[no-untyped-def]
-    """Return the square root of a double-double number."""
     first = np.sqrt(max(a, 1e-300))
     p, e = _product(first, first)
     rest, lost = _plus(a, al, -p, -e)
@@ -104,7 +101,6 @@ def _one_minus_cos(g, gl):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _plus_square(s, sl, a, b):  # type: ignore[no-untyped-def]
-    """Return s + sl + (a - b)^2."""
     d, dl = _sum(a, -b)
     p, pl = _times(d, dl, d, dl)
     return _plus(s, sl, p, pl)
@@ -190,7 +186,6 @@ def _lacking(v, vl, right, weights, low, out):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _over(a, al, b, bl):  # type: ignore[no-untyped-def]
-    """Return the quotient of two double-double numbers."""
     q = a / b
     p, pl = _times(b, bl, q, 0.0)
     r, rl = _plus(a, al, -p, -pl)

@@ -239,7 +239,6 @@ class Frame:
         return out
 
     def _cartesian(self, coords: FloatArray) -> FloatArray:
-        """Return points (n, d) of coordinates (r, rho theta[, z])."""
         assert self.axis is not None
         assert self.origin is not None
         angle = coords[:, 1] / self.radius + self.theta0
@@ -287,7 +286,6 @@ class Frame:
         return out
 
     def _features(self, coords: FloatArray) -> FloatArray:
-        """Return features (k, n) of nodes at ``coords`` (n, d)."""
         if self.cylindrical and self.period:
             phase = np.pi / self.period * coords[:, 1] / self.radius
             rows = [coords[:, 0], np.sin(phase), np.cos(phase)]
@@ -313,7 +311,6 @@ class Frame:
 
 
 def _perpendicular(direction: FloatArray) -> FloatArray:
-    """Return orthonormal rows (d - 1, d), perpendicular to a unit vector (d,)."""
     if len(direction) == 2:
         return np.array([[-direction[1], direction[0]]])
     return axis_basis(direction)[:2]

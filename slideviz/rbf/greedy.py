@@ -181,7 +181,6 @@ class GreedyFit:
         return some and bool(errors.max() < goal)
 
     def _full(self) -> bool:
-        """Return whether as many nodes as MAX_CONTROL_NODES allows are chosen."""
         limit = self._settings.max_nodes
         return limit is not None and len(self.interpolant.nodes) >= limit
 
@@ -195,7 +194,6 @@ class GreedyFit:
         return float(np.clip(np.log(max(first, 1e-300) / max(now, 1e-300)) / max(span, 1e-9), 0, 1))
 
     def _record(self, errors: FloatArray) -> None:
-        """Append a cycle with the largest of ``errors`` (c,) to ``history``."""
         cycle = Cycle(
             len(self.history) + 1,
             self._number,

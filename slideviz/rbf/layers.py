@@ -167,7 +167,6 @@ class WallNodes:
 
     @cached_property
     def _edges(self) -> IntArray:
-        """Return the nodes (2, e) of the edges of the facets, each once."""
         ends = np.stack([self.facets, np.roll(self.facets, -1, axis=1)], axis=-1).reshape(-1, 2)
         ends = np.unique(np.sort(ends, axis=1), axis=0)
         return ends[ends[:, 0] != ends[:, 1]].T

@@ -25,7 +25,6 @@ BLOCK = 256  # nodes of a task; it does all designs, so that what they share sta
 
 @njit(parallel=True, **_OPTIONS)
 def _shift(start, by):  # type: ignore[no-untyped-def]
-    """Add start (n, d) to ``by`` (k, n, d), in place."""
     n = by.shape[1]
     for task in prange((n + BLOCK - 1) // BLOCK):
         for k in range(by.shape[0]):
@@ -38,7 +37,6 @@ def _shift(start, by):  # type: ignore[no-untyped-def]
 
 @njit(parallel=True, **_OPTIONS)
 def _keep_undeformed(at, moved, start, before):  # type: ignore[no-untyped-def]
-    """Do what ``keep_undeformed`` does, for k designs."""
     n = at.shape[1]
     for task in prange((n + BLOCK - 1) // BLOCK):
         for k in range(at.shape[0]):
@@ -110,7 +108,6 @@ def _sine(x):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **_OPTIONS)
 def _cosine(x):  # type: ignore[no-untyped-def]
-    """Return cos x as ``_sine`` does."""
     t = x * x
     p = t * (_C[2] + t * (_C[3] + t * (_C[4] + t * (_C[5] + t * _C[6]))))
     return 1.0 + t * (_C[0] + t * (_C[1] + p))

@@ -243,7 +243,6 @@ def _across_period(
 
 
 def _role_numbers(boundary: Boundary, roles: Mapping[str, str]) -> IntArray:
-    """Return the number of each facet's role, (f,)."""
     given = [ROLE_NUMBER[roles.get(name, "fixed")] for name in boundary.names]
     return np.array(given, np.int64)[boundary.marker]
 

@@ -243,7 +243,6 @@ class System:
         return factor
 
     def _residuals(self) -> Residuals:
-        """Return the object that computes residuals in double-double arithmetic."""
         if "residuals" not in self._cache:
             self._cache["residuals"] = Residuals(self.basis, self.place)
         residuals: Residuals = self._cache["residuals"]

@@ -114,7 +114,6 @@ def recorded(result: FloatArray, *links: Link) -> Array:
 
 
 def _stretched(tangent: FloatArray, like: FloatArray) -> FloatArray:
-    """Return a tangent with its one column repeated as often as ``like`` has columns."""
     return (
         tangent if tangent.shape[-1] >= like.shape[-1] else np.repeat(tangent, like.shape[-1], -1)
     )

@@ -297,7 +297,6 @@ def _ring(n: GridCounts, number: IntArray) -> IntArray:
 
 
 def _quads(n: GridCounts, number: IntArray, ring: IntArray) -> IntArray:
-    """Return the cells (m, 4), counter-clockwise: first the channel, then the O-grid."""
     around = np.roll(ring, -1, axis=1)
     channel = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
     o_grid = [ring[1:], around[1:], around[:-1], ring[:-1]]
@@ -325,7 +324,6 @@ def _unknowns(n_points: int, number: IntArray, ring: IntArray) -> IntArray:
 
 
 def _line(nodes: IntArray) -> IntArray:
-    """Return the edges (k, 2) between neighbours in a row of nodes (k + 1,)."""
     return np.column_stack([nodes[:-1], nodes[1:]])
 
 

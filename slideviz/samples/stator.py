@@ -122,7 +122,6 @@ def _ring_knots(n: GridCounts) -> list[int]:
 
 
 def _spline(block: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-    """Return a block of points (a, b, 2) resampled by cubic splines: (*shape, 2)."""
     x, y = (np.linspace(0, 1, size) for size in block.shape[:2])
     new_x, new_y = (np.linspace(0, 1, size) for size in shape)
     kx, ky = min(3, len(x) - 1), min(3, len(y) - 1)
@@ -279,14 +278,12 @@ def _sides(grid: Grid) -> dict[str, tuple[IntArray, IntArray]]:
 
 
 def _grid_of(size: int) -> tuple[Grid, int]:
-    """Return the grid of a plane, and the number of layers, for about ``size`` hexahedra."""
     along = next(n for n in range(12, 1000) if _cells(n) * RADIAL * (n + 0.5) > size)
     grid = make_grid(counts(along, SHARES))
     return grid, max(round(size / len(grid.quads)), 1)
 
 
 def _cells(along: int) -> int:
-    """Return the number of cells of a plane with ``along`` cells along the inflow."""
     n = counts(along, SHARES)
     channel = (n.ahead + n.along + n.behind) * along - n.along * n.beside
     return channel + 2 * n.layers * (n.along + n.beside)

@@ -61,7 +61,6 @@ class SampleKind:
 
 
 def _thesis(name: str, size: int, variant: str) -> Sample:
-    """Return a square, polar, hexahedral or cylindrical sample (``make`` of `SampleKind`)."""
     return Sample(name, *thesis_case(name, size, variant))
 
 
@@ -71,27 +70,22 @@ def _streamed_thesis(name: str, size: int, variant: str) -> StreamedSample:
 
 
 def _passage(name: str, size: int, _variant: str) -> Sample:
-    """Return the sample ``passage``, which has one variant only."""
     return Sample(name, passage_mesh(size), passage_case())
 
 
 def _airfoil(name: str, size: int, variant: str) -> Sample:
-    """Return the sample ``airfoil``, with layers or without."""
     return Sample(name, airfoil_mesh(size, variant), airfoil_case())
 
 
 def _turbine_row(name: str, size: int, _variant: str) -> Sample:
-    """Return the sample ``turbine-row``, which has one variant only."""
     return Sample(name, row_mesh(size), row_case(size))
 
 
 def _extruded_row(name: str, size: int, _variant: str) -> Sample:
-    """Return the sample ``turbine-row-3d``, which has one variant only."""
     return Sample(name, extruded_row(size), extruded_case(size))
 
 
 def _stator(name: str, size: int, _variant: str) -> Sample:
-    """Return the sample ``stator``, which has one variant only."""
     mesh = stator_mesh(size)
     nodes = mesh.marker("BLADE").nodes
     moved = stator_displacement(nodes, mesh.points[nodes])
@@ -250,7 +244,6 @@ def write_sample(
 
 
 def _write_blocks(mesh: Path, zone: ZoneContent, overwrite: bool) -> None:
-    """Write a mesh as SU2's binary, block by block, to the path ``mesh``."""
     with atomic_write(mesh, MeshError, mesh if overwrite else None) as file:
         for block in chain(file_head(1), zone_blocks(zone, 1)):
             file.write(block)

@@ -151,7 +151,6 @@ def _case(grid: Layout, variant: str) -> tuple[Case, Displacements | None]:
 
 
 def _roles(markers: tuple[Marker, ...]) -> dict[str, Role]:
-    """Return the roles: sliding or periodic sides, moving block (thesis Figures 4.6 and 4.17)."""
     roles: dict[str, Role] = {marker.name: "sliding" for marker in markers}
     return roles | dict.fromkeys(PERIODIC, "periodic") | {"BLOCK": "moving"}
 

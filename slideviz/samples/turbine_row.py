@@ -339,7 +339,6 @@ def _spread(curve: FloatArray, sizing: Sizing) -> FloatArray:
 
 
 def _loop(nodes: IntArray) -> IntArray:
-    """Return the edges (k, 2) around a closed row of nodes (k,)."""
     return np.column_stack([nodes, np.roll(nodes, -1)])
 
 
@@ -433,7 +432,6 @@ def _fill(fixed, starts, sizing, most, turns):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _add(x, y, points, count, buckets):  # type: ignore[no-untyped-def]
-    """Append the point (x, y) to ``points`` and to its bucket; return the new number of points."""
     heads, following, low, width = buckets
     i = min(max(int((x - low[0]) / width), 0), heads.shape[0] - 1)
     j = min(max(int((y - low[1]) / width), 0), heads.shape[1] - 1)

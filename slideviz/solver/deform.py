@@ -225,7 +225,6 @@ def _systems(setup: Setup, case: Case, *, lasting: bool) -> list[int]:
 
 
 def _require_free(needed: float, what: str, remedy: str) -> None:
-    """Raise DeformError when fewer than ``needed`` bytes of memory are free."""
     free = free_memory()
     if needed > free:
         raise DeformError(

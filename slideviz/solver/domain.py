@@ -160,7 +160,6 @@ def find_classes(
 
 
 def _require_finite(mesh: Mesh) -> None:
-    """Raise MeshError when a coordinate is NaN or infinite."""
     if within(mesh.points, np.finfo(float).max):
         return
     bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))

@@ -193,7 +193,6 @@ def _reach(setup: Setup, shift: FloatArray, largest: float, kinds: tuple[str, ..
 
 
 def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
-    """Return why the interpolation fails, and what helps, as the end of a sentence."""
     nodes = np.concatenate([setup.known, setup.classes.sliding])
     at, shift = setup.coords[nodes], (moved - setup.coords)[nodes]
     from scipy.spatial import cKDTree  # takes long to load
@@ -221,6 +220,5 @@ def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
 
 
 def _boundaries(setup: Setup, node: int) -> str:
-    """Return the names of the boundaries that a node is on."""
     mine = (setup.boundary.facets == node).any(axis=1)
     return ", ".join(setup.boundary.names[k] for k in np.unique(setup.boundary.marker[mine]))

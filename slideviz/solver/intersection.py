@@ -186,7 +186,6 @@ def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray
 
 
 def _affine(points: FloatArray, vectors: FloatArray) -> bool:
-    """Return whether a motion of points (k, d) is affine: so no body goes through itself."""
     terms = np.column_stack([points - points.mean(axis=0), np.ones(len(points))])
     found = np.linalg.lstsq(terms, vectors)[0]
     tolerance = ROUNDING * np.abs(vectors).max(initial=0.0)
@@ -323,7 +322,6 @@ def winding_number(points: FloatArray, facets: IntArray, at: FloatArray) -> Floa
 
 
 def _winding_2d(arms: FloatArray) -> float:
-    """Return the winding number of line segments around the origin, from their ends (f, 2, 2)."""
     (a, b), (c, d) = arms[:, 0].T, arms[:, 1].T
     return float(np.arctan2(a * d - b * c, a * c + b * d).sum() / (2.0 * np.pi))
 

@@ -42,7 +42,6 @@ def layer_zone(case: Case, mesh: Mesh, domain: Domain, known: IntArray) -> Layer
 
 
 def _walls(case: Case, mesh: Mesh, domain: Domain) -> list[Wall]:
-    """Return the connected walls that carry nodes: moving ones, then fixed ones."""
     boundary, points = domain.boundary, mesh.points
     height = find_columns(mesh, 1).stack_thickness(points)
     size = np.linalg.norm(facet_vectors(points, boundary.facets), axis=1)

@@ -105,7 +105,6 @@ def beyond_pitch(case: Case, mesh: Mesh) -> str:
 
 
 def _along(pair: Pair, points: FloatArray, vectors: FloatArray) -> float:
-    """Return the largest displacement along the period of a pair: a length, or an angle."""
     if pair.kind == "translational":
         return float(np.abs(vectors @ (pair.vector / pair.period)).max(initial=0.0))
     axis = np.array(pair.axis) / np.linalg.norm(pair.axis)

@@ -282,7 +282,6 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
 def _method(
     case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray
 ) -> Callable[[Problem, PhaseTimer], Solution]:
-    """Return the function that solves one step, by METHOD and SLIDING_MODE of the case."""
     if case.method == "idw":
         from slideviz.baselines.idw import deform_idw
 

@@ -75,7 +75,6 @@ def _places(stack: ExitStack, source: FileSource, folder: Path) -> IntArray | No
 
 
 def _gathered(source: FileSource, where: IntArray) -> Cells:
-    """Return the elements at the places ``where`` (k,), in that order."""
     ordered = np.sort(where)
     cuts = np.flatnonzero(np.diff(ordered) > NEAR) + 1
     types, flats = [], []

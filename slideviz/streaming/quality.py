@@ -340,7 +340,6 @@ def _hashes(facets: IntArray) -> Hashes:
 
 
 def _is_among(hashes: Hashes, some: Hashes) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the hashes (n,) that are among ``some`` (k,), which is ascending."""
     if not len(some):
         return np.zeros(len(hashes), bool)
     at = np.minimum(np.searchsorted(some, hashes), len(some) - 1)

@@ -256,7 +256,6 @@ def _check_block(source: BinaryFile, place: ZonePlace, block: ElementBlock, cell
 def _repeated_index_error(
     source: BinaryFile, place: ZonePlace, element: int, index: int
 ) -> MeshError:
-    """Return the error for an element whose index is out of range or used twice."""
     return _cell_error(
         source,
         place,
@@ -267,7 +266,6 @@ def _repeated_index_error(
 
 
 def _cell_error(source: BinaryFile, place: ZonePlace, element: int, message: str) -> MeshError:
-    """Return the error for an element, with the byte in the file where it begins."""
     at = source.count(place.cells.offsets + element * source.width, "an offset")
     return source.error(place.cells.entries + at * source.width, f"element {element}: {message}")
 

@@ -245,8 +245,6 @@ def bounded(rows: Iterable[CombinationRow], bytes_kept: int) -> Iterator[Combina
 
 @dataclass(frozen=True, eq=False)
 class _Shared:
-    """The setup shared by runs of one method and mode, made for ``first``, and the time it took."""
-
     first: Combination
     setup: Setup
     seconds: float
@@ -327,7 +325,6 @@ def compare(
 
 
 def _share(combination: Combination, case: Case, mesh: Mesh) -> _Shared:
-    """Return the setup of a combination, and the time it took."""
     clock = _Clock()
     with clock:
         setup = make_setup(combination.applied(case), mesh)
@@ -341,7 +338,6 @@ def _result(
     shared: _Shared,
     report: Callable[[Combination, Progress], None] | None,
 ) -> Result:
-    """Return the result of a combination; its times are those of setup and deformation only."""
     applied = combination.applied(case)
     progress = (lambda now: report(combination, now)) if report else None
     pulled = deform(applied, mesh, progress, shared.setup)

@@ -175,7 +175,6 @@ def _drawn(images: Sequence[Pixels], axis: int) -> slice:
 
 
 def _fill(axes: Any, words: str, row: CombinationRow, wide: float) -> None:
-    """Write ``words`` into a facet, the reason why it has no picture, and numbers below it."""
     style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": SMALLEST, "color": "0.35"}
     axes.text(0.5, 0.5, fitted(words, wide, SMALLEST)[0], transform=axes.transAxes, **style)
     if row.result is not None:
@@ -183,7 +182,6 @@ def _fill(axes: Any, words: str, row: CombinationRow, wide: float) -> None:
 
 
 def _numbers(result: Result) -> str:
-    """Return the lowest and mean quality, and the number of inverted cells, in words."""
     measured = result.quality
     text = f"min {measured.min:.3f}, mean {measured.mean:.3f}"
     return f"{text}\n{measured.inverted} inverted" if measured.inverted else text

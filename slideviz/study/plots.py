@@ -174,7 +174,6 @@ _Draw = Callable[["Axes", Sequence[FacetLine]], None]
 
 
 def _outcomes(lines: Sequence[FacetLine]) -> list[Outcome]:
-    """Return the results of lines as plots against steps take them."""
     outcomes = []
     for line in lines:
         result = result_of(line)
@@ -296,7 +295,6 @@ def _grid(group: Sequence[Facet], draws: Sequence[_Draw], across: bool = False) 
 
 
 def _one_legend(figure: Figure) -> None:
-    """Draw one legend for all axes below them: lines first, markers last."""
     handles: dict[str, Any] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):

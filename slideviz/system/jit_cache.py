@@ -67,7 +67,6 @@ class _SealedFile(IndexDataCacheFile):  # type: ignore[misc]
         return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
 
     def _save_index(self, overloads: dict) -> None:
-        """Write the cache's entries by argument types."""
         content = self._dump((self._version, self._source_stamp, overloads))
         with self._open_for_write(self._index_path) as file:
             file.write(_with_checksum(content))
@@ -81,14 +80,11 @@ class _SealedFile(IndexDataCacheFile):  # type: ignore[misc]
             raise OSError(str(problem)) from problem  # Numba compiles it and writes it again
 
     def _save_data(self, name: str, data: Any) -> None:
-        """Write machine code to the file ``name``."""
         with self._open_for_write(self._data_path(name)) as file:
             file.write(_with_checksum(self._dump(data)))
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
-    """The cache of one function, in files with checksums."""
-
     def __init__(self, function: Callable) -> None:
         super().__init__(function)
         self._cache_file = _SealedFile(
@@ -143,7 +139,6 @@ def compilation_watched(compiling: Callable[[], None]) -> Iterator[None]:
 
 
 def _with_checksum(content: bytes) -> bytes:
-    """Return the content with its checksum before it."""
     return hashlib.sha256(content).digest() + content
 
 

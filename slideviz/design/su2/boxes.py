@@ -88,8 +88,6 @@ def _meets(ends: FloatArray, corners: FloatArray, dim: int) -> bool:
 
 
 def _crossed(ends: FloatArray, one: FloatArray, other: FloatArray) -> bool:
-    """Return whether any segment (e, 2, 2) meets the line through ``one`` and ``other``."""
-
     def side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
         return (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
             c[..., 0] - a[..., 0]
@@ -103,7 +101,6 @@ def _crossed(ends: FloatArray, one: FloatArray, other: FloatArray) -> bool:
 
 
 def _pierced(ends: FloatArray, triangle: FloatArray) -> bool:
-    """Return whether any segment (e, 2, 3) meets a triangle (3, 3)."""
     u, v = triangle[1] - triangle[0], triangle[2] - triangle[0]
     normal = np.cross(u, v)
     start, along = ends[:, 0] - triangle[0], ends[:, 1] - ends[:, 0]
@@ -168,7 +165,6 @@ def held_by_continuity(
 
 
 def _words(held: Planes) -> str:
-    """Return held planes in words: ``i = 0, 1, j = 4``."""
     return ", ".join(
         f"{letter} = {', '.join(map(str, sorted(planes)))}"
         for letter, planes in zip("ijk", held, strict=True)

@@ -270,7 +270,6 @@ def _perhaps_ours(path: Path, ignored: tuple[str, ...], rows: dict[str, Entry]) 
 
 
 def _one_letter_off(one: str, other: str) -> bool:
-    """Return whether two words differ by one letter, or by two that are swapped."""
     short, long = sorted((one, other), key=len)
     apart = (k for k, letters in enumerate(zip(short, long, strict=False)) if len({*letters}) > 1)
     at = next(apart, len(short))
@@ -287,7 +286,6 @@ def _read_keys(rows: Mapping[str, Entry] | None = None) -> set[str]:
 
 
 def _with_ending(path: Path, case: Case) -> Path:
-    """Return the path of the output mesh with the ending of its format, if it has none."""
     return path if path.suffix else path.with_suffix(f".{case.mesh_out_format or 'su2'}")
 
 

@@ -157,7 +157,6 @@ def _gradients(
 
 @contextmanager
 def _heard(said: list[str]) -> Iterator[None]:
-    """Context that appends the warnings of a deformer to ``said``, and passes other warnings on."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ConditionWarning)
         warnings.simplefilter("always", ToleranceWarning)

@@ -271,7 +271,6 @@ def _unordered(path: Path, mesh: Mesh) -> Sensitivities:
 
 
 def _rows(path: Path) -> Iterator[list[float]]:
-    """Yield the numbers of each line; lines that do not begin with a number are skipped."""
     text, _ = read_text(path, "file of sensitivities")
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.replace(",", " ").split()
@@ -284,7 +283,6 @@ def _rows(path: Path) -> Iterator[list[float]]:
 
 
 def _require_finite(path: Path, values: FloatArray) -> None:
-    """Raise CaseError if any of ``values`` (n, d) is not finite."""
     if not np.isfinite(values).all():
         row = int(np.argmax(~np.isfinite(values).all(axis=1)))
         raise CaseError(f"{path}: the sensitivity of point {row} is not finite; did SU2 diverge?")

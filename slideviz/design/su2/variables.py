@@ -225,7 +225,6 @@ def _groups(
 
 
 def _variable(name: str, group: list[Word]) -> DesignVariable:
-    """Return the variable with the parameters ``group``; raises CaseError where they are wrong."""
     kind, names = KINDS[name], KINDS[name].parameters
     if not names:
         return DesignVariable(name, (0.0,))  # what is written there means nothing: mostly (1.0)
@@ -251,7 +250,6 @@ def _with_values(
     problems: list[Problem],
     warnings: list[str],
 ) -> list[DesignVariable]:
-    """Return the variables with their values; 0 where these are missing."""
     entry = rows.get("DV_VALUE")
     needless = not variables or variables[0].group in WITHOUT_VALUE
     if entry is None:
@@ -314,7 +312,6 @@ def _dispatched(variables: list[DesignVariable], warnings: list[str]) -> tuple[D
 
 
 def _why_ignored(variable: DesignVariable, first: DesignVariable) -> str:
-    """Return why SU2 ignores a variable, or loses its motion; empty where it moves."""
     if first.group == "grid":
         return f"{first.kind} is first, and alone moves the mesh"
     if variable.group != first.group:

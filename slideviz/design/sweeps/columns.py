@@ -203,7 +203,6 @@ def _column_meaning(case: Case, name: str, known: Mapping[str, NumberPlace]) -> 
 
 
 def _all_names(case: Case) -> dict[str, NumberPlace]:
-    """Return the numbers of the motions by all their names."""
     return numbers_of(case) | {
         f"motion{at + 1}.{part}": place
         for at, motion in enumerate(case.motions)
@@ -218,7 +217,6 @@ def _normalized_name(name: str) -> str:
 
 
 def _head(motion: Motion) -> str:
-    """Return the begin of the names of a motion's numbers: ``BLADE.translate``."""
     head = f"{'+'.join(named(motion.marker)) or '*'}.{VERB_OF.get(type(motion), '')}"
     if isinstance(motion, BoxMotion):
         at = (motion.plane,) if isinstance(motion, FfdTwist) else motion.index
@@ -229,7 +227,6 @@ def _head(motion: Motion) -> str:
 
 
 def _parts(motion: Motion, at: int) -> Iterator[tuple[str, NumberPlace]]:
-    """Yield the names and places of the numbers of a motion."""
     if isinstance(motion, FromFile | Prescribed):
         return
     for field in fields(motion):
@@ -252,13 +249,11 @@ def _is_number(value: object) -> bool:
 
 
 def _names_text(known: Iterable[str]) -> str:
-    """Return names in words, `_LISTED` at most."""
     names = list(known)
     return ", ".join(names[:_LISTED]) + (", ..." if len(names) > _LISTED else "")
 
 
 def _number(value: Value) -> float:
-    """Return a value as a number; raises CaseError where it is not a finite number."""
     if isinstance(value, str):
         return number(value.strip())
     if not isinstance(value, Real) or not math.isfinite(value):

@@ -149,12 +149,10 @@ def _result(task: Task, mesh: Mesh, begin: float) -> DesignRow:
 
 
 def _warnings(last: Step) -> tuple[str, ...]:
-    """Return the warnings of a run, without notes."""
     return tuple(text for text in last.warnings if not isinstance(text, Note))
 
 
 def _worker_name() -> str:
-    """Return the name of this process: host and process id."""
     return f"{os.uname().nodename}, process {os.getpid()}"
 
 
@@ -194,8 +192,6 @@ def usable_cores() -> int:
 
 
 class _Call(NamedTuple):
-    """A call that was submitted: its future, and function with arguments."""
-
     future: Future
     work: tuple[Callable, tuple, dict]
 

@@ -108,7 +108,6 @@ class SweepResults:
         return []
 
     def _write_head(self) -> None:
-        """Write an empty table, and the sources."""
         text = json.dumps({"slideviz": __version__, **self._sources}, indent=2) + "\n"
         with atomic_write(self._folder / SOURCES, CaseError) as file:
             file.write(text.encode())
@@ -284,7 +283,6 @@ def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
 
 
 def _has_mesh(row: DesignRow, meshes: bool) -> bool:
-    """Return whether the mesh of a row exists, or is not wanted."""
     return not meshes or (row.mesh is not None and row.mesh.is_file())
 
 
@@ -306,7 +304,6 @@ def _means_same(text: str, value: Value) -> bool:
 
 
 def _short(text: str | None) -> str:
-    """Return a text, cut to 60 characters; ``nothing`` for None."""
     if text is None:
         return "nothing"
     return text if len(text) <= 60 else f"{text[:57]}..."

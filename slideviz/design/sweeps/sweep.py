@@ -190,8 +190,6 @@ class _Tasks:
 
 
 class _Loop:
-    """Submits the designs to the executor, and yields their rows."""
-
     def __init__(
         self,
         executor: Executor,

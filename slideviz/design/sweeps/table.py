@@ -110,7 +110,6 @@ def read_designs(case: Case, table: Table) -> Designs:
 
 
 def _rows_of(table: Sequence[Mapping[str, Any]] | Mapping[str, Sequence[Any]]) -> list[Mapping]:
-    """Return the rows of a table that is given by rows or by columns."""
     if not isinstance(table, Mapping):
         return list(table)
     lengths = {name: len(values) for name, values in table.items()}
@@ -121,7 +120,6 @@ def _rows_of(table: Sequence[Mapping[str, Any]] | Mapping[str, Sequence[Any]]) -
 
 
 def _value(value: Any) -> Value:
-    """Return a value as a text or a number of Python; None becomes an empty text."""
     if isinstance(value, str):
         return value.strip()
     if value is None or value != value:  # what tables of numbers have where there is nothing
@@ -251,7 +249,6 @@ def _design(
 
 
 def _filled_lines(text: str) -> list[tuple[int, str]]:
-    """Return the lines that are neither empty nor comments, with their numbers from 1."""
     return [
         (at, line)
         for at, line in enumerate(text.splitlines(), start=1)

@@ -97,7 +97,6 @@ def _numbered(labels: IntArray) -> tuple[IntArray, IntArray]:
 def _interfaces(
     zones: Sequence[CgnsZone], zone: int, names: dict[str, int], tolerance: float
 ) -> list[Interface]:
-    """Return the interfaces of a zone, given by index; ``names`` has the index of each zone."""
     interfaces = []
     for group in zones[zone].node.children("ZoneGridConnectivity_t"):
         for node in group.children("GridConnectivity1to1_t", "GridConnectivity_t"):
@@ -140,7 +139,6 @@ def _interface(
 
 
 def _period(node: Node) -> tuple[float, ...]:
-    """Return centre, angles and translation of a periodic interface; empty if it is none."""
     holder = node.child("GridConnectivityProperty_t")
     periodic = None if holder is None else holder.child("Periodic_t")
     if periodic is None:

@@ -67,7 +67,6 @@ def read_cgns(path: Path) -> Mesh:
 
 
 def _base(root: Node) -> Node:
-    """Return the base that has zones; raise MeshError if none or several have."""
     bases = root.children("CGNSBase_t")
     full = [base for base in bases if base.children("Zone_t")]
     if len(full) == 1:
@@ -190,7 +189,6 @@ def _add_open(
 
 
 def _free_name(one: Interface, taken: Sequence[str]) -> str:
-    """Return the name of an interface, with a number where another boundary has it."""
     name, number = one.node.name, 1
     while name in taken:
         number += 1
@@ -199,7 +197,6 @@ def _free_name(one: Interface, taken: Sequence[str]) -> str:
 
 
 def _together(parts: Sequence[Cells]) -> Cells:
-    """Return the cells of all parts as one."""
     if not parts:
         return Cells.from_blocks([])
     return Cells.from_types(
@@ -285,7 +282,6 @@ def _replace(path: Path, source: Path, tree: h5py.File, form: CgnsForm, points: 
 
 
 def _changed(path: Path, source: Path, name: str) -> Exception:
-    """Return the error for a file whose dataset ``name`` changed after the mesh was read."""
     return path_error(
         path,
         f"cannot be written: {printable(source)}, of which it is a copy, was changed after the "

@@ -153,7 +153,6 @@ def read_with_meshio(path: Path) -> Mesh:
 
 
 def _mesh(path: Path, data: meshio.Mesh) -> Mesh:
-    """Return the mesh that meshio read as a `Mesh`, or raise MeshError."""
     blocks = [
         _block(path, cells.type, cells.data, index)
         for index, cells in enumerate(data.cells)
@@ -178,7 +177,6 @@ def _mesh(path: Path, data: meshio.Mesh) -> Mesh:
 
 
 def _block(path: Path, name: str, nodes: object, index: int) -> MeshioBlock:
-    """Return a block of meshio's cells; MeshError if their type ``name`` or nodes are unusable."""
     if name not in MESHIO_TYPES:
         kind = "has many sides" if name.startswith(("poly", "pixel")) else "is of high order"
         raise path_error(
@@ -198,7 +196,6 @@ def _block(path: Path, name: str, nodes: object, index: int) -> MeshioBlock:
 
 
 def _points(path: Path, data: meshio.Mesh, cells: Cells) -> FloatArray:
-    """Return the points (n, 2) or (n, 3); MeshError for another shape or wrong nodes of cells."""
     points = np.asarray(data.points, float)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise path_error(
@@ -262,7 +259,6 @@ def _named_files(path: Path) -> Iterator[tuple[str, Path]]:
 
 
 def _files_of_xdmf(path: Path) -> Iterator[tuple[str, Path]]:
-    """Yield the same as `_named_files` for an XDMF file."""
     try:
         items = [item for _, item in ET.iterparse(path) if item.tag == "DataItem"]
     except ET.ParseError:

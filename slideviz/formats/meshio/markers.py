@@ -62,7 +62,6 @@ def find_markers(mesh: Mesh, data: meshio.Mesh, sides: Sequence[MeshioBlock]) ->
 
 
 def _by_cell_sets(data: meshio.Mesh, sides: Sequence[MeshioBlock]) -> Groups:
-    """Return the boundary elements in each named set of cells."""
     groups: Groups = {}
     for name, members in data.cell_sets.items():
         if name is not None and name.startswith("gmsh:"):

@@ -288,7 +288,6 @@ def _in_vtk_order(nodes: IntArray, offsets: IntArray, types: NDArray[np.uint8]) 
 
 
 def _array(name: str, values: NDArray) -> Iterator[bytes]:
-    """Yield the XML of one array, uncompressed: its length and its bytes in base64."""
     kind = values.dtype.str[1:]
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
     yield (

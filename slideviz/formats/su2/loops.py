@@ -19,7 +19,6 @@ from slideviz.system.jit_cache import njit
 
 @njit(inline="always", **OPTIONS)
 def _print_whole(value, out, at):  # type: ignore[no-untyped-def]
-    """Write a whole number, not negative, from ``out[at]`` on; return where it ends."""
     stop, quotient = at + 1, value
     while quotient >= 10:
         quotient //= 10
@@ -176,7 +175,6 @@ RUN_COLUMNS = 5
 
 @njit(inline="always", **OPTIONS)
 def _is_blank(code):  # type: ignore[no-untyped-def]
-    """Return whether a byte is a blank within a line."""
     return code == 32 or code == 9 or 11 <= code <= 13
 
 
@@ -188,7 +186,6 @@ def is_numeric(code):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _next_line(text, at):  # type: ignore[no-untyped-def]
-    """Return where the next line begins."""
     while text[at] != 10:
         at += 1
     return at + 1

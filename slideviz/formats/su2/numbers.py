@@ -77,7 +77,6 @@ def fill_cells(
 
 
 def _each(work: Callable[[Piece], None], rows: Rows, progress: Tick) -> None:
-    """Call ``work`` with each piece, on all cores."""
     for piece, _ in zip(rows, ordered_map(work, rows), strict=True):
         progress((piece.row + piece.rows) / number_of(rows))
 
@@ -118,7 +117,6 @@ def _element(lines: Lines, index: int, row: bytes, dim: int, n_points: int) -> t
 
 
 def _wrong_type(lines: Lines, index: int, vtk: int, dim: int, word: str) -> MeshError:
-    """Return the error for an element of unknown type (in the file ``word``) or wrong dimension."""
     if vtk in ELEMENTS:
         allowed = ", ".join(f"{t} ({e.name})" for t, e in ELEMENTS.items() if e.dim == dim)
         return lines.error(
@@ -247,7 +245,6 @@ def _point(lines: Lines, index: int, row: bytes, dim: int) -> FloatArray:
 
 
 def _wrong_count(lines: Lines, index: int, count: int, dim: int) -> MeshError:
-    """Return the error for a point on line ``index`` with ``count`` numbers."""
     return lines.error(
         index,
         f"a point has {dim} coordinates (NDIME= {dim}) and perhaps an index, but "

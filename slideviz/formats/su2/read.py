@@ -48,7 +48,6 @@ def find_halo(lines: Lines, zone: TextZone, mesh: Mesh) -> HaloAndRemarks:
 
 
 def _unused(why: str) -> str:
-    """Return the remark on a halo that cannot be used."""
     return (
         f"the SEND_RECEIVE markers tie no halo to its donors ({why}); they are kept, but the nodes "
         "are treated like all others, so make the halo anew"
@@ -168,7 +167,6 @@ def _readings(transform: FloatArray, dim: int) -> Iterator[RigidMotion]:
 
 
 def _about(axis: int, angle: float) -> FloatArray:
-    """Return the rotation (3, 3) by an angle in radians about Cartesian axis 0, 1 or 2."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
     out = np.eye(3)
     out[i, i] = out[j, j] = np.cos(angle)

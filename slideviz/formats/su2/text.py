@@ -214,7 +214,6 @@ class _Walk:
     def _walk(
         self,
     ) -> tuple[tuple[MarkerRows, ...], tuple[SendRows, ...], tuple[KeywordBlock, ...]]:
-        """Return the boundaries, the SEND_RECEIVE markers and the unknown sections."""
         markers, sends, unknown = [], [], []
         at = 0
         while at < len(self.sections):
@@ -265,7 +264,6 @@ class _Walk:
         return following, domain, at
 
     def _name(self, section: KeywordBlock) -> str:
-        """Return the name of a marker, ``SEND_RECEIVE`` in capitals; raise if it is unusable."""
         try:
             name = section.value.decode()
         except UnicodeDecodeError:
@@ -370,7 +368,6 @@ def boundaries_elsewhere(
 def _boundaries_of(
     lines: Lines, zone: TextZone, progress: Tick
 ) -> Iterator[tuple[int, str, FloatArray]]:
-    """Yield number, name and nodes (k, d) of each boundary of a zone."""
     count = number_of(zone.points)
     nodes = {
         part.name: parse_cells(lines, part.rows, zone.dim - 1, count, progress).nodes
@@ -424,7 +421,6 @@ def scan(raw: Source, progress: Tick) -> Lines:
 
 
 def _blocks(raw: Source) -> list[tuple[int, int]]:
-    """Return first byte and end of the blocks of a file, whole lines each."""
     bounds, begin = [], 0
     while begin < raw.size:
         end = line_end(raw, min(begin + BLOCK_BYTES, raw.size) - 1)

@@ -150,7 +150,6 @@ def _around(edits: Sequence[Edit], begin: int, end: int) -> Iterator[tuple[int, 
 
 
 def _ranges(begin: int, end: int) -> list[tuple[int, int]]:
-    """Return first byte and end of the blocks that a range of bytes is divided into."""
     return [(i, min(i + BLOCK_BYTES, end)) for i in range(begin, end, BLOCK_BYTES)]
 
 
@@ -218,7 +217,6 @@ def text_of_parts(
 
 
 def _zone(dim: int, cells: tuple[int, CellsOf], points: tuple[int, PointsOf]) -> Iterator[bytes]:
-    """Yield dimension, elements and points, as `text_of_parts` gets them."""
     yield f"NDIME= {dim}\nNELEM= {cells[0]}\n".encode()
     yield from _elements(*cells, numbered=True)
     yield f"NPOIN= {points[0]}\n".encode()
@@ -226,7 +224,6 @@ def _zone(dim: int, cells: tuple[int, CellsOf], points: tuple[int, PointsOf]) ->
 
 
 def _whole_zone(mesh: Mesh) -> Iterator[bytes]:
-    """Yield dimension, elements and points of a mesh in memory."""
     yield from _zone(
         mesh.dim,
         (len(mesh.cells), partial(_some, mesh.cells)),
@@ -241,12 +238,10 @@ def _some(cells: Cells, i: int, j: int) -> Cells:
 
 
 def _blocks(count: int) -> list[tuple[int, int]]:
-    """Return the first row of each block, and the one after the last."""
     return [(i, min(i + _BLOCK_ROWS, count)) for i in range(0, count, _BLOCK_ROWS)]
 
 
 def _point_rows(points: PointsOf, block: tuple[int, int]) -> bytes:
-    """Return a line for each point of a block: coordinates and index."""
     from slideviz.formats.su2.loops import print_points
 
     mine = points(*block)
@@ -264,12 +259,10 @@ def _markers(markers: Sequence[Marker], sends: int) -> Iterator[bytes]:
 
 
 def _elements(count: int, cells: CellsOf, *, numbered: bool) -> Iterator[bytes]:
-    """Yield a line for each element: type, nodes, and its index where asked for."""
     yield from ordered_map(partial(_cell_rows, cells, numbered), _blocks(count))
 
 
 def _cell_rows(cells: CellsOf, numbered: bool, block: tuple[int, int]) -> bytes:
-    """Return a line for each element of a block."""
     from slideviz.formats.su2.loops import print_cells
 
     some = cells(*block)
@@ -280,5 +273,4 @@ def _cell_rows(cells: CellsOf, numbered: bool, block: tuple[int, int]) -> bytes:
 
 
 def _with_line_break(text: bytes) -> bytes:
-    """Return the text of a section with a line break at its end."""
     return text if text.endswith(b"\n") else text + b"\n"

@@ -231,7 +231,6 @@ def _zone(source: BinaryFile, begin: int, number: int) -> ZonePlace:
 
 
 def _marker(source: BinaryFile, at: int, dim: int) -> MarkerPlace:
-    """Return the marker that begins at byte ``at``; raise MeshError for a wrong name or count."""
     raw = source.array(at, NAME_BYTES, np.uint8, "the name of a marker").tobytes()
     text, end, _ = raw.partition(b"\0")
     try:

@@ -165,7 +165,6 @@ def _mending(source: Path, ours: Path) -> Iterator[Callable[[Piece], None]]:
 
 @contextmanager
 def _checksums(path: Path) -> Iterator[Callable[[Piece], int]]:
-    """Context with a function that returns the CRC-32 of a piece of a file."""
     with path.open("rb") as file:
 
         def add_up(task: Piece) -> int:
@@ -178,7 +177,6 @@ def _checksums(path: Path) -> Iterator[Callable[[Piece], int]]:
 
 
 def _blocks(task: Piece) -> Iterator[tuple[int, int]]:
-    """Yield first byte and number of bytes of the blocks of a piece."""
     for at in range(*task, _BLOCK):
         yield at, min(_BLOCK, task[1] - at)
 
@@ -340,7 +338,6 @@ def finish_head(file: BinaryIO, head: bytes) -> None:
 
 
 def _kept_words(ours: Path) -> str:
-    """Return the message about a partial file that stays on the disk."""
     return f"the partial result is in {ours}; continue with --resume"
 
 
@@ -354,7 +351,6 @@ def _noted(note: Path, about: str) -> list[int]:
 
 
 def _lock(file: BinaryIO, path: Path) -> None:
-    """Lock a file, or raise MeshError, which names the target, if another process has."""
     import fcntl  # POSIX only
 
     try:
@@ -368,14 +364,12 @@ def _lock(file: BinaryIO, path: Path) -> None:
 
 
 def _removed(*paths: Path) -> None:
-    """Remove files, those that exist and can be removed."""
     for path in paths:
         with suppress(OSError):
             path.unlink(missing_ok=True)
 
 
 def _umask() -> int:
-    """Return the permission bits that new files do not get."""
     now = os.umask(0)
     os.umask(now)
     return now

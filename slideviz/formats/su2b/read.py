@@ -172,7 +172,6 @@ def _check_nodes(
 def _check_dim(
     source: BinaryFile, block: ElementBlock, dim: int, begin: int, offsets: IntArray
 ) -> None:
-    """Raise MeshError if a block has an element whose dimension is not ``dim``."""
     wrong = DIMS[block.types] != dim
     if wrong.any():
         k = int(np.argmax(wrong))
@@ -357,7 +356,6 @@ def read_elements(
 
 
 def _check_order(source: BinaryFile, table: ElementTable, cells: Cells, order: IntArray) -> None:
-    """Raise MeshError if an index of elements, ``order`` (m,), is not below m or repeats."""
     inside = order.view(np.uint64) < len(order)
     first = np.full(len(order), len(order))
     np.minimum.at(first, order[inside], np.flatnonzero(inside))

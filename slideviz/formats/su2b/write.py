@@ -167,7 +167,6 @@ def marker_table(cells: Cells, conn: np.dtype) -> bytes:
 
 
 def _parts(count: int) -> Iterator[tuple[int, int]]:
-    """Yield begin and end of parts of at most ``BLOCK`` of ``count`` items."""
     for first in range(0, count, BLOCK):
         yield first, min(first + BLOCK, count)
 
