@@ -81,15 +81,8 @@ class SolverSurface:
         """Return the displacement (m, d) of the moving nodes, of coordinates (N, d).
 
         Raises CaseError if the number of nodes is wrong, copies of a node disagree, or a node that
-        is not a moving one was moved.
-
-        Parameters
-        ----------
-        given : (N, d)
-            Coordinates that the nodes are to have.
-        now : (N, d)
-            Coordinates that the nodes have. Those of a node that is not a moving one must be given
-            as these, or undeformed.
+        is not a moving one was moved. ``given`` and ``now`` (N, d): coordinates that the nodes are
+        to have, and have; of a node that is not a moving one these, or undeformed, must be given.
         """
         if len(given) != len(self.nodes):
             raise CaseError(
@@ -116,11 +109,7 @@ class SolverSurface:
 
 
 def surface_at(mesh: Mesh, moving: IntArray, given: FloatArray) -> SolverSurface:
-    """Return the surface whose undeformed coordinates (N, d) are given.
-
-    Raises CaseError if a node is on none of the mesh's boundaries, or a moving node is not in the
-    surface.
-    """
+    """Return the surface of undeformed coordinates (N, d); CaseError if they are of another."""
     boundary = np.unique(np.concatenate([moving, *(marker.nodes for marker in mesh.markers)]))
     distance, found = cKDTree(mesh.points[boundary]).query(given)
     far, surface = np.asarray(distance), SolverSurface(mesh, moving, boundary[found])
@@ -374,10 +363,7 @@ class USMesh:
 
 
 def _read(options: Mapping[str, Any]) -> tuple[Mesh, Case, Any]:
-    """Return mesh, case and displacements (None without) of the options.
-
-    Raises CaseError where an option is missing or unknown; warns of options without effect.
-    """
+    """Return mesh, case and displacements (or None) of the options; CaseError if one is wrong."""
     from slideviz.case.model import Case
     from slideviz.formats.files import read
 

@@ -38,10 +38,7 @@ _DEFINED: WeakKeyDictionary[Mesh, dict[object, dict[str, Box]]] = WeakKeyDiction
 
 
 def boxes_for(case: Case, mesh: Mesh) -> dict[str, Box]:
-    """Return the boxes of the mesh and of the case, by name; of two with one name the mesh's.
-
-    Raises SlidevizError if the boxes in the mesh file or in FFD_DEFINITION have mistakes.
-    """
+    """Return the boxes of mesh and case by name; of two with one name that of the mesh."""
     boxes = boxes_of(mesh, system_of(case))
     return {**defined_boxes(case, mesh), **{box.name: box for box in boxes}}
 
@@ -59,11 +56,7 @@ def box_definition(case: Case) -> tuple[object, ...]:
 
 
 def defined_boxes(case: Case, mesh: Mesh) -> dict[str, Box]:
-    """Return the boxes that FFD_DEFINITION of the case defines, undeformed, by name.
-
-    They are found once for each mesh. Raises CaseError if the corners, degrees or orders of a box
-    make none.
-    """
+    """Return the undeformed boxes of FFD_DEFINITION by name; CaseError if values make no box."""
     key = box_definition(case)
     cache = _DEFINED.setdefault(mesh, {})
     if key not in cache:

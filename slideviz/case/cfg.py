@@ -34,11 +34,7 @@ _ROLE_OF = {term.key: role for role, term in ROLES.items()}
 
 
 def read_case(path: Path) -> Case:
-    """Return the case that a file describes.
-
-    Raises CaseError if the file cannot be read, or has mistakes: a line ``file:line: sentence`` for
-    each.
-    """
+    """Return the case that a file describes; CaseError with a line for each mistake."""
     text, warnings = read_text(path, "case file")
     case, problems, remarks = _parsed(path, text)
     if problems:
@@ -100,10 +96,7 @@ def set_key(case: Case, key: str, value: str) -> Case:
 
 
 def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]]:
-    """Return the case of a text, its problems, and warnings; paths are as written in it.
-
-    ``path`` is for messages only.
-    """
+    """Return the case of a text, its problems, and warnings; ``path`` is for messages only."""
     entries, problems = entries_of(text)
     require_no_mesh(path, entries)
     require_no_su2_configuration(path, entries)

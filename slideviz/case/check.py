@@ -36,10 +36,7 @@ _LISTED = 12
 
 
 def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
-    """Return why this mesh cannot be deformed as the case asks, a sentence for each; () if it can.
-
-    Displacement files are not read here.
-    """
+    """Return why this mesh cannot be deformed as the case asks; displacement files are not read."""
     return (
         *_value_problems(case),
         *_radius_problems(case, mesh),
@@ -53,10 +50,7 @@ def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
 
 
 def require_valid(case: Case, mesh: Mesh) -> None:
-    """Raise where the case does not fit the mesh (`check_case`).
-
-    Raises CaseError if it does not; the message has a line for each problem.
-    """
+    """Raise CaseError with a line for each problem where the case does not fit the mesh."""
     raise_all(check_case(case, mesh))
 
 
@@ -108,10 +102,7 @@ def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
 
 
 def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:
-    """Return a sentence for each of the markers ``named`` that the mesh lacks.
-
-    ``named`` has the key of the case file that names each marker.
-    """
+    """Return a sentence for each marker of ``named`` (to the key that names it) the mesh lacks."""
     known = mesh.marker_names
     names = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
     has = f"it has {names}" if known else "it has none"

@@ -119,10 +119,7 @@ def parse_rows(
 
 
 def _table(path: Path, lines: list[str], dim: int, columns: Columns) -> FloatArray:
-    """Return the numbers in the lines, (m, 1 + d), in their order.
-
-    Raises CaseError if there are none, or some line is no row of finite numbers.
-    """
+    """Return the numbers in the lines, (m, 1 + d); CaseError if a line is no row of numbers."""
     if not any(line.strip() for line in lines):
         raise CaseError(f"{path}: the file lists no node; expected lines {columns.heading(dim)}")
     try:
@@ -160,10 +157,7 @@ def _numbers(lines: list[str]) -> FloatArray:
 
 
 def _row(content: str, dim: int, columns: Columns) -> list[list[float]]:
-    """Return a list with the numbers of a line as its one row; without a row for an empty line.
-
-    Raises CaseError if the line has another number of columns, or words that are no numbers.
-    """
+    """Return the numbers of a line as one row, of an empty line none; or raise CaseError."""
     words = content.split()
     if columns.flat and dim == 2 and len(words) == 4:
         if number(words[3]) != 0.0:

@@ -66,10 +66,7 @@ class Key:
 
 
 def other_method(case: Case, method: Method | None) -> str:
-    """Return the message that the case's method does not use a setting of ``method``.
-
-    "" where it is that method, or ``method`` is None: all use it.
-    """
+    """Return the message that the case's method is not ``method``; "" where it is, or for None."""
     if method in (None, case.method):
         return ""
     label = METHODS[case.method].label
@@ -81,10 +78,7 @@ def _field(field: str) -> tuple[Put, Get]:
 
 
 def setting(name: str, group: str, kind: Kind, field: str, meaning: str, **window: Any) -> Key:
-    """Return the row of a key whose value is a field of ``Case``.
-
-    ``window`` has further attributes of the row (`Key`), mostly for the window.
-    """
+    """Return the row of a key whose value is a field of ``Case``; ``window`` has more of `Key`."""
     value = getattr(Case(), field)
     default = NO_DEFAULT if value is None else kind.write(value)
     return Key(name, group, kind, meaning, *_field(field), default, field=field, **window)

@@ -28,10 +28,7 @@ def no_pair(case: Case) -> str:
 
 
 def put_direction(case: Case, word: str) -> Case:
-    """Return the case with the direction of a word, and the type of periodicity that it implies.
-
-    Raises CaseError if the case has another type of periodicity.
-    """
+    """Return the case with the periodic direction of a word; CaseError if it has another type."""
     direction, implied = PERIODIC_DIRECTIONS[word]
     if implied is not None and case.periodic_type not in ("auto", implied):
         raise CaseError(

@@ -226,10 +226,7 @@ MET = "met"  # what `outcome` returns where all limits are met
 
 
 def outcome(results: Sequence[LimitResult]) -> str:
-    """Return `MET`, or the limits that are not met with their numbers; "" where there are none.
-
-    As a cell of a table: ``min > 0.3: 0.21; inverted = 0: 5``.
-    """
+    """Return a cell of a table: `MET`, or as ``min > 0.3: 0.21; inverted = 0: 5``; "" if none."""
     missed = [f"{one.limit}: {one.actual:.6g}" for one in results if not one.passed]
     return "; ".join(missed) or MET * bool(results)
 
@@ -276,10 +273,7 @@ def require_streamed(limits: Iterable[Limit]) -> None:
 
 
 def read_limits(text: str) -> tuple[Limit, ...]:
-    """Return the limits of a text like ``( min > 0.3, inverted = 0 )``; () for ``( )`` or NONE.
-
-    Raises CaseError if some have mistakes; the message has a line for each.
-    """
+    """Return the limits of ``( min > 0.3, inverted = 0 )``; () for ``( )`` or NONE."""
     inside = text.strip()
     if inside.count('"') % 2:
         raise CaseError(f"the quotation mark in {shown(text)} is not closed; close it")

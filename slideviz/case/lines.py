@@ -70,10 +70,7 @@ def read_text(path: Path, what: str) -> tuple[str, tuple[str, ...]]:
 
 
 def entries_of(text: str, signs: str = COMMENT_SIGNS) -> tuple[list[Entry], list[Problem]]:
-    """Return the entries of a case file in order, and a problem for each invalid line.
-
-    Comments begin with one of ``signs``.
-    """
+    """Return the entries of a case file (comments by ``signs``), and a problem per invalid line."""
     entries: list[Entry] = []
     problems: list[Problem] = []
     for line, content in _joined(text, problems, signs):

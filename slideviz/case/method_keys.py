@@ -75,10 +75,7 @@ def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Ke
 
 
 def put_double_edge(case: Case, wanted: bool) -> Case:
-    """Return the case that selects two nodes in a cycle, or one: RBF-SliDe's DOUBLE_EDGE.
-
-    A case without data reduction stays as it is.
-    """
+    """Return a case that has data reduction with two nodes in a cycle, or one (DOUBLE_EDGE)."""
     if case.reduction is None:
         return case
     return case.change(reduction=replace(case.reduction, selection="double" if wanted else "one"))

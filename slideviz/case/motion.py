@@ -146,10 +146,7 @@ def _shape(motion: OnAirfoil, mesh: Mesh, markers: list[str], nodes: IntArray) -
 
 
 def side_of(normals: FloatArray) -> FloatArray:
-    """Return 1 for the upper side of an airfoil, -1 for the lower one, by normals (m, d): (m,).
-
-    0 where the normal is level up to rounding.
-    """
+    """Return 1 for an airfoil's upper side, -1 for the lower, 0 if level; normals (m, d): (m,)."""
     upwards = normals[:, 1]
     level = np.abs(upwards) <= LEVEL * np.linalg.norm(normals, axis=1)
     return np.where(level, 0.0, np.sign(upwards))
@@ -207,10 +204,7 @@ def reference_displacements(
 
 
 def _read_file(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Displacements:
-    """Return the displacements of ``nodes`` (k,) of a mesh, which may be a part of a larger one.
-
-    In the file nodes have their numbers in the whole mesh.
-    """
+    """Return a file's displacements of ``nodes`` (k,), which it numbers as in the whole mesh."""
     if mesh.part is None:
         return read_displacements(path, nodes, mesh.points.shape, of)
     shape = mesh.part.n_points, mesh.dim

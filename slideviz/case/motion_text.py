@@ -55,10 +55,7 @@ MOST_TERMS = 100  # most terms of an airfoil's shape function
 
 
 def read_motions(text: str) -> tuple[Motion, ...]:
-    """Return the motions that the value of ``MOTION`` describes.
-
-    Raises CaseError if some have mistakes: a sentence for each, with the number of the motion.
-    """
+    """Return the motions of the value of ``MOTION``; CaseError with a sentence for each mistake."""
     groups = _groups(words_of(text), text)
     if not [group for group in groups if group]:
         return ()
@@ -75,18 +72,12 @@ def read_motions(text: str) -> tuple[Motion, ...]:
 
 
 def write_motions(motions: tuple[Motion, ...]) -> str:
-    """Return the value of ``MOTION`` that ``read_motions`` reads back without loss.
-
-    It has a line for each motion. Raises CaseError if a motion has no form in a case file.
-    """
+    """Return the value of ``MOTION``, a line for each motion; CaseError if one has no such form."""
     return " ; \\\n    ".join(_motion_text(motion) for motion in motions) or "( )"
 
 
 def _groups(words: list[Word], text: str) -> list[list[Word]]:
-    """Return the words in each outer pair of brackets, with inner brackets as words.
-
-    ``text`` is the whole value, for messages.
-    """
+    """Return the words in each outer pair of brackets of ``text``, inner brackets as words."""
     groups: list[list[Word]] = []
     depth = 0
     if is_none(words):

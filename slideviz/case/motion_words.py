@@ -172,10 +172,7 @@ def _exactly(motion: Motion) -> str:
 
 
 def mesh_words(mesh: Mesh) -> tuple[str, str]:
-    """Return one line on a mesh (dimensions, counts, size), and further lines.
-
-    The further lines: its halo, what of it is in memory, lowest and highest coordinates.
-    """
+    """Return a line on a mesh, and further ones: halo, what is in memory, extreme coordinates."""
     halo = "" if mesh.halo is None else f"  (halo: {int(mesh.halo.cells.sum()):,})"
     about = "" if mesh.halo is None else f"With {mesh.halo.describe()}.\n"
     size, ends = bounds_words(mesh)
@@ -189,10 +186,7 @@ def mesh_words(mesh: Mesh) -> tuple[str, str]:
 
 
 def bounds_words(mesh: Mesh) -> tuple[str, str]:
-    """Return two texts: the mesh's size along each axis, and its lowest and highest coordinates.
-
-    Both are "" for a mesh without points.
-    """
+    """Return the mesh's size along each axis, and its extreme coordinates; "" without points."""
     if not len(mesh.points):
         return "", ""
     low, high = mesh.bounds

@@ -63,10 +63,7 @@ class Kind:
 
 
 def choice(words: Mapping[str, Any]) -> Kind:
-    """Return the kind of the words of a table, which are read as the values there.
-
-    Upper or lower case does not matter. Of several words with one value the first is written.
-    """
+    """Return the kind of the words of a table, in any case; of synonyms the first is written."""
     written: dict[Any, str] = {}
     for word, value in words.items():
         written.setdefault(value, word)
@@ -199,20 +196,14 @@ def _remark_pairs(text: str) -> str:
 
 
 def read_vector(items: list[Word], what: str) -> tuple[float, ...]:
-    """Return the numbers of a vector, 2 or 3; messages call it ``what``.
-
-    Raises CaseError if the words are not two or three, or not numbers.
-    """
+    """Return the 2 or 3 numbers of a vector, called ``what`` in messages; or raise CaseError."""
     if len(items) not in (2, 3):
         raise CaseError(f"{what} has {len(items)} values; expected 2 or 3 numbers")
     return tuple(number(item.text) for item in items)
 
 
 def read_axis(items: list[Word]) -> tuple[float, float, float]:
-    """Return the direction given as ``x``, ``y``, ``z`` or three numbers; not of unit length.
-
-    Raises CaseError if the words are none of these, or the direction has no length.
-    """
+    """Return the direction ``x``, ``y``, ``z`` or of three numbers, of any length; or CaseError."""
     if len(items) == 1 and items[0].text.lower() in AXES:
         return AXES[items[0].text.lower()]
     if len(items) != 3:

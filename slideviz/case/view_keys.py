@@ -25,10 +25,7 @@ SectionText = tuple[str, tuple[float, ...], bool, bool, bool]
 
 
 def numbers(count: int, allowed: str, rising: bool = False, more: int = 0) -> Kind:
-    """Return the kind of a list of ``count`` to ``count + more`` numbers.
-
-    With ``rising``, each must be larger than the one before. ``allowed`` is for messages.
-    """
+    """Return the kind of ``count`` to ``count + more`` numbers; with ``rising`` each larger."""
 
     def read(text: str) -> tuple[float, ...]:
         values = tuple(number(item.text) for item in list_of(text))
@@ -56,11 +53,7 @@ def words(known: tuple[str, ...]) -> Kind:
 
 
 def read_sections(text: str) -> tuple[SectionText, ...]:
-    """Return the sections that the value of ``VIEW_SECTIONS`` describes.
-
-    Raises CaseError if one has another form, a wrong count of numbers, or numbers that give no
-    section.
-    """
+    """Return the sections of the value of ``VIEW_SECTIONS``; CaseError if one has another form."""
     sections = []
     for place, part in enumerate((p for p in text.split(";") if p.strip(" ()")), start=1):
         items = [item.text for item in list_of(part.strip())]

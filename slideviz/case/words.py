@@ -38,10 +38,7 @@ class Word:
 
 
 def words_of(text: str) -> list[Word]:
-    """Return the words of a value, brackets, commas and semicolons among them.
-
-    Raises CaseError if a quotation mark is not closed.
-    """
+    """Return the words of a value, brackets and separators among them, or raise CaseError."""
     words = []
     for match in _WORD.finditer(text):
         if match["bad"]:
@@ -76,10 +73,7 @@ def without_comment(line: str, signs: str = COMMENT_SIGNS) -> str:
 
 
 def list_of(text: str) -> list[Word]:
-    """Return the items of a list like ``(A, B)``, ``A, B`` or ``A B``; [] for ``( )``, ``(NONE)``.
-
-    Raises CaseError if a bracket is missing or misplaced, or a quotation mark is not closed.
-    """
+    """Return the items of ``(A, B)``, ``A, B`` or ``A B``; [] for ``( )``, ``(NONE)``."""
     words = words_of(text)
     opened = bool(words) and words[0].is_sign("(")
     closed = bool(words) and words[-1].is_sign(")")
@@ -106,10 +100,7 @@ def is_number(text: str) -> bool:
 
 
 def number(text: str) -> float:
-    """Return the number that a text is.
-
-    Raises CaseError if it is no number, or not finite.
-    """
+    """Return the finite number that a text is, or raise CaseError."""
     if not is_number(text):
         hint = "; write decimals with a point" if is_number(text.replace(",", ".")) else ""
         raise CaseError(f"{shown(text)} is not a number{hint}")
@@ -120,10 +111,7 @@ def number(text: str) -> float:
 
 
 def name_text(name: str) -> str:
-    """Return a name as it is written in a case file, in quotes where needed.
-
-    Raises CaseError if a case file cannot have it (`check_writable`).
-    """
+    """Return a name as in a case file, in quotes where needed; CaseError as `check_writable`."""
     check_writable(name)
     if _PLAIN_NAME.match(name) and not is_number(name) and name.upper() != "NONE":
         return name
@@ -131,10 +119,7 @@ def name_text(name: str) -> str:
 
 
 def check_writable(text: str) -> None:
-    """Raise where a text cannot be written in a line of a case file.
-
-    Raises CaseError if it is empty, has a line break or a zero byte, or cannot be written in UTF-8.
-    """
+    """Raise CaseError if a text is empty, or cannot be written in a line of UTF-8."""
     if not text:
         raise CaseError("an empty name cannot be written to a case file; give it a name")
     if any(sign in text for sign in "\n\r\0"):
@@ -155,9 +140,6 @@ def counted(number: int, what: str) -> str:
 
 
 def wrong_by(part: float, *, bounded: bool) -> str:
-    """Return the size of an error, a part of the largest value, in words.
-
-    ``bounded``: whether it is a bound; else it is the part of the error that could be measured.
-    """
+    """Return an error, a part of the largest value, in words: ``bounded``, or as measured."""
     percent = f"{100.0 * part:.2g} % of the largest"
     return f"up to {percent}" if bounded else f"{percent} or more; how much more is unknown"

@@ -112,10 +112,7 @@ def _say(arguments: argparse.Namespace, text: str) -> None:
 
 
 def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...]:
-    """Return the combinations of methods, periodic modes and steps that the arguments ask for.
-
-    Raises CaseError if a name is unknown, a list is empty, or a number of steps is not valid.
-    """
+    """Return the combinations that the arguments ask for; CaseError if an item is not valid."""
     from slideviz.errors import CaseError
     from slideviz.study.combinations import (
         AUTO,
@@ -167,10 +164,7 @@ def _computed(
     cannot: Mapping[Combination, str],
     folder: Path,
 ) -> tuple[list[CombinationRow], list[Path]]:
-    """Compute all combinations; return their rows, and the tables, written anew after each row.
-
-    ``cannot`` has the reasons for those that cannot be computed.
-    """
+    """Compute all combinations; return their rows, the tables, and reasons why some cannot be."""
     from slideviz.study.combinations import (
         bounded,
         compare,

@@ -45,10 +45,7 @@ def _convert(arguments: argparse.Namespace) -> int:
 
 
 def _is_to_be_streamed(arguments: argparse.Namespace) -> bool:
-    """Return whether to convert piece by piece: with ``--stream``, or if memory is too small.
-
-    Raises SlidevizError if ``--stream`` is given for other formats, or the mesh cannot be read.
-    """
+    """Return whether to convert piece by piece: with ``--stream``, or if memory is too small."""
     from slideviz.errors import CaseError
     from slideviz.streaming.converting import streamed_kind
     from slideviz.streaming.resources import missing_memory_of

@@ -103,10 +103,7 @@ def add_changes(call: argparse.ArgumentParser) -> None:
 
 
 def read_case(arguments: argparse.Namespace) -> Case:
-    """Return the case of the argument ``case``, changed by ``--set``, ``--steps`` and ``--zone``.
-
-    Its files are added to the inputs, which must not be written over.
-    """
+    """Return the case of the arguments, changed by ``--set``, ``--steps`` and ``--zone``."""
     from slideviz import Case
     from slideviz.cli.output_paths import add_case_inputs
 
@@ -119,10 +116,7 @@ def read_case(arguments: argparse.Namespace) -> Case:
 
 
 def require_mesh_file(arguments: argparse.Namespace, case: Case) -> Path:
-    """Return the mesh file of a case.
-
-    Raises CaseError if the case has none.
-    """
+    """Return the mesh file of a case, or raise CaseError."""
     from slideviz.errors import CaseError
 
     if case.mesh_file is None:

@@ -52,10 +52,7 @@ def input_paths(arguments: argparse.Namespace) -> dict[Path, str]:
 
 
 def qualities_path(output: Path) -> Path:
-    """Return the path of the qualities of each cell, beside a mesh that is written.
-
-    Raises CaseError if the path of the mesh is that of a folder.
-    """
+    """Return the path of the qualities of cells, beside a mesh; CaseError if that is a folder."""
     if not output.name:
         from slideviz.errors import CaseError
 
@@ -124,10 +121,7 @@ def _paths(one: OutputPath) -> Iterator[Path]:
 
 
 def _overlap(one: OutputPath, other: OutputPath) -> bool:
-    """Return whether ``other``, a file, is the same file as ``one`` or would be one in that folder.
-
-    False where ``other`` is a folder.
-    """
+    """Return whether the file ``other`` is the same as ``one``, or would be one in that folder."""
     from slideviz.system.file_checks import same_file
 
     assert one.path is not None
@@ -151,10 +145,7 @@ def _require_mesh_ending(file: Path) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and its parents where they are missing.
-
-    Raises CaseError if it cannot be made.
-    """
+    """Make a folder and its parents where they are missing, or raise CaseError."""
     from slideviz.errors import CaseError
     from slideviz.system.atomic import reason_of
 

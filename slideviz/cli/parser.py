@@ -65,10 +65,7 @@ a first try:  slideviz sample passage -o try && slideviz run try/passage.cfg
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """Return the arguments, with ``command`` set to the function to call.
-
-    Raises SystemExit on wrong usage (code 2), or if help was asked for (code 0).
-    """
+    """Return the arguments, with ``command`` the function to call; or raise SystemExit."""
     if not any(word in (*COMMANDS, "-h", "--help", "help") for word in argv[:1]):
         parser = _window_parser()
         if argv[1:] and not argv[0].startswith("-") and not Path(argv[0]).exists():

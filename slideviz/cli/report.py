@@ -120,10 +120,7 @@ def run_report(
 def limits_report(
     results: Sequence[LimitResult], before: Sequence[LimitResult] = ()
 ) -> list[dict[str, Any]]:
-    """Return the JSON array of limits: each with its number, and the worst cells that fail.
-
-    ``before`` are those of the undeformed mesh, if it is known.
-    """
+    """Return the JSON array of limits, with ``before`` deforming if known, and the worst cells."""
 
     def actual(result: LimitResult | None) -> float | None:
         return float(result.actual) if result is not None and isfinite(result.actual) else None
@@ -176,10 +173,7 @@ def limit_lines(report: Sequence[Mapping[str, Any]]) -> str:
 
 
 def limit_words(entry: Mapping[str, Any]) -> tuple[str, str, str]:
-    """Return the words on a limit of a report: ``0.2``, ``undeformed 0.4``, ``not met``.
-
-    The second is empty where it is unknown.
-    """
+    """Return the words on a limit of a report: ``0.2``, ``undeformed 0.4`` or "", ``not met``."""
     value = "no value" if entry["actual"] is None else f"{entry['actual']:.6g}"
     before = "" if entry["undeformed"] is None else f"undeformed {entry['undeformed']:.6g}"
     cells = f", in {counted(entry['failing'], 'cell')}" if entry["failing"] else ""
@@ -276,10 +270,7 @@ def print_remarks(remarks: Iterable[str], *, quiet: bool) -> None:
 
 
 def save_json(path: Path | None, report: Mapping[str, Any]) -> bool:
-    """Write a report to a file, or print it if ``path`` is ``-``; return whether it was printed.
-
-    If ``path`` is None, do nothing.
-    """
+    """Write a report to a file, or print it if ``path`` is ``-``; return whether it was printed."""
     if path is None:
         return False
     text = json.dumps(report, indent=2) + "\n"

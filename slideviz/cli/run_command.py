@@ -330,10 +330,7 @@ def _require_series(path: Path) -> None:
 
 
 def _default_output(case: Case) -> Path:
-    """Return the output file where none is given: ``name_def.su2`` for ``.../name.su2``.
-
-    It is in the current folder, and has the ending of MESH_OUT_FORMAT if given.
-    """
+    """Return ``name_def.su2`` for ``.../name.su2``, in the current folder (or MESH_OUT_FORMAT)."""
     assert case.mesh_file is not None
     ending = f".{case.mesh_out_format}" if case.mesh_out_format else case.mesh_file.suffix
     return Path(f"{case.mesh_file.stem}_def{ending}")

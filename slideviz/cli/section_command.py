@@ -213,10 +213,7 @@ def _section_and_passages(
     read_base: Callable[[], Mesh | None],
     case: Case | None,
 ) -> tuple[Section, dict[int, FloatArray]]:
-    """Return the section that is asked for, and the transformation (4, 4) of each passage.
-
-    A section without an axis gets that of the case, or of the rotational period.
-    """
+    """Return the section, and the transformation (4, 4) of each passage."""
     import numpy as np
 
     from slideviz.errors import CaseError

@@ -21,10 +21,7 @@ MOST_COPIES = 100  # most passages on each side: more could not be seen, and tak
 
 
 def glued(argv: Sequence[str]) -> list[str]:
-    """Return the words, with values that begin with a minus sign joined to their option by ``=``.
-
-    argparse would take ``-1,0,0`` as an option.
-    """
+    """Return the words, with a value like ``-1,0,0`` joined by ``=`` to its option for argparse."""
     words: list[str] = []
     for word in argv:
         if (
@@ -40,10 +37,7 @@ def glued(argv: Sequence[str]) -> list[str]:
 
 @dataclass(frozen=True)
 class SectionArgument:
-    """The section that an option describes.
-
-    ``axis``: whether the option contains the axis or normal of the section.
-    """
+    """The section that an option describes; ``axis``: whether with its axis or normal."""
 
     section: Section
     axis: bool = True
@@ -147,10 +141,7 @@ def _section(
 
 
 def _numbers(text: str, counts: tuple[int, ...], form: str) -> list[float]:
-    """Return the numbers of a list with commas; there must be as many as one of ``counts``.
-
-    ``form`` is the form of the list, for messages.
-    """
+    """Return the numbers of a list like ``form``, as many as one of ``counts``."""
     try:
         values = [float(word) for word in text.split(",")]
     except ValueError:

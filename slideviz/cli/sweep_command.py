@@ -130,10 +130,7 @@ def _print_columns(case: Any) -> int:
 
 @contextmanager
 def _executor(arguments: argparse.Namespace) -> Iterator[Executor | None]:
-    """Context with the executor of ``--scheduler``; with None where the option is not given.
-
-    Raises CaseError if Dask is not installed, no scheduler answers, or ``--workers`` is given, too.
-    """
+    """Context with the executor of ``--scheduler``, or None; CaseError if there is none."""
     from slideviz.errors import CaseError
 
     if arguments.scheduler is None:

@@ -92,13 +92,9 @@ def warn_of_errors(
 ) -> None:
     """Warn where designs miss what they must do by more than is allowed.
 
-    Parameters
-    ----------
-    errors, allowed : (...,)
-    reference : (...,) bool
-        Whether a design is one that all was chosen for.
-    reduced
-        Whether control nodes were chosen, beside the facets of sliding nodes.
+    ``errors`` and ``allowed`` (...,). ``reference`` (...,) bool: whether all was chosen for a
+    design.
+    ``reduced``: whether control nodes were chosen, beside the facets of sliding nodes.
     """
     above = errors > allowed
     if not above.any():
@@ -222,10 +218,7 @@ class Checks:
 
 
 def facets_of(setup: Setup, coords: FloatArray) -> dict[int, IntArray]:
-    """Return for each track, by its index, the simplex (s,) that each of its sliding nodes is on.
-
-    ``coords`` (n, d) are in the frame.
-    """
+    """Return for each track the simplex (s,) of each sliding node, at ``coords`` in the frame."""
     tracks, sliding = setup.tracks, setup.classes.sliding
     label = tracks.of_node[sliding]
     return {

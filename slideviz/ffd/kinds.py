@@ -227,10 +227,7 @@ def _is_held(index: tuple[int, ...], held: Planes) -> bool:
 
 
 def _shift(box: Box, chosen: list[tuple[object, object, object]], vector: FloatArray) -> Shift:
-    """Return the shift by a vector (3,) of the control points at the indices ``chosen``.
-
-    A control point at several of them moves several times as far.
-    """
+    """Return the shift by a vector (3,) of control points ``chosen``, each as often as it is."""
     unit = np.zeros(box.points.shape)
     for each in chosen:
         unit[each] += vector  # type: ignore[index]

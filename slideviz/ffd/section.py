@@ -46,10 +46,7 @@ Entries = dict[str, BoxEntry]  # the keyword lines of a box, by key
 
 
 def read_boxes(mesh: Mesh, lines: list[str], system: CoordinateSystem) -> tuple[Box, ...]:
-    """Return the boxes in the lines of a section, in a coordinate system.
-
-    Raises MeshError if the section has a mistake.
-    """
+    """Return the boxes in the lines of a section, in a coordinate system; or raise MeshError."""
     entries = entries_of(lines)
     readers = [_Reader(mesh, one, system) for one in entries]
     boxes = tuple(reader.box() for reader in readers)
@@ -301,10 +298,7 @@ _BOXES: WeakKeyDictionary[Mesh, dict[CoordinateSystem, tuple[Box, ...]]] = WeakK
 
 
 def boxes_of(mesh: Mesh, system: CoordinateSystem = CARTESIAN) -> tuple[Box, ...]:
-    """Return the boxes of a mesh, in the order of its file, in a coordinate system.
-
-    Raises MeshError if the section has a mistake.
-    """
+    """Return a mesh's boxes, in the order of its file, in a coordinate system; or MeshError."""
     cache = _BOXES.setdefault(mesh, {})
     if system not in cache:
         cache[system] = read_boxes(mesh, _lines(mesh), system)

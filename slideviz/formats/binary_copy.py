@@ -42,10 +42,7 @@ _Task = tuple[str, int, int]
 
 @dataclass(frozen=True, eq=False)
 class BinaryLayout:
-    """The layout of the binary form of a text mesh: at which byte each part begins.
-
-    `slideviz.formats.su2b.layout` describes the format.
-    """
+    """The layout of the binary form (`su2b.layout`) of a text mesh: where each part begins."""
 
     text: Text  # the text mesh
     width: int  # bytes of a count or an index, 4 or 8

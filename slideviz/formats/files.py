@@ -400,10 +400,7 @@ def write(
 
 
 def _checked_path(path: str | Path, file_format: FileFormat | None) -> Path:
-    """Return the path of a file whose format, where it is given, is one of SU2.
-
-    Raises MeshError if it is none.
-    """
+    """Return the path of a file; MeshError if ``file_format`` is given and none of SU2's."""
     if file_format not in (None, *FILE_FORMATS):
         known = " | ".join(FILE_FORMATS)
         raise path_error(Path(path), f"file_format {file_format!r} is not one of {known}")

@@ -41,10 +41,7 @@ class Hdf5Draft:
         self._problem: OSError | None = None
 
     def require(self) -> None:
-        """Raise if anything could not be written so far.
-
-        Raises MeshError with the reason of the first failure, and the remedy.
-        """
+        """Raise MeshError with the reason of the first failure if anything could not be written."""
         if self._problem is not None:
             reason = reason_of(self._problem)
             raise path_error(self._path, f"cannot be written: {reason}") from self._problem

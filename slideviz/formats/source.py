@@ -58,10 +58,7 @@ class Source:
         return pieces[0] if len(pieces) == 1 else b"".join(pieces)
 
     def require_same(self) -> None:
-        """Raise if the size or time stamp of an open file changed since it was opened.
-
-        Raises MeshError if it was changed.
-        """
+        """Raise MeshError if the size or time stamp of an open file changed since it was opened."""
         if self._now() != self._stamp:
             raise self.changed()
 
@@ -78,10 +75,7 @@ class Source:
 
 
 def open_source(path: Path) -> Source:
-    """Return the source of a file: its bytes, or the open file if it is larger than ``KEPT_BYTES``.
-
-    Raises MeshError if it cannot be opened.
-    """
+    """Return the source of a file: its bytes, or if larger than ``KEPT_BYTES`` the open file."""
     try:
         if path.stat().st_size <= KEPT_BYTES:
             return Source(path, path.read_bytes())
@@ -94,10 +88,7 @@ def open_source(path: Path) -> Source:
 
 
 def _reopened(path: Path, stamp: tuple[int, int]) -> Source:
-    """Return the source of a file that another process has open; raise MeshError if it changed.
-
-    ``stamp`` has its size and time stamp when it was opened there.
-    """
+    """Return the source of a file that another process opened; MeshError unless ``stamp`` fits."""
     source = open_source(path)
     if source._now() != stamp:
         raise source.changed()

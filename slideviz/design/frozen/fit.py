@@ -74,20 +74,13 @@ class FrozenFit:
     ) -> None:
         """Begin without rows.
 
-        Parameters
-        ----------
-        stages
-            Name and rows of each system that is to come in this step.
-        dropped : (m,)
-            Nodes that the pivot guard left out of the systems.
-        chosen, fixed
-            Keep discrete choices, and what depends on positions only (in the first step, where
-            positions are always the same).
-        refined
-            Whether systems are solved with twice the digits.
-        checked
-            Whether the error of solutions is estimated: for ``error_estimate``, which stays 0 with
-            data reduction, as that of `GreedyFit`, and for warnings of derivatives.
+        ``stages``: name and rows of each system that is to come in this step.
+        ``dropped`` (m,): nodes that the pivot guard left out of the systems.
+        ``chosen`` and ``fixed`` keep discrete choices, and what depends on positions only (in the
+        first step, where positions are always the same).
+        ``refined``: whether systems are solved with twice the digits.
+        ``checked``: whether the error of solutions is estimated: for ``error_estimate``, which
+        stays 0 with data reduction, as that of `GreedyFit`, and for warnings of derivatives.
         """
         basis = problem.basis
         self._problem, self._to_come, self.dropped = problem, stages, dropped

@@ -153,10 +153,7 @@ def solved(blocks: list[IntArray], factors: list[Factor], right: FloatArray) -> 
 
 
 def full_factor(system: FloatArray) -> Factor:
-    """Return a factor of all rows of a system (n, n), without the pivot guard.
-
-    Raises DeformError if the system is singular at the positions of a design.
-    """
+    """Return a factor of a system (n, n) without pivot guard; DeformError if it is singular."""
     try:
         lower = np.linalg.cholesky(system)
     except np.linalg.LinAlgError as problem:

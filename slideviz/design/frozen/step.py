@@ -96,10 +96,7 @@ def frozen_correction(
 
 
 def shares(frame: Frame, coords: Array, correction: FrozenCorrection) -> Array:
-    """Return the share (h,) of the error that each target takes over (`slideviz.rbf.field.share`).
-
-    It depends on the target's distance from its nearest boundary node.
-    """
+    """Return the share (h,) of the error that each target takes over, by its distance."""
     here = points(frame, take(coords, correction.targets))
     other = take(coords, correction.nearest) + correction.turn[:, None] * frame.shift()
     gap = length(here - points(frame, other))

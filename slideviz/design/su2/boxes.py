@@ -29,10 +29,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 
 def held_planes(config: Su2Config, mesh: Mesh, box: Box, continuity: str) -> Planes:
-    """Return the planes of control points that stay fixed, by axis.
-
-    ``continuity`` is a value of FFD_CONTINUITY.
-    """
+    """Return the planes of control points that FFD_CONTINUITY= ``continuity`` holds, by axis."""
     depth = CONTINUITIES[continuity]
     if not depth:
         indices = [list_of(config.words[f"FFD_FIX_{letter}"]) for letter in "IJK"]
@@ -62,10 +59,7 @@ def _planes(box: Box, axis: int) -> frozenset[int]:
 
 
 def _edges(mesh: Mesh, markers: tuple[str, ...], box: Box) -> FloatArray:
-    """Return the ends (e, 2, 3) of all segments between two nodes of a facet of some markers.
-
-    They are in the coordinates of the box.
-    """
+    """Return the ends (e, 2, 3) of all edges of the markers' facets, in the box's coordinates."""
     pairs = []
     for name in markers:
         for _, nodes in mesh.marker(name).cells.by_type.values():
@@ -283,10 +277,7 @@ def limits_of(config: Su2Config) -> Limits:
 
 
 def move_boxes(config: Su2Config, mesh: Mesh, nodes: IntArray) -> MovedBoxes:
-    """Return the boxes that the variables deform, with the nodes (m,) that are inside.
-
-    Raises CaseError if a box has no node inside, or a nested one is not inside its parent.
-    """
+    """Return the boxes that the variables deform, with the nodes (m,) inside; or CaseError."""
     known, names = boxes_for(config.case, mesh), {each.box for each in config.variables}
     nested = {name for box in known.values() if box.parent for name in (box.name, box.parent)}
     order = [box.name for box in boxes_of(mesh, system_of(config.case))]

@@ -81,14 +81,8 @@ def find_gradients(
 ) -> Gradients:
     """Return the gradients of the objective whose sensitivities the configuration names.
 
-    Raises
-    ------
-    SlidevizError
-        The sensitivities are missing or of another mesh, or the deformation is not possible.
-
-    Notes
-    -----
-    The warnings of the `Deformer` are among the warnings of the result.
+    Raises SlidevizError if the sensitivities are missing or of another mesh, or the deformation is
+    not possible. The warnings of the `Deformer` are among the warnings of the result.
     """
     mesh = surface.mesh
     sensitivities = read_sensitivities(surface.config, mesh, surface.nodes)

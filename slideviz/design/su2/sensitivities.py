@@ -20,10 +20,7 @@ NAME_BYTES = 33  # length of a column's name in these files
 
 
 def read_restart(path: Path) -> tuple[list[str], FloatArray]:
-    """Return the names of the columns of a restart, and its rows (n, c).
-
-    Raises CaseError if the file is cut off, or has a value that is not a number.
-    """
+    """Return the columns' names of a restart, and its rows (n, c); CaseError if it is damaged."""
     require_regular_file(path, CaseError)
     with path.open("rb") as file:
         binary = file.read(4) == np.int32(MAGIC).tobytes()

@@ -222,10 +222,7 @@ FORMULAS = {
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """Formulas that move nodes (a `Displacer`).
-
-    As in SU2 each acts on the undeformed points, and their displacements are added up.
-    """
+    """Formulas that move nodes (a `Displacer`): each acts on undeformed points, as in SU2."""
 
     config: Su2Config
     mesh: Mesh

@@ -240,10 +240,7 @@ class MovingSurface:
 
     @cached_property
     def displacement(self) -> FloatArray:
-        """Return the displacement of the nodes, (m, d), in the mesh's length unit.
-
-        Raises CaseError where it is not finite.
-        """
+        """Return the displacement of the nodes, (m, d); CaseError where it is not finite."""
         with _overflow_as_case_error(self.config):
             return self._finite(self.displacer.displacement())
 
@@ -314,10 +311,7 @@ def _overflow_as_case_error(config: Su2Config) -> Iterator[None]:
 
 
 def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
-    """Return the moving boundaries of a configuration, and what moves them.
-
-    Raises CaseError if markers or boxes are missing, or variables do not fit the mesh.
-    """
+    """Return the moving boundaries of a configuration, and what moves them; or CaseError."""
     group = config.variables[0].group
     problems = problems_of_markers(config, mesh, needed=group not in ("grid", "nothing"))
     if group == "ffd":

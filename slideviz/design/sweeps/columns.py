@@ -89,10 +89,7 @@ def numbers_of(case: Case) -> dict[str, NumberPlace]:
 
 
 def columns_of(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]:
-    """Return for the name of each column the place of its number, or its key.
-
-    Raises CaseError if some are unknown, mean the same, or cannot vary: a sentence for each.
-    """
+    """Return for each column's name the place of its number, or its key; or raise CaseError."""
     columns: dict[str, NumberPlace | str] = {}
     first: dict[NumberPlace | str, str] = {}
     problems = []

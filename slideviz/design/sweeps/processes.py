@@ -300,10 +300,7 @@ class Processes(Executor):
             self._discard(process)
 
     def _start(self) -> tuple[SpawnProcess, Connection]:
-        """Start a process, send it the mesh, and return it with the pipe to it.
-
-        Raises EOFError if it cannot be started, or ended before it had the mesh.
-        """
+        """Return a new process that has the mesh, and the pipe to it; EOFError if it ended."""
         context = get_context("spawn")
         here, there = context.Pipe()
         process = context.Process(target=_serve_calls, args=(there, _begin), daemon=True)

@@ -253,10 +253,7 @@ def lock_folder(folder: Path) -> BaseFileLock:
 
 
 def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
-    """Return what the results of a case depend on: digests of its data by name, keys as text.
-
-    Digests are of the mesh, its FFD boxes, given displacements and files of displacements.
-    """
+    """Return the digests by name, and keys as text, that the results of a case depend on."""
     prescribed = [motion for motion in case.motions if isinstance(motion, Prescribed)]
     written = tuple(motion for motion in case.motions if not isinstance(motion, Prescribed))
     plain = effective(case.change(motions=written))

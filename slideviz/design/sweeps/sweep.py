@@ -153,10 +153,7 @@ def _rows(
 
 
 class _Tasks:
-    """Makes the tasks that workers are sent: the case of each design, and the mesh once.
-
-    ``folder``: where the workers write deformed meshes; None: they write none.
-    """
+    """Makes workers' tasks: cases, the mesh once, and the folder for deformed meshes or None."""
 
     def __init__(self, mesh: Mesh, designs: Sequence[Design], folder: Path | None) -> None:
         self._folder = None if folder is None else Path(folder).absolute()

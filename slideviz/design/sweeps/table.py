@@ -184,10 +184,7 @@ def cells_of(
     words: Sequence[str] = WORDS,
     folder: Path = Path(),
 ) -> list[object]:
-    """Return the cells of a design's row, in the order of `head_of`.
-
-    Cells of results are empty if ``row`` is None. The path of the mesh is relative to ``folder``.
-    """
+    """Return the cells of a design's row as `head_of`; results are empty if ``row`` is None."""
     result = row or DesignRow(number)
     texts = {
         "mesh": result.mesh and os.path.relpath(result.mesh, folder),
@@ -201,10 +198,7 @@ def cells_of(
 
 
 def result_of(head: Sequence[str], cells: Sequence[str], folder: Path = Path()) -> DesignRow:
-    """Return the result in a line of a table, without the design's values.
-
-    Raises ValueError if the line has other columns than ``head``, or a number is wrong.
-    """
+    """Return the result in a line of a table; ValueError if its columns are not ``head``."""
     fields = dict(zip(head, cells, strict=True))  # columns and results differ in name
     numbers: dict[str, Any] = {
         name: read(fields[name]) for name, (_, read) in NUMBERS.items() if fields[name]

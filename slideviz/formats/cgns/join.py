@@ -113,10 +113,7 @@ def _interfaces(
 def _interface(
     zones: Sequence[CgnsZone], node: Node, zone: int, donor: int, tolerance: float
 ) -> Interface:
-    """Return an interface of a node; one whose nodes lie apart by more than ``tolerance`` is open.
-
-    Raises MeshError if it is wrong.
-    """
+    """Return an interface of a node, open if its nodes are apart; MeshError if it is wrong."""
     period = _period(node)
     if period:
         return Interface(node, zone, donor, None, period)
@@ -224,10 +221,7 @@ def _vertices(zone: CgnsZone, node: Node) -> IntArray:
 def _nearest(
     zone: CgnsZone, faces: Cells, donor: CgnsZone, others: Cells
 ) -> tuple[IntArray, IntArray]:
-    """Return the nodes (m,) of faces of a zone, and for each the donor's nearest node (m,).
-
-    These are nodes of the faces ``others`` of the donor.
-    """
+    """Return nodes (m,) of faces, and the nearest node (m,) of the donor's faces ``others``."""
     from scipy.spatial import KDTree
 
     here, there = faces.nodes, others.nodes

@@ -101,10 +101,7 @@ def _mesh(path: Path, base: Node, zones: Sequence[CgnsZone], joined: Joined) -> 
 
 
 def _renumbered(parts: Sequence[Cells], numbers: Sequence[IntArray]) -> Cells:
-    """Return the cells of all zones together, with the mesh's node numbers.
-
-    ``numbers`` are those of `Joined`.
-    """
+    """Return the cells of all zones together, with the node ``numbers`` of `Joined`."""
     flats = [number[part.connectivity] for part, number in zip(parts, numbers, strict=True)]
     return Cells.from_types(np.concatenate([part.types for part in parts]), np.concatenate(flats))
 

@@ -31,10 +31,7 @@ _LINK = " link"  # name of the HDF5 link in a node that is a link
 
 @contextmanager
 def cgns_file(path: Path) -> Iterator[Node]:
-    """Context with the root node of an open CGNS file.
-
-    Raises MeshError if it is no HDF5 file, or h5py raises any other error in the block.
-    """
+    """Context with the root node of a CGNS file; MeshError for any error of h5py in the block."""
     import h5py
 
     with path.open("rb") as file:
@@ -83,10 +80,7 @@ class Node:
         return path_error(self.file, f"{self.path or '/'}: {message}")
 
     def children(self, *labels: str) -> list[Node]:
-        """Return the children whose kind is one of ``labels``, in their order in the file.
-
-        Raises MeshError if a link leads to no node.
-        """
+        """Return the children of a kind in ``labels``, in order; MeshError if a link is broken."""
         import h5py
 
         nodes = []
@@ -114,10 +108,7 @@ class Node:
         return next((node for node in nodes if not names or node.name in names), None)
 
     def needed(self, label: str, *names: str) -> Node:
-        """Return the first child of a kind, with one of these names if any are given.
-
-        Raises MeshError if there is none.
-        """
+        """Return the first child of a kind, of one of these names if given; or raise MeshError."""
         node = self.child(label, *names)
         if node is None:
             what = f"{' or '.join(names)} ({label})" if names else label
@@ -125,10 +116,7 @@ class Node:
         return node
 
     def value(self) -> NDArray:
-        """Return its value, with the axes as in the dataset.
-
-        Raises MeshError if it has no value.
-        """
+        """Return its value, with the axes as in the dataset; MeshError if it has none."""
         import h5py
 
         data = self.group.get(DATA)

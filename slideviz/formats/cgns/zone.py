@@ -111,10 +111,7 @@ def read_sections(zone: Node, n_points: int) -> tuple[CgnsElements, list[Node]]:
 
 
 def _section(node: Node, n_points: int) -> tuple[int, Cells]:
-    """Return the number of the first element of a section, and its elements, or raise MeshError.
-
-    ``n_points`` is the number of the zone's vertices.
-    """
+    """Return a section's first element number, and its elements, of nodes below ``n_points``."""
     kind = int(node.integers(2)[0])
     name = _NAMES[kind] if 0 <= kind < len(_NAMES) else str(kind)
     if kind not in _TYPES and kind != _MIXED:
@@ -253,10 +250,7 @@ def read_zone(node: Node, dim: int, physical: int) -> CgnsZone:
 
 
 def _points(zone: Node, shape: tuple[int, ...], count: int) -> tuple[FloatArray, tuple[str, ...]]:
-    """Return the vertices (n, count) of a zone, and the paths of their datasets.
-
-    Raises MeshError if a coordinate is missing, is of another type or shape, or is not finite.
-    """
+    """Return the vertices (n, count) of a zone, and the paths of their datasets; or MeshError."""
     grid = zone.needed("GridCoordinates_t", "GridCoordinates")
     if (rind := grid.child("Rind_t")) is not None and rind.integers(-1).any():
         raise rind.fault(
@@ -423,10 +417,7 @@ def _listed_faces(zone: CgnsZone, node: Node, where: str, indices: IntArray) -> 
 
 
 def _faces(zone: CgnsZone, axis: int, first: IntArray) -> Cells:
-    """Return the faces of a structured zone across ``axis`` (0 to 2 for i, j, k).
-
-    ``first`` (m,) is the vertex of each face with the lowest indices.
-    """
+    """Return structured faces across ``axis`` (0 to 2) whose lowest vertices are ``first`` (m,)."""
     steps = np.delete(np.cumprod([1, *zone.shape[:-1]]), axis)
     corners = [0, steps[0]] if zone.dim == 2 else [0, steps[0], steps.sum(), steps[1]]
     return Cells.from_blocks([(3 if zone.dim == 2 else 9, first[:, None] + np.array(corners))])

@@ -38,10 +38,7 @@ _UNKNOWN = re.compile(r"Element type not available: (\S+)")
 
 
 def formats_of(path: Path) -> list[str]:
-    """Return the names of meshio's formats that have the file's ending, the likeliest first.
-
-    Raises MeshError if there is no such format.
-    """
+    """Return meshio's formats with the file's ending, the likeliest first; MeshError if none."""
     import meshio
 
     # Gmsh before ANSYS, which has the same ending but is rare.

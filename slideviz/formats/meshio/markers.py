@@ -133,10 +133,7 @@ def _add(groups: Groups, name: str | None, vtk: int, nodes: IntArray) -> None:
 
 
 def _by_point_sets(mesh: Mesh, data: meshio.Mesh, facets: Cells) -> tuple[Marker, ...]:
-    """Return a marker for each named set of points: the outer facets with all their nodes in it.
-
-    Sets without such facets are left out.
-    """
+    """Return a marker for each named set of points that has all nodes of some outer facets."""
     groups: Groups = {}
     for name, parts in in_node_sets(len(mesh.points), facets, data.point_sets).items():
         for vtk, nodes in parts:

@@ -54,10 +54,7 @@ _PRISM = np.array([0, 2, 1, 3, 5, 4])
 
 
 def write_vtu(path: Path, mesh: Mesh, options: WriteOptions) -> None:
-    """Write a mesh as VTU, with values on its cells and points and the names of its boundaries.
-
-    Raises MeshError if the file cannot be written.
-    """
+    """Write a mesh as VTU, with values and the names of its boundaries; or raise MeshError."""
     check_mesh(mesh)
     write_blocks(path, vtu_blocks(mesh, options.cell_data, options.point_data), options)
 

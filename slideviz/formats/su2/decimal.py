@@ -153,10 +153,7 @@ def decimal(text, at, bits, k):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _digits(text, at, value):  # type: ignore[no-untyped-def]
-    """Append the decimal digits from ``text[at]`` on to ``value``, modulo 2^64.
-
-    Returns the new value and where the digits end.
-    """
+    """Append the digits from ``text[at]`` on to ``value``, modulo 2^64; return it and the end."""
     digit = np.uint64(text[at]) - U48
     while digit < U10:
         value = value * U10 + digit
@@ -190,10 +187,7 @@ def _first_digits(text, at):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _exponent(text, at):  # type: ignore[no-untyped-def]
-    """Return where the exponent from ``text[at]`` on ends, and its value.
-
-    The end is -1 if there are no digits, or more than five.
-    """
+    """Return the end of the exponent at ``text[at]`` (-1: not 1 to 5 digits), and its value."""
     down = text[at] == 45
     if down or text[at] == 43:
         at += 1

@@ -158,10 +158,7 @@ def misspelt(sections: list[KeywordBlock], key: str) -> str:
 
 
 def count_of(lines: Lines, section: KeywordBlock) -> int:
-    """Return the number after the keyword; further words are ignored.
-
-    Raises MeshError if the first word is no whole number, or negative.
-    """
+    """Return the number after the keyword, ignoring further words; MeshError if it is no count."""
     word = (section.value.split() or [b""])[0]
     if not _COUNT.fullmatch(word):
         raise lines.error(

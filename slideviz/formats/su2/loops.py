@@ -34,19 +34,9 @@ def _print_whole(value, out, at):  # type: ignore[no-untyped-def]
 def print_cells(types, offsets, nodes, first, out):  # type: ignore[no-untyped-def]
     """Write a row for each element, type, nodes and index, into ``out``; return its length.
 
-    Parameters
-    ----------
-    types, offsets, nodes : (m,), (m + 1,), (k,)
-        The elements; only differences of the offsets are used.
-    first : int
-        The index of the first element; if negative, rows get no index.
-    out : (b,) uint8
-        Receives the text.
-
-    Returns
-    -------
-    int
-        The number of bytes.
+    ``types`` (m,), ``offsets`` (m + 1,), ``nodes`` (k,): of the offsets only differences are used.
+    ``first``: the index of the first element; if negative, rows get no index.
+    ``out`` (b,) uint8: receives the text.
     """
     at, k = 0, 0
     for row in range(len(types)):
@@ -65,10 +55,7 @@ def print_cells(types, offsets, nodes, first, out):  # type: ignore[no-untyped-d
 
 @njit(inline="always", **OPTIONS)
 def _copy_number(numbers, j, out, at):  # type: ignore[no-untyped-def]
-    """Copy the number at ``numbers[j]``, orjson's text, to ``out[at]``.
-
-    Returns where the next number begins in ``numbers``, and where the copy ends in ``out``.
-    """
+    """Copy orjson's number at ``numbers[j]`` to ``out[at]``; return where each goes on."""
     while numbers[j] != 44 and numbers[j] != 93:
         out[at] = numbers[j]
         j += 1
@@ -82,19 +69,9 @@ def _copy_number(numbers, j, out, at):  # type: ignore[no-untyped-def]
 def print_points(numbers, dim, first, out):  # type: ignore[no-untyped-def]
     """Write a row for each point, coordinates and index, into ``out``; return its length.
 
-    Parameters
-    ----------
-    numbers : (c,) uint8
-        The coordinates, as orjson writes them.
-    dim, first : int
-        Number of coordinates of a point; index of the first point.
-    out : (b,) uint8
-        Receives the text.
-
-    Returns
-    -------
-    int
-        The number of bytes.
+    ``numbers`` (c,) uint8: the coordinates, ``dim`` of each point, as orjson writes them.
+    ``first``: index of the first point.
+    ``out`` (b,) uint8: receives the text.
     """
     j, at, row = 2, 0, first
     while j < len(numbers):
@@ -113,22 +90,12 @@ def print_points(numbers, dim, first, out):  # type: ignore[no-untyped-def]
 def print_changed(text, numbers, changed, out):  # type: ignore[no-untyped-def]
     """Copy ``text`` to ``out`` with the coordinates that changed replaced.
 
-    Parameters
-    ----------
-    text : (b,) uint8
-        Whole lines; those that begin with a number are points.
-    numbers : (c,) uint8
-        All m x d coordinates of the points, as orjson writes them.
-    changed : (m, d) bool
-        The coordinates to replace.
-    out : (b + c,) uint8
-        Receives the text.
-
-    Returns
-    -------
-    rows, n_bytes : int
-        Number of points in the text, -1 if more than m: if it is not m, the file was changed. And
-        number of bytes in ``out``.
+    Returns the number of points in the text (if it is not m, the file was changed; -1: more than m)
+    and the number of bytes in ``out``.
+    ``text`` (b,) uint8: whole lines; those that begin with a number are points.
+    ``numbers`` (c,) uint8: all m x d coordinates of the points, as orjson writes them.
+    ``changed`` (m, d) bool: the coordinates to replace.
+    ``out`` (b + c,) uint8: receives the text.
     """
     i, j, at, row = 0, 2, 0, 0
     while i < len(text):
@@ -210,10 +177,7 @@ def _next_word(text, at):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _type_of(text, at):  # type: ignore[no-untyped-def]
-    """Return the whole number that a row begins with, an element type; 256 if it is larger.
-
-    It is 0 if there are no digits.
-    """
+    """Return the number that a row begins with: 0 without digits, 256 if it is no type."""
     at += text[at] == 43
     value = np.int64(0)
     while 48 <= text[at] <= 57:
@@ -225,20 +189,11 @@ def _type_of(text, at):  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def scan_block(text, runs):  # type: ignore[no-untyped-def]
-    """Write the runs (see `Lines`) of a block of lines into ``runs``; return how many there are.
+    """Write the runs (see `Lines`) of a block into ``runs``; return the numbers of runs and lines.
 
-    Parameters
-    ----------
-    text : (b,) uint8
-        The lines.
-    runs : (l, 5) int64
-        Receives the runs, columns as in ``RUN_COLUMNS``, with bytes and lines counted from the
-        start of the block; l is the number of lines. The first run may have no line of text.
-
-    Returns
-    -------
-    n_runs, n_lines : int
-        Numbers of runs and lines.
+    ``text`` (b,) uint8: the lines.
+    ``runs`` (l, 5) int64: receives the runs, columns as in ``RUN_COLUMNS``, with bytes and lines
+    counted from the start of the block; l is the number of lines. The first run may have no text.
     """
     at, line, n = 0, 0, 0
     while at < len(text):
@@ -311,24 +266,12 @@ def _nodes(text, at, size, n_points, nodes, k):  # type: ignore[no-untyped-def]
 def cell_block(text, dim, n_points, types, nodes, odd):  # type: ignore[no-untyped-def]
     """Read the rows of elements (type, nodes, perhaps an index, ignored) into types and nodes.
 
-    Parameters
-    ----------
-    text : (b,) uint8
-        Whole lines; those that are no rows are skipped.
-    dim, n_points : int
-        Dimension that elements must have; number that nodes must be below.
-    types : (m,) uint8
-        Receives the types.
-    nodes : (k,) int64
-        Receives the nodes.
-    odd : (m, 3) int64
-        Receives for each row left: its number, the first byte of its line, and the index of its
-        first node in ``nodes``.
-
-    Returns
-    -------
-    rows, left : int
-        Number of rows (-1 if more than m; if it is not m, the file was changed), and of rows left.
+    Returns the number of rows (-1 if more than m; if it is not m, the file was changed), and of
+    rows left. ``text`` (b,) uint8: whole lines; those that are no rows are skipped.
+    ``dim``, ``n_points``: dimension that elements must have; number that nodes must be below.
+    ``types`` (m,) uint8, ``nodes`` (k,) int64: receive types and nodes.
+    ``odd`` (m, 3) int64: receives for each row left its number, the first byte of its line, and the
+    index of its first node in ``nodes``.
     """
     at, row, k, n = 0, 0, 0, 0
     while at < len(text):
@@ -367,25 +310,13 @@ def _ends_row(text, at):  # type: ignore[no-untyped-def]
 def point_block(text, first, points, extra, odd):  # type: ignore[no-untyped-def]
     """Read the rows of points (coordinates, perhaps one or two indices) into ``points``.
 
-    Parameters
-    ----------
-    text : (b,) uint8
-        Whole lines; those that are no rows are skipped.
-    first : int
-        Number of the first row among all points.
-    points : (m, d) uint64
-        Receives the bits of the coordinates.
-    extra : (2,) int64
-        Updated by the rows that are not left: ``[0]`` becomes the largest count of numbers on a
-        row, ``[1]`` the smallest number of a row that has only d numbers, the last of which is
-        that number: perhaps its index, and a coordinate is missing.
-    odd : (m, 2) int64
-        Receives for each row left: its number and the first byte of its line.
-
-    Returns
-    -------
-    rows, left : int
-        Number of rows (-1 if more than m; if it is not m, the file was changed), and of rows left.
+    Returns as `cell_block`. ``text`` (b,) uint8: whole lines; those that are no rows are skipped.
+    ``first``: number of the first row among all points.
+    ``points`` (m, d) uint64: receives the bits of the coordinates.
+    ``extra`` (2,) int64: updated by the rows that are not left: ``[0]`` becomes the largest count
+    of numbers on a row, ``[1]`` the smallest number of a row that has only d numbers, the last of
+    which is that number: perhaps its index, and a coordinate is missing.
+    ``odd`` (m, 2) int64: receives for each row left its number and the first byte of its line.
     """
     at, row, n, dim = 0, 0, 0, points.shape[1]
     bits = np.zeros(1, np.uint64)

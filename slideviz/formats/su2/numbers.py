@@ -186,16 +186,9 @@ def parse_points(lines: Lines, rows: Rows, dim: int, progress: Tick) -> FloatArr
 def fill_points(lines: Lines, piece: Piece, points: FloatArray) -> IntArray:
     """Write the coordinates of the m points of a piece into ``points`` (m, d).
 
-    Returns
-    -------
-    (2,) int64
-        Largest count of numbers on a row, and number of the first row that may lack a coordinate
-        (``extra`` of `loops.point_block`), the largest int64 if there is none.
-
-    Raises
-    ------
-    MeshError
-        A row has too few or many numbers, or one that is not finite; the message has its line.
+    Returns (2,) int64: the largest count of numbers on a row, and the number of the first row that
+    may lack a coordinate (``extra`` of `loops.point_block`), the largest int64 if there is none.
+    Raises MeshError if a row has too few or many numbers, or one that is not finite.
     """
     from slideviz.formats.su2.loops import point_block
 
