@@ -111,17 +111,11 @@ def knots(count: int, order: int) -> FloatArray:
 def blending(count: int, order: int, at: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the functions and their derivatives at parametric coordinates.
 
-    Parameters
-    ----------
-    count, order : int
-        Control points, and the order of the functions, from 1 to ``count``.
-    at : (m,) float64
-        Parametric coordinates; outside of [0, 1] the outermost polynomials are continued.
-
-    Returns
-    -------
-    values, slopes : (m, count) float64
-        The functions, and their derivatives with respect to the coordinate.
+    Returns ``values, slopes`` (m, count): the functions, and their derivatives with respect to the
+    coordinate.
+    ``count`` and ``order``: control points, and the order of the functions, from 1 to ``count``.
+    ``at`` (m,) float64: parametric coordinates; outside of [0, 1] the outermost polynomials are
+    continued.
     """
     knot, degree = knots(count, order), order - 1
     span = np.clip(np.searchsorted(knot, at, "right") - 1, degree, count - 1)

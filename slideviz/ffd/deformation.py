@@ -36,16 +36,8 @@ CHUNK = 20_000  # points solved for together
 def parametric(box: Box, points: FloatArray) -> tuple[FloatArray, np.ndarray]:
     """Return the parametric coordinates of points, and which points are in the box.
 
-    Parameters
-    ----------
-    points : (m, 3) or (m, 2) float64
-        In 2D, points of the plane z = 0.
-
-    Returns
-    -------
-    uvw : (m, 3) float64
-        In [0, 1]; NaN outside of the box.
-    inside : (m,) bool
+    Returns ``uvw`` (m, 3): in [0, 1]; NaN outside of the box; ``inside`` (m,) bool.
+    ``points`` (m, 3) or (m, 2) float64: in 2D, points of the plane z = 0.
     """
     spatial = np.zeros((len(points), 3))
     spatial[:, : points.shape[1]] = points

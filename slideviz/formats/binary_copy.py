@@ -115,15 +115,11 @@ def binary_layout(
 ) -> BinaryLayout:
     """Return the layout of the binary form of a text mesh.
 
-    Parameters
-    ----------
-    text : Text
-        The text mesh.
-    is_result : bool
-        Whether the binary is made for users, as by `slideviz.convert`: with the markers' names and
-        8 bytes for each index. If not, markers have numbers, and indices 4 bytes where they fit.
-    begin, number : int
-        First byte and number of its zone.
+    ``text``: the text mesh.
+    ``is_result``: whether the binary is made for users, as by `slideviz.convert`: with the markers'
+    names and 8 bytes for each index. If not, markers have numbers, and indices 4 bytes where they
+    fit.
+    ``begin`` and ``number``: first byte and number of its zone.
     """
     pieces = text.zone.elements
     before = np.zeros((len(pieces) + 1, len(SORTED)), np.int64)

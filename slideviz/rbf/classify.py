@@ -189,11 +189,8 @@ def _ranks(normals: FloatArray, group: IntArray, label: IntArray) -> IntArray:
     """Return the rank of the mean normals of each node's clusters, (g,).
 
     Where two are opposite (a thin tip) it counts as full, d.
-
-    Parameters
-    ----------
-    normals, group, label : (m, d), (m,), (m,)
-        The normals of fans, the number of their node, and of their cluster there.
+    ``normals`` (m, d), ``group`` (m,), ``label`` (m,): the normals of fans, the number of their
+    node, and of their cluster there.
     """
     dim = normals.shape[1]
     means = np.zeros((int(group[-1]) + 1, int(label.max()) + 1, dim))
@@ -274,19 +271,12 @@ def classify(
 ) -> Classes:
     """Return the classes of all nodes.
 
-    Parameters
-    ----------
-    fan_role : (m,)
-        ``moving``, ``fixed``, ``sliding``, ``periodic`` or ``internal``.
-    normals : (m, d)
-        Unit normals of the undeformed fans, turned about the axis so that those of a node and of
-        its images can be compared (``Frame.turned_back``).
-    representative : (n,)
-        For each node, the number of the periodic image that represents it.
-    sliding
-        ``none``, ``ps`` or ``ds``.
-    periodic
-        ``none``, ``periodic``, ``fixed`` or ``moving``.
+    ``fan_role`` (m,): ``moving``, ``fixed``, ``sliding``, ``periodic`` or ``internal``.
+    ``normals`` (m, d): unit normals of the undeformed fans, turned about the axis so that those of
+    a node and of its images can be compared (``Frame.turned_back``).
+    ``representative`` (n,): for each node, the number of the periodic image that represents it.
+    ``sliding``: ``none``, ``ps`` or ``ds``.
+    ``periodic``: ``none``, ``periodic``, ``fixed`` or ``moving``.
     """
     at = representative[fans.fan_node]
     effect = _effects(fan_role, at, sliding, periodic)
@@ -342,14 +332,10 @@ def _collect(
 ) -> Classes:
     """Return the classes, with clusters numbered over all sliding nodes, images included.
 
-    Parameters
-    ----------
-    moving, fixed : (n,) bool
-    rows : (p, 2)
-        What `slide_rows` returns: fan, and cluster within its node.
-    at : (m,)
-        The node of each fan, with images as their representative.
-    representative : (n,)
+    ``moving`` and ``fixed`` (n,) bool.
+    ``rows`` (p, 2): what `slide_rows` returns: fan, and cluster within its node.
+    ``at`` (m,): the node of each fan, with images as their representative.
+    ``representative`` (n,).
     """
     order = np.argsort(at[rows[:, 0]], kind="stable")
     rows = rows[order]

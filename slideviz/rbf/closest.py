@@ -318,12 +318,8 @@ class ClosestPoints:
         """Return the closest point for each x (m, d), (m, d), and the number of its simplex, (m,).
 
         Numbers below 0 and from n on are images; `simplices` returns the corners.
-
-        Parameters
-        ----------
-        guess : (m,), optional
-            Numbers of simplices that are probably the closest, for speed. Where x is on its
-            guessed simplex, that one is taken, even if x is on others too.
+        ``guess`` (m,): numbers of simplices that are probably the closest, for speed. Where x is on
+        its guessed simplex, that one is taken, even if x is on others too.
         """
         begin = np.empty(0, np.int64) if guess is None else guess % len(self._order)
         dim, turns = x.shape[1], self._periods(x)

@@ -135,15 +135,10 @@ def _orthonormalised(
     """Return normals and right-hand sides with those of coinciding nodes orthonormalised.
 
     Raises DeformError where the right-hand sides of dependent constraints contradict each other.
-
-    Parameters
-    ----------
-    nodes, normals, right : (r,), (r, d), (..., r, 1)
-        The constraints, ``right`` their right-hand sides.
-    rows : (g, k)
-        The k rows of each group of coinciding nodes.
-    keep : (r,) bool
-        Set to False where a constraint follows from others of its group.
+    ``nodes`` (r,), ``normals`` (r, d), ``right`` (..., r, 1): the constraints, ``right`` their
+    right-hand sides.
+    ``rows`` (g, k): the k rows of each group of coinciding nodes.
+    ``keep`` (r,) bool: set to False where a constraint follows from others of its group.
     """
     for k, row in enumerate(rows.T):
         n, b = take(normals, row), take(right, row)

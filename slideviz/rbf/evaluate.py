@@ -46,16 +46,11 @@ def evaluate(
 ) -> FloatArray:
     """Return s at the targets, (N, d).
 
-    Parameters
-    ----------
-    basis
-        Radial function, support radius and distance.
-    targets, controls : (k, N), (k, n)
-        Features, as ``Frame.features`` gives them; k = 2, 3 or 4.
-    weights : (n, d)
-        Coefficients alpha of Eq. 2.6, d = 1 to 3 components.
-    tick
-        Called between chunks with the fraction done; may raise to stop.
+    ``basis``: radial function, support radius and distance.
+    ``targets`` (k, N), ``controls`` (k, n): features, as ``Frame.features`` gives them; k = 2, 3 or
+    4.
+    ``weights`` (n, d): coefficients alpha of Eq. 2.6, d = 1 to 3 components.
+    ``tick``: called between chunks with the fraction done; may raise to stop.
     """
     near = reached(basis, targets, controls, weights)
     if near is not None:
@@ -169,11 +164,8 @@ def matrix(
 ) -> FloatArray:
     """Return G_ab = phi(|x_a - c_b|) (m_a . n_b), (N, n).
 
-    Parameters
-    ----------
-    rows, columns
-        Features (k, N) of the node of each constraint, and its unit direction (N, d), or None
-        to leave the dot product out. ``columns`` None: the same as the rows.
+    ``rows`` and ``columns``: features (k, N) of the node of each constraint, and its unit direction
+    (N, d), or None to leave the dot product out. ``columns`` None: the same as the rows.
     """
     x, across = padded_rows(rows[0], 4), _directions(*rows)
     c, along = (

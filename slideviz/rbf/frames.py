@@ -63,11 +63,8 @@ def _corners_at_axis(x: FloatArray, touching: np.ndarray, nodes: IntArray) -> Fl
 
     A triangle with one corner on the axis becomes a quadrilateral, which begins at the corner
     before and has that corner twice, with the angle of each neighbour; else it gets their mean.
-
-    Parameters
-    ----------
-    x, touching, nodes : (k, d), (k,) bool, (k,)
-        The facet's corners, which of them are on the axis, and its nodes.
+    ``x`` (k, d), ``touching`` (k,) bool, ``nodes`` (k,): the facet's corners, which of them are on
+    the axis, and its nodes.
     """
     width = len(nodes)
     size = 3 if width == 4 and nodes[2] == nodes[3] else width
@@ -91,17 +88,10 @@ def hold_on_axis(
 ) -> tuple[IntArray, FloatArray, IntArray]:
     """Return the constraints with those of nodes on the axis replaced, so that they move along it.
 
-    Parameters
-    ----------
-    nodes, normals : (q,), (q, d)
-        Constraints of sliding nodes, rows of one node together.
-
-    Returns
-    -------
-    nodes, normals : (p,), (p, d)
-        The constraints; those of nodes on the axis are the last rows.
-    fixed : (h,)
-        Nodes on the axis that cannot move along it either (`TILT`; in 2D all of them).
+    Returns ``nodes, normals`` (p,), (p, d): the constraints; those of nodes on the axis are the
+    last rows; ``fixed`` (h,): nodes on the axis that cannot move along it either (`TILT`; in 2D all
+    of them).
+    ``nodes`` (q,), ``normals`` (q, d): constraints of sliding nodes, rows of one node together.
     """
     there = axis[nodes]
     if not there.any():
@@ -336,14 +326,10 @@ def make_frame(
 ) -> tuple[Frame, FloatArray]:
     """Return the frame that periodic pairs ask for, and the coordinates (n, d) in it.
 
-    Parameters
-    ----------
-    points : (n, d)
-        The undeformed mesh.
-    pairs
-        The periodic pairs; all have one period. Empty: not periodic.
-    periodic_distance
-        False keeps the frame of the pairs but with the plain distance (PERIODIC_MODE= none).
+    ``points`` (n, d): the undeformed mesh.
+    ``pairs``: the periodic pairs; all have one period. Empty: not periodic.
+    ``periodic_distance``: false keeps the frame of the pairs but with the plain distance
+    (PERIODIC_MODE= none).
     """
     dim = points.shape[1]
     if pairs and pairs[0].kind == "translational":

@@ -49,24 +49,15 @@ def newton(
 ) -> tuple[IntArray, list[FloatArray]]:
     """Return the rows picked by the one-node Newton greedy, and the Newton basis of each block.
 
-    Parameters
-    ----------
-    schur : list of (p_k, p_k)
-        What remains of the pool's matrix after the nodes chosen before, block after block.
-    residual : (p, m)
-        Of all rows of the pool, those of a block together, p the sum of all p_k.
-    nodes, factor : (p,), (p,)
-        The node of each row (all rows of a node are picked together), and the node's factor
-        (`tie_breaker`), with which its error is multiplied to decide between equal errors.
-    count, floor
-        Number of nodes, and the error below which to stop (the first is always taken).
-
-    Returns
-    -------
-    picked : (q,) int64
-        Places of rows among the p, in the order of choice.
-    basis : list of (p_k, q_k)
-        A column for each picked row of the block, in the same order.
+    Returns ``picked`` (q,) int64: places of rows among the p, in the order of choice; ``basis``
+    list of (p_k, q_k): a column for each picked row of the block, in the same order.
+    ``schur``: what remains of the pool's matrix after the nodes chosen before, block after block.
+    ``residual`` (p, m): of all rows of the pool, those of a block together, p the sum of all p_k.
+    ``nodes`` (p,), ``factor`` (p,): the node of each row (all rows of a node are picked together),
+    and the node's factor (`tie_breaker`), with which its error is multiplied to decide between
+    equal errors.
+    ``count`` and ``floor``: number of nodes, and the error below which to stop (the first is always
+    taken).
     """
     stops = np.cumsum([len(s) for s in schur])
     block = np.repeat(np.arange(len(schur)), [len(s) for s in schur])
@@ -370,20 +361,12 @@ class GreedyLevel:
     ) -> bool:
         """Run the Newton greedy on a pool's rows and append what it picks to the factors.
 
-        Parameters
-        ----------
-        rows, residual : (p,), (p, m)
-            The rows of the pool, and what the interpolant still lacks in each.
-        count, floor
-            How many nodes to pick at most, and the error below which to stop (the first is
-            always picked).
-        target : (r, m)
-            What the level has to meet, in all rows of the candidates.
-
-        Returns
-        -------
-        bool
-            Whether any was picked. ``increment`` is not solved for yet: call `solve`.
+        Returns whether any was picked. ``increment`` is not solved for yet: call `solve`.
+        ``rows`` (p,), ``residual`` (p, m): the rows of the pool, and what the interpolant still
+        lacks in each.
+        ``count`` and ``floor``: how many nodes to pick at most, and the error below which to stop
+        (the first is always picked).
+        ``target`` (r, m): what the level has to meet, in all rows of the candidates.
         """
         among = self._among
         order = np.argsort(among.block[rows], kind="stable")

@@ -132,12 +132,8 @@ def radial_sum(
     """Return the sum of weighted radial functions (..., N, d), at targets (k, N).
 
     Of controls (k, n); targets and controls are features.
-
-    Parameters
-    ----------
-    weights : (..., n, d)
-    out : (..., N, d), optional
-        Where the sums of several designs are written.
+    ``weights`` (..., n, d).
+    ``out`` (..., N, d): where the sums of several designs are written.
     """
     x, c, w = value(targets), value(controls), value(weights)
 

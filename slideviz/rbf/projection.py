@@ -154,14 +154,10 @@ class Tracks:
     def project(self, coords: FloatArray, nodes: IntArray, free: FloatArray) -> FloatArray:
         """Return the displacements (m, d) from ``coords`` to the closest points on the tracks.
 
-        Parameters
-        ----------
-        coords : (n, d)
-            Current positions in the frame, on the tracks.
-        nodes : (m,)
-        free : (m, d)
-            Displacements as interpolated. Zero displacements stay exactly zero. Those of nodes
-            without a track become zero.
+        ``coords`` (n, d): current positions in the frame, on the tracks.
+        ``nodes`` (m,).
+        ``free`` (m, d): displacements as interpolated. Zero displacements stay exactly zero. Those
+        of nodes without a track become zero.
         """
         out = np.zeros_like(free)
         label = self.of_node[nodes]

@@ -118,16 +118,12 @@ class System:
     ) -> Refined:
         """Return the weights that meet all rows, also those that the guard left out.
 
-        Parameters
-        ----------
-        right, start : (n, m)
-            Right-hand sides, and weights to begin with.
-        largest : (m,)
-            The largest data of each column, relative to which errors of its field are.
-        of_weights
-            Whether the weights themselves are the result, as of an adjoint system, where the field
-            does not show errors in the weights of nodes that nearly coincide. The doubt is then
-            the largest change of a weight in the last round, as a part of the largest weight.
+        ``right`` and ``start`` (n, m): right-hand sides, and weights to begin with.
+        ``largest`` (m,): the largest data of each column, relative to which errors of its field
+        are.
+        ``of_weights``: whether the weights themselves are the result, as of an adjoint system,
+        where the field does not show errors in the weights of nodes that nearly coincide. The doubt
+        is then the largest change of a weight in the last round, as a part of the largest weight.
         """
         weights, low = start.copy(), np.zeros_like(start)
         residuals = self._residuals()

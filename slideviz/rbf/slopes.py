@@ -202,14 +202,10 @@ def pull_positions(
 
     For the gradient with respect to the controls, exchange targets with controls and adjoint with
     weights.
-
-    Parameters
-    ----------
-    targets, controls : (k, N), (k, n)
-        Features, as ``Frame.features`` gives them.
-    adjoint, weights : (N, d), (n, d)
-    power
-        Not 0: the power of inverse distance weighting, xi^-power in place of the radial function.
+    ``targets`` (k, N), ``controls`` (k, n): features, as ``Frame.features`` gives them.
+    ``adjoint`` (N, d), ``weights`` (n, d).
+    ``power``, not 0: the power of inverse distance weighting, xi^-power in place of the radial
+    function.
     """
     x, c = padded_rows(targets, 4), padded_rows(controls, 4)
     out = np.empty((4, x.shape[1]))

@@ -44,13 +44,9 @@ def solve_saddle(matrix: FloatArray, terms: FloatArray, right: FloatArray) -> Sa
 
     Symmetric indefinite, solved with Bunch and Kaufman's pivoting. Terms that are dependent at
     the given nodes (all in one plane) are left out. Raises DeformError if numbers are not finite.
-
-    Parameters
-    ----------
-    matrix : (n, n)
-    terms : (n, q)
-        The polynomial's terms in each row.
-    right : (n, m)
+    ``matrix`` (n, n).
+    ``terms`` (n, q): the polynomial's terms in each row.
+    ``right`` (n, m).
     """
     require_finite(matrix)
     system, use = saddle_system(matrix, terms)

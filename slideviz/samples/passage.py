@@ -332,19 +332,13 @@ def smooth(
 ) -> FloatArray:
     """Return the points (n, 2) that minimise the functional (see above), by Newton's method.
 
-    Parameters
-    ----------
-    points : (n, 2)
-        Where to start; no cell may be folded.
-    quads : (m, 4)
-        Nodes of the cells, counter-clockwise.
-    rho : (m,)
-        Wanted length of a cell's edges 1-2 and 3-0, divided by that of its edges 0-1 and 2-3.
-    dof : (n, 2)
-        Number of the unknown that moves each coordinate, -1 where it is fixed. Coordinates with
-        the same number move alike.
-    tolerance : float
-        It ends when a step moves no coordinate by more than this length.
+    ``points`` (n, 2): where to start; no cell may be folded.
+    ``quads`` (m, 4): nodes of the cells, counter-clockwise.
+    ``rho`` (m,): wanted length of a cell's edges 1-2 and 3-0, divided by that of its edges 0-1 and
+    2-3.
+    ``dof`` (n, 2): number of the unknown that moves each coordinate, -1 where it is fixed.
+    Coordinates with the same number move alike.
+    ``tolerance``: it ends when a step moves no coordinate by more than this length.
     """
     corners = np.concatenate([np.roll(quads, -k, axis=1)[:, [0, 1, 3]] for k in range(4)])
     ratio = np.concatenate([rho, 1 / rho, rho, 1 / rho])

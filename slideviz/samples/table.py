@@ -162,16 +162,10 @@ def sample(name: str, size: int | None = None, variant: str | None = None) -> Sa
     """Return a sample case.
 
     Raises CaseError if there is no such sample or variant, or the size is out of range.
-
-    Parameters
-    ----------
-    name : str
-        One of ``SAMPLES``.
-    size : int, optional
-        Cells in each direction; of the passage: cells along its inflow; of the airfoil: cells
-        around it; of turbine rows and stator: all cells. The usual size when left out.
-    variant : str, optional
-        One of ``SAMPLES[name].variants``; the first when left out.
+    ``name``: one of ``SAMPLES``.
+    ``size``: cells in each direction; of the passage: cells along its inflow; of the airfoil: cells
+    around it; of turbine rows and stator: all cells. The usual size when left out.
+    ``variant``: one of ``SAMPLES[name].variants``; the first when left out.
     """
     row, kind = _row(name, variant)
     return row.make(name, row.size if size is None else size, kind)

@@ -49,17 +49,11 @@ def unsoundness(
 ) -> str | None:
     """Return why the result of a step cannot be right, and what helps; None where it may be.
 
-    Parameters
-    ----------
-    moved : (n, d)
-        Coordinates in the frame after the step. In a cylindrical one angles are times the largest
-        radius: so a body that turns about the axis carries no node farther than itself.
-    part : float
-        The part of the whole displacement that is reached after the step, 0 to 1.
-    farthest : float
-        The largest displacement of all nodes, in the frame.
-    least : float
-        A length: the whole displacement counts as at least so long, where it is smaller.
+    ``moved`` (n, d): coordinates in the frame after the step. In a cylindrical one angles are times
+    the largest radius: so a body that turns about the axis carries no node farther than itself.
+    ``part``: the part of the whole displacement that is reached after the step, 0 to 1.
+    ``farthest``: the largest displacement of all nodes, in the frame.
+    ``least``: a length: the whole displacement counts as at least so long, where it is smaller.
     """
     largest = part * setup.largest
     if solution.lost > HOPELESS * largest:

@@ -57,11 +57,8 @@ LOOSE = 0.1  # a tolerance above this part of the largest displacement gets a wa
 def sliding_gap(points: FloatArray, facets: IntArray, classes: Classes) -> float:
     """Return the smallest distance between a moving and a sliding node on one edge; or inf.
 
-    Parameters
-    ----------
-    points : (n, d)
-    facets : (f, k)
-        Of the boundary, so that a streamed mesh has the same.
+    ``points`` (n, d).
+    ``facets`` (f, k): of the boundary, so that a streamed mesh has the same.
     """
     moving, sliding = np.zeros((2, len(points)), bool)
     moving[classes.moving], sliding[classes.sliding] = True, True
@@ -225,20 +222,12 @@ class Setup(Domain):
 def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Setup:
     """Return the setup of a deformation: all that stays the same over its steps.
 
-    Parameters
-    ----------
-    moved : Displacements, optional
-        Displacements of moving nodes, as ``displaced`` returns them; None: by the case's motions.
-
-    Raises
-    ------
-    CaseError
-        The case does not fit the mesh.
-    MeshError
-        Periodic markers do not match, a marker element is no side of a cell, or a coordinate is
-        not finite, or too large to compute with.
-    DeformError
-        No node is moving or fixed, or periodic images are asked to move differently.
+    Raises CaseError if the case does not fit the mesh, and MeshError if periodic markers do not
+    match, a marker element is no side of a cell, or a coordinate is not finite, or too large to
+    compute with, and DeformError if no node is moving or fixed, or periodic images are asked to
+    move differently.
+    ``moved``: displacements of moving nodes, as ``displaced`` returns them; None: by the case's
+    motions.
     """
     require_valid(case, mesh)
     domain = find_domain(case, mesh)

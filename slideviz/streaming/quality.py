@@ -148,24 +148,12 @@ def measure_mesh(
     """Return the quality of all cells of a mesh.
 
     Of a mesh in a file it is without size and skew, and its arrays are in scratch files.
-
-    Parameters
-    ----------
-    stack : ExitStack
-        Removes the scratch files when it closes.
-    folder : Path
-        Where they are made, that for temporary files: 9 bytes for each cell.
-    worst : int
-        As for `quality_totals`.
-    counts : CellCounts, optional
-        Counts all cells, too.
-    may_fold : bool
-        As for `quality_blocks`.
-
-    Raises
-    ------
-    MeshError
-        As by `quality_blocks`; or there is no disk space for the scratch files.
+    Raises MeshError as `quality_blocks` does, or if there is no disk space for the scratch files.
+    ``stack``: removes the scratch files when it closes.
+    ``folder``: where they are made, that for temporary files: 9 bytes for each cell.
+    ``worst``: as for `quality_totals`.
+    ``counts``: counts all cells, too.
+    ``may_fold``: as for `quality_blocks`.
     """
     collector: QualityCollector | None = None
     for block in quality_blocks(source, metric, tick, may_fold=may_fold):

@@ -120,32 +120,18 @@ def stream(
     Raises CaseError or MeshError if the case does not fit the mesh, or the mesh is of no format
     that can be streamed, and DeformError if the system cannot be solved, or the method needs the
     whole mesh.
-
-    Parameters
-    ----------
-    output : Path
-        The file of the deformed mesh, written whole or not at all.
-    file_format : {"su2", "su2b"}, optional
-        The format of ``output``; None: by its ending.
-    report : callable
-        Called often with a ``Progress``; an exception it raises ends the run at once.
-    note : callable
-        Called with a sentence on what ``resume`` found.
-    warn : callable
-        Called with a sentence on what of the mesh the output will lack; with "" if nothing.
-    resume : bool
-        Whether to go on where a run was stopped.
-    replaces : Path, optional
-        An input file that the output may overwrite.
-    listed : int
-        Most inverted cells whose first inverted step is found.
-    worst : int
-        As for `slideviz.mesh.quality.quality_totals`.
-    later : int
-        Bytes for each cell that the caller writes beside the output afterwards: the disk must
-        have room for them, too.
-    ranks : SerialPool or Ranks
-        The processes that share the work; this one is rank 0.
+    ``output``: the file of the deformed mesh, written whole or not at all.
+    ``file_format``: the format of ``output``; None: by its ending.
+    ``report``: called often with a ``Progress``; an exception it raises ends the run at once.
+    ``note``: called with a sentence on what ``resume`` found.
+    ``warn``: called with a sentence on what of the mesh the output will lack; with "" if nothing.
+    ``resume``: whether to go on where a run was stopped.
+    ``replaces``: an input file that the output may overwrite.
+    ``listed``: most inverted cells whose first inverted step is found.
+    ``worst``: as for `slideviz.mesh.quality.quality_totals`.
+    ``later``: bytes for each cell that the caller writes beside the output afterwards: the disk
+    must have room for them, too.
+    ``ranks``: the processes that share the work; this one is rank 0.
     """
     assert case.mesh_file is not None
     path = case.mesh_file

@@ -113,17 +113,9 @@ def cut_cells(
 ) -> CellBlock:
     """Return the cells of some blocks that a section can cut, after any transformation.
 
-    Parameters
-    ----------
-    matrices : iterable of (4, 4)
-        The transformations of the points.
-    near : float
-        Nodes at most so far from the section are on it.
-
-    Returns
-    -------
-    CellBlock
-        The cells with nodes on both sides of the section, or on it; perhaps none.
+    Returns the cells with nodes on both sides of the section, or on it; perhaps none.
+    ``matrices``: the transformations of the points.
+    ``near``: nodes at most so far from the section are on it.
     """
     transformations = list(matrices)
     return join_blocks(

@@ -152,19 +152,11 @@ def open_for_run(
 
     The copy is removed at the end, but kept where the run is stopped, to go on with. Raises
     MeshError if it is of no format that can be streamed, or has a mistake; the disk has no room.
-
-    Parameters
-    ----------
-    is_text : bool
-        Whether the output is a text.
-    version : str
-        The program's version: a copy made by another version is not used again.
-    resume : bool
-        Whether to use the copy that a stopped run has left.
-    warn : callable
-        Called with a sentence on what of the mesh the output will lack; with "" if nothing.
-    later : int
-        Bytes for each cell that the caller writes beside the output afterwards.
+    ``is_text``: whether the output is a text.
+    ``version``: the program's version: a copy made by another version is not used again.
+    ``resume``: whether to use the copy that a stopped run has left.
+    ``warn``: called with a sentence on what of the mesh the output will lack; with "" if nothing.
+    ``later``: bytes for each cell that the caller writes beside the output afterwards.
     """
     if require_su2(path, file_format) == "su2b":
         if is_text:

@@ -42,18 +42,9 @@ def montage(rows: Sequence[CombinationRow], base: Mesh) -> Any:
 
     With many methods and few modes it is the other way round, so that the montage is not too long.
     A method or a mode without any result has no row or column; a note at the foot says why.
-
-    Parameters
-    ----------
-    rows : sequence of CombinationRow
-        Of one number of steps. Where a row has no result or no mesh, its place says so.
-    base : Mesh
-        The undeformed mesh.
-
-    Returns
-    -------
-    matplotlib.figure.Figure or None
-        None where no row has a mesh.
+    Returns None where no row has a mesh.
+    ``rows``: of one number of steps. Where a row has no result or no mesh, its place says so.
+    ``base``: the undeformed mesh.
     """
     done = [row for row in rows if row.result is not None]
     kept = {

@@ -81,14 +81,10 @@ def result_of(line: FacetLine) -> Result:
 def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | None:
     """Return the function that makes profiles along the span; None without a span.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        The undeformed mesh. Cells are assigned to places along the span by it, so that a layer of
-        cells stays together when it bends.
-    span : {"r", "x", "y", "z"}, optional
-        When left out: the radius of a 3D mesh that repeats by rotation, z of another 3D mesh,
-        no span for a 2D mesh.
+    ``mesh``: the undeformed mesh. Cells are assigned to places along the span by it, so that a
+    layer of cells stays together when it bends.
+    ``span``: when left out: the radius of a 3D mesh that repeats by rotation, z of another 3D mesh,
+    no span for a 2D mesh.
     """
     axis, origin, turns = case.axis, case.origin, False
     names = case.markers_with("periodic")

@@ -43,14 +43,11 @@ class SerialPool:
     ) -> Iterator[RunTasks[Task, Result]]:
         """Context with a function that does tasks and yields their results in order.
 
-        Parameters
-        ----------
-        make : callable
-            A function at the top level of a module. Each rank calls it with ``arguments``; it
-            returns a context manager with the function that does one task, in any thread, and opens
-            the files it needs by itself.
-        arguments : object
-            Arguments of ``make``; they, tasks and results are pickled if there are several ranks.
+        ``make``: a function at the top level of a module. Each rank calls it with ``arguments``; it
+        returns a context manager with the function that does one task, in any thread, and opens the
+        files it needs by itself.
+        ``arguments``: arguments of ``make``; they, tasks and results are pickled if there are
+        several ranks.
         """
         threads = cores()
         with make(*arguments) as work, core_limit(1), ThreadPoolExecutor(threads) as pool:

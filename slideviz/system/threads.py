@@ -47,13 +47,9 @@ def in_parts(
 ) -> None:
     """Call ``work`` with slices that cut ``count`` rows into parts, on all cores.
 
-    Parameters
-    ----------
-    work : callable
-        Each call writes to places of its own.
-    tick : callable
-        Called by the calling thread, before each of its parts, with the fraction begun. What it
-        raises ends the work, as does what ``work`` raises.
+    ``work``: each call writes to places of its own.
+    ``tick``: called by the calling thread, before each of its parts, with the fraction begun. What
+    it raises ends the work, as does what ``work`` raises.
     """
     parts = iter([slice(first, min(first + PART, count)) for first in range(0, count, PART)])
 

@@ -245,19 +245,11 @@ def partial_file(
     An error in the block removes the file. If the program is stopped, the file stays if a part is
     recorded as done, so that ``resume`` can continue. Otherwise the caller removes or renames it.
     Raises MeshError if it cannot be written, or another process is writing it.
-
-    Parameters
-    ----------
-    path : Path
-        The target.
-    size : int
-        Number of bytes.
-    about : str
-        A text that identifies the work: if that in the note differs, the file is made anew.
-    resume : bool
-        Whether to continue with the file of a stopped process, if there is one.
-    more : str
-        End of its name, where a target has several partial files.
+    ``path``: the target.
+    ``size``: number of bytes.
+    ``about``: a text that identifies the work: if that in the note differs, the file is made anew.
+    ``resume``: whether to continue with the file of a stopped process, if there is one.
+    ``more``: end of its name, where a target has several partial files.
     """
     ours, note = names_of(path, more)
     try:
@@ -299,19 +291,11 @@ def partial_copy(
 
     Of a copy that a stopped process has left, all that is not ``changed`` is made equal again.
     Raises MeshError if it cannot be written, or another process is writing it.
-
-    Parameters
-    ----------
-    path : Path
-        The target.
-    source : Path
-        The mesh to copy.
-    about, resume
-        As of `partial_file`.
-    changed : tuple of int
-        The first of the bytes that the caller changes, and the one after the last.
-    ranks : SerialPool or Ranks
-        The processes that copy.
+    ``path``: the target.
+    ``source``: the mesh to copy.
+    ``about`` and ``resume``: as of `partial_file`.
+    ``changed``: the first of the bytes that the caller changes, and the one after the last.
+    ``ranks``: the processes that copy.
     """
     require_no_input(path, MeshError, replaces)
     size = source.stat().st_size
