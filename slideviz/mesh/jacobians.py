@@ -219,7 +219,7 @@ def spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _write_prism(at, count, found):  # type: ignore[no-untyped-def]
+def write_prism(at, count, found):  # type: ignore[no-untyped-def]
     """Write the coefficients that `prism_coefficients` describes into ``found`` (3, 3, ...)."""
     for c in range(count):
         a, b = edge(at, 0, 1, c), edge(at, 0, 2, c)
@@ -238,7 +238,7 @@ NODE = np.array([[[0, 4], [3, 7]], [[1, 5], [2, 6]]])
 
 
 @njit(**OPTIONS)
-def _write_hexahedron(at, count, found):  # type: ignore[no-untyped-def]
+def write_hexahedron(at, count, found):  # type: ignore[no-untyped-def]
     """Write those that `hexahedron_coefficients` describes into ``found`` (3, 3, 3, ...)."""
     found[:] = 0.0
     for i in range(2):
@@ -298,10 +298,10 @@ def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ig
         sides, states = turn[here], status[here]
         states[:] = VALID
         if vtk == 12:
-            _write_hexahedron(at, count, coefficients)
+            write_hexahedron(at, count, coefficients)
             _mark(coefficients.reshape(27, LANES), sides, states, UNPROVEN)
         elif vtk == 13:
-            _write_prism(at, count, coefficients[0])
+            write_prism(at, count, coefficients[0])
             _mark(coefficients[0, 1], sides, states, UNPROVEN)
         for k in range(len(table)):
             for c in range(count):
@@ -327,7 +327,7 @@ def prism_coefficients(at: FloatArray) -> FloatArray:
     Jacobians, and the volume is the sum of all, divided by 18.
     """
     coefficients = np.empty((3, 3, at.shape[2]))
-    _write_prism(np.ascontiguousarray(at), at.shape[2], coefficients)
+    write_prism(np.ascontiguousarray(at), at.shape[2], coefficients)
     return coefficients
 
 
@@ -342,5 +342,5 @@ def hexahedron_coefficients(at: FloatArray) -> FloatArray:
     J.-F. Remacle, C. Geuzaine, Geometrical validity of curvilinear finite elements, 2013).
     """
     coefficients = np.empty((3, 3, 3, at.shape[2]))
-    _write_hexahedron(np.ascontiguousarray(at), at.shape[2], coefficients)
+    write_hexahedron(np.ascontiguousarray(at), at.shape[2], coefficients)
     return coefficients

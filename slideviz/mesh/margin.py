@@ -1,0 +1,319 @@
+"""Margins of cells: how far nodes may go along straight paths before a cell is no longer valid.
+
+Along ``x + s u`` each determinant of the proof of validity (`slideviz.mesh.jacobians`) is a
+polynomial in s: quadratic in 2D, cubic in 3D. A cell's margin is the smallest s at which one of
+them is not positive: exact for triangles, quadrilaterals, tetrahedra and pyramids, and for cells
+whose Jacobian vanishes first in a corner. Inside of prisms and hexahedra it is a lower bound, from
+Bézier coefficients: the cell is cut in halves until the bound is at most the part `GAP` below the
+margin.
+
+Rounding cannot make a margin too large: from each determinant a bound for the rounding errors of
+coordinates and determinants is subtracted (`ROUNDING`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from slideviz.mesh.jacobians import (
+    CORNERS,
+    LANES,
+    LEVELS,
+    OPTIONS,
+    corners,
+    gather,
+    write_hexahedron,
+    write_prism,
+)
+from slideviz.system.jit_cache import njit
+from slideviz.system.threads import in_parts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from slideviz.mesh.model import Cells, FloatArray, IntArray
+
+GAP = 2.0**-9
+"""Largest relative distance from a lower bound to the margin at which a cell is not cut again."""
+
+PARTS = 1000
+"""Most parts that a cell is cut into; those left then count with their lower bounds."""
+
+ROUNDING = 64 * np.finfo(float).eps
+"""Bound for the error of a determinant, divided by the largest coordinate and by the squared (in 2D
+simple) size of the cell."""
+
+STRIDES = {12: np.array([9, 3, 1]), 13: np.array([3])}
+"""Distances of neighbouring coefficients along the axes in which a cell is cut, by type."""
+_NO_STRIDES = np.empty(0, np.int64)
+
+
+def margins(
+    points: FloatArray,
+    displacement: FloatArray,
+    cells: Cells,
+    cap: float,
+    signs: NDArray[np.int8] | None = None,
+    going_on: Callable[[], object] = lambda: None,
+) -> FloatArray:
+    """Return the margins (m,) of cells along ``points + s * displacement``, from 0 to ``cap``.
+
+    A cell with margin 0 is not valid at s = 0, or not proved to be. The bits do not depend on the
+    number of threads, nor on the other cells.
+
+    Parameters
+    ----------
+    points, displacement : (n, d)
+    cells : Cells
+        Cells of dimension d.
+    cap : float
+        Largest margin that is looked for; positive, finite.
+    signs : (m,), optional
+        1, or -1 for a cell that is numbered the other way round; without it all are 1.
+    going_on : callable
+        Called every few thousand cells; what it raises ends the work.
+    """
+    found = np.empty(len(cells))
+    turns = np.ones(len(cells), np.int8) if signs is None else signs
+    for vtk, (ids, nodes) in cells.by_type.items():
+
+        def of_part(part: slice, vtk: int, ids: IntArray, nodes: IntArray) -> None:
+            here, values = ids[part], np.empty(part.stop - part.start)
+            strides = STRIDES.get(vtk, _NO_STRIDES)
+            arrays = points, displacement, nodes[part], CORNERS[vtk], turns[here], strides
+            _write_margins(vtk, *arrays, cap, values)
+            found[here] = values
+
+        in_parts(partial(of_part, vtk=vtk, ids=ids, nodes=nodes), len(ids), lambda _: going_on())
+    return found
+
+
+@njit(**OPTIONS)
+def _write_margins(vtk, points, displacement, nodes, table, turn, strides, cap, found):  # type: ignore[no-untyped-def]
+    """Write the margins of cells of one type, ``nodes`` (m, n), into ``found`` (m,)."""
+    dim, size = points.shape[1], 3 ** len(strides) if len(strides) != 1 else 9
+    size = size if len(strides) else len(table)
+    start, motion, at = np.empty((3, dim, nodes.shape[1], LANES))
+    values, errors = np.empty((4, size, LANES)), np.empty((4, LANES))
+    scale, poly = np.empty(LANES), np.empty((size, 4))
+    stack = np.empty((len(strides) * LEVELS + 2, size, 4))
+    for first in range(0, len(nodes), LANES):
+        count = min(LANES, len(nodes) - first)
+        gather(points, nodes, first, count, start)
+        gather(displacement, nodes, first, count, motion)
+        _normalize(start, motion, count, scale, errors)
+        for k in range(4):
+            a, b = (1.0, 1.0, 1.0, 0.0)[k], (0.0, 1.0, -1.0, 1.0)[k]
+            for axis in range(dim):
+                for j in range(nodes.shape[1]):
+                    for c in range(count):
+                        at[axis, j, c] = a * start[axis, j, c] + b * motion[axis, j, c]
+            if vtk == 12:
+                write_hexahedron(at, count, values[k].reshape(3, 3, 3, LANES))
+            elif vtk == 13:
+                write_prism(at, count, values[k].reshape(3, 3, LANES))
+            else:
+                corners(at, table, count, values[k])
+        safe = _write_polynomials(dim, values, errors, turn[first : first + count], cap / scale)
+        for c in range(count):
+            found[first + c], end = cap, cap / scale[c]
+            if not safe[c]:
+                poly[:] = values[:, :, c].T
+                root = _margin(poly, strides, end, stack)
+                if root < end:
+                    found[first + c] = min(cap, scale[c] * root)
+
+
+@njit(**OPTIONS)
+def _normalize(start, motion, count, scale, errors):  # type: ignore[no-untyped-def]
+    """Take both relative to the cell's first node, and divide s by ``scale``, (LANES,).
+
+    So both have one size, and the polynomials in s / scale have coefficients of like size.
+    ``errors`` (4, LANES) become the polynomial that bounds the rounding errors of determinants.
+    """
+    for c in range(count):
+        far, fast, size, speed = 0.0, 0.0, 0.0, 0.0
+        for axis in range(len(start)):
+            x, u = start[axis, 0, c], motion[axis, 0, c]
+            for j in range(start.shape[1]):
+                far = max(far, abs(start[axis, j, c]))
+                fast = max(fast, abs(motion[axis, j, c]))
+                start[axis, j, c] -= x
+                motion[axis, j, c] -= u
+                size = max(size, abs(start[axis, j, c]))
+                speed = max(speed, abs(motion[axis, j, c]))
+        scale[c] = size / speed if speed > 1e-100 * size else 1.0
+        for axis in range(len(start)):
+            for j in range(start.shape[1]):
+                motion[axis, j, c] *= scale[c]
+        speed, fast = speed * scale[c], fast * scale[c]
+        if fast == 0.0:
+            errors[:, c] = 0.0  # no coordinate changes: the proof decides
+            continue
+        # (far + fast t) (size + speed t)^(d - 1)
+        quadratic = (size * size, 2 * size * speed, speed * speed)
+        if len(start) == 2:
+            quadratic = (size, speed, 0.0)
+        errors[0, c] = ROUNDING * far * quadratic[0]
+        errors[1, c] = ROUNDING * (far * quadratic[1] + fast * quadratic[0])
+        errors[2, c] = ROUNDING * (far * quadratic[2] + fast * quadratic[1])
+        errors[3, c] = ROUNDING * fast * quadratic[2]
+
+
+@njit(**OPTIONS)
+def _write_polynomials(dim, values, errors, turn, ends):  # type: ignore[no-untyped-def]
+    """Turn determinants at x, x + v, x - v and v, ``values`` (4, k, ...), into coefficients.
+
+    Return a mask (LANES,) of the cells of which no polynomial has a root up to ``ends``: all of
+    its four Bernstein coefficients are positive there.
+    """
+    safe = np.ones(LANES, np.bool_)
+    for k in range(values.shape[1]):
+        for c in range(len(turn)):
+            sign, t = turn[c], ends[c]
+            at, plus, minus = values[0, k, c], values[1, k, c], values[2, k, c]
+            last = values[3, k, c]
+            cubic = last if dim == 3 else 0.0
+            square = 0.5 * (plus + minus) - at if dim == 3 else last
+            d0 = sign * at - errors[0, c]
+            d1 = sign * (0.5 * (plus - minus) - cubic) - errors[1, c]
+            d2, d3 = sign * square - errors[2, c], sign * cubic - errors[3, c]
+            values[0, k, c], values[1, k, c] = d0, d1
+            values[2, k, c], values[3, k, c] = d2, d3
+            low, high = d0 + d1 * t / 3, d0 + (2 * d1 + d2 * t) * t / 3
+            end = d0 + (d1 + (d2 + d3 * t) * t) * t
+            safe[c] = safe[c] and d0 > 0 and low > 0 and high > 0 and 0 < end < np.inf
+    return safe
+
+
+@njit(**OPTIONS)
+def _margin(poly, strides, end, stack):  # type: ignore[no-untyped-def]
+    """Return a lower bound for the first t, up to ``end``, at which a cell is not valid.
+
+    Parameters
+    ----------
+    poly : (k, 4)
+        Polynomials in t of the corner Jacobians, or of a cell's Bézier coefficients.
+    strides : (a,)
+        Distances of neighbouring coefficients along the axes in which it can be cut.
+    stack : (b, k, 4)
+        Memory for parts of the cell.
+    """
+    low, high = _bounds(poly, strides, end)
+    if len(strides) == 0 or low >= high * (1 - GAP):
+        return min(low, high)
+    lows, depths = np.empty(len(stack)), np.empty(len(stack), np.int64)
+    stack[0], lows[0], depths[0] = poly, low, 0
+    least, top, parts = high, 1, 1
+    while top:
+        top -= 1
+        low, depth = lows[top], depths[top]
+        if low >= high * (1 - GAP) or depth == len(strides) * LEVELS or parts >= PARTS:
+            least = min(least, low)
+            continue
+        # The second half takes the place of the part, the first half the next place.
+        _cut(stack[top], strides[depth % len(strides)], stack[top + 1])
+        for k in range(2):
+            lows[top + k], upper = _bounds(stack[top + k], strides, high)
+            high, depths[top + k] = min(high, upper), depth + 1
+        if lows[top] < lows[top + 1]:  # the part that limits comes first
+            for k in range(poly.shape[0]):
+                for j in range(4):
+                    swap = stack[top, k, j]
+                    stack[top, k, j] = stack[top + 1, k, j]
+                    stack[top + 1, k, j] = swap
+            lows[top], lows[top + 1] = lows[top + 1], lows[top]
+        top, parts = top + 2, parts + 1
+    return min(least, high)
+
+
+@njit(**OPTIONS)
+def _bounds(poly, strides, end):  # type: ignore[no-untyped-def]
+    """Return the first roots, up to ``end``, of all coefficients and of the values in corners."""
+    high = low = end
+    for k in range(len(poly)):
+        corner = True
+        for stride in strides:
+            corner = corner and k // stride % 3 != 1
+        if corner:
+            high = first_root(poly[k, 0], poly[k, 1], poly[k, 2], poly[k, 3], high)
+    low = high
+    for k in range(len(poly)):
+        low = first_root(poly[k, 0], poly[k, 1], poly[k, 2], poly[k, 3], low)
+    return low, high
+
+
+@njit(**OPTIONS)
+def _cut(poly, stride, half):  # type: ignore[no-untyped-def]
+    """Cut a part in two along an axis: ``poly`` becomes the second half, ``half`` the first."""
+    for k in range(len(poly)):
+        if k // stride % 3 == 0:
+            for j in range(4):
+                a, b, c = poly[k, j], poly[k + stride, j], poly[k + 2 * stride, j]
+                ab, bc = 0.5 * (a + b), 0.5 * (b + c)
+                middle = 0.5 * (ab + bc)
+                half[k, j], half[k + stride, j], half[k + 2 * stride, j] = a, ab, middle
+                poly[k, j], poly[k + stride, j] = middle, bc
+
+
+@njit(**OPTIONS)
+def first_root(a, b, c, d, end):  # type: ignore[no-untyped-def]
+    """Return the smallest t at which a + b t + c t² + d t³ is not positive, or ``end``.
+
+    The polynomial is positive at the returned t, and before: a root is returned from below.
+    """
+    if not 0.0 < a < np.inf:
+        return 0.0
+    low, high = a + b * end / 3, a + (2 * b + c * end) * end / 3
+    at_end = a + (b + (c + d * end) * end) * end
+    if low > 0 and high > 0 and at_end > 0:
+        return end
+    # It is monotone between the roots of its derivative b + 2 c t + 3 d t².
+    first = second = end
+    inner = c * c - 3 * b * d
+    if inner > 0:
+        q = -(c + np.copysign(np.sqrt(inner), c))
+        one, two = b / q, q / (3 * d)  # q is not 0, for inner is not
+        first, second = min(one, two), max(one, two)
+    left = 0.0
+    for right in (first, second, end):
+        if left < right <= end:
+            if not a + (b + (c + d * right) * right) * right > 0:
+                return _root_between(a, b, c, d, left, right)
+            left = right
+    return end
+
+
+@njit(**OPTIONS)
+def _root_between(a, b, c, d, left, right):  # type: ignore[no-untyped-def]
+    """Return the root in an interval from below: positive at ``left``, not at ``right``.
+
+    Newton's method, with bisection where that leaves the interval or is slow; at last steps down
+    until the value is positive.
+    """
+    t, width = 0.5 * (left + right), right - left
+    for _ in range(200):
+        value = a + (b + (c + d * t) * t) * t
+        if value > 0:
+            left = t
+        else:
+            right = t
+        slope = b + (2 * c + 3 * d * t) * t
+        step = -value / slope if slope != 0 else np.inf
+        slow = not abs(step) < 0.5 * width
+        width = right - left if slow else abs(step)
+        before = t
+        t = 0.5 * (left + right) if slow or not left < t + step < right else t + step
+        if abs(t - before) <= 1e-14 * right or t == before:
+            break
+    for power in range(6):
+        lower = t * (1 - 1e-14 * 10**power)
+        if lower <= left:
+            return left
+        if a + (b + (c + d * lower) * lower) * lower > 0:
+            return lower
+    return left
