@@ -104,10 +104,7 @@ def _solved(box: Box, points: FloatArray, size: FloatArray) -> FloatArray:
 def _newton(
     box: Box, points: FloatArray, uvw: FloatArray, size: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the end of Newton's method from ``uvw`` (m, 3), and its distance from points, (m,).
-
-    Distances are scaled to a box of size 1 along each axis, since boxes can be thin.
-    """
+    """Return Newton's end from ``uvw`` (m, 3), and its distance (m,) over the size of the box."""
     uvw = uvw.copy()
     remaining = points - box.at(uvw)
     gap = np.linalg.norm(remaining / size, axis=1)

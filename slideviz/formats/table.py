@@ -182,10 +182,7 @@ def endings(select: Callable[[MeshFormat], object]) -> list[str]:
 
 
 def own_endings(*fields: str) -> str:
-    """Return the endings of the formats that slideviz writes itself, with commas.
-
-    Only those whose ``fields`` are true, such as ``quality`` and ``series``.
-    """
+    """Return the endings of slideviz's own formats whose ``fields`` are true, with commas."""
     rows = (row for row in _ROWS if row.writer != MESHIO.writer)
     return ", ".join(row.ending for row in rows if all(getattr(row, name) for name in fields))
 

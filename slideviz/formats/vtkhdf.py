@@ -47,10 +47,7 @@ class _Block:
 
 
 class StepSeries:
-    """A VTKHDF file that is being written: `add` each step, then `end`.
-
-    Where ``is_series`` is false, it is the file of a single mesh without steps: `add` once.
-    """
+    """A VTKHDF file in the making: `add` each step (a single mesh if not ``is_series``), `end`."""
 
     def __init__(self, draft: Hdf5Draft, blocks: Sequence[_Block], is_series: bool) -> None:
         self._draft = draft
@@ -114,19 +111,13 @@ class StepSeries:
 
 @contextmanager
 def vtkhdf_series(path: Path, mesh: Mesh, replaces: Path | None = None) -> Iterator[StepSeries]:
-    """Context with a file to add steps of a mesh to, which replaces ``path`` at the end.
-
-    Raises MeshError if it cannot be written.
-    """
+    """Context with a file to add steps to, which replaces ``path`` at the end; or MeshError."""
     with _collection(path, mesh, replaces, is_series=True) as series:
         yield series
 
 
 def write_vtkhdf(path: Path, mesh: Mesh, options: WriteOptions) -> None:
-    """Write one mesh to a VTKHDF file, with values on its cells and points.
-
-    Raises MeshError if it cannot be written.
-    """
+    """Write a mesh to a VTKHDF file, with values on its cells and points; or raise MeshError."""
     check_mesh(mesh)
     with _collection(path, mesh, options.replaces, is_series=False) as series:
         series.add(mesh.points, options.cell_data, options.point_data)

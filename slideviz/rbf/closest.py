@@ -140,10 +140,7 @@ def _copy(point, out):  # type: ignore[no-untyped-def]
 
 @njit(**_OPTIONS)
 def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
-    """Write the point of triangle a, b, c closest to x to ``out``; return the squared distance.
-
-    ``trial`` (3,) is scratch.
-    """
+    """Write the point of triangle a, b, c closest to x to ``out``; return the squared distance."""
     uu, uv, vv, wu, wv = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         u, v, w = b[i] - a[i], c[i] - a[i], x[i] - a[i]

@@ -84,10 +84,7 @@ def full_rows(problem: Problem, nodes: IntArray, values: Array) -> ConstraintRow
 
 
 def sliding_rows(problem: Problem) -> ConstraintRows:
-    """Return the rows of direct sliding: all axes of known nodes, normals of sliding nodes.
-
-    Those of coinciding nodes are merged. Raises DeformError where they contradict each other.
-    """
+    """Return the rows of direct sliding: axes of known nodes, normals of sliding ones, merged."""
     known, d = problem.known, value(problem.values).shape[-1]
     nodes = np.concatenate([np.repeat(known, d), problem.normal_nodes])
     normals = join(np.tile(np.eye(d), (len(known), 1)), problem.normals)

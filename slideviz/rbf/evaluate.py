@@ -119,10 +119,7 @@ def _plain(basis: Basis, features: FloatArray) -> FloatArray:
 
 
 def boxes(basis: Basis, features: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Return boxes with nodes in them, lowest and highest (k, b), and the box of each node, (n,).
-
-    No box is wider than `BOX` support radii along an axis.
-    """
+    """Return boxes of at most `BOX` radii with nodes, low and high (k, b), and each node's (n,)."""
     x = _plain(basis, features)
     start = x.min(axis=1, keepdims=True)
     if np.linalg.norm(x.max(axis=1) - start[:, 0]) < basis.radius:
@@ -138,10 +135,7 @@ def boxes(basis: Basis, features: FloatArray) -> tuple[FloatArray, FloatArray, I
 
 
 def connected(basis: Basis, features: FloatArray) -> IntArray:
-    """Return labels (n,) of nodes; nodes whose labels differ are in no common support.
-
-    Not even by way of other nodes: the system of all is one for each label.
-    """
+    """Return labels (n,) of nodes: equal where supports connect them, also by other nodes."""
     if not (features.shape[1] and KERNELS[basis.kernel].compact):
         return np.zeros(features.shape[1], np.int64)
     low, high, box = boxes(basis, features)

@@ -201,10 +201,7 @@ class Frame:
         return self.of_polar(polar(points, self.axis, self.origin))
 
     def of_polar(self, polar: FloatArray) -> FloatArray:
-        """Turn polar coordinates (n, d), as `polar` returns them, into frame coordinates, in place.
-
-        Only in a cylindrical frame. Returns the same array.
-        """
+        """Turn `polar` coordinates (n, d) into those of a cylindrical frame, in place."""
 
         def turn(part: slice) -> None:
             angle = polar[part, 1] - self.theta0

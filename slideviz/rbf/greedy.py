@@ -185,10 +185,7 @@ class GreedyFit:
         return limit is not None and len(self.interpolant.nodes) >= limit
 
     def _fraction(self, errors: FloatArray) -> float:
-        """Return the progress, 0 to 1: how far the error has fallen towards the tolerance.
-
-        On a logarithmic scale, from the first cycle's error.
-        """
+        """Return the logarithmic progress, 0 to 1, of the error from the first to the tolerance."""
         first, now = self.history[0].error, float(errors.max(initial=0.0))
         span = np.log(max(first, 1e-300) / max(self._settings.tolerance, 1e-300))
         return float(np.clip(np.log(max(first, 1e-300) / max(now, 1e-300)) / max(span, 1e-9), 0, 1))

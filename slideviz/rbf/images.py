@@ -93,10 +93,7 @@ class ImageDisplacements:
         return np.concatenate([np.zeros((1, self.vectors.shape[1])), self.vectors])[row]
 
     def require_alike(self, allowed: float) -> None:
-        """Raise DeformError when given displacements of images differ by more than ``allowed``.
-
-        In any component, in the mesh's length unit.
-        """
+        """Raise DeformError when given displacements of images differ by more than ``allowed``."""
         gap = np.abs(self.vectors - self.at(self.prescribed)).max(axis=1, initial=0.0)
         if gap.max(initial=0.0) > allowed:
             worst = int(np.argmax(gap))

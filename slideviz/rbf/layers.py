@@ -411,10 +411,7 @@ class LayerZone:
 def find_zone(
     walls: WallNodes, nodes: IntArray, targets: FloatArray, slides: np.ndarray
 ) -> LayerZone:
-    """Return the zone of walls among ``nodes`` (m,), at undeformed Cartesian ``targets`` (m, d).
-
-    ``slides`` (m,) bool: which of them slide.
-    """
+    """Return the zone of walls among ``nodes`` (m,) at ``targets`` (m, d); ``slides`` (m,) bool."""
     hit, share, by_displacement, by_rotation = walls.near(targets)
     sliding = np.flatnonzero(slides[hit])
     return LayerZone(walls, nodes[hit], targets[hit], sliding, share, by_displacement, by_rotation)

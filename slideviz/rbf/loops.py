@@ -51,10 +51,7 @@ def _keep_undeformed(at, moved, start, before):  # type: ignore[no-untyped-def]
 
 @njit(**_OPTIONS)
 def place(found, nodes, out):  # type: ignore[no-untyped-def]
-    """Write values (b, k d) at ``nodes`` (b,) of k designs to ``out`` (k, n, d).
-
-    In one thread, so that several threads may call it at once.
-    """
+    """Write values (b, k d) at ``nodes`` (b,) of k designs to ``out`` (k, n, d), in one thread."""
     d = out.shape[2]
     for k in range(out.shape[0]):
         for i in range(found.shape[0]):

@@ -193,10 +193,7 @@ def largest_norm(vectors: Array) -> Any:
 def _finish(
     problem: Problem, timer: PhaseTimer, fit: Fit, nodes: IntArray, values: Array
 ) -> Solution:
-    """Return the solution: evaluate at all nodes, set boundary nodes exactly, spread their errors.
-
-    ``values`` (..., b, d) are the exact displacements of the boundary nodes ``nodes`` (b,).
-    """
+    """Return the solution, exact at ``nodes`` (b,) by ``values``; elsewhere errors are spread."""
     displacement = _at(problem, timer, fit, slice(None))
     errors = values - take(displacement, nodes)
     total, carried = problem.carried_error(nodes) + errors, None

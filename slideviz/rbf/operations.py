@@ -81,10 +81,7 @@ def _converted(
 
 
 def difference(frame: Frame, start: FloatArray, vectors: Array) -> Array:
-    """Return frame components (..., n, d) of displacements ``vectors`` of points ``start`` (n, d).
-
-    As ``Frame.difference``.
-    """
+    """Return displacements ``vectors`` of ``start`` (n, d) in the frame, (..., n, d)."""
     v = value(vectors)
     full = np.broadcast_to(start, v.shape)
     out = frame.difference(flat(full), flat(v)).reshape(v.shape)

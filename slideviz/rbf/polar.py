@@ -30,10 +30,7 @@ UNIQUE = 1e-12  # where R is not unique to this precision (relative), its deriva
 
 
 def nearest_rotations(matrices: Array, d: int) -> Array:
-    """Return the rotations (m, d d) nearest to matrices (m, d d), both row by row, d = 2 or 3.
-
-    The identity for a matrix of zeros.
-    """
+    """Return the rotations (m, d d) nearest to matrices (m, d d), row by row; I for zeros."""
     m = value(matrices)
     out = rotations(m.reshape(-1, d, d))
 

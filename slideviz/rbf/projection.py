@@ -222,10 +222,7 @@ def find_tracks(
 def _across_period(
     boundary: Boundary, representative: IntArray, roles: Mapping[str, str]
 ) -> IntArray:
-    """Return pairs (j, 2) of facets that meet only where periodic images are taken as one node.
-
-    Without the facets of periodic markers.
-    """
+    """Return pairs (j, 2) of facets, not of periodic markers, that meet only by images."""
     glued = np.zeros(len(representative), bool)
     glued[representative[representative != np.arange(len(representative))]] = True
     across = glued[representative[boundary.facets]].any(axis=1)

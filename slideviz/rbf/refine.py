@@ -207,10 +207,7 @@ class System:
         return total, field_error
 
     def _field(self, weights: FloatArray) -> FloatArray:
-        """Return the largest absolute component of each column's field, (m,), of weights (n, m).
-
-        At the points `check_points` the nodes.
-        """
+        """Return the largest component (m,) of the field of weights (n, m) at `check_points`."""
         features, normals = self.place
         if "checks" not in self._cache:
             points = check_points(features)

@@ -177,10 +177,7 @@ def _sum_powers(x, c, w, period_over_pi, scale, power, out):  # type: ignore[no-
 def sum_powers(
     basis: Basis, targets: FloatArray, controls: FloatArray, weights: FloatArray, power: float
 ) -> FloatArray:
-    """Return sum_j w_j (|x_i - c_j| / R)^-power at targets (k, N), (N, d).
-
-    Of controls (k, n) with weights w (n, d); all features.
-    """
+    """Return sum_j w_j (|x_i - c_j| / R)^-power, (N, d); targets (k, N), controls (k, n)."""
     x, c = padded_rows(targets, 4), padded_rows(controls, 4)
     out = np.empty((3, x.shape[1]))
     with compiled.one_at_a_time(x.shape[1] * c.shape[1]):

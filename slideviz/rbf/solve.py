@@ -179,10 +179,7 @@ def solve_lower(lower: FloatArray, right: FloatArray, transposed: bool = False) 
 
 
 def condition(*factors: FloatArray) -> float:
-    """Return an estimate of the condition number of a block-diagonal matrix of blocks L L^T.
-
-    In the 1-norm, after Higham and Tisseur (`_norm`); 1.0 without rows.
-    """
+    """Return the condition number, in the 1-norm (`_norm`), of blocks L L^T; 1.0 without rows."""
     sizes = np.array([_norms(lower) for lower in factors if len(lower)])
     return float(np.prod(sizes.max(axis=0))) if len(sizes) else 1.0
 
@@ -230,10 +227,7 @@ def _norm(apply: Callable[[FloatArray], FloatArray], n: int) -> float:
 
 
 def factorise(matrix: FloatArray, tick: Tick = no_tick) -> Factor:
-    """Return the factor of a symmetric matrix (n, n) with unit diagonal.
-
-    Raises DeformError if the matrix has numbers that are not finite.
-    """
+    """Return the factor of a matrix (n, n) with unit diagonal; DeformError if not finite."""
     return extend(NOTHING, matrix, tick)
 
 
@@ -275,10 +269,7 @@ def extend(before: Factor, rows: FloatArray, tick: Tick = no_tick) -> Factor:
 
 
 def _cholesky(block: FloatArray, dropped: NDArray[np.bool_]) -> FloatArray:
-    """Return the factor of a diagonal block; set ``dropped`` for rows that the guard leaves out.
-
-    These are rows of the identity in the factor.
-    """
+    """Return a diagonal block's factor, rows of the identity where the guard sets ``dropped``."""
     try:
         head = np.asarray(np.linalg.cholesky(block), np.float64)
         if np.min(np.diag(head)) ** 2 >= PIVOT_GUARD:
@@ -292,10 +283,7 @@ def _cholesky(block: FloatArray, dropped: NDArray[np.bool_]) -> FloatArray:
 
 @njit(nogil=True, cache=True)
 def _guarded_cholesky(a, guard, dropped):  # type: ignore[no-untyped-def]
-    """Factorise a block in place; rows with a pivot below ``guard`` become rows of the identity.
-
-    And are set True in ``dropped``.
-    """
+    """Factorise in place; pivots below ``guard`` give identity rows, and set ``dropped``."""
     n = len(a)
     for j in range(n):
         for i in range(j):

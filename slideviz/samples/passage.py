@@ -62,10 +62,7 @@ def camber(x: FloatArray, section: BladeSection = PASSAGE) -> FloatArray:
 
 
 def blade_nodes(lower: int, upper: int, section: BladeSection = PASSAGE) -> FloatArray:
-    """Return the nodes of the blade counter-clockwise from the leading edge: (lower + upper, 2).
-
-    The pressure side has ``lower`` edges, the suction side ``upper``.
-    """
+    """Return the blade's nodes, counter-clockwise from the leading edge, (lower + upper, 2)."""
     phi = np.linspace(0.0, np.pi, 20001)
     there = _spread(_surface(phi, -1.0, section), lower)
     back = _spread(_surface(phi, 1.0, section), upper)
@@ -73,10 +70,7 @@ def blade_nodes(lower: int, upper: int, section: BladeSection = PASSAGE) -> Floa
 
 
 def _surface(phi: FloatArray, side: float, section: BladeSection) -> FloatArray:
-    """Return points (m, 2) of one side, at x = (1 - cos phi) / 2 on the camber line.
-
-    ``side`` is -1 for the pressure side, 1 for the suction side.
-    """
+    """Return points (m, 2) of a side (-1: pressure), x = (1 - cos phi) / 2 on the camber line."""
     x = (1 - np.cos(phi)) / 2
     a, b, c = section.thickness
     half = side * np.sin(phi) / 2 * (a + b * (1 - x) ** c)
@@ -141,10 +135,7 @@ class GridCounts:
 
 
 def counts(size: int, shares: Shares = PASSAGE_SHARES) -> GridCounts:
-    """Return the numbers of cells for ``size`` cells along the inflow.
-
-    Raises CaseError if ``size`` is below 12, too few to follow the blade.
-    """
+    """Return the numbers of cells for ``size`` cells along the inflow; CaseError below 12."""
     if size < 12:
         raise CaseError(f"size {size} is too coarse for the blade; expected 12 cells or more")
     cells = (shares.ahead, shares.along, shares.behind, shares.beside, shares.layers)
@@ -219,10 +210,7 @@ class Grid:
 
 
 def passage_mesh(size: int) -> Mesh:
-    """Return the mesh of the sample ``passage``, with ``size`` cells along the inflow.
-
-    Raises CaseError if ``size`` is below 12.
-    """
+    """Return the mesh of ``passage``, with ``size`` cells along the inflow; CaseError below 12."""
     grid = make_grid(counts(size))
     points = smoothed(grid, straight_points(grid, PASSAGE))
     sides = {"airfoil" if k == "blade" else k: side for k, side in grid.sides().items()}
@@ -285,10 +273,7 @@ def layer_parts(n: GridCounts) -> FloatArray:
 
 
 def _ring(n: GridCounts, number: IntArray) -> IntArray:
-    """Return the nodes of the O-grid, from the blade out, counter-clockwise: (layers + 1, k).
-
-    Column 0 is the grid line from the leading edge to the hole's first side.
-    """
+    """Return the O-grid's nodes from the blade out, counter-clockwise from the leading edge."""
     hole = number[n.ahead : n.ahead + n.along + 1, n.below : n.below + n.beside + 1]
     rim = np.concatenate([hole[:-1, 0], hole[-1, :-1], hole[:0:-1, -1], hole[0, :0:-1]])
     rim = np.roll(rim, n.nose)

@@ -66,10 +66,7 @@ def reshaped(points: FloatArray, radii: tuple[float, float], stack_z: float) -> 
 
 
 def _bumps(points: FloatArray) -> FloatArray:
-    """Return the sum (k,) of Gaussian bumps at points (k, 3), a length along theta.
-
-    Their centres are random in the bounding box of the points.
-    """
+    """Return the sum (k,) at points (k, 3) of Gaussian bumps along theta, placed randomly."""
     random = np.random.default_rng(SEED)
     low, high = points.min(axis=0), points.max(axis=0)
     total = np.zeros(len(points))
@@ -152,10 +149,7 @@ ROUGH = 1e-3  # tolerance of `smooth` for interpolated grids, in chords
 
 
 def stator_mesh(size: int) -> Mesh:
-    """Return the mesh of the sample ``stator``, of about ``size`` hexahedra.
-
-    Raises CaseError if ``size`` is not within ``SIZES``.
-    """
+    """Return the mesh of ``stator``, about ``size`` hexahedra; CaseError if not in ``SIZES``."""
     if not SIZES[0] <= size <= SIZES[1]:
         raise CaseError(
             f"size {size} is out of range; a stator has {SIZES[0]} to {SIZES[1]}, or up to "
@@ -290,10 +284,7 @@ def _cells(along: int) -> int:
 
 
 def _plane(grid: Grid, radius: float, angles_deg: tuple[float, float]) -> FloatArray:
-    """Return z and theta (m, 2) of the smoothed grid on the cylinder of that radius.
-
-    ``angles_deg`` are those of `BladeSection`.
-    """
+    """Return z and theta (m, 2) of a smoothed cylinder grid; angles as of `BladeSection`."""
     pitch = 2 * np.pi * radius / BLADES / CHORD
     ends = (-LEADING_EDGE / CHORD, (DEPTH - LEADING_EDGE) / CHORD)
     section = BladeSection(angles_deg, THICKNESS, pitch, ends, HOLE)
@@ -312,9 +303,6 @@ def _plane(grid: Grid, radius: float, angles_deg: tuple[float, float]) -> FloatA
 
 
 def _repeated(cells: IntArray, nodes: int, layers: int) -> IntArray:
-    """Return the elements (k, n) of the first layer repeated in all layers: (layers * k, n).
-
-    ``nodes`` is the number of nodes in a plane.
-    """
+    """Return the elements (k, n) of a layer of ``nodes`` in all layers: (layers * k, n)."""
     shift = nodes * np.arange(layers)[:, None, None]
     return (cells + shift).reshape(-1, cells.shape[1])

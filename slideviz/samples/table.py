@@ -34,10 +34,7 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class StreamedSample:
-    """A sample whose mesh, of any size, is made while it is written: ``zone`` makes its parts.
-
-    Case and displacement are as in `Sample`.
-    """
+    """A `Sample` whose mesh, of any size, is made while it is written, by its ``zone``."""
 
     zone: ZoneContent
     case: Case
@@ -244,10 +241,7 @@ def _write_blocks(mesh: Path, zone: ZoneContent, overwrite: bool) -> None:
 
 
 def _in_folder(case: Case, folder: Path, name: str, ending: str) -> Case:
-    """Return the case with mesh, output and displacement files in a folder.
-
-    ``name`` is that of the sample, ``ending`` that of the mesh files, without dot.
-    """
+    """Return the case of the sample ``name``, with files in a folder, meshes of ``ending``."""
     motions = tuple(
         replace(motion, path=folder / motion.path) if isinstance(motion, FromFile) else motion
         for motion in case.motions

@@ -59,10 +59,7 @@ def mesh_of(grid: Structured, name: str) -> Mesh:
 
 
 def zone_of(grid: Structured) -> ZoneContent:
-    """Return the zone of a grid's mesh, to be written to a file block by block.
-
-    Raises CaseError if the mesh has more than ``LARGEST`` cells.
-    """
+    """Return the zone of a grid to be written block by block; CaseError above ``LARGEST``."""
     if grid.n_cells > LARGEST:
         raise CaseError(f"{grid.n_cells} cells are too many; a sample has {LARGEST} at most")
 
@@ -163,10 +160,7 @@ def _motions(dim: int, variant: str) -> tuple[Motion, ...]:
 
 
 def _polar_shift(points: FloatArray) -> FloatArray:
-    """Return the displacement (k, d) of points (k, d) by 0.2 in r, -10 degrees and 0.2 in z (3D).
-
-    The direction of the shift in r depends on the angle, so that no motions of a case describe it.
-    """
+    """Return the shift (k, d) by 0.2 in r, -10 degrees, 0.2 in z, which no motions describe."""
     x, y = points[:, :2].T
     radius, angle = np.hypot(x, y) + 0.2, np.arctan2(y, x) - np.radians(10.0)
     moved = [radius * np.cos(angle) - x, radius * np.sin(angle) - y]

@@ -79,10 +79,7 @@ def _sweep(points: FloatArray, triangles: IntArray, fixed: int) -> FloatArray:
 
 
 def inside(places: FloatArray, points: FloatArray, edges: IntArray) -> NDArray[np.bool_]:
-    """Return a mask (k,) of the places (k, 2) inside the closed edges (e, 2) between points (n, 2).
-
-    Inside is where the edges go round an odd number of times.
-    """
+    """Return which places (k, 2) the edges (e, 2) of points (n, 2) go round oddly often, (k,)."""
     odd = np.zeros(len(places), bool)
     (x0, y0), (x1, y1) = points[edges[:, 0]].T, points[edges[:, 1]].T
     order = np.argsort(places[:, 1], kind="stable")
@@ -149,10 +146,7 @@ def _growth(far: FloatArray, most: float) -> FloatArray:
 
 
 def _distance(points: FloatArray, rim: FloatArray) -> FloatArray:
-    """Return D (k,) of points (k, 2), from the nodes of the rim (r, 2) and the wake of any vane.
-
-    Inside the rim it has no meaning.
-    """
+    """Return D (k,) of outer points (k, 2), from the rim's nodes (r, 2) and any vane's wake."""
     best = np.full(len(points), np.inf)
     s, *line = camber_line()
     wake = s > CHORD
@@ -192,10 +186,7 @@ _TURNS = np.radians([0.0, 60.0, -60.0, 120.0, -120.0, 180.0, 30.0, -30.0, 90.0, 
 
 
 def row_mesh(size: int) -> Mesh:
-    """Return the mesh of the sample ``turbine-row``, of about ``size`` cells.
-
-    Raises CaseError if ``size`` is not within ``SIZES``.
-    """
+    """Return the mesh of ``turbine-row``, about ``size`` cells; CaseError if not in ``SIZES``."""
     from slideviz.samples.turbine_row import front_points
 
     if not SIZES[0] <= size <= SIZES[1]:
@@ -223,10 +214,7 @@ def row_mesh(size: int) -> Mesh:
 
 
 def row_case(size: int) -> Case:
-    """Return the case of thesis Figure 4.11: the vane 7 % larger, and 0.001 lower.
-
-    With more than `MANY` cells it has data reduction.
-    """
+    """Return the case of thesis Figure 4.11; with more than `MANY` cells with data reduction."""
     return Case(
         roles={
             "BLADE": "moving",

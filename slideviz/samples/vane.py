@@ -34,10 +34,7 @@ TOP = 0.85
 
 @cache
 def camber_line() -> FloatArray:
-    """Return points of the camber line from inflow to outflow: (4, m).
-
-    The rows are arc length (0 at the leading edge), x, y, and direction in radians.
-    """
+    """Return arc length from the leading edge, x, y and angle of the camber line: (4, m)."""
     ahead, behind = -1.5 * AHEAD / CHORD, 3.0
     u = np.arange(ahead, behind, 2e-4)
     u -= u[np.argmin(np.abs(u))]

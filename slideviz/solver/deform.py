@@ -170,10 +170,7 @@ def folded_at(steps: Sequence[Step], mesh: Mesh, cells: IntArray) -> IntArray:
 
 
 def require_memory(setup: Setup, case: Case, *, lasting: bool = False) -> None:
-    """Raise DeformError when the system of a step would not fit into free memory.
-
-    ``lasting`` has the meaning of `slideviz.rbf.problem.Problem.lasting`.
-    """
+    """Raise DeformError when a step's systems would not fit into memory; ``lasting``: `Problem`."""
     if case.method == "elastic":
         _require_free(
             ELASTIC_BYTES[setup.coords.shape[1]] * len(setup.coords),

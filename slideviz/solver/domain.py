@@ -90,10 +90,7 @@ def find_domain(case: Case, mesh: Mesh) -> Domain:
 
 
 def roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
-    """Return the case with the roles of halo copies replaced, and notes for the user.
-
-    A boundary that is a copy of another one, by the mesh's halo, gets the other's role.
-    """
+    """Return the case where halo copies of boundaries have the others' roles, and notes."""
     roles, notes = dict(case.roles), []
     for copy, origin in mesh.halo.sides if mesh.halo is not None else ():
         role, other = (case.roles.get(name, "fixed") for name in (copy, origin))

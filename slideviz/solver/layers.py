@@ -21,10 +21,7 @@ SIZE = 0.02  # largest automatic thickness of a zone over the largest extent of 
 
 
 def layer_zone(case: Case, mesh: Mesh, domain: Domain, known: IntArray) -> LayerZone | None:
-    """Return the nodes that go with walls in a case (LAYERS); None where there are no such walls.
-
-    ``known`` (a,) are moving and fixed nodes.
-    """
+    """Return the nodes that go with walls (LAYERS), or None; ``known`` (a,): moving and fixed."""
     if case.layers == "no" or case.method != "rbf":
         return None
     walls = _walls(case, mesh, domain)

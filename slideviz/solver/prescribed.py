@@ -139,10 +139,7 @@ def prescribe(
 
 
 def support_radius(case: Case, mesh: Mesh, moved: Displacements) -> float:
-    """Return the support radius R, in the mesh's length unit.
-
-    ``moved``: the prescribed displacements.
-    """
+    """Return the support radius R for the displacements ``moved``, in the mesh's length unit."""
     if case.support_radius is not None:
         return case.support_radius
     if case.influence_factor:

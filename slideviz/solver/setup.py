@@ -203,10 +203,7 @@ class Setup(Domain):
         return out
 
     def _tie(self, nodes: IntArray, slid: FloatArray) -> None:
-        """Overwrite displacements ``slid`` (m, d) of halo copies among ``nodes`` by their donors'.
-
-        Only where both slide; turned as the halo turns them.
-        """
+        """Overwrite ``slid`` (m, d) of sliding halo copies by their donors', turned as the halo."""
         if self.halo is None:
             return
         row = np.full(len(self.coords), -1)
@@ -327,9 +324,6 @@ def idw_weights(case: Case, dim: int) -> Weights:
 
 
 def _candidates(classes: Classes, known: IntArray) -> int:
-    """Return the number of nodes that could be control nodes; periodic images count as one.
-
-    ``known`` (a,) are the moving and fixed nodes.
-    """
+    """Return how many nodes could be control nodes, images once; ``known`` (a,): not sliding."""
     nodes = np.concatenate([known, classes.edge, classes.surface])
     return int((classes.representative[nodes] == nodes).sum())

@@ -306,10 +306,7 @@ def problem_at(
 def displaced_coords(
     setup: Setup, coords: FloatArray, displacement: FloatArray, goal: FloatArray
 ) -> FloatArray:
-    """Return the displaced coordinates (n, d), written over the displacement.
-
-    Known nodes are exactly at their ``goal`` (a, d).
-    """
+    """Return displaced coordinates (n, d), over the displacement; known nodes at ``goal``."""
     moved = shifted(coords, displacement, setup.axis)
     moved[setup.known] = np.where(
         goal == setup.coords[setup.known], setup.coords[setup.known], goal
@@ -318,10 +315,7 @@ def displaced_coords(
 
 
 def shifted(coords: FloatArray, displacement: FloatArray, axis: np.ndarray) -> FloatArray:
-    """Return the coordinates (n, d) after a displacement, which they overwrite.
-
-    Nodes on the ``axis``, a mask (n,), stay on it.
-    """
+    """Return coordinates (n, d) after a displacement, written over it; ``axis`` (n,) stays."""
     displacement[axis, :2] = 0.0
 
     def add(part: slice) -> None:
@@ -407,10 +401,7 @@ def _doubt_warning(
 def _dropped_warning(
     setup: Setup, solution: Solution, index: int, total: int, mesh: Mesh
 ) -> list[str]:
-    """Return the warning that the system is singular, or the pivot guard left out nodes; or [].
-
-    Only a note where the misfit at these nodes is negligible.
-    """
+    """Return the warning, or the note if negligible, that singular nodes were left out; or []."""
     if not len(solution.dropped):
         return []
     since = f"from step {index} on, " if total > 1 else ""

@@ -84,10 +84,7 @@ class Output:
         self._collector: RunCollector | None = None
 
     def _opened(self) -> Partial:
-        """Return the file for the deformed points, after waiting until it can be written.
-
-        It is a copy of the mesh file; where the output is a text, it has only points.
-        """
+        """Return the file for the deformed points when it can be written; of a text only points."""
         if not self._is_ready:
             with self._timer.phase("write") as tick:
                 self._partial.ready(tick)
@@ -167,10 +164,7 @@ class Output:
         return self._collector
 
     def finish(self, ffd: bytes | None) -> None:
-        """Write the output where it is a text; ``ffd`` are its boxes, None: those of the mesh.
-
-        A binary output is complete already.
-        """
+        """Write the output where it is a text, with the boxes ``ffd``, None: those of the mesh."""
         if not self._is_text:
             return
         partial, written = self._opened(), 0

@@ -284,10 +284,7 @@ def require_consistent_orientation(sums: Iterable[int], name: str, remedy: str =
 def folded_steps(
     displacer: InteriorDisplacer, source: FileSource, cells: Mapping[int, tuple[int, IntArray]]
 ) -> dict[int, tuple[int, int]]:
-    """Return VTK type and first step with an inverted cell, by cell number.
-
-    ``cells``: VTK type and nodes of each cell to follow, by its number.
-    """
+    """Return VTK type and first inverted step by number of ``cells``: VTK type and nodes each."""
     if not cells:
         return {}
     types = [vtk for vtk, _ in cells.values()]

@@ -59,10 +59,7 @@ class StreamInput:
         return text_size(place)
 
     def skin(self, tick: Tick, ranks: SerialPool = SERIAL) -> Mesh:
-        """Return the boundary and the cells at it; the whole mesh is read and checked.
-
-        Raises MeshError if the file has a mistake.
-        """
+        """Return the boundary and the cells at it, reading and checking the mesh; or MeshError."""
         if self.text is None:
             return read_skin(self.path, self.zone, tick, ranks)
         return skin_of_text(self.text, self.path, progress_share(tick, COPIED), ranks)
@@ -74,10 +71,7 @@ def progress_share(tick: Tick, begin: float, end: float = 1.0) -> Tick:
 
 
 def require_su2(path: Path, file_format: FileFormat | None = None) -> FileFormat:
-    """Return the format of a mesh file, SU2 text or binary: only these can be streamed.
-
-    Raises MeshError if it is of another format.
-    """
+    """Return the format of a mesh file; MeshError if it is neither SU2 text nor binary."""
     kind = format_of(path, file_format).value
     if kind is None:
         raise MeshError(

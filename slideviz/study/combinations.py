@@ -85,10 +85,7 @@ KEY_COLUMNS = ("method", "periodic", "steps")
 
 
 def csv_text(rows: Sequence[CombinationRow]) -> str:
-    """Return the table as CSV; numbers with all their digits, empty cells without a result.
-
-    It has a column ``limits`` where the case has some.
-    """
+    """Return the table as CSV, with all digits; ``limits`` only if the case has some."""
     columns = dict(COLUMNS)
     if any(row.result is not None and row.result.limits for row in rows):
         columns["limits"] = StudyColumn("limits that are not met, or met", lambda r: r.limits)
@@ -113,10 +110,7 @@ def history_text(rows: Sequence[CombinationRow]) -> str:
 
 
 def save_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all.
-
-    Raises CaseError if the file cannot be written.
-    """
+    """Write a text file, whole or not at all; CaseError if it cannot be written."""
     with atomic_write(path, CaseError) as file:
         file.write(text.encode())
 

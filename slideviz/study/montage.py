@@ -83,10 +83,7 @@ def montage(rows: Sequence[CombinationRow], base: Mesh) -> Any:
 def _axis(
     rows: Sequence[CombinationRow], done: Sequence[CombinationRow], what: str
 ) -> dict[str, tuple[int, str]]:
-    """Return place and name of each method, or mode (``what``), that has a result.
-
-    The name is empty where only one was asked for.
-    """
+    """Return place and name ("" if one was asked) of each method or mode with a result."""
     words = (
         {name: title for name, (title, _) in COMPARED_METHODS.items()}
         if what == "method"

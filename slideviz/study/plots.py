@@ -156,10 +156,7 @@ def save_figure(
     dpi: int = 200,
     suffixes: Sequence[str] = (".png", ".svg"),
 ) -> list[Path]:
-    """Write a figure as PNG and SVG, each whole or not at all; return the paths.
-
-    Raises CaseError if a file cannot be written.
-    """
+    """Write a figure as PNG and SVG, each whole; return the paths, or raise CaseError."""
     paths = [folder / f"{name}{suffix}" for suffix in suffixes]
     for path in paths:
         write_figure(figure, path, dpi)

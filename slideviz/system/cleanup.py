@@ -18,20 +18,14 @@ from typing import BinaryIO, Protocol
 
 
 def private_folder(folder: Path) -> Path:
-    """Make a folder if there is none, let only its owner enter it, and return it.
-
-    Raises OSError if it cannot be made, or is somebody else's.
-    """
+    """Make a folder that only its owner may enter, and return it; OSError if it is another's."""
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     folder.chmod(0o700)
     return folder
 
 
 def private_file(path: Path) -> None:
-    """Make an empty file if there is none, and let only its owner read and write it.
-
-    Raises OSError if it cannot be made, is somebody else's, or a symbolic link.
-    """
+    """Make an empty file for its owner only; OSError if it is another's, or a link."""
     with open_temporary(path, new=True) as file:
         os.fchmod(file.fileno(), 0o600)
 

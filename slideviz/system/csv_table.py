@@ -21,10 +21,7 @@ def csv_text(rows: Iterable[Sequence[object]], delimiter: str = ",") -> str:
 
 
 def write_csv(path: Path, rows: Iterable[Sequence[object]], error: type[SlidevizError]) -> None:
-    """Write rows of cells to a file as CSV, whole or not at all.
-
-    Raises an error of the class ``error`` if the file cannot be written.
-    """
+    """Write rows of cells to a CSV file, whole or not at all, or raise an ``error``."""
     text = csv_text(rows)
     with atomic_write(path, error) as file:
         file.write(text.encode())

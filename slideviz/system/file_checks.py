@@ -80,10 +80,7 @@ def require_regular_file(path: Path, error: type[SlidevizError]) -> int:
 
 
 def read_json(path: Path) -> Any:
-    """Return the content of a JSON file.
-
-    Raises OSError or ValueError if it cannot be read, is no JSON, or nested too deep.
-    """
+    """Return the content of a JSON file, or raise OSError or ValueError."""
     try:
         return json.loads(path.read_bytes())
     except RecursionError as problem:
@@ -91,10 +88,7 @@ def read_json(path: Path) -> Any:
 
 
 def require_length(path: Path, error: type[SlidevizError], what: str, most: int) -> None:
-    """Raise as `require_regular_file`, or ``error`` if a file has more than ``most`` bytes.
-
-    ``what`` is the kind of file, for the message: ``case file``.
-    """
+    """Raise as `require_regular_file`, or if a ``what`` has more than ``most`` bytes."""
     size = require_regular_file(path, error)
     if size > most:
         raise error(

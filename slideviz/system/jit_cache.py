@@ -122,10 +122,7 @@ def njit(**options: Any) -> Callable[[Callable], Any]:
 
 @contextmanager
 def compilation_watched(compiling: Callable[[], None]) -> Iterator[None]:
-    """Context that calls ``compiling`` whenever a loop is compiled, in whatever thread.
-
-    It is not called when a loop comes from the cache on disk.
-    """
+    """Context that calls ``compiling`` when a loop is compiled, not loaded, in any thread."""
 
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, _: object) -> None:
@@ -143,10 +140,7 @@ def _with_checksum(content: bytes) -> bytes:
 
 
 def _without_checksum(sealed: bytes) -> bytes:
-    """Return the content that `_with_checksum` put a checksum before.
-
-    Raises ValueError if the content does not have that checksum.
-    """
+    """Return the content that `_with_checksum` sealed, or raise ValueError."""
     content = sealed[32:]
     if hashlib.sha256(content).digest() != sealed[:32]:
         raise ValueError("the file is damaged")

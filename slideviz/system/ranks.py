@@ -174,10 +174,7 @@ class Ranks(SerialPool):
     def _results(
         self, pool: ThreadPoolExecutor, work: Callable[[Task], Result], tasks: Sequence[Task]
     ) -> Iterator[Result]:
-        """Yield the results of tasks in order; rank 0 does tasks too, in the thread of ``pool``.
-
-        Raises the error of a task in its place.
-        """
+        """Yield the results of tasks in order, or raise their error; rank 0 works in ``pool``."""
         idle = list(range(1, self.size))
         local: Future[None] | None = None
         results: dict[int, tuple[Any, BaseException | None]] = {}

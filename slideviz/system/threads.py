@@ -75,10 +75,7 @@ def in_parts(
 
 
 def ordered_map(work: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Result]:
-    """Yield what ``work`` returns for each task, in order; raise its error in place of a result.
-
-    Tasks are done in as many threads as `cores` (see `submit_ahead`).
-    """
+    """Yield the result (or raise the error) of ``work`` for each task, in order; on all `cores`."""
     threads = min(cores(), len(tasks))
     if threads < 2:
         yield from map(work, tasks)
@@ -90,10 +87,7 @@ def ordered_map(work: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterat
 def submit_ahead(
     pool: ThreadPoolExecutor, threads: int, work: Callable[[Task], Result], tasks: Sequence[Task]
 ) -> Iterator[Result]:
-    """Yield the results of tasks in order, at most two tasks for each of the pool's threads ahead.
-
-    Thus results that are not yet used do not fill the memory.
-    """
+    """Yield results in order, tasks at most twice the pool's threads ahead: memory is bounded."""
     waiting: deque[Future[Result]] = deque()
     try:
         for task in tasks:

@@ -187,10 +187,7 @@ def _deformer(
 
 
 def _directions(surface: MovingSurface) -> FloatArray:
-    """Return k displacements (k, m, d): those of all variables, distributed on `DIRECTIONS` sums.
-
-    Each variable moves nodes by at most `REACH` times the mesh's extent.
-    """
+    """Return k displacements (k, m, d), `DIRECTIONS` sums of all variables, each up to `REACH`."""
     sums: list[FloatArray] = []
     for k, (place, part) in enumerate(surface.values):
         slope = surface.slope(place, part, undeformed=True)

@@ -134,10 +134,7 @@ def _wrong_type(lines: Lines, index: int, vtk: int, dim: int, word: str) -> Mesh
 
 
 def _numbers(lines: Lines, index: int, row: bytes, kind: type) -> NDArray:
-    """Return the numbers of a row, (w,) of dtype ``kind``: ``np.int64`` or ``np.float64``.
-
-    Raises MeshError if a word is not one such number.
-    """
+    """Return the numbers (w,) of a row, int64 or float64; MeshError for any other word."""
     words = row.split()
     numbers = []
     for word in words:
@@ -150,10 +147,7 @@ def _numbers(lines: Lines, index: int, row: bytes, kind: type) -> NDArray:
 
 
 def _parse(text: bytes, kind: type) -> NDArray | None:
-    """Return the numbers of a text, (w,), or None if a word is no number.
-
-    Floats are rounded correctly, as by Python.
-    """
+    """Return the numbers (w,) of a text, correctly rounded, or None if a word is none."""
     # NumPy takes a lone sign for 0, or joins it to the next word.
     if kind is np.int64 and (b"-" in text or b"+" in text) and _LONE_SIGN.search(text):
         return None

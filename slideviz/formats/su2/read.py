@@ -121,10 +121,7 @@ def _best(
 
 
 def _table(lines: Lines, parts: Sequence[SendRows], count: int) -> IntArray | None:
-    """Return node and ``PERIODIC_INDEX`` of each row, (r, 2), or None if any row is wrong.
-
-    ``count`` is the number of nodes.
-    """
+    """Return node, below ``count``, and ``PERIODIC_INDEX`` of each row, (r, 2), or None."""
     pieces = (piece for part in parts for piece in part.rows)
     rows = [row.split()[:3] for piece in pieces for _, row in lines.numeric(piece)]
     if not rows or any(len(row) < 3 or not all(w.isdigit() for w in row) for row in rows):
@@ -201,10 +198,7 @@ class Document(Origin):
 
 
 def is_su2(path: Path) -> bool:
-    """Return whether a file begins as an SU2 text does, by its ``NDIME=``.
-
-    Raises OSError if it cannot be read.
-    """
+    """Return whether a file begins as an SU2 text does, by its ``NDIME=``; or raise OSError."""
     with path.open("rb") as file:
         return _NDIME.search(file.read(_SNIFFED_BYTES)) is not None
 

@@ -50,10 +50,7 @@ class SectionRows:
         self.text_lines = lines.firsts[:-1][lines.kinds != ROWS]
 
     def none(self, section: KeywordBlock) -> None:
-        """Raise if a section that should have no rows of numbers has any.
-
-        Raises MeshError if the section has rows.
-        """
+        """Raise MeshError if a section that should have no rows of numbers has any."""
         rows = self.lines.pieces(section.line, section.stop)
         if rows:
             raise self.lines.error(

@@ -29,18 +29,12 @@ Edit = tuple[int, int, bytes]
 
 
 def write_su2(path: Path, mesh: Mesh, options: WriteOptions) -> None:
-    """Write a mesh as SU2 text.
-
-    Raises MeshError as `su2_blocks` does, or if the file cannot be written.
-    """
+    """Write a mesh as SU2 text; MeshError if `su2_blocks` raises it, or it cannot be written."""
     write_blocks(path, su2_blocks(mesh), options)
 
 
 def su2_zones(*meshes: Mesh) -> Iterator[bytes]:
-    """Yield an SU2 file with a zone for each mesh, block by block.
-
-    Raises MeshError as `su2_blocks` does.
-    """
+    """Yield an SU2 file with a zone for each mesh, block by block; errors as `su2_blocks`."""
     yield f"NZONE= {len(meshes)}\n".encode()
     for number, mesh in enumerate(meshes, 1):
         yield f"IZONE= {number}\n".encode()

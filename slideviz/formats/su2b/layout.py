@@ -179,10 +179,7 @@ def find_zones(source: BinaryFile) -> tuple[ZonePlace, ...]:
 
 
 def find_zone(source: BinaryFile, number: int | None) -> ZonePlace:
-    """Return where the zone of that number (from 1) is; None: the first.
-
-    Raises MeshError if there is no such zone, or as `find_zones` does.
-    """
+    """Return where a zone is (from 1; None: the first); MeshError as `find_zones`, or if none."""
     zones, chosen = find_zones(source), 1 if number is None else number
     if not 1 <= chosen <= len(zones):
         has = "one zone" if len(zones) == 1 else f"the zones 1 to {len(zones)}"

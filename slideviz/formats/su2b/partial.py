@@ -87,10 +87,7 @@ def _together(
 def _beside(
     make: WorkerFactory[Piece, None], files: tuple[Path, Path], tasks: list[Piece], _: SerialPool
 ) -> Iterator[Callable[[Tick], None]]:
-    """Context in which a thread does the ``tasks``, with a function that waits for it.
-
-    At the end of the context it stops after the current task.
-    """
+    """Context with a function that waits for a thread's ``tasks``; its end stops these early."""
     stopped, done = Event(), 0
 
     def run() -> None:
@@ -120,10 +117,7 @@ def _beside(
 
 @contextmanager
 def _copying(source: Path, ours: Path) -> Iterator[Callable[[Piece], None]]:
-    """Context with a function that copies a piece of a file to the same place of another.
-
-    When it returns, the bytes are on the disk.
-    """
+    """Context with a function that copies a piece of a file, onto the disk, to the same place."""
     with source.open("rb") as given, open_temporary(ours) as file:
 
         def copy(task: Piece) -> None:
@@ -136,10 +130,7 @@ def _copying(source: Path, ours: Path) -> Iterator[Callable[[Piece], None]]:
 
 
 def _copied(given: BinaryIO, file: BinaryIO, at: int, count: int) -> int:
-    """Copy at most ``count`` bytes at ``at``, inside the kernel if possible; return how many.
-
-    Raises MeshError if the file ends there.
-    """
+    """Copy up to ``count`` bytes at ``at``, in the kernel if possible; return how many."""
     with suppress(OSError, AttributeError):
         moved = os.copy_file_range(given.fileno(), file.fileno(), count, at, at)
         if moved:

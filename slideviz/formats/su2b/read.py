@@ -46,10 +46,7 @@ class ElementBlock:
 def element_blocks(
     source: BinaryFile, place: ZonePlace, table: ElementTable, dim: int, size: int = BLOCK
 ) -> Iterator[ElementBlock]:
-    """Yield the elements of a table, of dimension ``dim``, in blocks of at most ``size``.
-
-    Raises MeshError as `element_block` does.
-    """
+    """Yield a table's elements, of dimension ``dim``, in blocks; MeshError as `element_block`."""
     for first in range(0, table.count, size):
         yield element_block(source, place, table, dim, first, size)
     if not table.count:
@@ -378,9 +375,6 @@ def sorted_back(cells: Cells, order: IntArray) -> Cells:
 
 
 def is_su2b(path: Path) -> bool:
-    """Return whether a file begins as an SU2 binary mesh does.
-
-    Raises OSError if it cannot be read.
-    """
+    """Return whether a file begins as an SU2 binary mesh does; or raise OSError."""
     with path.open("rb") as file:
         return file.read(4) in MAGIC

@@ -47,10 +47,7 @@ class ZoneContent:
 
 
 def write_su2b(path: Path, mesh: Mesh, options: WriteOptions) -> None:
-    """Write a mesh as SU2 binary.
-
-    Raises MeshError as `su2b_blocks` does, or if the file cannot be written.
-    """
+    """Write a mesh as SU2 binary; MeshError as `su2b_blocks`, or if it cannot be written."""
     write_blocks(path, su2b_blocks(mesh), options)
 
 
@@ -79,10 +76,7 @@ def su2b_blocks(*meshes: Mesh) -> Iterator[bytes]:
 
 
 def require_binary(mesh: Mesh, _path: Path | None = None) -> None:
-    """Raise if an SU2 binary file cannot hold a mesh.
-
-    Raises MeshError if it has a halo, or a boundary has a name that cannot stand in such a file.
-    """
+    """Raise MeshError for a halo, or a marker's name that an SU2 binary file cannot hold."""
     if mesh.halo is not None or (isinstance(mesh.origin, Document) and mesh.origin.sends):
         raise halo_error(mesh.name)
     require_binary_names(mesh.name, mesh.marker_names)
@@ -158,10 +152,7 @@ def padded(name: bytes) -> bytes:
 
 
 def marker_table(cells: Cells, conn: np.dtype) -> bytes:
-    """Return the bytes of a marker's elements (count, offsets, list), which follow its name.
-
-    ``conn`` is the data type of counts and indices.
-    """
+    """Return count, offsets and list, of type ``conn``, of a marker's elements, as bytes."""
     head = np.concatenate([[len(cells), 0], np.cumsum(SIZES[cells.types] + 1)])
     return np.concatenate([head, rows_of(cells.types, cells.connectivity)]).astype(conn).tobytes()
 
