@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -71,6 +72,8 @@ def test_a_folding_step_is_halved(square):
 
 class Recorded:
     """A run of which is known what each number of steps gives: steps made, and minimum quality."""
+
+    setup = SimpleNamespace(relaxation=None)
 
     def __init__(self, given):
         self.case, self.given = sv.Case(steps=0), given

@@ -14,7 +14,7 @@ part of the safeguard are choices, so that a frozen step is a chain of forces an
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from weakref import WeakKeyDictionary
@@ -47,8 +47,12 @@ they grow each time."""
 LEAST = 0.2
 """A part below this becomes zero where cells are still worse."""
 
-STRAIN = 0.15
-"""Along an edge, the part may grow by so much that the edge is strained by this."""
+STRAINS = 0.6, 0.15
+"""Along an edge, the part may grow by so much that the edge is strained by this: the first is
+better for most meshes, the second for some."""
+
+PARTS = 0.5, 0.25
+"""Parts of the relaxation that are tried everywhere."""
 
 TINY = 1e-9
 """Growth along edges of no length, and between periodic images."""
@@ -197,30 +201,55 @@ class Relaxation:
     def _kept_part(
         self, problem: Problem, before: Array, after: Array, tie: Callable[[Array], Array]
     ) -> FloatArray:
-        """Return the parts (n, 1) of the relaxation after which no cell is worse.
+        """Return the parts (n, 1) of the relaxation that make no cell worse.
 
-        Where cells would be worse the part is halved, up to zero, and grows from there as far as
-        that strains cells by `STRAIN`, so that layers go as one. Zero everywhere if that fails.
+        All of it if possible. Else the one with the best mean of `PARTS` of it everywhere, and of
+        parts that are smaller near the cells that would be worse; zero if none is better.
         """
-        first = self._quality(problem, before)
-        theta, cap = np.ones(len(self.mesh.points)), np.full(len(self.mesh.points), np.inf)
-        graph = None
-        for _ in range(TRIES):
-            moved = blended(problem, before, after, theta[:, None], tie)
-            now = self._quality(problem, moved)
-            bad = spoiled(first, now)
-            if not bad.any():
-                return theta[:, None] if now.mean >= first.mean else np.zeros((len(theta), 1))
+        first, n = self._quality(problem, before), len(self.mesh.points)
+
+        def tried(theta: FloatArray) -> tuple[np.ndarray, float]:
+            now = self._quality(problem, blended(problem, before, after, theta, tie))
+            return np.flatnonzero(spoiled(first, now)), now.mean
+
+        found = [(first.mean, np.zeros((n, 1)))]
+        bad, mean = tried(np.ones((n, 1)))
+        if not len(bad):
+            return np.full((n, 1), float(mean >= first.mean))
+        graph = self._graph(problem, value(before), value(after))
+        for part in PARTS:
+            worse, mean = tried(np.full((n, 1), part))
+            if not len(worse):
+                found.append((mean, np.full((n, 1), part)))
+        for strain in STRAINS:
+            found += self._held_back(graph, strain, bad, tried)
+        return max(found, key=lambda each: each[0])[1]
+
+    def _held_back(
+        self,
+        graph: csr_array,
+        strain: float,
+        bad: np.ndarray,
+        tried: Callable[[FloatArray], tuple[np.ndarray, float]],
+    ) -> Iterator[tuple[float, FloatArray]]:
+        """Yield the mean quality, and the parts (n, 1) that make no cell worse; nothing if none do.
+
+        At worse cells (``bad``; ``tried`` returns those of a part, and the mean) the part is
+        halved, up to zero, and grows from there as far as that strains cells by ``strain``.
+        """
+        theta, cap = np.ones(graph.shape[0]), np.full(graph.shape[0], np.inf)
+        for k in range(1, TRIES):
             nodes = np.unique(self.domain.cells.take(bad).nodes)
             cap[nodes] = np.where(theta[nodes] > LEAST, 0.5 * theta[nodes], 0.0)
-            if graph is None:
-                graph = self._graph(problem, value(before), value(after))
-            graph.data *= SLOWER
-            theta = _grown(graph, cap)
-        return np.zeros((len(theta), 1))
+            apart = SLOWER**k * np.clip(strain * graph.data, TINY, 2.0)
+            theta = _grown(csr_array((apart, graph.indices, graph.indptr), graph.shape), cap)
+            bad, mean = tried(theta[:, None])
+            if not len(bad):
+                yield mean, theta[:, None]
+                return
 
     def _graph(self, problem: Problem, before: FloatArray, after: FloatArray) -> csr_array:
-        """Return how much the part may grow along each edge of the mesh, (n, n), for ``_grown``."""
+        """Return the length of each edge of the mesh over how far its nodes are relaxed, (n, n)."""
         frame, n = self.body.frame, len(self.mesh.points)
         coords = value(problem.coords)
         shift = frame.points(coords + after) - frame.points(coords + before)
@@ -236,9 +265,8 @@ class Relaxation:
         images = np.flatnonzero(problem.same_as != np.arange(n))
         rows = np.concatenate([ends[:, 0], images])
         columns = np.concatenate([ends[:, 1], problem.same_as[images]])
-        apart = np.clip(STRAIN * length / far, TINY, 2.0)
-        growth = np.concatenate([apart, np.full(len(images), TINY)])
-        return csr_array((growth, (rows, columns)), shape=(n, n))
+        apart = np.concatenate([length / far, np.zeros(len(images))])
+        return csr_array((apart, (rows, columns)), shape=(n, n))
 
     def _quality(self, problem: Problem, displacement: Array) -> Quality:
         at = self.body.frame.points(value(problem.coords) + value(displacement))

@@ -7,6 +7,7 @@ worker run the same code.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -99,9 +100,17 @@ def deform(
 
 
 def all_steps(stepping: Stepping) -> Iterator[Step]:
-    """Yield the steps of a case: as many as it asks for, or as STEPS= auto finds best."""
-    count = stepping.case.steps
-    yield from stepping.steps(count) if count else _automatic(stepping)
+    """Yield the steps of a case: as many as it asks for, or as STEPS= auto finds best.
+
+    Their number is found without relaxation, and only the result is relaxed.
+    """
+    if stepping.case.steps:
+        yield from stepping.steps(stepping.case.steps)
+    elif stepping.setup.relaxation is None:
+        yield from _automatic(stepping)
+    else:
+        *_, last = found = list(_automatic(replace(stepping, setup=stepping.setup.at_step(False))))
+        yield from renumbered(list(stepping.steps([step.part for step in found])), last.tried)
 
 
 def _automatic(stepping: Stepping) -> Iterator[Step]:

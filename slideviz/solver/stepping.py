@@ -54,15 +54,17 @@ class Stepping:
     only the skin of a streamed mesh; the steps then have a ``field``. None: the quality of the last
     step's mesh."""
 
-    def steps(self, count: int, halve: bool = False) -> Iterator[Step]:
+    def steps(self, count: int | Sequence[float], halve: bool = False) -> Iterator[Step]:
         """Yield the steps that divide the displacement into ``count`` equal parts.
 
         Raises DeformError if a step cannot be solved, or its result cannot be right.
         ``halve``: whether a step that folds more cells or is unsound is replaced by two of half the
-        length, and these again, up to ``HALVINGS`` times.
+        length, and these again, up to ``HALVINGS`` times. ``count`` can also be the part of the
+        displacement that is made after each step.
         """
         setup, mesh = self.setup, self.mesh
-        ahead = [(k / count, 0) for k in range(1, count + 1)]
+        parts = [k / count for k in range(1, count + 1)] if isinstance(count, int) else count
+        ahead = [(part, 0) for part in parts]
         coords, done, index, folded = setup.coords, 0.0, 0, 0
         warnings = [*self.case.warnings, *setup.warnings]
         remarks: list[str] = []
@@ -370,7 +372,7 @@ def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
 def _limited_note(limited: int, nodes: int, index: int) -> Note:
     return Note(
         f"step {index}: the relaxation was held back at {limited} of {nodes} nodes, where it would "
-        "have made the worst cells worse; more STEPS may help"
+        f"have made the worst cells worse{'; more STEPS may help' if index == 1 else ''}"
     )
 
 

@@ -190,6 +190,49 @@ def test_the_safeguard_keeps_the_worst_cells(monkeypatch):
     assert any("relaxation was held back" in text for text in step.warnings)
 
 
+def test_the_best_part_of_the_relaxation_that_spoils_no_cell_is_kept(monkeypatch):
+    mesh, case = airfoil(100.0, relax="yes")
+
+    def mean(strains, parts):
+        monkeypatch.setattr(relaxation, "STRAINS", strains)
+        monkeypatch.setattr(relaxation, "PARTS", parts)
+        step = last(case, mesh)
+        return sv.quality(step.mesh, mesh).mean, step.relaxed.theta
+
+    plain = sv.quality(last(case.change(relax="no"), mesh).mesh, mesh).mean
+    assert mean((), ()) == (plain, 0.0)
+    uniform, theta = mean((), (0.5, 0.25))  # half of it inverts a cell
+    assert theta == 0.25
+    best, slow = mean((0.6,), ())[0], mean((0.15,), ())[0]
+    assert plain + 0.01 < uniform < slow - 0.01 < best - 0.02
+    for strains, parts in (((0.6, 0.15), (0.25,)), ((0.15, 0.6), (0.25, 0.5))):
+        assert mean(strains, parts)[0] == best
+
+
+@pytest.mark.parametrize(("steps", "advised"), [(1, True), (3, False)])
+def test_more_steps_are_advised_only_where_they_may_help(steps, advised):
+    mesh, case = airfoil(100.0, relax="yes", steps=steps)
+    (note,) = (text for text in last(case, mesh).warnings if "was held back" in text)
+    assert ("more STEPS may help" in note) == advised
+
+
+def test_automatic_steps_are_chosen_before_relaxation(monkeypatch):
+    mesh, case = airfoil(60.0, relax="yes", steps=0)
+    plain = last(case.change(relax="no"), mesh)
+    calls, relaxed = [], relaxation.Relaxation.relaxed
+    monkeypatch.setattr(
+        relaxation.Relaxation, "relaxed", lambda *args: calls.append(1) or relaxed(*args)
+    )
+    steps = list(sv.deform(case, mesh))
+    assert len(plain.tried) > 1
+    assert steps[-1].tried == plain.tried
+    assert len(calls) == 1
+    assert [step.total for step in steps] == [plain.total] * plain.total
+    fixed = last(case.change(steps=plain.total), mesh)
+    np.testing.assert_array_equal(steps[-1].mesh.points, fixed.mesh.points)
+    assert steps[-1].relaxed == fixed.relaxed
+
+
 def test_auto_leaves_out_large_meshes_and_other_methods(monkeypatch):
     mesh, case = airfoil(relax="auto")
     assert last(case, mesh).relaxed is not None
