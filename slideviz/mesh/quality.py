@@ -342,7 +342,7 @@ def quality(
 
         def of_part(part: slice, vtk: int, ids: IntArray, nodes: IntArray) -> None:
             here = ids[part]
-            result = _of_cells(mesh.points, vtk, nodes[part], signs[here], sums[here], metric)
+            result = cell_quality(mesh.points, vtk, nodes[part], signs[here], sums[here], metric)
             size[here], skew[here], status[here] = result
             values[here] = np.sqrt(result[0]) * result[1]
 
@@ -362,7 +362,7 @@ def quality(
     return replace(result, derivative=derivative_of(mesh, result, before, p, going_on))
 
 
-def _of_cells(
+def cell_quality(
     points: FloatArray,
     vtk: int,
     nodes: IntArray,

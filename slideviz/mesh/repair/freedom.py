@@ -1,0 +1,69 @@
+"""Freedom of nodes: in which directions a repair may move each, and which move as one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.mesh.model import FloatArray, IntArray, sealed
+
+Project = Callable[[IntArray, FloatArray], tuple[FloatArray, FloatArray]]
+"""Takes nodes (k,) that slide on curved boundaries, with all images and copies of each, ascending,
+and their points (k, d). Returns the points on the boundary (k, d), images where they belong, and
+the maps T (k, d, d) there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Freedom:
+    """Which nodes may move, and how: ``x_i = x_i⁰ + T_i q_b``, q_b the unknowns of its block.
+
+    The displacement q_b (d,) of a block is common to a node, its periodic images and its copies in
+    a halo. T_i is R_i P: P projects on the directions in which the node may move (all for a node
+    of the interior; the tangents of its surface, or its edge, for one that slides), R_i turns
+    to the image (I for the node itself). These are ``place`` and ``turn`` of
+    `slideviz.elastic.stiffness.Conditions`, too.
+    """
+
+    place: IntArray
+    """(n,): the block of each node, from 0; -1 for a node that is held (moving, fixed)."""
+    bound: IntArray
+    """(m,): the nodes of blocks, ascending, whose map is not the identity."""
+    maps: FloatArray
+    """(m, d, d): their maps T_i."""
+    curved: IntArray
+    """(s,): the nodes, ascending, that slide on a boundary that may be curved."""
+    project: Project | None = None
+    """Puts them back after each outer round; None if no boundary is curved."""
+
+    @classmethod
+    def within(cls, dim: int, held: NDArray[np.bool_]) -> Freedom:
+        """Return the freedom of nodes that move anywhere, but for those of the mask held (n,)."""
+        place = np.where(held, -1, np.cumsum(~held) - 1)
+        none = np.empty(0, np.int64)
+        return cls(sealed(place), none, np.empty((0, dim, dim)), none)
+
+    def of_part(self, nodes: IntArray) -> Freedom:
+        """Return the freedom of some nodes (k,), ascending, in that order, as of a mesh of its own.
+
+        Blocks of which a node is left out stay blocks. `project` gets numbers of the whole.
+        """
+        place = self.place[nodes]
+        used = np.unique(place[place >= 0])
+        place = np.where(place >= 0, np.searchsorted(used, place), -1)
+        bound = np.isin(self.bound, nodes)
+        whole = self.project
+
+        def project(some: IntArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+            assert whole is not None
+            return whole(nodes[some], points)
+
+        return Freedom(
+            sealed(place),
+            np.searchsorted(nodes, self.bound[bound]),
+            self.maps[bound],
+            np.searchsorted(nodes, self.curved[np.isin(self.curved, nodes)]),
+            None if whole is None else project,
+        )

@@ -1,0 +1,219 @@
+"""Patches: the cells near bad ones, with the nodes among them that may move.
+
+Patches that share a node are one. A node moves only if all cells of its block (of the node, its
+images and copies) are in the patch, so that everything outside keeps its bits.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.mesh.fans import components
+from slideviz.mesh.jacobians import CORNERS
+from slideviz.mesh.model import Cells, FloatArray, IntArray
+from slideviz.mesh.repair.energy import CORNER_AT, Targets, write_curvatures, write_energy
+from slideviz.mesh.repair.freedom import Freedom
+from slideviz.system.jit_cache import njit
+
+CHUNK = 512
+"""Cells that a thread works on at a time."""
+
+FLAT = 1e-12
+"""Curvature of a block, over its largest one, below which a direction counts as held."""
+
+
+def find_patches(
+    cells: Cells, freedom: Freedom, bad: NDArray[np.bool_], rings: int
+) -> tuple[list[IntArray], NDArray[np.bool_]]:
+    """Return the cells (k,) of each patch, ascending, and a mask (n,) of nodes that may move.
+
+    ``bad`` is a mask (m,) of cells; patches are these and ``rings`` rings of cells by nodes.
+    """
+    place, count = freedom.place, len(freedom.place)
+    chosen = bad.copy()
+    for _ in range(rings):
+        near = _with_images(place, _nodes_of(cells, chosen, count))
+        for ids, nodes in cells.by_type.values():
+            chosen[ids] |= near[nodes].any(axis=1)
+    inside = ~_nodes_of(cells, ~chosen, count) & (place >= 0)
+    inside &= ~_with_images(place, ~inside)
+    ids = np.flatnonzero(chosen)
+    part = cells.take(ids)
+    first, sizes = part.connectivity[part.offsets[:-1]], np.diff(part.offsets)
+    label = components(count, np.repeat(first, sizes), part.connectivity)
+    label = _with_representative(place, label)[first]
+    return [ids[label == one] for one in np.unique(label)], inside
+
+
+def _nodes_of(cells: Cells, chosen: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
+    """Return a mask (count,) of the nodes of the cells in the mask ``chosen`` (m,)."""
+    out = np.zeros(count, bool)
+    for ids, nodes in cells.by_type.values():
+        out[nodes[chosen[ids]]] = True
+    return out
+
+
+def _with_images(place: IntArray, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the mask ``chosen`` (n,) with all nodes of the blocks of those in it."""
+    blocks = np.zeros(int(place.max(initial=-1)) + 2, bool)  # the last one: of held nodes
+    blocks[place[chosen]] = True
+    blocks[-1] = False
+    return chosen | blocks[place]
+
+
+def _with_representative(place: IntArray, label: IntArray) -> IntArray:
+    """Return labels (n,) of connected nodes in which blocks connect their nodes, too."""
+    first = np.full(int(place.max(initial=-1)) + 1, -1)
+    own = np.flatnonzero(place >= 0)
+    first[place[own[::-1]]] = own[::-1]
+    count = len(label)
+    pairs = first[place[own]]
+    return components(count, np.r_[label, own], np.r_[np.arange(count), pairs])
+
+
+class Patch:
+    """A patch with numbers of its own, and the sums over its cells."""
+
+    def __init__(
+        self,
+        points: FloatArray,
+        nodes: IntArray,
+        freedom: Freedom,
+        parts: list[Targets],
+        pool: Executor,
+    ) -> None:
+        """Take a patch.
+
+        Parameters
+        ----------
+        points : (k, d)
+            Of its nodes.
+        nodes : (k,)
+            Their numbers in the whole mesh, ascending.
+        freedom : Freedom
+            Of them; blocks that do not move have no number.
+        parts : list
+            Its cells; their nodes count from 0.
+        pool : Executor
+            Does chunks of cells.
+        """
+        self.start, self.nodes, self.freedom, self.parts = points, nodes, freedom, parts
+        self.blocks = int(freedom.place.max(initial=-1)) + 1
+        self.maps = np.ascontiguousarray(freedom.maps)
+        self.row = np.full(len(nodes), -1)
+        self.row[freedom.bound] = np.arange(len(freedom.bound))
+        self._pool = pool
+        self._flat = np.concatenate([part.nodes.ravel() for part in parts])
+        owner = freedom.place[self._flat]
+        order = np.argsort(owner, kind="stable")
+        begins = np.searchsorted(owner[order], np.arange(self.blocks + 1))
+        self._order, self._begins = order, begins
+        self._slopes = np.empty((len(self._flat), points.shape[1]))
+        sizes = [len(part.nodes) for part in parts]
+        self.values, self.least = np.empty(sum(sizes)), np.empty(sum(sizes))
+        self._chunks, first, entry = [], 0, 0
+        for part, size in zip(parts, sizes, strict=True):
+            width = part.nodes.shape[1]
+            slopes = self._slopes[entry : entry + size * width].reshape(size, width, -1)
+            for low in range(0, size, CHUNK):
+                here = slice(low, min(low + CHUNK, size))
+                whole = slice(first + here.start, first + here.stop)
+                self._chunks.append((part, here, whole, slopes[here]))
+            first, entry = first + size, entry + size * width
+
+    def points(self, unknowns: FloatArray) -> FloatArray:
+        """Return the points (k, d) of unknowns (b, d)."""
+        out = np.array(self.start)
+        _move(self.freedom.place, self.row, self.maps, unknowns, out)
+        return out
+
+    def of_cells(self, work: object) -> None:
+        """Call ``work(part, here, whole, slopes)`` for each chunk of cells, on all cores."""
+        assert callable(work)
+        if len(self._chunks) == 1:
+            work(*self._chunks[0])
+        else:
+            list(self._pool.map(lambda chunk: work(*chunk), self._chunks))
+
+    def gathered(self) -> FloatArray:
+        """Return the sum (b, d) of the slopes of the cells by unknowns."""
+        out = np.empty((self.blocks, self.start.shape[1]))
+        _gather_blocks(
+            self._begins, self._order, self._flat, self.row, self.maps, self._slopes, out
+        )
+        return out
+
+    def energy(self, unknowns: FloatArray, epsilon: float) -> tuple[float, FloatArray]:
+        """Return the energy and its gradient (b, d); `least` has the least D of the cells."""
+        points = self.points(unknowns)
+
+        def work(part: Targets, here: slice, whole: slice, slopes: FloatArray) -> None:
+            table, at = CORNERS[part.vtk], CORNER_AT[part.vtk]
+            cells = part.nodes[here], table, at, part.scale[here], part.shape[here]
+            out = self.values[whole], slopes, self.least[whole]
+            write_energy(part.vtk, points, *cells, epsilon, *out)
+
+        self.of_cells(work)
+        return float(self.values.sum()), self.gathered()
+
+    def curvature(self, unknowns: FloatArray, epsilon: float) -> FloatArray:
+        """Return the inverse (b, d, d) of each block of the positive Hessian, where it can move."""
+        points, d = self.points(unknowns), self.start.shape[1]
+        total = np.zeros((self.blocks, d, d))
+        for part in self.parts:
+            table, at = CORNERS[part.vtk], CORNER_AT[part.vtk]
+            out = np.empty((*part.nodes.shape, d, d))
+
+            def work(low: int, part=part, table=table, at=at, out=out) -> None:  # type: ignore[no-untyped-def]
+                here = slice(low, low + CHUNK)
+                cells = part.nodes[here], table, at, part.scale[here], part.shape[here]
+                write_curvatures(part.vtk, points, *cells, epsilon, out[here])
+
+            list(self._pool.map(work, range(0, len(part.nodes), CHUNK)))
+            place = self.freedom.place[part.nodes]
+            bound = self.row[part.nodes] >= 0
+            maps = self.maps[self.row[part.nodes[bound]]]
+            out[bound] = np.swapaxes(maps, 1, 2) @ out[bound] @ maps
+            np.add.at(total, place[place >= 0], out[place >= 0])
+        value, vector = np.linalg.eigh(total)
+        keep = value > FLAT * value[:, -1:]
+        inverse = np.where(keep, 1.0 / np.where(keep, value, 1.0), 0.0)
+        return (vector * inverse[:, None, :]) @ np.swapaxes(vector, 1, 2)
+
+
+@njit(nogil=True, cache=True)
+def _move(place, row, maps, unknowns, out):  # type: ignore[no-untyped-def]
+    """Add the displacements of unknowns (b, d) to the points ``out`` (k, d)."""
+    d = out.shape[1]
+    for i in range(len(out)):
+        block, m = place[i], row[i]
+        if block < 0:
+            continue
+        for a in range(d):
+            if m < 0:
+                out[i, a] += unknowns[block, a]
+            else:
+                total = 0.0
+                for b in range(d):
+                    total += maps[m, a, b] * unknowns[block, b]
+                out[i, a] += total
+
+
+@njit(nogil=True, cache=True)
+def _gather_blocks(begins, order, nodes, row, maps, slopes, out):  # type: ignore[no-untyped-def]
+    """Write the sums of slopes (e, d), each times its map's transpose, into ``out`` (b, d)."""
+    d = out.shape[1]
+    out[:] = 0.0
+    for block in range(len(out)):
+        for k in range(begins[block], begins[block + 1]):
+            entry = order[k]
+            m = row[nodes[entry]]
+            for a in range(d):
+                if m < 0:
+                    out[block, a] += slopes[entry, a]
+                else:
+                    for b in range(d):
+                        out[block, a] += maps[m, b, a] * slopes[entry, b]
