@@ -52,9 +52,9 @@ def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: i
         _weights(alpha, spread, turn[here], powers, sums[here])
         slope[:] = 0.0
         if points.shape[1] == 2:
-            _pull_plane(vtk, at, table, count, alpha, spread, slope)
+            pull_plane(vtk, at, table, count, alpha, spread, slope)
         else:
-            _pull_solid(vtk, at, table, count, alpha, spread, slope)
+            pull_solid(vtk, at, table, count, alpha, spread, slope)
         for c in range(count):
             for j in range(nodes.shape[1]):
                 for axis in range(points.shape[1]):
@@ -91,7 +91,7 @@ def _power(base, exponent):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _pull_plane(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
+def pull_plane(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives of ln f_ss by the nodes of plane cells to ``slope`` (2, n, ...).
 
     ``alpha`` and ``spread`` (k, ...) are its derivatives by Jacobians and spreads (`_weights`).
@@ -117,8 +117,8 @@ def _pull_plane(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no
 
 
 @njit(**OPTIONS)
-def _pull_solid(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
-    """Add the derivatives by nodes to ``slope`` (3, n, ...), as `_pull_plane` for 3D cells."""
+def pull_solid(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
+    """Add the derivatives by nodes to ``slope`` (3, n, ...), as `pull_plane` for 3D cells."""
     for k in range(len(table)):
         o, i, j, h = table[k, 0], table[k, 1], table[k, 2], table[k, 3]
         for c in range(count):
@@ -189,13 +189,13 @@ def pull_coefficients(vtk, points, nodes, table, weights, out):  # type: ignore[
         part[:, :count] = weights[:, first : first + count]
         slope[:] = 0.0
         if vtk == 12:
-            _pull_hexahedron(at, count, part.reshape(3, 3, 3, LANES), slope)
+            pull_hexahedron(at, count, part.reshape(3, 3, 3, LANES), slope)
         elif vtk == 13:
-            _pull_prism(at, count, part.reshape(3, 3, LANES), slope)
+            pull_prism(at, count, part.reshape(3, 3, LANES), slope)
         elif points.shape[1] == 2:
-            _pull_plane(5, at, table, count, part, none, slope)
+            pull_plane(5, at, table, count, part, none, slope)
         else:
-            _pull_solid(14, at, table, count, part, none, slope)
+            pull_solid(14, at, table, count, part, none, slope)
         for c in range(count):
             for j in range(nodes.shape[1]):
                 for axis in range(points.shape[1]):
@@ -212,7 +212,7 @@ _PRISM_HEIGHTS = np.array([[0, 3], [1, 4], [2, 5]])
 
 
 @njit(**OPTIONS)
-def _pull_hexahedron(at, count, weights, slope):  # type: ignore[no-untyped-def]
+def pull_hexahedron(at, count, weights, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives of the coefficients of hexahedra, times ``weights`` (3, 3, 3, ...)."""
     heights, factors = NODE.reshape(4, 2), np.empty((3, 4))
     for i in range(2):
@@ -228,7 +228,7 @@ def _pull_hexahedron(at, count, weights, slope):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _pull_prism(at, count, weights, slope):  # type: ignore[no-untyped-def]
+def pull_prism(at, count, weights, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives of the coefficients of prisms, times ``weights`` (3, 3, ...)."""
     for c in range(count):
         _pull_heights(at, c, _PRISM_SIDES, _PRISM_HEIGHTS, weights[:, :, c], slope)

@@ -17,15 +17,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.mesh.jacobian_slopes import _pull_hexahedron, _pull_plane, _pull_prism, _pull_solid
+from slideviz.mesh.jacobian_slopes import pull_hexahedron, pull_plane, pull_prism, pull_solid
 from slideviz.mesh.jacobians import (
     CORNERS,
     LANES,
     OPTIONS,
-    _write_hexahedron,
-    _write_prism,
     corners,
     gather,
+    write_hexahedron,
+    write_prism,
 )
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.system.jit_cache import njit
@@ -100,9 +100,9 @@ def targets(vtk: int, nodes: IntArray, at: FloatArray, signs: FloatArray) -> Tar
 def _coefficients(vtk, at, table, count, found):  # type: ignore[no-untyped-def]
     """Write the coefficients of the proof of cells of one type into ``found`` (k, LANES)."""
     if vtk == 12:
-        _write_hexahedron(at, count, found.reshape(3, 3, 3, LANES))
+        write_hexahedron(at, count, found.reshape(3, 3, 3, LANES))
     elif vtk == 13:
-        _write_prism(at, count, found.reshape(3, 3, LANES))
+        write_prism(at, count, found.reshape(3, 3, LANES))
     else:
         corners(at, table, count, found)
 
@@ -111,13 +111,13 @@ def _coefficients(vtk, at, table, count, found):  # type: ignore[no-untyped-def]
 def _pull(vtk, at, table, count, weights, none, slope):  # type: ignore[no-untyped-def]
     """Add the slopes (d, n, LANES) of the coefficients times ``weights`` (k, LANES)."""
     if vtk == 12:
-        _pull_hexahedron(at, count, weights.reshape(3, 3, 3, LANES), slope)
+        pull_hexahedron(at, count, weights.reshape(3, 3, 3, LANES), slope)
     elif vtk == 13:
-        _pull_prism(at, count, weights.reshape(3, 3, LANES), slope)
+        pull_prism(at, count, weights.reshape(3, 3, LANES), slope)
     elif at.shape[0] == 2:
-        _pull_plane(5, at, table, count, weights, none, slope)
+        pull_plane(5, at, table, count, weights, none, slope)
     else:
-        _pull_solid(14, at, table, count, weights, none, slope)
+        pull_solid(14, at, table, count, weights, none, slope)
 
 
 @njit(**OPTIONS)
