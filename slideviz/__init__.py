@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         Scale,
         Translate,
     )
-    from slideviz.design.deformer import Deformer
+    from slideviz.design.deformer import Constraint, Deformer
     from slideviz.design.sweeps.sweep import sweep
     from slideviz.errors import ConditionWarning, SlidevizError, ToleranceWarning
     from slideviz.export.flat_section import section
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 _NAMES = {
     "case.model": "Bump Case Cst Ffd FfdCamber FfdThickness FfdTwist FromFile HicksHenne "
     "Prescribed Radial Rotate Scale Translate",
-    "design.deformer": "Deformer",
+    "design.deformer": "Constraint Deformer",
     "design.sweeps.sweep": "sweep",
     "errors": "ConditionWarning SlidevizError ToleranceWarning",
     "export.flat_section": "section",
@@ -69,12 +69,12 @@ _NAMES = {
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 __all__ = [
-    "Bump", "Case", "Cells", "Combination", "ConditionWarning", "Cst", "Deformer", "Detail", "Ffd",
-    "FfdCamber", "FfdThickness", "FfdTwist", "FromFile", "HicksHenne", "Marker", "Mesh",
-    "MetricValues", "Prescribed", "Quality", "QualityDerivative", "Radial", "Reduction", "Rotate",
-    "Scale", "Section", "SectionStyle", "SlidevizError", "Step", "ToleranceWarning", "Translate",
-    "Walls", "__version__", "compare", "convert", "deform", "film", "metrics", "picture", "quality",
-    "read", "section", "sweep", "walls", "write",
+    "Bump", "Case", "Cells", "Combination", "ConditionWarning", "Constraint", "Cst", "Deformer",
+    "Detail", "Ffd", "FfdCamber", "FfdThickness", "FfdTwist", "FromFile", "HicksHenne", "Marker",
+    "Mesh", "MetricValues", "Prescribed", "Quality", "QualityDerivative", "Radial", "Reduction",
+    "Rotate", "Scale", "Section", "SectionStyle", "SlidevizError", "Step", "ToleranceWarning",
+    "Translate", "Walls", "__version__", "compare", "convert", "deform", "film", "metrics",
+    "picture", "quality", "read", "section", "sweep", "walls", "write",
 ]  # fmt: skip
 
 

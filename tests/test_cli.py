@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,8 +13,10 @@ import time
 from dataclasses import fields, replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
+import pyvista as pv
 
 import slideviz as sv
 from slideviz.cli import run
@@ -276,8 +279,64 @@ def test_metrics_are_printed_reported_and_written_where_they_are_asked_for(tmp_p
         assert np.array_equal(table[field], values.of_cells)
     assert run([*call, "warpage"]) == 2
     assert "'warpage' is not one of all | size_skew" in capsys.readouterr().err
-    assert run([*call, "skewness", "--stream"]) == 1
-    assert "--metrics needs the mesh in memory" in capsys.readouterr().err
+    assert run([*call, "skewness,growth,size", "--stream"]) == 1
+    error = capsys.readouterr().err
+    assert "--metrics skewness,growth needs the mesh in memory" in error
+    alone = re.search(r"use --metrics (\S+), or", error)[1]
+    assert run([*call, alone, "--stream", "--json", str(tmp_path / "s.json")]) == 0
+    streamed = json.loads((tmp_path / "s.json").read_text())["metrics"]
+    assert streamed == {name: report[name] for name in alone.split(",")}
+    assert set(streamed) >= {"size", "skew", "scaled_jacobian", "aspect_ratio"}
+
+
+@pytest.fixture
+def channel(tmp_path: Path) -> tuple[sv.Mesh, sv.Case]:
+    """A channel with layers at its lower wall, which moves, and its case; both are in files."""
+    mesh = layered(8, 0.001)
+    case = sv.Case(roles={"y_m": "moving", "x_m": "internal", "x_p": "sliding"}, sliding="ps")
+    case = case.change(motions=(sv.Translate("y_m", (0, 1e-4)),), mesh_file=tmp_path / "mesh.su2")
+    sv.write(tmp_path / "mesh.su2", mesh)
+    case.write(tmp_path / "case.cfg")
+    return mesh, case
+
+
+@pytest.mark.parametrize("ending", [".vtu", ".vtkhdf"])
+def test_metrics_and_walls_are_in_files_for_paraview(channel, tmp_path, ending):
+    base, case = channel
+    out = tmp_path / f"out{ending}"
+    words = ["--metrics", "ALL", "-q", "--json", str(tmp_path / "report.json")]
+    assert run(["run", str(tmp_path / "case.cfg"), "-o", str(out), *words]) == 0
+    assert run(["run", str(tmp_path / "case.cfg"), "-o", str(tmp_path / "moved.su2"), "-q"]) == 0
+    moved = sv.read(tmp_path / "moved.su2")
+    layers = sv.walls(moved, base, case.walls(base.marker_names)).with_layers()
+    count = len(moved.cells)  # a VTU file has those of boundaries, too
+
+    def check(path, reference, names):
+        if ending == ".vtu":
+            grid = pv.read(path)
+            of_cells, of_points = (dict(part) for part in (grid.cell_data, grid.point_data))
+        else:
+            with h5py.File(path) as file:
+                parts = (file[f"VTKHDF/volume/{kind}Data"] for kind in ("Cell", "Point"))
+                of_cells, of_points = ({k: v[:] for k, v in part.items()} for part in parts)
+        for name, one in sv.metrics(moved, reference=reference).items():
+            if name in ("size-skew", "size", "skew"):
+                continue
+            field = name.replace("-", "_")
+            np.testing.assert_allclose(of_cells[field][:count], one.of_cells, rtol=1e-9)
+            if one.term.where == "nodes":
+                np.testing.assert_allclose(of_points[field], one.values, rtol=1e-9)
+        for name in names:
+            np.testing.assert_allclose(of_cells[name][:count], layers.at_cells(name), rtol=1e-9)
+        return of_cells
+
+    check(out, base, layers.values)
+    rated = tmp_path / f"rated{ending}"
+    words = ["--metrics", "all", "--case", str(tmp_path / "case.cfg")]
+    shutil.move(tmp_path / "mesh.su2", tmp_path / "away.su2")
+    assert run(["quality", str(tmp_path / "moved.su2"), *words, "-o", str(rated)]) == 0
+    alone = check(rated, None, ("first_height", "growth", "equal_layers", "wall_angle"))
+    assert "height_ratio" not in alone
 
 
 def test_a_run_reports_metrics_before_and_after(square, tmp_path, capsys):
@@ -662,12 +721,8 @@ def test_quality_checks_limits(square, tmp_path, capsys):
     assert "did you mean min?" in capsys.readouterr().err
 
 
-def test_layers_are_in_reports_and_summaries(tmp_path, capsys):
-    mesh = layered(8, 0.001)
-    case = sv.Case(roles={"y_m": "moving", "x_m": "internal", "x_p": "sliding"}, sliding="ps")
-    case = case.change(motions=(sv.Translate("y_m", (0, 1e-4)),), mesh_file=tmp_path / "mesh.su2")
-    sv.write(tmp_path / "mesh.su2", mesh)
-    case.write(tmp_path / "case.cfg")
+def test_layers_are_in_reports_and_summaries(channel, tmp_path, capsys):
+    mesh, _ = channel
     out, report = tmp_path / "out.su2", tmp_path / "report.json"
     assert run(["run", f"{tmp_path}/case.cfg", "-o", str(out), "--json", str(report)]) == 0
     line = next(x for x in capsys.readouterr().out.splitlines() if "layers at" in x)
@@ -682,3 +737,30 @@ def test_layers_are_in_reports_and_summaries(tmp_path, capsys):
     alone = json.loads(capsys.readouterr().out)["walls"]
     assert alone["y_m"] == {key: walls["y_m"][key] for key in ("layered", "after")}
     assert "x_m" in alone
+
+
+@pytest.mark.usefixtures("channel")
+def test_a_missed_limit_of_walls_says_where_and_whether_the_undeformed_mesh_misses_it(
+    tmp_path, capsys
+):
+    call = ["run", str(tmp_path / "case.cfg"), "-q", "-o", str(tmp_path / "out.su2")]
+    report = ["--json", str(tmp_path / "report.json")]
+    limits = "LIMITS=( height_ratio@y_m > 0.99999, equal_layers@y_m > 4 )"
+    assert run([*call, "--set", limits, *report]) == 4
+    error = capsys.readouterr().err
+    assert re.search(
+        r"height_ratio@y_m > 0.99999 is not met at y_m, in \d+ cells \(.*, undef", error
+    )
+    missed = r"equal_layers@y_m > 4 is not met at y_m, .*: 1, the undeformed mesh misses it, too: "
+    assert re.search(missed, error)
+    assert "what may help: LAYERS= AUTO; RELAX= YES; " in error
+    ratio, equal = json.loads((tmp_path / "report.json").read_text())["limits"]
+    assert (ratio["boundaries"], ratio["undeformed_passed"]) == (["y_m"], True)
+    assert (equal["boundaries"], equal["undeformed_passed"]) == (["y_m"], False)
+    assert run([*call, "--set", "LIMITS=( equal_layers@y_m > 4 )"]) == 4
+    assert "may help" not in capsys.readouterr().err
+    assert run([*call, "--set", "LIMITS=( growth@x_m < 1.2 )"]) == 1
+    assert "x_m is no wall" in capsys.readouterr().err
+    mesh = ["quality", str(tmp_path / "mesh.su2"), "--limits"]
+    assert run([*mesh, "height_ratio > 0.5"]) == 1
+    assert "compares with the undeformed mesh; give it (--ref" in capsys.readouterr().err

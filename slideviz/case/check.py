@@ -11,6 +11,7 @@ from slideviz.case.boxes import ffd_problems
 from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.key import BOUNDARIES, FILES, MOTION, Key
 from slideviz.case.keys import KEYS
+from slideviz.case.limits import not_walls
 from slideviz.case.method_keys import FACTORS, why_no_tolerance
 from slideviz.case.model import (
     BoxMotion,
@@ -98,7 +99,12 @@ def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     nothing = "no marker moves; name one in MARKER_MOVING"
     named = {name: ROLES[role].key for name, role in case.roles.items()}
     limited = {limit.marker: "LIMITS" for limit in case.limits if limit.marker}
-    return (*unknown_markers(mesh, named | limited), *[nothing] * (not case.markers_with("moving")))
+    there = [limit for limit in case.limits if limit.marker in mesh.marker_names]
+    return (
+        *unknown_markers(mesh, named | limited),
+        *not_walls(there, case.walls(mesh.marker_names)),
+        *[nothing] * (not case.markers_with("moving")),
+    )
 
 
 def unknown_markers(mesh: Mesh, named: Mapping[str, str]) -> list[str]:

@@ -9,8 +9,9 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from math import inf
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from slideviz.mesh.metrics import metric
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, PIECE, UNPROVEN, Quality
 from slideviz.mesh.quality_derivative import cell_margins
-from slideviz.mesh.walls import walls
+from slideviz.mesh.walls import CHANGES, LAYERS, walls
 from slideviz.terms import METRICS, SIZE_SKEW, Metric, field_of
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ _LIMIT = re.compile(
     r'(?P<name>[\w-]+)(?:@(?:"(?P<quoted>(?:[^"]|"")+)"|(?P<plain>[^\s<>="]+)))?'
     r"\s*(?P<sign>[<>=]+)\s*(?P<value>\S+)\Z"
 )
-_ITEM = re.compile(r'(?:"[^"]*"|[^",])+')
+_ITEM = re.compile(r'(?:"[^"]*"|[^",;])+')
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +56,16 @@ class MeasuredMesh:
     with layers."""
 
 
-Values = tuple[FloatArray, IntArray | None]
-"""Values (k,) of cells, NaN where one has none, and the numbers (k,) of the cells; None: all."""
+class Values(NamedTuple):
+    """The values of a number in cells."""
+
+    values: FloatArray
+    """(k,): NaN where a cell has none."""
+    cells: IntArray | None = None
+    """(k,): the numbers of the cells; None: all."""
+    boundary: IntArray | None = None
+    """(k,): the place in `names` of the boundary that a value belongs to; None: to none."""
+    names: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -72,10 +81,13 @@ class LimitNumber:
     on_boundary: bool = False
     """Whether it is measured at boundaries, so that one can be named after ``@``."""
     streamed: bool = False  # whether it is known of a mesh in a file
+    compares: bool = False
+    """Whether it compares with the undeformed mesh, and has no value without it."""
+    range: tuple[float, float] = (-inf, inf)  # the values that are possible
 
 
 def _of_quality(name: str) -> Callable[[MeasuredMesh, str], Values]:
-    return lambda measured, _: (getattr(measured.quality, name), None)
+    return lambda measured, _: Values(getattr(measured.quality, name))
 
 
 def _of_metric(name: Metric) -> Callable[[MeasuredMesh, str], Values]:
@@ -84,16 +96,15 @@ def _of_metric(name: Metric) -> Callable[[MeasuredMesh, str], Values]:
 
     def values(measured: MeasuredMesh, _: str) -> Values:
         assert measured.mesh is not None
-        return metric(measured.mesh, name, measured.reference).of_cells, None
+        return Values(metric(measured.mesh, name, measured.reference).of_cells)
 
     return values
 
 
-def _margins(measured: MeasuredMesh) -> FloatArray:
+def _margins(measured: MeasuredMesh, _: str) -> Values:
     assert measured.mesh is not None
-    if measured.reference is None:
-        return np.empty(0)
-    return cell_margins(measured.mesh, measured.reference)
+    assert measured.reference is not None
+    return Values(cell_margins(measured.mesh, measured.reference))
 
 
 def _of_walls(name: str) -> Callable[[MeasuredMesh, str], Values]:
@@ -106,25 +117,39 @@ def _of_walls(name: str) -> Callable[[MeasuredMesh, str], Values]:
         boundary, corner = found.columns.boundary, found.columns.corner
         wanted = [one for one in found.markers if marker or one in found.layered]
         some = np.isin(boundary.marker, [boundary.names.index(one) for one in wanted])
-        if name not in found.values:  # there is no undeformed mesh to compare with
-            return np.empty(0), None
-        cells = np.repeat(boundary.owner[some], corner.shape[1])
-        return found.values[name][corner[some].ravel()], cells
+        width = corner.shape[1]
+        cells, at = (np.repeat(x[some], width) for x in (boundary.owner, boundary.marker))
+        return Values(found.values[name][corner[some].ravel()], cells, at, boundary.names)
 
     return values
 
 
-def _wall(name: str, meaning: str, signs: str) -> LimitNumber:
-    return LimitNumber(meaning, signs, _of_walls(name), on_boundary=True)
+def _wall(
+    name: str, meaning: str, signs: str, range_: tuple[float, float] = (-inf, inf)
+) -> LimitNumber:
+    row = LimitNumber(meaning, signs, _of_walls(name), on_boundary=True, range=range_)
+    return replace(row, compares=name in CHANGES)
 
 
 NUMBERS: Mapping[str, LimitNumber] = {
     "min": LimitNumber(
-        "lowest quality", ">", _of_quality("values"), total=lambda q: q.min, streamed=True
+        "lowest quality",
+        ">",
+        _of_quality("values"),
+        total=lambda q: q.min,
+        streamed=True,
+        range=(0.0, 1.0),
     ),
-    "mean": LimitNumber("mean quality", ">", total=lambda q: q.mean, streamed=True),
+    "mean": LimitNumber(
+        "mean quality", ">", total=lambda q: q.mean, streamed=True, range=(0.0, 1.0)
+    ),
     "inverted": LimitNumber(
-        "inverted cells", "<=", total=lambda q: q.inverted, status=INVERTED, streamed=True
+        "inverted cells",
+        "<=",
+        total=lambda q: q.inverted,
+        status=INVERTED,
+        streamed=True,
+        range=(0.0, inf),
     ),
     "unproven": LimitNumber(
         "cells neither proved valid nor found inverted",
@@ -132,21 +157,30 @@ NUMBERS: Mapping[str, LimitNumber] = {
         total=lambda q: q.unproven,
         status=UNPROVEN,
         streamed=True,
+        range=(0.0, inf),
     ),
     "margin": LimitNumber(
         "least coefficient of a cell's Jacobian over that before; 0 folds",
         ">",
-        lambda measured, _: (_margins(measured), None),
+        _margins,
+        compares=True,
     ),
     "first_height": _wall("first_height", "distance of the first node from its wall", "<>"),
     "height_ratio": _wall("height_ratio", "first height over that before", "<>"),
-    "growth": _wall("growth", "ratio of successive layers, the first five", "<"),
-    "equal_layers": _wall("equal_layers", "first layers of equal height, up to five", ">"),
-    "wall_angle": _wall("wall_angle", "between first edge and wall in degrees, 90 best", ">"),
-    "angle_change": _wall("angle_change", "change of that angle in degrees", "<"),
+    "growth": _wall("growth", "ratio of successive layers, the first five", "<", (1.0, inf)),
+    "equal_layers": _wall(
+        "equal_layers", "first layers of equal height, up to five", ">", (0.0, LAYERS)
+    ),
+    "wall_angle": _wall(
+        "wall_angle", "between first edge and wall in degrees, 90 best", ">", (-90.0, 90.0)
+    ),
+    "angle_change": _wall("angle_change", "change of that angle in degrees", "<", (0.0, 180.0)),
     **{
         field_of(name): LimitNumber(
-            f"{term.label} {term.unit}".strip(), "<>"[term.best == "high"], _of_metric(name)
+            f"{term.label} {term.unit}".strip(),
+            "<>"[term.best == "high"],
+            _of_metric(name),
+            range=term.range,
         )
         for name, term in METRICS.items()
     },
@@ -183,6 +217,10 @@ class Limit(CheckedFields):
             raise CaseError(f"{self}: {self.name} is of the whole mesh; leave out @{self.marker}")
         if not np.isfinite(self.value):
             raise CaseError(f"{self}: expected a finite number as the limit")
+        low, high = row.range
+        if not low <= self.value <= high:
+            ends = f"a number from {low:g} to {high:g}" if high < inf else f"at least {low:g}"
+            raise CaseError(f"{self}: expected {ends}, for {self.name} ({row.meaning}) is that")
 
     def __str__(self) -> str:
         place = f"@{name_text(self.marker)}" if self.marker else ""
@@ -202,6 +240,8 @@ class LimitResult:
     """The number; of one of each cell, the value farthest beyond the limit, or nearest to it. NaN
     where no cell has a value."""
     cells: IntArray  # (k,): the cells that fail, the worst first; none for a mean
+    boundaries: tuple[str, ...] = ()
+    """Of a number of walls, the boundaries where it fails, the worst first."""
 
     @property
     def passed(self) -> bool:
@@ -209,9 +249,33 @@ class LimitResult:
         return bool(self.limit.holds(self.actual))
 
 
-def check_limits(limits: Iterable[Limit], measured: MeasuredMesh) -> tuple[LimitResult, ...]:
-    """Return for each limit whether a mesh meets it."""
+def check_limits(limits: Sequence[Limit], measured: MeasuredMesh) -> tuple[LimitResult, ...]:
+    """Return for each limit whether a mesh meets it.
+
+    Raises CaseError for a limit on a number that compares with the undeformed mesh where there is
+    none, and for one at a boundary that is no wall.
+    """
+    problems = [] if measured.boundaries is None else not_walls(limits, measured.boundaries)
+    if measured.reference is None and measured.mesh is not None:
+        problems += [
+            f"LIMITS: {limit} compares with the undeformed mesh; give it (--reference UNDEFORMED)"
+            for limit in limits
+            if NUMBERS[limit.name].compares
+        ]
+    if problems:
+        raise CaseError("\n".join(problems))
     return tuple(_result(limit, measured) for limit in limits)
+
+
+def not_walls(limits: Iterable[Limit], walls: Sequence[str]) -> list[str]:
+    """Return a sentence for each limit at a boundary that is none of the ``walls``."""
+    named = ", ".join(walls) or "none: all boundaries are periodic or internal"
+    return [
+        f"LIMITS: {limit}: {limit.marker} is no wall, for it is periodic or internal; walls are "
+        f"{named}"
+        for limit in limits
+        if limit.marker and limit.marker not in walls
+    ]
 
 
 def check_case_limits(
@@ -227,7 +291,11 @@ MET = "met"  # what `outcome` returns where all limits are met
 
 def outcome(results: Sequence[LimitResult]) -> str:
     """Return a cell of a table: `MET`, or as ``min > 0.3: 0.21; inverted = 0: 5``; "" if none."""
-    missed = [f"{one.limit}: {one.actual:.6g}" for one in results if not one.passed]
+    missed = [
+        f"{one.limit}: {'no value' if np.isnan(one.actual) else f'{one.actual:.6g}'}"
+        for one in results
+        if not one.passed
+    ]
     return "; ".join(missed) or MET * bool(results)
 
 
@@ -243,9 +311,10 @@ def _result(limit: Limit, measured: MeasuredMesh) -> LimitResult:
                 cells = np.flatnonzero(mask if quality.halo is None else mask & ~quality.halo)
             return LimitResult(limit, actual, cells)
     assert row.values is not None
-    values, ids = row.values(measured, limit.marker)
+    values, ids, boundary, names = row.values(measured, limit.marker)
     low = limit.sign[0] == ">"
     failing, by_how_much = [np.empty(0, np.int64)], [np.empty(0)]
+    places = [np.empty(0, np.int64)]
     for first in range(0, len(values), PIECE):  # they may be in a file, and not fit into memory
         some = values[first : first + PIECE]
         cells = np.arange(first, first + len(some)) if ids is None else ids[first : first + PIECE]
@@ -256,9 +325,13 @@ def _result(limit: Limit, measured: MeasuredMesh) -> LimitResult:
         bad = counts & ~limit.holds(some)
         failing.append(cells[bad])
         by_how_much.append(some[bad] if low else -some[bad])
-    found = np.concatenate(failing)[np.argsort(np.concatenate(by_how_much), kind="stable")]
-    places = np.sort(np.unique(found, return_index=True)[1])  # a cell may have several walls
-    return LimitResult(limit, actual, found[places])
+        if boundary is not None:
+            places.append(boundary[first : first + PIECE][bad])
+    order = np.argsort(np.concatenate(by_how_much), kind="stable")
+    found = np.concatenate(failing)[order]
+    at = [] if boundary is None else np.concatenate(places)[order].tolist()
+    first_of = np.sort(np.unique(found, return_index=True)[1])  # a cell may have several walls
+    return LimitResult(limit, actual, found[first_of], tuple(names[k] for k in dict.fromkeys(at)))
 
 
 def require_streamed(limits: Iterable[Limit]) -> None:
@@ -296,10 +369,13 @@ def read_limits(text: str) -> tuple[Limit, ...]:
 def _read_limit(text: str) -> Limit:
     match = _LIMIT.match(text)
     if match is None:
-        raise CaseError(f"{shown(text)} is no limit; expected NAME > NUMBER, as min > 0.3")
+        raise CaseError(
+            f"{shown(text)} is no limit; expected NAME > NUMBER, as min > 0.3, and a comma between "
+            "two limits"
+        )
     quoted = match["quoted"]
     marker = match["plain"] or "" if quoted is None else quoted.replace('""', '"')
-    return Limit(field_of(match["name"]), match["sign"], number(match["value"]), marker)
+    return Limit(field_of(match["name"]).lower(), match["sign"], number(match["value"]), marker)
 
 
 def write_limits(limits: tuple[Limit, ...]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, MutableMapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
+    from slideviz.mesh.metrics import MetricValues
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
     from slideviz.streaming.quality import CellCounts
     from slideviz.streaming.source import MeshSource
     from slideviz.streaming.stream_input import StreamInput
-    from slideviz.terms import FileFormat, SkewMetric
+    from slideviz.terms import FileFormat, Metric, SkewMetric
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,15 +31,26 @@ class OpenMesh:
     """Returns the undeformed mesh or, of a mesh in its file, its boundary."""
     stack: ExitStack  # closes files, and removes temporary ones
 
-    def quality(self, arguments: argparse.Namespace, counts: CellCounts | None = None) -> Quality:
-        """Return the quality of all cells; ``counts`` counts them, too."""
+    def quality(
+        self,
+        arguments: argparse.Namespace,
+        counts: CellCounts | None = None,
+        metrics: MutableMapping[Metric, MetricValues | None] | None = None,
+    ) -> Quality:
+        """Return the quality of all cells; ``counts`` and ``metrics`` as for `measure_mesh`."""
         from slideviz.streaming.quality import measure_mesh
 
         folder = Path(tempfile.gettempdir())
         metric: SkewMetric = getattr(arguments, "metric", "knupp")
         with progress_of(arguments, "quality") as tick:
             return measure_mesh(
-                self.stack, folder, self.source, metric=metric, counts=counts, tick=tick
+                self.stack,
+                folder,
+                self.source,
+                metric=metric,
+                counts=counts,
+                tick=tick,
+                metrics=metrics,
             )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from slideviz.errors import not_one_of
-from slideviz.terms import METRICS, NO_REFERENCE, Metric, field_of
+from slideviz.terms import NO_REFERENCE, RATED, Quantity, field_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -36,12 +36,12 @@ def reference_words(reference: Path | None) -> str:
     return f"{NO_REFERENCE}; {REMEDY}" if reference is None else f"reference: {reference}"
 
 
-def metric_names(text: str) -> tuple[Metric, ...]:
-    """Return the metrics of a text: "all", or names separated by commas, with - or _."""
-    fields = {field_of(name): name for name in METRICS}
-    if text.strip() == "all":
-        return tuple(METRICS)
-    wanted = [field_of(word.strip()) for word in text.split(",")]
+def metric_names(text: str) -> tuple[Quantity, ...]:
+    """Return metrics and numbers of walls of a text: "all", or names with commas, with - or _."""
+    fields = {field_of(name): name for name in RATED}
+    wanted = [field_of(word.strip().lower()) for word in text.split(",")]
+    if wanted == ["all"]:
+        return tuple(RATED)
     for word in wanted:
         if word not in fields:
             raise argparse.ArgumentTypeError(not_one_of(word, ("all", *fields)))
@@ -62,7 +62,8 @@ SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
             "type": metric_names,
             "default": (),
             "metavar": "NAMES",
-            "help": "other numbers too: all, or names with commas, as skewness,expansion",
+            "help": "other numbers too, also in a .vtu, .vtkhdf or .csv file: all, or names with "
+            "commas, as skewness,expansion,growth",
         },
     ),
     "stream": (

@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING
 
 from slideviz.cli.options import add_reference, add_shared, optional_case, reference_words
 from slideviz.formats.table import own_endings
-from slideviz.terms import SKEW_METRICS
+from slideviz.terms import METRICS, SKEW_METRICS, field_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from slideviz.case.limits import Limit, MeasuredMesh
-    from slideviz.case.model import Case
+    from slideviz.case.limits import Limit, LimitResult
+    from slideviz.cli.mesh_source import OpenMesh
     from slideviz.mesh.metrics import MetricValues
-    from slideviz.mesh.model import Mesh
+    from slideviz.mesh.model import FloatArray, Mesh
     from slideviz.mesh.quality import Quality
+    from slideviz.mesh.walls import Walls
     from slideviz.terms import Metric
 
 
@@ -70,21 +71,14 @@ def quality(arguments: argparse.Namespace) -> int:
 
     Returns the exit code.
     """
-    from slideviz import metrics, write
-    from slideviz.case.limits import MeasuredMesh, require_streamed
+    from slideviz import write
+    from slideviz.case.limits import MeasuredMesh, check_limits
     from slideviz.cli.mesh_source import open_mesh
     from slideviz.cli.output_paths import OutputPath, require_output_paths
-    from slideviz.cli.report import WORST
-    from slideviz.errors import CaseError
-    from slideviz.formats.files import quality_data
+    from slideviz.formats.files import metric_data, quality_data
 
     output = arguments.output
-    if arguments.stream and output is not None:
-        raise CaseError("-o needs the mesh in memory; leave it out, or --stream")
-    if arguments.stream and arguments.metrics:
-        raise CaseError("--metrics needs the mesh in memory; leave it out, or --stream")
-    if arguments.stream:
-        require_streamed(arguments.limits)
+    _require_streamed(arguments)
     is_table = output is not None and output.suffix.lower() == ".csv"
     case = optional_case(arguments)
     require_output_paths(
@@ -93,35 +87,54 @@ def quality(arguments: argparse.Namespace) -> int:
         OutputPath(arguments.json, "--json"),
     )
     with open_mesh(arguments, case) as opened:
-        mesh, found = opened.source.mesh, opened.quality(arguments)
-        if is_table:
-            extra = metrics(mesh, arguments.metrics, opened.read_base())
-            _write_csv(output, found, extra)
-        elif output:
-            write(output, mesh, cell_data=quality_data(output, found))
-        worst = found.worst(WORST)
-        rows = list(zip(worst.tolist(), opened.source.types(worst).tolist(), strict=True))
+        rated: dict[Metric, MetricValues | None]
+        rated = dict.fromkeys(name for name in METRICS if name in arguments.metrics)
+        mesh, found = opened.source.mesh, opened.quality(arguments, metrics=rated)
+        values = {name: one for name, one in rated.items() if one is not None}
         base = opened.read_base()
         names = case.walls(mesh.marker_names) if case else None
-        measured, layers = MeasuredMesh(found, mesh, base, names), _walls(mesh, base, case)
-        return _report(arguments, mesh.name, measured, rows, opened.reference, layers)
+        layers = _walls(mesh, base, names)
+        results = check_limits(arguments.limits, MeasuredMesh(found, mesh, base, names))
+        cells, points = metric_data(values, layers, arguments.metrics)
+        if is_table:
+            _write_csv(output, found, cells)
+        elif output and (data := quality_data(output, found)) is not None:
+            write(output, mesh, cell_data=data | cells, point_data=points)
+        elif output:
+            write(output, mesh)
+        return _report(arguments, opened, found, values, layers, results)
+
+
+def _require_streamed(arguments: argparse.Namespace) -> None:
+    """Raise CaseError for what needs the mesh in memory, where ``--stream`` is set."""
+    from slideviz.case.limits import require_streamed
+    from slideviz.errors import CaseError
+
+    if not arguments.stream:
+        return
+    if arguments.output is not None:
+        raise CaseError("-o needs the mesh in memory; leave it out, or --stream")
+    several = [name for name in arguments.metrics if name not in METRICS or not METRICS[name].alone]
+    if several:
+        known = ",".join(field_of(name) for name, term in METRICS.items() if term.alone)
+        raise CaseError(
+            f"--metrics {','.join(map(field_of, several))} needs the mesh in memory, for a "
+            f"stream has one cell at a time; use --metrics {known}, or leave out --stream"
+        )
+    require_streamed(arguments.limits)
 
 
 def _report(
     arguments: argparse.Namespace,
-    name: str,
-    measured: MeasuredMesh,
-    worst: Sequence[tuple[int, int]],
-    reference: Path | None,
-    walls: dict[str, dict],
+    opened: OpenMesh,
+    found: Quality,
+    metrics: Mapping[Metric, MetricValues],
+    layers: Walls | None,
+    limits: Sequence[LimitResult],
 ) -> int:
-    """Print the quality of a mesh or write it as JSON, and return the exit code.
-
-    ``worst`` are numbers and VTK types of the worst cells, ``reference`` is the undeformed mesh,
-    ``walls`` a summary of `Walls`.
-    """
-    from slideviz.case.limits import check_limits
+    """Print the quality of a mesh or write it as JSON, and return the exit code."""
     from slideviz.cli.report import (
+        WORST,
         histogram_lines,
         limit_lines,
         limits_report,
@@ -136,12 +149,12 @@ def _report(
     from slideviz.cli.run_outcome import report_limits
     from slideviz.cli.terminal import INVERTED
 
-    found = measured.quality
-    report = quality_report(name, found, worst)
+    worst, reference = found.worst(WORST), opened.reference
+    rows = list(zip(worst.tolist(), opened.source.types(worst).tolist(), strict=True))
+    report = quality_report(opened.source.mesh.name, found, rows)
+    walls = None if layers is None else layers.summary()
     report |= {"walls": walls, "reference": str(reference) if reference else None}
-    assert measured.mesh is not None
-    report["metrics"] = metrics_report(measured.mesh, arguments.metrics, measured.reference)
-    report["limits"] = limits_report(check_limits(arguments.limits, measured))
+    report |= {"metrics": metrics_report(metrics), "limits": limits_report(limits)}
     if not save_json(arguments.json, report):
         print(f"{arguments.mesh}: size-skew, metric {found.metric}")
         print(f"  {reference_words(reference)}")
@@ -158,25 +171,25 @@ def _report(
     return INVERTED if found.inverted else code
 
 
-def _walls(mesh: Mesh, reference: Mesh | None, case: Case | None) -> dict[str, dict]:
+def _walls(mesh: Mesh, reference: Mesh | None, names: Sequence[str] | None) -> Walls | None:
+    """Return the layers at the boundaries ``names`` of a mesh; None for one in a file."""
     from slideviz import walls
     from slideviz.errors import MeshError
 
     if mesh.part is not None:
-        return {}
+        return None
     try:
-        found = walls(mesh, reference, case.walls(mesh.marker_names) if case else None)
+        return walls(mesh, reference, names)
     except MeshError:  # of a mesh with a mistake the quality is of use still
-        return {}
-    return found.summary()
+        return None
 
 
-def _write_csv(path: Path, found: Quality, metrics: Mapping[Metric, MetricValues]) -> None:
+def _write_csv(path: Path, found: Quality, more: Mapping[str, FloatArray]) -> None:
+    """Write number, size-skew, size, skew, status and ``more`` of each cell as CSV."""
     from slideviz.errors import CaseError
     from slideviz.system.atomic import atomic_write
-    from slideviz.terms import CELL_STATES, SIZE_SKEW, field_of
+    from slideviz.terms import CELL_STATES
 
-    more = {field_of(k): one.of_cells for k, one in metrics.items() if k not in SIZE_SKEW}
     columns = zip(found.values, found.size, found.skew, found.status, *more.values(), strict=True)
     lines = [",".join(("cell,size_skew,size,skew,status", *more))]
     for cell, (value, size, skew, status, *others) in enumerate(columns):

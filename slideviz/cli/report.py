@@ -17,7 +17,7 @@ from slideviz.case.model import Case
 from slideviz.case.words import counted
 from slideviz.errors import CaseError, Note
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.metrics import metrics
+from slideviz.mesh.metrics import MetricValues
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.walls import Walls, wall_words
@@ -85,7 +85,7 @@ def run_report(
             check_case_limits(case, quality, last.mesh, mesh),
             check_case_limits(case, undeformed, mesh, mesh),
         ),
-        "walls": {} if walls is None else walls.summary(),
+        "walls": None if walls is None else walls.summary(),
         "tried": [_fields(trial, TRIAL_KEYS) for trial in last.tried],
         "control_nodes": [step.control_nodes for step in steps],
         "control_candidates": last.candidates,
@@ -134,7 +134,9 @@ def limits_report(
             "value": result.limit.value,
             "actual": actual(result),
             "undeformed": actual(old),
+            "undeformed_passed": None if old is None else old.passed,
             "passed": result.passed,
+            "boundaries": list(result.boundaries),
             "failing": len(result.cells),
             "cells": result.cells[:LISTED].tolist(),
         }
@@ -142,13 +144,8 @@ def limits_report(
     ]
 
 
-def metrics_report(
-    mesh: Mesh, names: Sequence[Metric], reference: Mesh | None = None
-) -> dict[str, Any]:
+def metrics_report(found: Mapping[Metric, MetricValues]) -> dict[str, Any]:
     """Return the summaries of metrics of a mesh, by the names of their fields."""
-    if not names:
-        return {}
-    found = metrics(mesh, names, reference)
     return {field_of(name): values.summary() for name, values in found.items()}
 
 
@@ -176,8 +173,12 @@ def limit_words(entry: Mapping[str, Any]) -> tuple[str, str, str]:
     """Return the words on a limit of a report: ``0.2``, ``undeformed 0.4`` or "", ``not met``."""
     value = "no value" if entry["actual"] is None else f"{entry['actual']:.6g}"
     before = "" if entry["undeformed"] is None else f"undeformed {entry['undeformed']:.6g}"
+    if before and not entry["passed"] and not entry["undeformed_passed"]:
+        before = f"the undeformed mesh misses it, too: {entry['undeformed']:.6g}"
+    names = entry["boundaries"]
+    place = f" at {', '.join(names[:3])}{', ...' * (len(names) > 3)}" if names else ""
     cells = f", in {counted(entry['failing'], 'cell')}" if entry["failing"] else ""
-    return value, before, "met" if entry["passed"] else f"not met{cells}"
+    return value, before, "met" if entry["passed"] else f"not met{place}{cells}"
 
 
 def _relaxed(steps: Sequence[Step]) -> Relaxed | None:
@@ -309,9 +310,9 @@ def _cell(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def wall_lines(walls: Mapping[str, dict]) -> str:
+def wall_lines(walls: Mapping[str, dict] | None) -> str:
     """Return a line for each boundary with layers of ``walls``, a summary of `Walls`, or ""."""
-    layered = {name: row for name, row in walls.items() if row["layered"]}
+    layered = {name: row for name, row in (walls or {}).items() if row["layered"]}
     rows = [(f"layers at {name}", wall_words(row)) for name, row in layered.items()]
     more = len(rows) - MOST_WALLS
     rows[MOST_WALLS:] = [(f"and at {more} more boundaries", "")] if more > 0 else []

@@ -33,13 +33,18 @@ from slideviz.cli.run_outcome import (
 )
 from slideviz.cli.terminal import holding, say
 from slideviz.formats.table import FORMATS, endings, format_for, own_endings, usual_ending
+from slideviz.terms import METRICS, WALL_VALUES
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from slideviz.case.model import Case
+    from slideviz.mesh.metrics import MetricValues
     from slideviz.mesh.model import Mesh
+    from slideviz.mesh.quality import Quality
     from slideviz.solver.deform import Step
     from slideviz.solver.steps import RunResult
-    from slideviz.terms import FileFormat, SkewMetric
+    from slideviz.terms import FileFormat, Metric
 
 KEPT_BYTES = 1_000_000_000
 """Most bytes of meshes of steps in memory; they are kept to find when cells were inverted."""
@@ -151,8 +156,8 @@ def _run(arguments: argparse.Namespace) -> int:
     )
     if arguments.metrics:
         report["metrics"] = {
-            "before": metrics_report(done.mesh, arguments.metrics, done.mesh),
-            "after": metrics_report(done.steps[-1].mesh, arguments.metrics, done.mesh),
+            "before": metrics_report(_rated(arguments, done.mesh, before, done.mesh)),
+            "after": metrics_report(_rated(arguments, done.steps[-1].mesh, found, done.mesh)),
         }
     in_memory = None if streamed else done.mesh
     advice = advice_for(case, done.steps[-1].layers, in_memory, found, report["limits"])
@@ -160,6 +165,36 @@ def _run(arguments: argparse.Namespace) -> int:
         note_finished(about, results, report, folded, advice)
     files = {"mesh": output, CELLS: qualities}
     return report_outcome(arguments, report, files, found, before, folded, advice=advice)
+
+
+def _rated(
+    arguments: argparse.Namespace, mesh: Mesh, found: Quality, base: Mesh
+) -> dict[Metric, MetricValues]:
+    """Return the metrics that ``--metrics`` asks for, of a mesh with its quality."""
+    from slideviz.mesh.metrics import rated_metric
+
+    names = [name for name in METRICS if name in arguments.metrics]
+    return {name: rated_metric(mesh, name, base, found) for name in names}
+
+
+def _fields(
+    arguments: argparse.Namespace, case: Case, path: Path, mesh: Mesh, found: Quality, base: Mesh
+) -> tuple[dict[str, NDArray] | None, dict[str, NDArray]]:
+    """Return the quality and the metrics of a mesh as data of the cells and points of a file.
+
+    The first is None, and the second empty, where the format has no place for them.
+    """
+    from slideviz import walls
+    from slideviz.formats.files import metric_data, quality_data
+
+    data = quality_data(path, found)
+    if data is None or not arguments.metrics:
+        return data, {}
+    asked = set(arguments.metrics) & set(WALL_VALUES)
+    layers = walls(mesh, base, case.walls(mesh.marker_names)) if asked else None
+    rated = _rated(arguments, mesh, found, base)
+    cells, points = metric_data(rated, layers, arguments.metrics)
+    return data | cells, points
 
 
 def _about(case: Case) -> str:
@@ -173,7 +208,6 @@ def _deform(
 ) -> RunResult:
     from slideviz import quality, read, walls, write
     from slideviz.cli.report import folded_cells
-    from slideviz.formats.files import quality_data
     from slideviz.formats.losses import warning_of_losses
     from slideviz.scene.overview import require_detail
     from slideviz.solver.steps import RunResult
@@ -193,9 +227,16 @@ def _deform(
     layers = walls(last.mesh, mesh, case.walls(mesh.marker_names))
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
-    data = quality_data(output, measured)
-    force = arguments.force
-    write(output, last.mesh, overwrite=force, cell_data=data, base=mesh, file_format=kind)
+    cells, points = _fields(arguments, case, output, last.mesh, measured, mesh)
+    write(
+        output,
+        last.mesh,
+        overwrite=arguments.force,
+        cell_data=cells,
+        base=mesh,
+        file_format=kind,
+        point_data=points,
+    )
     seconds["write"] += time.perf_counter()
     folded = folded_cells(steps, mesh, measured)
     return RunResult(mesh, tuple(steps), measured, before, folded, seconds, layers)
@@ -360,7 +401,7 @@ def run_steps(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Ste
 
     steps: list[Step] = []
     folder = arguments.steps_dir
-    series = _series(arguments.steps_file, mesh, case.quality_metric)
+    series = _series(arguments, case, mesh)
     with series as add, Bar(not arguments.quiet, begun=arguments.begun) as bar:
         for step in deform(case, mesh, bar):
             if folder:
@@ -377,25 +418,28 @@ def run_steps(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Ste
 
 @contextmanager
 def _series(
-    path: Path | None, mesh: Mesh, metric: SkewMetric
+    arguments: argparse.Namespace, case: Case, mesh: Mesh
 ) -> Iterator[Callable[[Mesh], object]]:
     """Context with a function that adds the mesh of a step to the file of all steps.
 
-    The undeformed mesh is in it already. Each mesh has the quality of its cells and the
-    displacement of its points. Without a ``path`` the function does nothing. Raises MeshError if
-    the file cannot be written; none is left.
+    The undeformed mesh is in it already. Each mesh has the quality of its cells, the
+    displacement of its points, and metrics. Without ``--steps-file`` the function does nothing.
+    Raises MeshError if the file cannot be written; none is left.
     """
+    path = arguments.steps_file
     if path is None:
         yield lambda _: None
         return
     from slideviz import quality
-    from slideviz.formats.files import quality_data
 
     with format_for(path).function("series")(path, mesh) as series:
 
         def add(now: Mesh) -> None:
-            values = quality_data(path, quality(now, reference=mesh, metric=metric))
-            series.add(now.points, values or {}, {"displacement": now.points - mesh.points})
+            found = quality(now, reference=mesh, metric=case.quality_metric)
+            cells, points = _fields(arguments, case, path, now, found, mesh)
+            series.add(
+                now.points, cells or {}, {"displacement": now.points - mesh.points, **points}
+            )
 
         add(mesh)
         yield add

@@ -234,9 +234,9 @@ def advice_for(
     memory, with its quality ``found`` after the run, neither the pitch nor boundaries beside the
     cells are named.
     """
-    missed = [entry for entry in limits if not entry["passed"]]
+    missed = [entry for entry in limits if not entry["passed"] and entry["undeformed_passed"]]
     if found is not None and not found.inverted and not missed:
-        return ""
+        return ""  # what the undeformed mesh misses, no other deformation mends
     import numpy as np
 
     from slideviz.case.limits import NUMBERS
@@ -253,7 +253,7 @@ def advice_for(
     every = [remedy.keys for remedy in remedies(case, beside, pitch, layers)]
     if found is not None and not found.inverted and case.method == "rbf":
         walls = any(NUMBERS[entry["name"]].on_boundary for entry in missed)
-        keep = ["LAYERS= KEEP"] * (walls and case.layers == "no")
+        keep = ["LAYERS= AUTO"] * (walls and case.layers == "no")
         every = [*keep, *["RELAX= YES"] * (case.relax == "no"), *every]
     ideas = "; ".join(every)
     return f"{pitch[:1].lower()}{pitch[1:]}; what may help: {ideas}".removeprefix("; ")

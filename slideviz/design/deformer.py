@@ -284,7 +284,8 @@ class Deformer:
         ----------
         name : {"min", "mean", "margin"}
             The smooth minimum or the mean of the quality (`slideviz.QualityDerivative`), or the
-            smooth minimum of the margins (`slideviz.mesh.quality_derivative.SmoothMargin`).
+            smooth minimum of the margins: for each cell the smallest coefficient of its Jacobian
+            over that before, 1 where the cell is only moved, 0 where it folds.
         displacement : (m, d), optional
             The design; the case's own if not given.
         p : float

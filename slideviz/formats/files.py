@@ -15,7 +15,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -37,12 +37,14 @@ from slideviz.formats.table import (
     usual_ending,
 )
 from slideviz.mesh.check import check_size
+from slideviz.mesh.metrics import MetricValues
 from slideviz.mesh.model import Cells, Marker, Mesh, Origin
 from slideviz.mesh.quality import Quality, quality
+from slideviz.mesh.walls import Walls
 from slideviz.system.atomic import atomic_write
 from slideviz.system.cleanup import killed_at_end
 from slideviz.system.threads import Tick
-from slideviz.terms import FileFormat
+from slideviz.terms import SIZE_SKEW, WALL_VALUES, FileFormat, Metric, Quantity, field_of
 
 # Limits of the process: several times what the slowest of meshio's readers needs.
 _SECONDS = 20
@@ -342,6 +344,7 @@ def write(
     going_on: Callable[[], object] | None = None,
     *,
     file_format: FileFormat | None = None,
+    point_data: Mapping[str, ArrayLike] | None = None,
 ) -> None:
     """Write a mesh, in the format that the ending of ``path`` names, whole or not at all.
 
@@ -363,6 +366,8 @@ def write(
         at ``path`` stays.
     file_format : {"su2", "su2b"}, optional
         SU2's text or binary, whatever the ending.
+    point_data : mapping of str to (n,) or (n, k), optional
+        Values on the points by name, as ``cell_data``.
 
     Raises
     ------
@@ -385,17 +390,20 @@ def write(
             "this is the file that the mesh was read from; choose another name, or ask "
             "for overwriting",
         )
-    values = _cell_arrays(mesh, cell_data or {})
+    values = _arrays("cell", len(mesh.cells), cell_data or {})
+    at_points = _arrays("point", len(mesh.points), point_data or {})
     row = format_for(path, file_format)
-    if values and row.solver:
+    if (values or at_points) and row.solver:
+        kind, names = ("cell", values) if values else ("point", at_points)
         raise path_error(
             path,
-            f"a {row.ending} file has no place for cell data ({', '.join(values)}); write a .vtu "
+            f"a {row.ending} file has no place for {kind} data ({', '.join(names)}); write a .vtu "
             "file",
         )
-    moved = {} if base is None or row.solver else {"displacement": mesh.points - base.points}
+    if base is not None and not row.solver:
+        at_points["displacement"] = mesh.points - base.points
     replaces = path if overwrite else None
-    options = WriteOptions(values, moved, replaces, going_on or (lambda: None))
+    options = WriteOptions(values, at_points, replaces, going_on or (lambda: None))
     row.function("writer")(path, mesh, options)
 
 
@@ -414,6 +422,23 @@ def quality_data(path: Path, found: Quality) -> dict[str, NDArray] | None:
     return {"size-skew": found.values, "size": found.size, "skew": found.skew}
 
 
+def metric_data(
+    found: Mapping[Metric, MetricValues], layers: Walls | None, names: Sequence[Quantity]
+) -> tuple[dict[str, NDArray], dict[str, NDArray]]:
+    """Return metrics, and numbers of walls among ``names``, as data of cells and of points.
+
+    Those of `quality_data` are left out, as are numbers that need a reference where there is none.
+    """
+    rows = [(field_of(name), one) for name, one in found.items() if name not in SIZE_SKEW]
+    cells = {field: one.of_cells for field, one in rows}
+    points = {field: one.values for field, one in rows if one.term.where == "nodes"}
+    if layers is not None:
+        fields = (field_of(name) for name in names if name in WALL_VALUES)
+        at_walls = layers.with_layers()
+        cells |= {field: at_walls.at_cells(field) for field in fields if field in layers.values}
+    return cells, points
+
+
 def is_source(path: Path, mesh: Mesh) -> bool:
     """Return whether ``path`` is the file that a mesh was read from, and that still exists."""
     try:
@@ -423,13 +448,13 @@ def is_source(path: Path, mesh: Mesh) -> bool:
         return False
 
 
-def _cell_arrays(mesh: Mesh, cell_data: Mapping[str, ArrayLike]) -> dict[str, NDArray]:
-    """Return the cell data as arrays; raise MeshError if one does not fit the number of cells."""
-    values = {name: np.asarray(given) for name, given in cell_data.items()}
+def _arrays(what: str, count: int, data: Mapping[str, ArrayLike]) -> dict[str, NDArray]:
+    """Return data of cells or points as arrays; raise MeshError if one does not fit the number."""
+    values = {name: np.asarray(given) for name, given in data.items()}
     for name, array in values.items():
-        if array.ndim not in (1, 2) or len(array) != len(mesh.cells):
+        if array.ndim not in (1, 2) or len(array) != count:
             raise MeshError(
-                f"cell data {name!r} has shape {array.shape}, but the mesh has {len(mesh.cells)} "
-                "cells; give one value or one row for each cell"
+                f"{what} data {name!r} has shape {array.shape}, but the mesh has {count} "
+                f"{what}s; give one value or one row for each {what}"
             )
     return values

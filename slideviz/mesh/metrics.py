@@ -27,7 +27,7 @@ from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.topology import find_boundary, vertex_normals
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
-from slideviz.terms import METRICS, SIZE_SKEW, Metric, MetricTerm
+from slideviz.terms import METRICS, SIZE_SKEW, Metric, MetricTerm, field_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -90,10 +90,9 @@ class MetricValues:
     @property
     def worst_at(self) -> int:
         """Return the number of the cell or node with the worst value, the first of several."""
-        values = -self.values if self.term.best == "low" else self.values
-        rated = np.full(len(values), np.inf)
-        rated[self.counted] = values[self.counted]
-        return int(rated.argmin())
+        values = self.values[self.counted]
+        at = int(values.argmin() if self.term.best == "high" else values.argmax())
+        return at if isinstance(self.counted, slice) else int(np.flatnonzero(self.counted)[at])
 
     def summary(self) -> dict[str, object]:
         """Return the numbers for a report, as plain Python values; None for an infinite one."""
@@ -111,15 +110,15 @@ class MetricValues:
 
 @check_types
 def metrics(
-    mesh: Mesh, names: Iterable[Metric] | None = None, reference: Mesh | None = None
-) -> dict[Metric, MetricValues]:
-    """Return the values of some metrics of a mesh, or of all.
+    mesh: Mesh, names: Iterable[str] | None = None, reference: Mesh | None = None
+) -> dict[str, MetricValues]:
+    """Return the values of some metrics of a mesh, or of all, by name.
 
     Parameters
     ----------
     mesh : Mesh
     names : iterable of str, optional
-        Names of `slideviz.terms.METRICS`; None: all.
+        Names of `slideviz.terms.METRICS`, with ``-`` or ``_``, in any case; None: all.
     reference : Mesh, optional
         The undeformed mesh, as of `slideviz.quality`. Only size-skew and its factors depend on its
         shape. Of the others, cells that are numbered the other way round there have the same
@@ -141,23 +140,38 @@ def metrics(
     >>> round(found["smallest-angle"].min, 6), found["aspect-ratio"].max
     (45.0, 2.0)
     """
-    wanted = list(METRICS if names is None else names)
-    rated = quality(mesh, reference) if set(wanted) & set(SIZE_SKEW) else None
-    return {
-        name: metric(mesh, name, reference)
-        if rated is None or name not in SIZE_SKEW
-        else _of_quality(rated, name)
-        for name in wanted
-    }
+    wanted = {name: metric_name(name) for name in (METRICS if names is None else names)}
+    rated = quality(mesh, reference) if set(wanted.values()) & set(SIZE_SKEW) else None
+    return {key: rated_metric(mesh, name, reference, rated) for key, name in wanted.items()}
+
+
+def metric_name(text: str) -> Metric:
+    """Return the metric of a name, which may have ``_`` for ``-`` and capitals.
+
+    Raises CaseError if there is none.
+    """
+    for name in METRICS:
+        if field_of(name) == field_of(text.strip().lower()):
+            return name
+    raise CaseError(f"metric: {not_one_of(text, METRICS)}")
+
+
+def rated_metric(
+    mesh: Mesh, name: Metric, reference: Mesh | None, rated: Quality | None
+) -> MetricValues:
+    """Return the values of one metric of a mesh whose quality may be known."""
+    if rated is None or name not in SIZE_SKEW:
+        return metric(mesh, name, reference)
+    values = {"size": rated.size, "skew": rated.skew}.get(name, rated.values)
+    return MetricValues(name, values, values, rated.counted)
 
 
 @check_types
 def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricValues:
     """Return the values of one metric; parameters and errors are those of `metrics`."""
-    if name not in METRICS:
-        raise CaseError(f"metric: {not_one_of(name, METRICS)}")
+    name = metric_name(name)
     if name in SIZE_SKEW:
-        return _of_quality(quality(mesh, reference), name)
+        return rated_metric(mesh, name, reference, quality(mesh, reference))
     if mesh.part is not None and not METRICS[name].alone:
         raise CaseError(f"{name} compares neighbouring cells: expected the whole mesh in memory")
     check_cells(mesh)
@@ -175,12 +189,6 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
     if mesh.halo is not None:
         counted[mesh.halo.outer] = False
     return MetricValues(name, values, of_cells, counted)
-
-
-def _of_quality(found: Quality, name: Metric) -> MetricValues:
-    """Return one of the metrics that a quality has."""
-    values = {"size": found.size, "skew": found.skew}.get(name, found.values)
-    return MetricValues(name, values, values, found.counted)
 
 
 def _computed(

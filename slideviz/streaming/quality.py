@@ -11,7 +11,7 @@ is then 0 (modulo 2**64) where no cell is folded; where one is, it is 0 with a p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.formats.su2b.read import read_markers
+from slideviz.mesh.metrics import MetricValues, rated_metric
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.orientation import corner_sums, facets_of
 from slideviz.mesh.quality import INVERTED, Quality, quality, quality_totals
@@ -31,7 +32,7 @@ from slideviz.streaming.skin import Index, index_of
 from slideviz.streaming.source import CELLS, CellBlock, FileSource, MeshSource, Scratch
 from slideviz.system.ranks import SERIAL
 from slideviz.system.threads import Tick
-from slideviz.terms import SkewMetric
+from slideviz.terms import Metric, SkewMetric
 
 Hashes = NDArray[np.uint64]
 
@@ -144,6 +145,7 @@ def measure_mesh(
     counts: CellCounts | None = None,
     may_fold: bool = False,
     tick: Tick = lambda _: None,
+    metrics: MutableMapping[Metric, MetricValues | None] | None = None,
 ) -> Quality:
     """Return the quality of all cells of a mesh.
 
@@ -154,8 +156,12 @@ def measure_mesh(
     ``worst``: as for `quality_totals`.
     ``counts``: counts all cells, too.
     ``may_fold``: as for `quality_blocks`.
+    ``metrics``: gets the values of the metrics that are its keys; of a mesh in a file only those
+    of single cells (``METRICS[name].alone``) are possible.
     """
     collector: QualityCollector | None = None
+    files: dict[Metric, Scratch] = {}
+    rated = {} if metrics is None else metrics
     for block in quality_blocks(source, metric, tick, may_fold=may_fold):
         found = block.quality
         assert found is not None
@@ -163,9 +169,19 @@ def measure_mesh(
             if collector is None:
                 try:
                     collector = QualityCollector(stack, folder, source.n_cells, metric)
+                    for name in rated:
+                        files[name] = Scratch(stack, folder, source.n_cells, float)
                 except MeshError as problem:
                     raise MeshError(f"{problem} (TMPDIR names another folder)") from problem
             collector.add(index_of(block.ids), found.values, found.status, found.signs[:1])
+        for name in rated:
+            values = rated_metric(block.mesh, name, block.base, found)
+            if name in files:
+                every = files[name].array
+                every[index_of(block.ids)] = values.values
+                files[name].release()
+                values = MetricValues(name, every, every, slice(None))
+            rated[name] = values
         if counts is not None:
             counts.add(block)
     if collector is not None:

@@ -33,8 +33,11 @@ def limits(draw):
     name = draw(st.sampled_from(sorted(NUMBERS)))
     row = NUMBERS[name]
     sign = draw(st.sampled_from([one for one in OPERATORS if one[0] in row.signs]))
-    marker = draw(st.text('a," <(@é', max_size=4)) if row.on_boundary else ""
-    return Limit(name, sign, draw(st.floats(allow_nan=False, allow_infinity=False)), marker)
+    marker = draw(st.text('a,;" <(@é', max_size=4)) if row.on_boundary else ""
+    low, high = (None if abs(end) == np.inf else end for end in row.range)
+    return Limit(
+        name, sign, draw(st.floats(low, high, allow_nan=False, allow_infinity=False)), marker
+    )
 
 
 @given(st.lists(limits(), max_size=4))
@@ -42,7 +45,10 @@ def test_written_limits_are_read_back(some):
     assert read_limits(write_limits(tuple(some))) == tuple(some)
 
 
-@pytest.mark.parametrize("text", ["min>.3,inverted=0", " ( min > 0.3 , inverted = 0.0 ) "])
+@pytest.mark.parametrize(
+    "text",
+    ["min>.3,inverted=0", " ( min > 0.3 , inverted = 0.0 ) ", "( Min > 0.3 ; INVERTED = 0 )"],
+)
 def test_spaces_and_brackets_may_be_left_out(text):
     assert read_limits(text) == (Limit("min", ">", 0.3), Limit("inverted", "=", 0.0))
     assert Case(limits=text).limits == read_limits(text)
@@ -61,7 +67,12 @@ def test_no_limits(text):
             r"LIMITS has no number 'mni'; did you mean min\? \(`slideviz keys` lists all",
         ),
         ("foo > 0.3", r"'foo' is not one of min \| "),
-        ("min", r"'min' is no limit; expected NAME > NUMBER, as min > 0.3"),
+        ("min", r"'min' is no limit; expected NAME > NUMBER, as min > 0.3, and a comma between"),
+        ("min > 0.3 inverted = 0", r"is no limit; .* a comma between two limits"),
+        ("mean > 2", r"mean > 2: expected a number from 0 to 1, for mean \(mean quality\) is"),
+        ("growth < 0.5", r"growth < 0.5: expected at least 1, for growth"),
+        ("largest_angle < 50", r"expected a number from 60 to 360"),
+        ("equal_layers > 6", r"expected a number from 0 to 5"),
         ("min > 0,3", r"'3' is no limit"),
         ("min > high", r"'high' is not a number"),
         ("min < 0.3", r"min < 0.3: a limit of min \(lowest quality\) needs >"),
@@ -227,10 +238,34 @@ def test_without_a_boundary_those_with_layers_count(layered):
     assert outer.actual == pytest.approx(1.0)
     assert len(outer.cells) == 6
     assert set(outer.cells.tolist()) == set(range(24, 30))
-    none = replace(layered, boundaries=("UPPER",))
+    none = replace(layered, boundaries=("UPPER",))  # which has none
     (unknown,) = check_limits(read_limits("growth < 1.3"), none)
     assert not unknown.passed
     assert np.isnan(unknown.actual)
+
+
+def test_limits_that_compare_need_the_undeformed_mesh(layered):
     alone = replace(layered, reference=None)
-    (change,) = check_limits(read_limits("height_ratio > 0.5"), alone)
-    assert np.isnan(change.actual)
+    for text in ("height_ratio > 0.5", "angle_change < 5", "margin > 0"):
+        with pytest.raises(CaseError, match=rf"LIMITS: {text} compares with .*--reference"):
+            check_limits(read_limits(text), alone)
+
+
+def test_a_missed_limit_of_walls_names_the_boundaries_where_it_fails(layered):
+    (both,) = check_limits(read_limits("first_height > 1.5"), replace(layered, boundaries=None))
+    assert both.boundaries == ("LOWER",)  # UPPER has no layers
+    (one,) = check_limits(read_limits("first_height@UPPER > 1.5"), layered)
+    assert one.boundaries == ("UPPER",)
+    (met,) = check_limits(read_limits("first_height@LOWER > 0.001"), layered)
+    assert met.boundaries == ()
+
+
+def test_a_boundary_that_is_no_wall_cannot_be_limited(layered):
+    case = Case(roles={"LOWER": "moving", "UPPER": "periodic"}, limits="growth@UPPER < 1.5")
+    (problem,) = [text for text in check_case(case, layered.mesh) if "LIMITS" in text]
+    assert problem == (
+        "LIMITS: growth@UPPER < 1.5: UPPER is no wall, for it is periodic or internal; walls are "
+        "LOWER"
+    )
+    with pytest.raises(CaseError, match="UPPER is no wall"):
+        check_limits(case.limits, replace(layered, boundaries=("LOWER",)))

@@ -31,3 +31,6 @@ def test_the_unit_square_grid_has_the_numbers_that_one_counts():
 def test_an_unknown_metric_is_refused():
     with pytest.raises(sv.SlidevizError, match=r"'warpage' is not one of size-skew \| "):
         metric(grid((2, 2)), "warpage")
+    found = metrics(grid((2, 2)), ["aspect_ratio", "Aspect-Ratio"])  # as in files, in any case
+    assert list(found) == ["aspect_ratio", "Aspect-Ratio"]
+    assert {one.metric for one in found.values()} == {"aspect-ratio"}
