@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from slideviz.export.flat_section import section
     from slideviz.export.verbs import film, picture
     from slideviz.formats.files import convert, read, write
+    from slideviz.mesh.margin import SafeFraction
     from slideviz.mesh.metrics import MetricValues, metrics
     from slideviz.mesh.model import Cells, Marker, Mesh
     from slideviz.mesh.quality import Quality, quality
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from slideviz.scene.overview import Detail
     from slideviz.sections.model import Section
     from slideviz.solver.deform import Step, deform
+    from slideviz.solver.safe_fraction import safe_fraction
     from slideviz.study.combinations import Combination, compare
 
 _NAMES = {
@@ -54,6 +56,7 @@ _NAMES = {
     "export.flat_section": "section",
     "export.verbs": "film picture",
     "formats.files": "convert read write",
+    "mesh.margin": "SafeFraction",
     "mesh.metrics": "MetricValues metrics",
     "mesh.model": "Cells Marker Mesh",
     "mesh.quality": "Quality quality",
@@ -64,6 +67,7 @@ _NAMES = {
     "scene.overview": "Detail",
     "sections.model": "Section",
     "solver.deform": "Step deform",
+    "solver.safe_fraction": "safe_fraction",
     "study.combinations": "Combination compare",
 }  # the public names of each module
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
@@ -72,9 +76,9 @@ __all__ = [
     "Bump", "Case", "Cells", "Combination", "ConditionWarning", "Constraint", "Cst", "Deformer",
     "Detail", "Ffd", "FfdCamber", "FfdThickness", "FfdTwist", "FromFile", "HicksHenne", "Marker",
     "Mesh", "MetricValues", "Prescribed", "Quality", "QualityDerivative", "Radial", "Reduction",
-    "Rotate", "Scale", "Section", "SectionStyle", "SlidevizError", "Step", "ToleranceWarning",
-    "Translate", "Walls", "__version__", "compare", "convert", "deform", "film", "metrics",
-    "picture", "quality", "read", "section", "sweep", "walls", "write",
+    "Rotate", "SafeFraction", "Scale", "Section", "SectionStyle", "SlidevizError", "Step",
+    "ToleranceWarning", "Translate", "Walls", "__version__", "compare", "convert", "deform", "film",
+    "metrics", "picture", "quality", "read", "safe_fraction", "section", "sweep", "walls", "write",
 ]  # fmt: skip
 
 

@@ -361,6 +361,7 @@ Metric = Literal[
     "smallest-angle",
     "largest-angle",
     "aspect-ratio",
+    "safe-fraction",
 ]
 WallValue = Literal[
     "first-height", "height-ratio", "growth", "equal-layers", "wall-angle", "angle-change"
@@ -393,9 +394,14 @@ class MetricTerm(ColorByTerm):
     """Whether it belongs to cells, or to nodes: a cell then has the worst of its nodes."""
     alone: bool = True
     """Whether the nodes of a cell, deformed and undeformed, are enough to compute its value."""
+    compares: bool = False
+    """Whether there is none without the undeformed mesh."""
     colors: tuple[float, float] | None = None
     """The default ends of the color bar; None: those of ``range``, or of the mesh if infinite."""
 
+
+FARTHEST = 10.0
+"""Largest safe fraction of a motion that is looked for."""
 
 METRICS: dict[Metric, MetricTerm] = {
     "size-skew": MetricTerm("size-skew", "Knupp's: √size · skew. 1 is best."),
@@ -487,6 +493,14 @@ METRICS: dict[Metric, MetricTerm] = {
     ),
     "aspect-ratio": MetricTerm(
         "aspect ratio", "Longest over shortest edge of the cell.", range=(1.0, inf), best="low"
+    ),
+    "safe-fraction": MetricTerm(
+        "safe fraction",
+        "How many times as far the cell may go, straight on, before it folds. Below 1 it does.",
+        range=(0.0, FARTHEST),
+        limit=1.0,
+        compares=True,
+        colors=(0.0, 2.0),
     ),
 }
 """The metrics: numbers that rate cells or nodes. `slideviz.mesh.metrics` computes them."""

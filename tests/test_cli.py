@@ -104,6 +104,7 @@ def test_inverted_cells_give_code_3_and_are_named(square, capsys):
     assert run([*argv, "--set", "PERIODIC_MODE=none"]) == 3
     err = capsys.readouterr().err
     assert "cells are inverted" in err
+    assert "the motion is safe up to " in err
     assert "quadrilateral" in err
     assert "STEPS" in err
     assert (square / "square_deformed.su2").exists()

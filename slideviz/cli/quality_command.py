@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from slideviz.cli.options import add_reference, add_shared, optional_case, reference_words
 from slideviz.formats.table import own_endings
-from slideviz.terms import METRICS, SKEW_METRICS, field_of
+from slideviz.terms import METRICS, RATED, SKEW_METRICS, field_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -87,6 +87,8 @@ def quality(arguments: argparse.Namespace) -> int:
         OutputPath(arguments.json, "--json"),
     )
     with open_mesh(arguments, case) as opened:
+        if opened.reference is None and arguments.metrics == tuple(RATED):
+            arguments.metrics = tuple(k for k, term in RATED.items() if not term.compares)
         rated: dict[Metric, MetricValues | None]
         rated = dict.fromkeys(name for name in METRICS if name in arguments.metrics)
         mesh, found = opened.source.mesh, opened.quality(arguments, metrics=rated)

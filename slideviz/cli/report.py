@@ -23,6 +23,7 @@ from slideviz.mesh.quality import Quality
 from slideviz.mesh.walls import Walls, wall_words
 from slideviz.rbf.problem import Relaxed
 from slideviz.solver.deform import Step, folded_at
+from slideviz.solver.steps import safe_fraction_of
 from slideviz.streaming.quality import CellCounts
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import Metric, field_of
@@ -60,7 +61,7 @@ def run_report(
     ``folded``: VTK type and first inverted step of the inverted cells with the lowest numbers.
     ``walls``: the layers at the boundaries; None where the mesh is in a file.
     """
-    last = steps[-1]
+    last, safe = steps[-1], safe_fraction_of(steps)
     spent = dict.fromkeys(PHASES, 0.0) | dict(seconds)
     for step in steps:
         for phase, value in step.seconds.items():
@@ -86,6 +87,8 @@ def run_report(
             check_case_limits(case, undeformed, mesh, mesh),
         ),
         "walls": None if walls is None else walls.summary(),
+        **({} if safe is None else safe.report()),
+        "safe_fractions": [step.safe.fraction for step in steps if step.safe is not None],
         "tried": [_fields(trial, TRIAL_KEYS) for trial in last.tried],
         "control_nodes": [step.control_nodes for step in steps],
         "control_candidates": last.candidates,

@@ -403,7 +403,7 @@ def run_steps(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Ste
     folder = arguments.steps_dir
     series = _series(arguments, case, mesh)
     with series as add, Bar(not arguments.quiet, begun=arguments.begun) as bar:
-        for step in deform(case, mesh, bar):
+        for step in deform(case, mesh, bar, certify=True):
             if folder:
                 assert case.mesh_file is not None
                 width = len(str(step.total))

@@ -167,6 +167,7 @@ def _print_run(
 ) -> None:
     from slideviz.case.words import counted
     from slideviz.cli.report import limit_lines, metric_lines, quality_lines, table, wall_lines
+    from slideviz.mesh.margin import SafeFraction
 
     counts, spent = report["node_counts"], report["seconds"]
     method = "" if report["method"] == "rbf" else f"method {report['method']}, "
@@ -200,6 +201,8 @@ def _print_run(
     if report["periodic_misfit"] is not None:
         rows.append(("periodic misfit", report["periodic_misfit"]))
     print(table(rows))
+    if (safe := SafeFraction.of_report(report)) is not None:
+        print(f"  {safe.words}")
     if report["limits"]:
         print(f"limits:\n{limit_lines(report['limits'])}")
     if rated := report.get("metrics"):
@@ -261,6 +264,7 @@ def advice_for(
 
 def _inverted_sentence(report: dict, folded: Folded, advice: str) -> str:
     from slideviz.mesh.elements import ELEMENTS
+    from slideviz.mesh.margin import SafeFraction
 
     inverted, cells = report["quality"]["inverted"], report["quality"]["cells"]
     named = ", ".join(
@@ -268,4 +272,6 @@ def _inverted_sentence(report: dict, folded: Folded, advice: str) -> str:
         for cell, (vtk, step) in list(folded.items())[:5]
     )
     more = f" and {inverted - 5} more" if inverted > 5 else ""
-    return f"{inverted} of {cells} cells are inverted: {named}{more}; {advice}"
+    safe = SafeFraction.of_report(report)
+    reach = "" if safe is None or safe.fraction >= 1 else f"{safe.words}; "
+    return f"{inverted} of {cells} cells are inverted: {named}{more}; {reach}{advice}"

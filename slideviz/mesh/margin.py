@@ -13,12 +13,15 @@ coordinates and determinants is subtracted (`ROUNDING`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, fields
 from functools import partial
-from typing import TYPE_CHECKING
+from math import floor
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobians import (
     CORNERS,
     LANES,
@@ -29,13 +32,15 @@ from slideviz.mesh.jacobians import (
     write_hexahedron,
     write_prism,
 )
+from slideviz.mesh.orientation import reference_of
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
+from slideviz.terms import FARTHEST
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from slideviz.mesh.model import Cells, FloatArray, IntArray
+    from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 
 GAP = 2.0**-9
 """Largest relative distance from a lower bound to the margin at which a cell is not cut again."""
@@ -90,6 +95,93 @@ def margins(
 
         in_parts(partial(of_part, vtk=vtk, ids=ids, nodes=nodes), len(ids), lambda _: going_on())
     return found
+
+
+@dataclass(frozen=True)
+class SafeFraction:
+    """How far a motion may go until the first cell is no longer proved valid."""
+
+    fraction: float
+    """Of the motion, from 0 to `slideviz.terms.FARTHEST`; 1 is all of it."""
+    cell: int | None = None  # the number of the first such cell; None if there is none up to then
+    kind: str = ""  # the name of its element type
+    where: tuple[float, ...] = ()  # its middle in the undeformed mesh
+    step: int = 1
+    """The step on whose straight path that is. Beyond a fraction of 1 that is the last, straight
+    on."""
+
+    @property
+    def words(self) -> str:
+        """Return a sentence, its number rounded down: ``the motion is safe up to 62 %, ...``."""
+        place = ", ".join(f"{value:.4g}" for value in self.where)
+        who = f"cell {self.cell} ({self.kind}) at ({place})"
+        if self.cell is None:
+            return f"the motion could go more than {self.fraction:g} times as far"
+        if self.fraction <= 0:
+            return f"the undeformed mesh is not valid: {who}"
+        reach = f"could go {floor(100 * self.fraction) / 100:.3g} times as far"
+        if self.fraction < 1:
+            reach = f"is safe up to {floor(1000 * self.fraction) / 10:g} %"
+        return f"the motion {reach}, until {who} folds"
+
+    def report(self) -> dict[str, object]:
+        """Return the keys of a report: ``safe_fraction``, ``safe_cell`` and so on."""
+        return {f"safe_{name}": value for name, value in asdict(self).items()}
+
+    @classmethod
+    def of_report(cls, report: Mapping[str, Any]) -> SafeFraction | None:
+        """Return what `report` wrote into a report; None if it did not."""
+        if "safe_fraction" not in report:
+            return None
+        return cls(**{one.name: report[f"safe_{one.name}"] for one in fields(cls)})
+
+
+def path_margins(mesh: Mesh, reference: Mesh, signs_of: Mesh | None = None) -> FloatArray:
+    """Return the margins (m,) of all cells along the straight path from ``reference`` to ``mesh``.
+
+    They are at most `slideviz.terms.FARTHEST`. The undeformed mesh ``signs_of``, without it
+    ``reference``, tells which cells are numbered the other way round.
+    """
+    signs = reference_of(signs_of or reference)[1]
+    return margins(reference.points, mesh.points - reference.points, mesh.cells, FARTHEST, signs)
+
+
+def step_safety(
+    before: Mesh,
+    after: Mesh,
+    undeformed: Mesh,
+    part: tuple[float, float] = (0.0, 1.0),
+    step: int = 1,
+) -> SafeFraction:
+    """Return how far one step, straight on, may go, as a fraction of the whole motion.
+
+    ``before``, ``after``: the meshes before and after the step. ``part``: the fractions of the
+    motion that they have. The cells of a halo do not count.
+    """
+    first, length = part[0], part[1] - part[0]
+    signs, cells = reference_of(undeformed)[1], after.cells
+    cap = (FARTHEST - first) / length
+    found = margins(before.points, after.points - before.points, cells, cap, signs)
+    if after.halo is not None:
+        found[after.halo.cells] = cap
+    cell = int(found.argmin())
+    if found[cell] >= cap:
+        return SafeFraction(FARTHEST, step=step)
+    nodes = cells.connectivity[cells.offsets[cell] : cells.offsets[cell + 1]]
+    where = tuple(undeformed.points[nodes].mean(axis=0).tolist())
+    kind = ELEMENTS[int(cells.types[cell])].name
+    return SafeFraction(first + float(found[cell]) * length, cell, kind, where, step)
+
+
+def chain(steps: Iterable[tuple[float, SafeFraction]]) -> SafeFraction:
+    """Return how far a run may go: until the first step that ends beyond its safe fraction.
+
+    ``steps`` have the fraction of the motion after each step, and the step's safe fraction.
+    """
+    for end, safe in steps:
+        if safe.fraction < end:
+            break
+    return safe
 
 
 @njit(**OPTIONS)

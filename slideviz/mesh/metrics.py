@@ -21,9 +21,10 @@ from slideviz.mesh import dual_loops, face_loops, shape_loops
 from slideviz.mesh.adjacency import SIDE_NODES, SIDES, cells_around, sides_of
 from slideviz.mesh.check import check_size
 from slideviz.mesh.jacobians import check_cells
+from slideviz.mesh.margin import path_margins
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
-from slideviz.mesh.quality import Quality, quality
+from slideviz.mesh.quality import Quality, checked_reference, quality
 from slideviz.mesh.topology import find_boundary, vertex_normals
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
@@ -118,7 +119,8 @@ def metrics(
     ----------
     mesh : Mesh
     names : iterable of str, optional
-        Names of `slideviz.terms.METRICS`, with ``-`` or ``_``, in any case; None: all.
+        Names of `slideviz.terms.METRICS`, with ``-`` or ``_``, in any case; None: all, without a
+        reference those that need none.
     reference : Mesh, optional
         The undeformed mesh, as of `slideviz.quality`. Only size-skew and its factors depend on its
         shape. Of the others, cells that are numbered the other way round there have the same
@@ -130,7 +132,8 @@ def metrics(
         The mesh has no cells or unusable ones, coordinates too large, or the reference is another
         mesh.
     CaseError
-        There is no such metric, or it compares neighbouring cells and the mesh is a part.
+        There is no such metric, or it compares neighbouring cells and the mesh is a part, or it
+        compares with the undeformed mesh and there is no reference.
 
     Examples
     --------
@@ -140,7 +143,9 @@ def metrics(
     >>> round(found["smallest-angle"].min, 6), found["aspect-ratio"].max
     (45.0, 2.0)
     """
-    wanted = {name: metric_name(name) for name in (METRICS if names is None else names)}
+    if names is None:
+        names = [name for name, term in METRICS.items() if reference or not term.compares]
+    wanted = {name: metric_name(name) for name in names}
     rated = quality(mesh, reference) if set(wanted.values()) & set(SIZE_SKEW) else None
     return {key: rated_metric(mesh, name, reference, rated) for key, name in wanted.items()}
 
@@ -176,19 +181,25 @@ def metric(mesh: Mesh, name: Metric, reference: Mesh | None = None) -> MetricVal
         raise CaseError(f"{name} compares neighbouring cells: expected the whole mesh in memory")
     check_cells(mesh)
     check_size(mesh)
+    counted = slice(None) if mesh.halo is None else ~mesh.halo.cells
+    if METRICS[name].compares:
+        if reference is None:
+            raise CaseError(f"{name} compares with the undeformed mesh; give a reference")
+        base = checked_reference(reference, mesh)
+        key = name, None if base is mesh else base  # a key must not keep its own mesh alive
+        values = _cached(mesh, key, lambda: {key: path_margins(mesh, base)})
+        return MetricValues(name, values, values, counted)
     signs = reference_of(mesh if reference is None else reference)[1]
     turned = hash(signs.tobytes()) if (signs < 0).any() else 0
     values = _cached(mesh, (name, turned), lambda: _computed(mesh, name, turned, signs))
     if METRICS[name].where == "cells":
-        return MetricValues(
-            name, values, values, slice(None) if mesh.halo is None else ~mesh.halo.cells
-        )
-    key, best = ("cells", name, turned), METRICS[name].best
-    of_cells = _cached(mesh, key, lambda: {key: _worst_of_nodes(mesh, values, best)})
-    counted = ~np.isnan(values)
+        return MetricValues(name, values, values, counted)
+    place, best = ("cells", name, turned), METRICS[name].best
+    of_cells = _cached(mesh, place, lambda: {place: _worst_of_nodes(mesh, values, best)})
+    used = ~np.isnan(values)
     if mesh.halo is not None:
-        counted[mesh.halo.outer] = False
-    return MetricValues(name, values, of_cells, counted)
+        used[mesh.halo.outer] = False
+    return MetricValues(name, values, of_cells, used)
 
 
 def _computed(

@@ -80,5 +80,5 @@ def _deform(name: str, settings: Mapping[str, Any], stopped: Stopped) -> None:
     case: Case = made.case.change(
         motions=(motion,), steps=1, periodic="moving", reduction=None, **settings
     )
-    for _ in deform(case, mesh, progress=lambda _: raise_if_cancelled(stopped)):
+    for _ in deform(case, mesh, progress=lambda _: raise_if_cancelled(stopped), certify=True):
         pass

@@ -334,7 +334,7 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         if unfinished:
             raise_if_cancelled(stopped)
 
-    for step in deform(case, mesh, progress=progress):
+    for step in deform(case, mesh, progress=progress, certify=True):
         unfinished = step.index < step.total
         report(JobProgress(f"Step {step.index} of {step.total}: quality", step.index / step.total))
         measured = quality(step.mesh, mesh, case.quality_metric, going_on)

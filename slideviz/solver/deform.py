@@ -41,6 +41,7 @@ def deform(
     mesh: Mesh,
     progress: Callable[[Progress], None] | None = None,
     setup: Setup | None = None,
+    certify: bool = False,
 ) -> Iterator[Step]:
     """Yield the deformed mesh of each step, with numbers on how it was made.
 
@@ -55,6 +56,8 @@ def deform(
     setup
         What ``make_setup`` returned for this mesh and a case that differs in the number of steps
         alone; it is made when there is none.
+    certify
+        Whether each step says how far it may go until the first cell folds (``Step.safe``).
 
     Raises
     ------
@@ -95,7 +98,7 @@ def deform(
         with timer.phase("classify"):
             setup = make_setup(case, mesh)
     require_memory(setup, case)
-    stepping = Stepping(case, mesh, setup, report, timer.seconds)
+    stepping = Stepping(case, mesh, setup, report, timer.seconds, certify=certify)
     yield from all_steps(stepping)
 
 
@@ -109,7 +112,8 @@ def all_steps(stepping: Stepping) -> Iterator[Step]:
     elif stepping.setup.relaxation is None:
         yield from _automatic(stepping)
     else:
-        *_, last = found = list(_automatic(replace(stepping, setup=stepping.setup.at_step(False))))
+        plain = replace(stepping, setup=stepping.setup.at_step(False), certify=False)
+        *_, last = found = list(_automatic(plain))
         yield from renumbered(list(stepping.steps([step.part for step in found])), last.tried)
 
 

@@ -15,6 +15,7 @@ from slideviz.errors import DeformError, Note, UnsoundError
 from slideviz.mesh.check import within
 from slideviz.mesh.halo import Halo
 from slideviz.mesh.interfaces import torn_interfaces
+from slideviz.mesh.margin import step_safety
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.quality import Quality, quality
 from slideviz.rbf.constraint_rows import AGREE
@@ -53,6 +54,8 @@ class Stepping:
     """Returns the quality of all cells after the last of the steps it is given, where ``mesh`` is
     only the skin of a streamed mesh; the steps then have a ``field``. None: the quality of the last
     step's mesh."""
+    certify: bool = False
+    """Whether each step says how far it may go (`Step.safe`)."""
 
     def steps(self, count: int | Sequence[float], halve: bool = False) -> Iterator[Step]:
         """Yield the steps that divide the displacement into ``count`` equal parts.
@@ -72,6 +75,7 @@ class Stepping:
         seconds = dict(self.seconds)
         before: Solution | None = None
         made: list[Step] = []
+        last = mesh
         while ahead:
             part, halvings = ahead[0]
             total = index + len(ahead)
@@ -101,7 +105,11 @@ class Stepping:
                 made.append(step)
             if failure:
                 raise failure
-            coords, done, index = moved, part, index + 1
+            if self.certify:
+                with timer.phase("quality"):
+                    safe = step_safety(last, step.mesh, mesh, (done, part), index + 1)
+                step = replace(step, safe=safe)
+            coords, done, index, last = moved, part, index + 1, step.mesh
             before = solution
             ahead.pop(0)
             if solution.short and solution.max_error > worst:

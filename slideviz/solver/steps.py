@@ -5,13 +5,14 @@ Steps are made in `slideviz.solver.stepping`, their number is chosen in `slidevi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from dataclasses import field as made_by
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from slideviz.mesh.margin import SafeFraction, chain
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.rbf.field import Field
 from slideviz.rbf.layers import KeptLayers
@@ -99,6 +100,9 @@ class Step:
     """How the step was relaxed; None where it was not."""
     kept_layers: KeptLayers | None = None
     """The walls that carried the nodes near them along (LAYERS); None where none did."""
+    safe: SafeFraction | None = None
+    """How far this step, straight on, may go until the first cell folds; None where it was not
+    asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,3 +124,14 @@ class RunResult:
     seconds: dict[str, float]  # spent by phase, besides those of the steps
     walls: Walls | None = None
     """The layers at the boundaries, compared with those of ``mesh``; None of one in a file."""
+
+    @property
+    def safe(self) -> SafeFraction | None:
+        """Return how far the run may go; None if that was not asked for."""
+        return safe_fraction_of(self.steps)
+
+
+def safe_fraction_of(steps: Iterable[Step]) -> SafeFraction | None:
+    """Return how far the run of some steps may go; None if that was not asked for."""
+    known = [(step.part, step.safe) for step in steps if step.safe is not None]
+    return chain(known) if known else None

@@ -139,9 +139,10 @@ class Output:
                     partial.note([*partial.sums, checksum])
                 tick(end / total)
 
-    def measure(self, listed: int) -> RunCollector:
+    def measure(self, listed: int, displacer: InteriorDisplacer | None = None) -> RunCollector:
         """Return the quality of all cells, before and after, with ``listed`` inverted ones.
 
+        With ``displacer`` it says how far each of its steps may go.
         Raises MeshError if cells are numbered in both directions, and some are folded.
         """
         partial, count = self._opened(), self.source.n_cells
@@ -149,7 +150,8 @@ class Output:
         if self._collector is None:
             self._collector = RunCollector(self._stack, folder, count, metric)
         self._collector.reset()
-        arguments = self._mesh_file, self._zone, partial.path, metric, listed
+        steps = displacer and displacer.without_cells()
+        arguments = self._mesh_file, self._zone, partial.path, metric, listed, steps
         with (
             self._timer.phase("quality") as tick,
             self._ranks.sharing(cell_measurer, *arguments) as do,
@@ -234,11 +236,16 @@ def checksum_reader(path: Path, zone: int | None, partial: Path) -> Iterator[Cal
 
 @contextmanager
 def cell_measurer(
-    path: Path, zone: int | None, partial: Path, metric: SkewMetric, listed: int
+    path: Path,
+    zone: int | None,
+    partial: Path,
+    metric: SkewMetric,
+    listed: int,
+    displacer: InteriorDisplacer | None,
 ) -> Iterator[Callable[[Part], MeasuredBlock]]:
-    """Context with a function that measures the quality of the cells of a part."""
+    """Context with a function that measures the cells of a part, as `MeasuredBlock.of` does."""
     with ExitStack() as stack:
         source = FileSource.open(stack, (path, zone), moved=partial)
         yield lambda part: MeasuredBlock.of(
-            source.between(part[0], part[1] - part[0]), metric, listed
+            source.between(part[0], part[1] - part[0]), metric, listed, displacer
         )

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.formats.su2b.read import read_markers
+from slideviz.mesh.margin import SafeFraction, step_safety
 from slideviz.mesh.metrics import MetricValues, rated_metric
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.orientation import corner_sums, facets_of
@@ -208,10 +209,20 @@ class MeasuredBlock:
     """dict of int to (int, (n,) int64): VTK type and nodes of inverted cells, by their number:
     those with the lowest numbers."""
     farthest: Farthest  # the node with the largest displacement
+    safe: list[SafeFraction]  # how far each step may go
 
     @classmethod
-    def of(cls, block: CellBlock, metric: SkewMetric, listed: int) -> MeasuredBlock:
-        """Return the quality of a block, with the ``listed`` inverted cells of lowest numbers."""
+    def of(
+        cls,
+        block: CellBlock,
+        metric: SkewMetric,
+        listed: int,
+        displacer: InteriorDisplacer | None = None,
+    ) -> MeasuredBlock:
+        """Return the quality of a block, with the ``listed`` inverted cells of lowest numbers.
+
+        It says how far each step may go if it gets the steps, with ``displacer``.
+        """
         base, mesh = block.base, block.mesh
         assert base is not None
         before, after = quality(base, metric=metric), quality(mesh, base, metric)
@@ -227,7 +238,25 @@ class MeasuredBlock:
             orientations_of(before.signs),
             {int(block.ids[k]): (int(mesh.cells.types[k]), nodes[k]) for k in first},
             farthest_node(base.points, mesh.points, block.nodes),
+            [] if displacer is None else _safe_fractions(block, displacer),
         )
+
+
+def _safe_fractions(block: CellBlock, displacer: InteriorDisplacer) -> list[SafeFraction]:
+    """Return how far each step may go, by the cells of a block."""
+    base, steps, found = block.base, displacer.steps, []
+    assert base is not None
+    meshes = [block.mesh]
+    if len(steps) > 1:
+        moved = displacer.after_steps(block.nodes, base.points)
+        meshes = [base.with_points(points) for points in moved]
+    before, done = base, 0.0
+    for step, mesh in zip(steps, meshes, strict=True):
+        safe = step_safety(before, mesh, base, (done, step.part), step.index)
+        cell = None if safe.cell is None else int(block.ids[safe.cell])
+        found.append(replace(safe, cell=cell))
+        before, done = mesh, step.part
+    return found
 
 
 class RunCollector:
@@ -243,6 +272,8 @@ class RunCollector:
         """VTK type and nodes of inverted cells, by their number: those with the lowest numbers."""
         self.farthest = Farthest(-1.0, 0, np.empty(0))
         """The node with the largest displacement."""
+        self.safe: list[SafeFraction] = []
+        """How far each step may go."""
 
     def add(self, found: MeasuredBlock, listed: int) -> None:
         """Add a block; the ``listed`` inverted cells with the lowest numbers so far are kept."""
@@ -250,6 +281,8 @@ class RunCollector:
         self.before.add(found.ids, found.before, found.old, found.signs)
         self.farthest = self.farthest.further(found.farthest)
         self.inverted = dict(sorted((self.inverted | found.inverted).items())[:listed])
+        both = zip(self.safe or found.safe, found.safe, strict=True)
+        self.safe = [min(pair, key=lambda one: (one.fraction, one.cell or 0)) for pair in both]
 
 
 @contextmanager

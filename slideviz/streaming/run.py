@@ -27,13 +27,13 @@ from slideviz.mesh.quality import Quality
 from slideviz.rbf.problem import PhaseTimer
 from slideviz.rbf.projection import Tracks
 from slideviz.solver.deform import all_steps, require_memory
-from slideviz.solver.growth import Farthest, stray_warning
+from slideviz.solver.growth import stray_warning
 from slideviz.solver.setup import make_setup
 from slideviz.solver.stepping import Stepping
 from slideviz.solver.steps import Progress, RunResult, Step
 from slideviz.streaming.interior import InteriorDisplacer
 from slideviz.streaming.output import Output
-from slideviz.streaming.quality import folded_steps
+from slideviz.streaming.quality import RunCollector, folded_steps
 from slideviz.streaming.stream_input import open_for_run, require_su2
 from slideviz.system.ranks import SERIAL, SerialPool
 from slideviz.system.threads import give_back
@@ -185,7 +185,7 @@ def stream(
         remaining.next()
         out.displace(displacer, final=True)
         remaining.next()
-        measured = out.measure(listed)
+        measured = out.measure(listed, displacer)
         folded = folded_steps(displacer, out.source, measured.inverted)
         moved = displacer.steps[-1].mesh.origin.ffd
         if is_text:
@@ -193,7 +193,7 @@ def stream(
         out.finish(None if moved is displacer.skin.origin.ffd else moved)
     return RunResult(
         displacer.skin,
-        _steps_of_whole_mesh(displacer, measured.farthest),
+        _steps_of_whole_mesh(displacer, measured),
         measured.after.quality(worst),
         measured.before.quality(),
         folded,
@@ -275,19 +275,21 @@ def about_run(case: Case) -> str:
     return hashlib.sha256(f"{text}{state.st_size} {state.st_mtime_ns}".encode()).hexdigest()
 
 
-def _steps_of_whole_mesh(displacer: InteriorDisplacer, farthest: Farthest) -> tuple[Step, ...]:
-    """Return the steps of the skin, with the ``node_counts`` of the whole mesh.
+def _steps_of_whole_mesh(displacer: InteriorDisplacer, measured: RunCollector) -> tuple[Step, ...]:
+    """Return the steps of the skin, with ``node_counts`` and ``safe`` of the whole mesh.
 
     The last one warns of the node of the whole mesh that went farthest, if it strays.
     """
     skin, last = displacer.skin, displacer.steps[-1]
     assert skin.part is not None
     more = skin.part.n_points - len(skin.points)
-    stray = stray_warning(displacer.setup, skin, last.mesh.points, farthest)
+    stray = stray_warning(displacer.setup, skin, last.mesh.points, measured.farthest)
     steps = (*displacer.steps[:-1], replace(last, warnings=(*last.warnings, *stray)))
     return tuple(
         replace(
-            step, node_counts={**step.node_counts, "internal": step.node_counts["internal"] + more}
+            step,
+            node_counts={**step.node_counts, "internal": step.node_counts["internal"] + more},
+            safe=safe,
         )
-        for step in steps
+        for step, safe in zip(steps, measured.safe, strict=True)
     )

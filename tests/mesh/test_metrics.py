@@ -7,12 +7,15 @@ import pytest
 
 import slideviz as sv
 from slideviz.mesh.metrics import metric, metrics
-from slideviz.terms import METRICS
+from slideviz.terms import FARTHEST, METRICS
 from tests.builders import grid
+
+FREE = "safe-fraction"
 
 
 def test_the_unit_square_grid_has_the_numbers_that_one_counts():
-    found = metrics(grid((4, 4)))
+    mesh = grid((4, 4))
+    found = metrics(mesh, reference=mesh)
     assert found["orthogonality"].summary()["min"] == 90.0
     # Corners have two faces of half a cell and two markers of the same size; a node of a side has
     # a whole face inwards, halves along the side; inner nodes have whole faces only.
@@ -22,10 +25,11 @@ def test_the_unit_square_grid_has_the_numbers_that_one_counts():
     assert np.all(ratio[1:-1, 1:-1] == 1.0)
     assert found["volume-ratio"].max == 1.0
     for name, term in METRICS.items():
-        if name not in ("area-ratio", "orthogonality", "smallest-angle", "largest-angle"):
+        if name not in ("area-ratio", "orthogonality", "smallest-angle", "largest-angle", FREE):
             ideal = 0.0 if term.best == "low" and term.range[0] == 0 else 1.0
             assert (found[name].min, found[name].max) == (ideal, ideal), name
     assert found["smallest-angle"].min == found["largest-angle"].max == 90.0
+    assert found[FREE].min == FARTHEST
 
 
 def test_an_unknown_metric_is_refused():

@@ -72,7 +72,7 @@ def bits(points):
 def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, size, sets):
     case = made(tmp_path, name, size, sets)
     mesh = sv.read(case.mesh_file)
-    steps = list(sv.deform(case, mesh))
+    steps = list(sv.deform(case, mesh, certify=True))
     found, before = sv.quality(steps[-1].mesh, mesh), sv.quality(mesh)
     ids = found.inverted_cells(100)
     for chunk in (37, 1 << 20):
@@ -87,7 +87,7 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, size, se
         when = {cell: step for cell, (_, step) in done.folded.items()}
         assert when == dict(zip(ids.tolist(), folded_at(steps, mesh, ids).tolist(), strict=True))
         for one, other in zip(steps, done.steps, strict=True):
-            for field in ("max_error", "control_nodes", "node_counts", "warnings", "tried"):
+            for field in ("max_error", "control_nodes", "node_counts", "warnings", "tried", "safe"):
                 assert getattr(one, field) == getattr(other, field)
             assert one.periodic_misfit == other.periodic_misfit
     assert sorted(p.name for p in tmp_path.glob(".*")) == []
