@@ -232,6 +232,14 @@ KERNELS: dict[str, KernelTerm] = {
 }
 """The radial functions of thesis Tables 2.1 and 2.2, with formulas in `slideviz.rbf.kernels`."""
 
+Polynomial = Literal["auto", "no", "yes"]
+POLYNOMIALS: dict[Polynomial, Term] = {
+    "auto": Term("automatic", "Where the kernel needs it."),
+    "no": Term("off", "Far from the boundary, compact kernels leave nodes where they are."),
+    "yes": Term("on", "Motions that are linear in the coordinates are exact with any kernel."),
+}
+"""Whether sums of radial functions have a linear polynomial (thesis Eq. 2.1)."""
+
 Selection = Literal["block", "double", "one"]
 SELECTIONS: dict[Selection, Term] = {
     "block": Term("growing blocks"),

@@ -27,7 +27,7 @@ from slideviz.case.model import (
 )
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.errors import CaseError, Note, nearest
-from slideviz.terms import ROLES, SLIDES
+from slideviz.terms import KERNELS, ROLES, SLIDES
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -91,6 +91,12 @@ def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
             f"{case.direction}); write theta, or PERIODIC_TYPE= translational"
         )
         problems.append((("PERIODIC_DIRECTION", "PERIODIC_TYPE"), sentence))
+    if case.polynomial == "no" and KERNELS[case.kernel].polynomial:
+        sentence = (
+            f"RBF_KERNEL= {case.kernel} needs the linear polynomial: without it the system may be "
+            "singular; use POLYNOMIAL= AUTO, or another kernel such as wendland-c2"
+        )
+        problems.append((("POLYNOMIAL", "RBF_KERNEL"), sentence))
     return problems + ffd_contradictions(case)
 
 

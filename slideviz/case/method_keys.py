@@ -20,6 +20,7 @@ from slideviz.terms import (
     LAYERS,
     LEVEL_CRITERIA,
     METHODS,
+    POLYNOMIALS,
     RELAXES,
     SELECTIONS,
     SLIDING,
@@ -364,6 +365,21 @@ METHOD_ROWS = (
         tip="The radial function; a global one reaches through the whole mesh whatever the "
         "radius, and needs a smaller support radius.",
         run_label="{}",
+        method="rbf",
+    ),
+    setting(
+        "POLYNOMIAL",
+        METHOD,
+        one_of(POLYNOMIALS),
+        "polynomial",
+        "Add a linear polynomial to the radial functions: motions that are linear in the "
+        "coordinates are exact then, with any kernel, and nodes beyond all supports move too. "
+        "AUTO: only where the kernel needs it (thin-plate, multiquadric, quadric).",
+        label="Polynomial",
+        form="more",
+        tip="Whether a linear polynomial is added to the radial functions: a motion that is linear "
+        "in the coordinates is then exact with any kernel, and nodes far from the motion move too.",
+        run_label="polynomial {}",
         method="rbf",
     ),
     setting(

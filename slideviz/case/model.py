@@ -24,6 +24,7 @@ from slideviz.terms import (
     METHODS,
     PERIODIC_MODES,
     PERIODIC_TYPES,
+    POLYNOMIALS,
     RELAXES,
     ROLES,
     SIDES,
@@ -36,6 +37,7 @@ from slideviz.terms import (
     Method,
     PeriodicMode,
     PeriodicType,
+    Polynomial,
     Relax,
     Role,
     Side,
@@ -324,6 +326,7 @@ class Case(CheckedFields):
     support_radius: float | None = None
     kernel: str = field(default="wendland-c2", metadata=KERNELS)
     reduction: Reduction | None = AUTO
+    polynomial: Polynomial = field(default="auto", metadata=POLYNOMIALS)
     relax: Relax = field(default="no", metadata=RELAXES)
     layers: Layers = field(default="no", metadata=LAYERS)
     layer_thickness: Annotated[float, 'a length, or "auto"'] = 0.0

@@ -30,6 +30,17 @@ class Basis:
     period: float = 0.0
     """Angle in radians of a rotational periodic distance (Eq. 2.15); 0: Euclidean features."""
     kernel: str = "wendland-c2"  # a key of ``KERNELS``
+    polynomial: bool = False  # whether a kernel that needs no linear polynomial has one
+
+    @property
+    def saddle(self) -> bool:
+        """Return whether the kernel needs the linear polynomial: its matrix is not definite."""
+        return KERNELS[self.kernel].polynomial
+
+    @property
+    def tailed(self) -> bool:
+        """Return whether sums have a linear polynomial, which acts on all nodes (Eq. 2.1)."""
+        return self.polynomial or self.saddle
 
     @property
     def period_over_pi(self) -> float:

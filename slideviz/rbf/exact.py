@@ -9,7 +9,6 @@ from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.double_double import supports
 from slideviz.rbf.evaluate import Tick, matrix
 from slideviz.rbf.field import linear_terms
-from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Cycle, Interpolant, Levels, PhaseTimer, Problem, first_occurrences
 from slideviz.rbf.refine import TRUSTED, System, check_points
 from slideviz.rbf.solve import (
@@ -18,7 +17,9 @@ from slideviz.rbf.solve import (
     condition,
     enough_threads,
     extend,
+    polynomial,
     saddle_condition,
+    solve_lower,
     solve_saddle,
 )
 from slideviz.rbf.tape import Array, gather, multiply, value
@@ -26,6 +27,9 @@ from slideviz.rbf.tape import Array, gather, multiply, value
 
 class ExactFit:
     """The interpolant that meets all rows: solves ``G w = b``, G_ab = phi_ab (n_a . n_b).
+
+    With a polynomial G w = b - P c (`solve.polynomial`), or one system for both if G is not
+    definite.
 
     Rows are sorted by position, so that the pivot guard leaves out the same rows however nodes
     are numbered. Each system of pseudo sliding is the leading block of the next: one factor grows.
@@ -63,7 +67,7 @@ class ExactFit:
             rows = self._rows.followed_by(rows)
         self._rows = rows
         with self._timer.phase("solve") as tick:
-            if KERNELS[problem.basis.kernel].polynomial:
+            if problem.basis.saddle:
                 self.interpolant, deficient = saddle_fit(problem, rows)
                 self.dropped = np.unique(rows.nodes) if deficient else np.empty(0, np.int64)
                 self.error_estimate = max(
@@ -81,50 +85,73 @@ class ExactFit:
                 # What never moves counts where the system is kept for other data.
                 if moves[each] or problem.lasting
             ]
-            dropped = [self._solve(rows, part, weights, tick) for part in solved]
+            work = [self._extend(rows, part, tick) for part in solved]
+            tail, rest = None, rows.data
+            if problem.basis.polynomial:
+                terms = row_terms(problem, rows)
+                tail = self._polynomial(terms, rest, solved)
+                rest = rest - terms @ tail
+            dropped = []
+            for part, flops in zip(solved, work, strict=True):
+                with enough_threads(flops):
+                    found = self._factors[int(part[0])].solve(rest[part])
+                weights[part], left = self._checked(rows, part, rest[part], found, tick)
+                dropped.append(left)
         left_out = np.concatenate(dropped)
         self.dropped = np.unique(rows.nodes[left_out])
         some = np.flatnonzero(active)
-        self.interpolant = gathered(rows.only(some), weights[some])
+        self.interpolant = gathered(rows.only(some), weights[some], with_components(tail, problem))
         known = np.setdiff1d(np.arange(len(names)) if problem.lasting else some, left_out)
         self.stages += ((names[known],),)
 
-    def _solve(
-        self, rows: ConstraintRows, part: IntArray, weights: FloatArray, tick: Tick
-    ) -> IntArray:
-        """Write the weights of the rows ``part``, one block, to ``weights`` (r, m).
+    def _place(self, rows: ConstraintRows) -> tuple[FloatArray, FloatArray | None]:
+        """Return the features (k, r) and directions of rows."""
+        return self._problem.place(rows.nodes), rows.directions
 
-        Returns the rows that the solution does not meet because the pivot guard left them out.
+    def _extend(self, rows: ConstraintRows, part: IntArray, tick: Tick) -> float:
+        """Extend the factor of the rows ``part``, one block, by those that are new.
+
+        Returns the number of operations that this takes.
         """
-        first = int(part[0])
-        before = self._factors.get(first, NOTHING)
-        done = len(before.retained) + len(before.dropped)
-        problem, new, right = self._problem, part[done:], rows.data[part]
+        before = self._factors.get(int(part[0]), NOTHING)
+        new = part[len(before.retained) + len(before.dropped) :]
+        ends = self._place(rows.only(new)), self._place(rows.only(part))
+        system = matrix(self._problem.basis, *ends, tick)
+        with enough_threads(flops := len(system) * len(part) ** 2 / 3):
+            self._factors[int(part[0])] = extend(before, system, tick)
+        return flops
 
-        def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
-            normals = None if rows.directions is None else rows.directions[index]
-            return problem.place(rows.nodes[index]), normals
-
-        system = matrix(problem.basis, place(new), place(part), tick)
-        with enough_threads(len(system) * len(part) ** 2 / 3):
-            factor = extend(before, system, tick)
-            found = factor.solve(right)
-        self._factors[first] = factor
-        largest = float(np.abs(rows.data).max(initial=0.0))
-        system_ = System(problem.basis, place(part), factor)
-        weights[part], met = self._checked(system_, right, found, largest, tick)
-        return part[factor.dropped[:0] if met else factor.dropped]
+    def _polynomial(
+        self, terms: FloatArray, right: FloatArray, solved: list[IntArray]
+    ) -> FloatArray:
+        """Return the polynomial's coefficients (q, m) for terms (r, q) and data (r, m) of rows."""
+        kept, forward = [np.empty(0, np.int64)], [np.empty((0, terms.shape[1] + right.shape[1]))]
+        for part in solved:
+            factor = self._factors[int(part[0])]
+            kept.append(part[factor.retained])
+            forward.append(solve_lower(factor.lower, np.c_[terms, right][kept[-1]]))
+        along, across = np.hsplit(np.concatenate(forward), [terms.shape[1]])
+        return polynomial(terms[np.concatenate(kept)], along, across)
 
     def _checked(
-        self, system: System, right: FloatArray, found: FloatArray, largest: float, tick: Tick
-    ) -> tuple[FloatArray, bool]:
-        """Return ``found``, or refined weights where they are much better, and whether refined.
+        self,
+        rows: ConstraintRows,
+        part: IntArray,
+        right: FloatArray,
+        found: FloatArray,
+        tick: Tick,
+    ) -> tuple[FloatArray, IntArray]:
+        """Return the weights of the rows ``part``, one block, and the rows that they do not meet.
 
-        Refined weights meet all rows, also those that the pivot guard left out. Sets
-        ``error_estimate`` and ``refined``.
+        The weights are ``found``, or refined ones where these are much better: they meet all rows,
+        also those that the pivot guard left out. Sets ``error_estimate`` and ``refined``.
         ``right`` and ``found`` (n, m): right-hand sides, and the weights that the factor gives.
-        ``largest``: largest component of the data of all blocks, by which errors are judged.
+        Errors are judged by the largest component of the data of all blocks.
         """
+        system = System(
+            self._problem.basis, self._place(rows.only(part)), self._factors[int(part[0])]
+        )
+        largest = float(np.abs(rows.data).max(initial=0.0))
         trials = [(right, found, largest)]
         if self._problem.lasting:
             rough = system.rough_data()
@@ -145,9 +172,9 @@ class ExactFit:
                     max(self.refined, *field_error, first),
                     max(self.error_estimate, error_estimate),
                 )
-                return refined[0].weights, True
+                return refined[0].weights, part[:0]
         self.error_estimate = max(self.error_estimate, *field_error)
-        return found, False
+        return found, part[system.factor.dropped]
 
     def condition(self) -> float:
         """Return an estimate of the condition number of the last system; 1.0 before any."""
@@ -175,6 +202,11 @@ def row_keys(rows: ConstraintRows) -> IntArray:
     return np.stack([rows.nodes, place - first], axis=1)
 
 
+def with_components(tail: FloatArray | None, problem: Problem) -> FloatArray | None:
+    """Return coefficients (q, d), also those (q d, 1) of rows with directions; None without."""
+    return None if tail is None else tail.reshape(-1, problem.dim)
+
+
 def gathered(rows: ConstraintRows, weights: Array, tail: Array | None = None) -> Interpolant:
     """Return the interpolant with a weight for each row, (r, m), summed up for each node.
 
@@ -198,8 +230,8 @@ def saddle_fit(problem: Problem, rows: ConstraintRows) -> tuple[Interpolant, boo
     """Return the interpolant with polynomial, and whether the system was singular."""
     place = problem.place(rows.nodes), rows.directions
     solved = solve_saddle(matrix(problem.basis, place), row_terms(problem, rows), rows.data)
-    d = problem.dim
-    return gathered(rows, solved.weights, solved.tail.reshape(-1, d)), solved.rank_deficient
+    tail = with_components(solved.tail, problem)
+    return gathered(rows, solved.weights, tail), solved.rank_deficient
 
 
 def condition_with_terms(problem: Problem, rows: ConstraintRows) -> float:

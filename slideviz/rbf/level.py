@@ -12,11 +12,25 @@ import numpy as np
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import matrix
-from slideviz.rbf.exact import condition_with_terms, gathered, row_keys, saddle_fit
-from slideviz.rbf.kernels import KERNELS, PLAIN
+from slideviz.rbf.exact import (
+    condition_with_terms,
+    gathered,
+    row_keys,
+    row_terms,
+    saddle_fit,
+    with_components,
+)
+from slideviz.rbf.kernels import PLAIN
 from slideviz.rbf.problem import Interpolant, Problem
 from slideviz.rbf.reduction import Reduction
-from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise, solve_lower
+from slideviz.rbf.solve import (
+    PIVOT_GUARD,
+    condition,
+    enough_threads,
+    factorise,
+    polynomial,
+    solve_lower,
+)
 from slideviz.rbf.tape import value
 
 POOL = 768  # largest number of rows in the pool of a block
@@ -271,9 +285,15 @@ class GrowingFactor:
         rest = target[self.rows[n:]] - self.lower[n:, :n] @ self.forward
         self.forward = np.concatenate([self.forward, solve_lower(self.lower[n:, n:], rest)])
 
-    def weights(self) -> FloatArray:
-        """Return the weights (k, m) that solve G w = b."""
-        return solve_lower(self.lower, self.forward, transposed=True)
+    def weights(self, tail: FloatArray | None = None) -> FloatArray:
+        """Return the weights (k, m) that solve G w = b, or b - P c for a polynomial's c (q, m).
+
+        The target that ``forward`` follows is then b beside P.
+        """
+        forward = self.forward
+        if tail is not None:
+            forward = forward[:, : -len(tail)] - forward[:, -len(tail) :] @ tail
+        return solve_lower(self.lower, forward, transposed=True)
 
 
 class GreedyLevel:
@@ -294,8 +314,9 @@ class GreedyLevel:
         self._problem, self._among, self.previous_levels = problem, candidates, previous_levels
         # Only positive definite functions have pivots. For the others the default one tells
         # which nodes add most, and the weights come from the system with the polynomial.
-        self._tailed, self.singular = KERNELS[problem.basis.kernel].polynomial, False
-        self._basis = replace(problem.basis, kernel=PLAIN) if self._tailed else problem.basis
+        self._saddle, self.singular = problem.basis.saddle, False
+        self._basis = replace(problem.basis, kernel=PLAIN) if self._saddle else problem.basis
+        self._terms = self._terms_of(candidates)
         self.increment = Interpolant(np.empty(0, np.int64), np.empty((0, problem.dim)))
         self.chosen: IntArray = np.empty(0, np.int64)
         """(k,): the chosen rows, in the order of their choice."""
@@ -303,7 +324,8 @@ class GreedyLevel:
         """(r,): rows that cannot be chosen any more: they are, or would make the system
         singular."""
         count = int(candidates.block.max(initial=0)) + 1
-        self._grown = [GrowingFactor(candidates.rows.data.shape[1]) for _ in range(count)]
+        width = candidates.rows.data.shape[1] + self._terms.shape[1]
+        self._grown = [GrowingFactor(width) for _ in range(count)]
 
     @property
     def interpolant(self) -> Interpolant:
@@ -324,6 +346,7 @@ class GreedyLevel:
         """Choose among ``candidates`` from here on, which begin with those there were before."""
         more = np.zeros(len(candidates.rows.nodes) - len(self.excluded), bool)
         self._among, self.excluded = candidates, np.concatenate([self.excluded, more])
+        self._terms = self._terms_of(candidates)
 
     def targets(self) -> FloatArray:
         """Return what this level has to meet: the data less the levels before, (r, m)."""
@@ -331,6 +354,16 @@ class GreedyLevel:
         if not len(self.previous_levels.nodes):
             return right
         return right - self._among.values(self._problem, self.previous_levels)
+
+    def _terms_of(self, candidates: Candidates) -> FloatArray:
+        """Return the polynomial's terms in each row, (r, q); q = 0 where `solve` needs none."""
+        if self._problem.basis.polynomial:
+            return row_terms(self._problem, candidates.rows)
+        return np.empty((len(candidates.rows.nodes), 0))
+
+    def _followed(self, factor: GrowingFactor, target: FloatArray) -> None:
+        """Bring ``factor.forward`` up to date, for the target (r, m) and the polynomial's terms."""
+        factor.follow(np.c_[target, self._terms] if self._terms.size else target)
 
     def _rows(self, target: FloatArray) -> ConstraintRows:
         """Return the chosen rows, with their data from the target (r, m)."""
@@ -341,13 +374,18 @@ class GreedyLevel:
     def solve(self, target: FloatArray) -> None:
         """Make ``increment`` meet the target (r, m) in the chosen rows."""
         rows = self._rows(target)
-        if self._tailed:
+        if self._saddle:
             found, self.singular = saddle_fit(self._problem, rows)
         else:
-            weights = np.empty_like(rows.data)
+            weights, tail = np.empty_like(rows.data), None
+            if self._terms.size:
+                forward = np.concatenate([factor.forward for factor in self._grown])
+                chosen = np.concatenate([factor.rows for factor in self._grown])
+                across, along = np.hsplit(forward, [rows.data.shape[1]])
+                tail = polynomial(self._terms[chosen], along, across)
             for factor in self._grown:
-                weights[factor.turn] = factor.weights()
-            found = gathered(rows, weights)
+                weights[factor.turn] = factor.weights(tail)
+            found = gathered(rows, weights, with_components(tail, self._problem))
         self.increment = replace(found, levels=(row_keys(self._among.rows)[self.chosen],))
 
     def pick(
@@ -393,7 +431,7 @@ class GreedyLevel:
             mine = (picked >= start) & (picked < start + len(parts[k]))
             at = picked[mine] - start
             factor.append(parts[k][at], turn[mine], beside=left[k][:, at].T, corner=bases[k][at])
-            factor.follow(target)
+            self._followed(factor, target)
             start += len(parts[k])
         self.chosen = np.concatenate([self.chosen, rows[picked]])
         self.excluded[rows[picked]] = True
@@ -413,7 +451,7 @@ class GreedyLevel:
                 factor.append(
                     part[made.retained], turn, beside=left[:, made.retained].T, corner=made.lower
                 )
-                factor.follow(target)
+                self._followed(factor, target)
                 self.chosen = np.concatenate([self.chosen, part[made.retained]])
             self.excluded[rows] = True
             self.solve(target)
@@ -434,7 +472,7 @@ class GreedyLevel:
 
     def condition(self) -> float:
         """Return an estimate of the condition number of the system of all blocks."""
-        if self._tailed:
+        if self._saddle:
             return condition_with_terms(self._problem, self._rows(self._among.rows.data))
         factors = [factor.lower for factor in self._grown]
         with enough_threads(20.0 * max(len(lower) for lower in factors) ** 2):

@@ -140,7 +140,7 @@ class Problem:
     def reach(self) -> tuple[IntArray, np.ndarray]:
         """Return labels (n,) of boundary nodes that supports connect, and which labels move, (k,).
 
-        All of them where no node is displaced.
+        All of them where no node is displaced, and where a polynomial moves every node.
         """
         nodes = np.concatenate([self.known, self.edge, self.surface, self.normal_nodes])
         nodes = np.unique(self.same_as[nodes])
@@ -148,7 +148,7 @@ class Problem:
         label[nodes] = connected(self.basis, self.place(nodes))
         moves = np.zeros(int(label.max(initial=0)) + 1, bool)
         moves[label[self.same_as[self.known[value(self.values).any(axis=1)]]]] = True
-        return label, moves if moves.any() else ~moves
+        return label, moves if moves.any() and not self.basis.tailed else np.ones_like(moves)
 
     def carried_error(self, nodes: IntArray) -> Array:
         """Return the errors (..., m, d) that the interpolants of earlier steps left at nodes."""

@@ -97,16 +97,44 @@ def saddle_condition(matrix: FloatArray, terms: FloatArray) -> float:
 
 def saddle_system(matrix: FloatArray, terms: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return ``[[G, P], [P^T, 0]]`` with P the independent columns of terms, and their indices."""
-    scale = np.maximum(np.abs(terms).max(axis=0), 1e-300)
-    r, order = qr(terms / scale, pivoting=True, mode="r")
-    size = np.abs(np.diag(r))
-    use = np.sort(order[: len(size)][size > RANK * size.max(initial=0.0)])
+    use = independent(terms)
     n, q = len(matrix), len(use)
     system = np.zeros((n + q, n + q))
     system[:n, :n] = matrix
     system[:n, n:] = terms[:, use]
     system[n:, :n] = terms[:, use].T
     return system, use
+
+
+def independent(terms: FloatArray) -> IntArray:
+    """Return the columns of the polynomial's terms (n, q) that do not depend on others, (k,)."""
+    if not len(terms):
+        return np.empty(0, np.int64)
+    scale = np.maximum(np.abs(terms).max(axis=0), 1e-300)
+    r, order = qr(terms / scale, pivoting=True, mode="r")
+    size = np.abs(np.diag(r))
+    return np.asarray(np.sort(order[: len(size)][size > RANK * size.max(initial=0.0)]))
+
+
+def polynomial(terms: FloatArray, forward: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the coefficients c (q, m) of ``[[G, P], [P^T, 0]] [w, c] = [b, 0]``, G = L L^T.
+
+    With them, w solves ``G w = b - P c``. They are least squares of L^-1 (b - P c): so a definite
+    system keeps its factor, pivot guard and blocks.
+
+    Parameters
+    ----------
+    terms, forward : (n, q)
+        P, and L^-1 P of the rows that the factor retains, in any order.
+    right : (n, m)
+        L^-1 b of the same rows.
+    """
+    use = independent(terms)
+    tail = np.zeros((terms.shape[1], right.shape[1]))
+    scale = np.maximum(np.abs(terms[:, use]).max(axis=0, initial=0.0), 1e-300)
+    found = np.linalg.lstsq(forward[:, use] / scale, right, rcond=None)[0]
+    tail[use] = found / scale[:, None]
+    return tail
 
 
 PIVOT_GUARD = 1e-12

@@ -19,6 +19,7 @@ from slideviz.rbf.classify import Classes, directions
 from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.frames import Frame, hold_on_axis
 from slideviz.rbf.frames import corners as corners_of
+from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.layers import LayerZone
 from slideviz.rbf.methods import SLIDING_METHODS
 from slideviz.rbf.problem import PhaseTimer, Problem, Solution
@@ -253,7 +254,12 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
         **of_domain | {"warnings": warnings},
         known=conditions.known,
         target=conditions.target,
-        basis=Basis(support_radius(case, mesh, conditions.moved), angle, case.kernel),
+        basis=Basis(
+            support_radius(case, mesh, conditions.moved),
+            angle,
+            case.kernel,
+            polynomial=case.polynomial == "yes" and not KERNELS[case.kernel].polynomial,
+        ),
         candidates=candidates,
         reduction=reduction,
         layers=needed_by_layers(reduction, gap),

@@ -21,7 +21,6 @@ from slideviz.mesh.quality import Quality, quality
 from slideviz.rbf.constraint_rows import AGREE
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import largest_misfit, misfits
-from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.operations import features
 from slideviz.rbf.problem import FrozenChoices, PhaseTimer, Problem, Solution
 from slideviz.rbf.refine import NOTED, TRUSTED
@@ -415,7 +414,7 @@ def _dropped_warning(
     if not len(solution.dropped):
         return []
     since = f"from step {index} on, " if total > 1 else ""
-    if KERNELS[setup.basis.kernel].polynomial:
+    if setup.basis.saddle:
         sentence = (
             f"{since}the system is singular for RBF_KERNEL= {setup.basis.kernel}, "
             f"and its {solution.control_nodes} control nodes are met by least squares, to "

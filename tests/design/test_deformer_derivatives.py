@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Rotate, Translate
+from slideviz.case.model import Case, Rotate, Scale, Translate
 from slideviz.design.frozen import fit
 from slideviz.elastic import multigrid
 from slideviz.errors import DeformError
@@ -293,6 +293,34 @@ def test_kernels(kernel, sliding, reduction):
     roles = dict.fromkeys(mesh.marker_names, "sliding") | {"BLOCK": "moving"}
     case = Case(roles=roles, motions=motions(mesh, "BLOCK"), sliding=sliding, kernel=kernel)
     check(case.change(reduction=reduction, steps=2), mesh)
+
+
+@pytest.mark.parametrize("reduction", [None, REDUCED], ids=["exact", "reduced"])
+@pytest.mark.parametrize("method", [("ps", "moving"), ("ds", "fixed"), ("none", "periodic")])
+@pytest.mark.parametrize("dim", [2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("frame", ["translational", "rotational"])
+def test_a_polynomial_with_a_definite_kernel(frame, dim, method, reduction):
+    settings = {"steps": 2, "reduction": reduction, "polynomial": "yes"}
+    if frame == "rotational":
+        mesh = sector(dim)
+        check(
+            sector_case(mesh, method, motions(mesh, "BLOCK" if dim == 2 else "blade"), **settings),
+            mesh,
+        )
+    else:
+        mesh = box(dim)
+        check(box_case(mesh, method, motions(mesh, "BLOCK"), **settings), mesh)
+
+
+def test_a_polynomial_over_a_nearly_singular_system():
+    """Refined systems, and a motion that is linear: the polynomial alone moves all nodes."""
+    mesh = builders.square(6)
+    roles = dict.fromkeys(mesh.marker_names, "moving")
+    case = Case(roles=roles, motions=(Scale("", (1.1, 1.2)),), kernel="wendland-c6")
+    deformer = check(case.change(influence_factor=8.0, polynomial="yes"), mesh)
+    expected = (mesh.points - mesh.points.mean(axis=0)) * (0.1, 0.2)
+    moved = deformer.deform() - mesh.points
+    np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("sliding", ["ps", "ds"])

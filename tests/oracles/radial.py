@@ -8,6 +8,8 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 
 Distance = Callable[[np.ndarray, np.ndarray], float]
+Terms = Callable[[np.ndarray], np.ndarray]
+"""The terms of a polynomial at positions (n, d), (n, q)."""
 
 
 def wendland_c2(xi: float) -> float:
@@ -70,7 +72,24 @@ def sums(targets, controls, weights, radius: float, distance: Distance = euclide
     return out
 
 
-def regular(targets, controls, values, radius: float, distance: Distance = euclidean):
-    """Eq. 2.5 and 2.7; least squares, so that periodic images in one system do not matter."""
-    weights = np.linalg.lstsq(phi(controls, controls, radius, distance), values, rcond=1e-13)[0]
-    return sums(targets, controls, weights, radius, distance)
+def no_terms(x) -> np.ndarray:
+    """No polynomial: (n, 0)."""
+    return np.zeros((len(x), 0))
+
+
+def regular(
+    targets,
+    controls,
+    values,
+    radius: float,
+    distance: Distance = euclidean,
+    terms: Terms = no_terms,
+):
+    """Eq. 2.4, 2.5 and 2.7; least squares, so that periodic images in one system do not matter."""
+    along, d = terms(controls), values.shape[1]
+    n, q = along.shape
+    system = np.block(
+        [[phi(controls, controls, radius, distance), along], [along.T, np.eye(q) * 0]]
+    )
+    found = np.linalg.lstsq(system, np.r_[values, np.zeros((q, d))], rcond=1e-13)[0]
+    return sums(targets, controls, found[:n], radius, distance) + terms(targets) @ found[n:]

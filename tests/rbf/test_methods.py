@@ -74,13 +74,14 @@ def known_and_sliding(mesh, grid_places, n, normals_of, free=None, hold=True):
     ("method", "periodic"), [("none", None), ("ps", None), ("ds", None), *PERIODIC]
 )
 @pytest.mark.parametrize("dim", [2, 3])
-def test_a_turned_box_moves_as_the_literal_system_says(dim, method, periodic):
+@pytest.mark.parametrize("polynomial", ["no", "yes"])
+def test_a_turned_box_moves_as_the_literal_system_says(polynomial, dim, method, periodic):
     n = 6 if dim == 2 else 4
     base = builders.square(n) if dim == 2 else builders.cube(n)
     places = (base.points * n).round()
     q = turn(dim)
     mesh = base.with_points(base.points @ q.T + 3.0)
-    (last,) = sv.deform(box_case(dim, method, periodic), mesh)
+    (last,) = sv.deform(box_case(dim, method, periodic).change(polynomial=polynomial), mesh)
     found = last.mesh.points - mesh.points
 
     free = 1 if periodic in ("fixed", "moving") else None
@@ -92,18 +93,28 @@ def test_a_turned_box_moves_as_the_literal_system_says(dim, method, periodic):
     x, distance = mesh.points, radial.euclidean
     if periodic:
         x, distance = base.points, radial.translational(1.0, 1)
+
+    def terms(x):
+        along = 2 * np.pi * x[:, 1:2]
+        repeated = [x[:, [0, *range(2, dim)]], np.cos(along), np.sin(along)] if periodic else [x]
+        return np.c_[np.ones(len(x)), np.hstack(repeated)]
+
+    if polynomial == "no":
+        terms = radial.no_terms
     at = [known, [i for i, _ in edge], [i for i, _ in surface]]
     spots = [x[i] for i in at]
     pairs = [[(x[i], rows) for i, rows in level] for level in (edge, surface)]
     if method == "none":
         held = np.concatenate([values, np.zeros((len(at[1]) + len(at[2]), dim))])
         expected = radial.regular(
-            x, np.concatenate([s.reshape(-1, dim) for s in spots]), held, radius, distance
+            x, np.concatenate([s.reshape(-1, dim) for s in spots]), held, radius, distance, terms
         )
     elif method == "ds":
-        expected, _ = sliding.direct(x, (spots[0], values), pairs[0] + pairs[1], radius, distance)
+        expected, _ = sliding.direct(
+            x, (spots[0], values), pairs[0] + pairs[1], radius, distance, terms
+        )
     else:
-        expected = sliding.pseudo(x, (spots[0], values), pairs, radius, distance)
+        expected = sliding.pseudo(x, (spots[0], values), pairs, radius, distance, terms)
     np.testing.assert_allclose(found, expected, atol=2e-9)
     np.testing.assert_allclose(np.abs(expected).max(), np.abs(values).max(), rtol=0.5)
     assert last.max_error < 1e-9
@@ -123,7 +134,10 @@ def moved_block(mesh, block):
 @pytest.mark.parametrize(
     ("method", "periodic"), [("none", "none"), ("ps", "none"), ("ds", "none"), *PERIODIC]
 )
-def test_a_sector_moves_as_the_literal_system_in_polar_coordinates_says(method, periodic):
+@pytest.mark.parametrize("polynomial", ["no", "yes"])
+def test_a_sector_moves_as_the_literal_system_in_polar_coordinates_says(
+    polynomial, method, periodic
+):
     n = 6
     mesh = builders.sector(n, 30.0)
     roles = {"inner": "sliding", "outer": "sliding", "per1": "periodic", "per2": "periodic"}
@@ -133,8 +147,18 @@ def test_a_sector_moves_as_the_literal_system_in_polar_coordinates_says(method, 
         sliding=method,
         periodic=periodic,
         periodic_type="rotational",
+        polynomial=polynomial,
     )
     (last,) = sv.deform(case, mesh)
+
+    def terms(x):
+        r, across = x[:, 0], 12 * x[:, 1]
+        if periodic == "none":
+            return np.c_[np.ones(len(x)), r * np.cos(x[:, 1]), r * np.sin(x[:, 1])]
+        return np.c_[np.ones(len(x)), r, np.cos(across), np.sin(across)]
+
+    if polynomial == "no":
+        terms = radial.no_terms
 
     def polar(points):
         return np.stack([np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])], axis=1)
@@ -156,11 +180,11 @@ def test_a_sector_moves_as_the_literal_system_in_polar_coordinates_says(method, 
     if method == "none":
         held = [x[known], np.array([p for p, _ in level])]
         values = np.concatenate([values, np.zeros((len(level), 2))])
-        expected = radial.regular(x, np.concatenate(held), values, radius, distance)
+        expected = radial.regular(x, np.concatenate(held), values, radius, distance, terms)
     elif method == "ds":
-        expected, _ = sliding.direct(x, (x[known], values), level, radius, distance)
+        expected, _ = sliding.direct(x, (x[known], values), level, radius, distance, terms)
     else:
-        expected = sliding.pseudo(x, (x[known], values), [level, []], radius, distance)
+        expected = sliding.pseudo(x, (x[known], values), [level, []], radius, distance, terms)
     np.testing.assert_allclose(found, expected, atol=2e-9)
 
 

@@ -37,6 +37,7 @@ RUNS = [
     ("square", 25, ("STEPS=3", "SLIDING_MODE=ds")),
     ("square", 25, ("STEPS=1", "SLIDING_MODE=none", "PERIODIC_MODE=none")),
     ("square", 25, ("STEPS=2", "RBF_KERNEL=thin-plate", "PERIODIC_MODE=fixed")),
+    ("square", 25, ("STEPS=2", "POLYNOMIAL=YES", "INFLUENCE_FACTOR=0.3")),
     ("square", 25, ("STEPS=2", "METHOD=idw")),
     ("square", 25, ("STEPS=2", "DATA_REDUCTION=YES", "DATA_RED_TOLERANCE=1e-2")),
     ("polar", 25, ("STEPS=2", "PERIODIC_MODE=periodic", "SLIDING_MODE=ds")),

@@ -13,6 +13,7 @@ from scipy.linalg import lu_factor, lu_solve
 from slideviz.design.frozen.solve import (
     LeastSquares,
     MeasuredSystem,
+    WithPolynomial,
     columnwise,
     full_factor,
     solved,
@@ -21,9 +22,7 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows
 from slideviz.rbf.double_double import supports
 from slideviz.rbf.evaluate import matrix
-from slideviz.rbf.exact import gathered, parts, row_keys
-from slideviz.rbf.field import linear_terms
-from slideviz.rbf.kernels import KERNELS
+from slideviz.rbf.exact import gathered, parts, row_keys, row_terms
 from slideviz.rbf.operations import columns, radial_sum, terms
 from slideviz.rbf.problem import Cycle, Interpolant, Levels, Problem
 from slideviz.rbf.refine import System
@@ -32,9 +31,9 @@ from slideviz.rbf.solve import (
     Factor,
     enough_threads,
     extend,
+    independent,
     is_singular,
     pseudo_inverse,
-    saddle_system,
 )
 from slideviz.rbf.tape import (
     Array,
@@ -87,8 +86,7 @@ class FrozenFit:
         self._basis, self._features = basis, problem.features
         self._dim = problem.dim
         self._chosen, self._fixed = chosen, fixed
-        tailed = KERNELS[basis.kernel].polynomial
-        self._refined, self._checked = refined and supports(basis), checked and not tailed
+        self._refined, self._checked = refined and supports(basis), checked and not basis.saddle
         self.error_estimate: Any = np.zeros(())
         self.stages: tuple[Levels, ...] = ()
         self._rows: ConstraintRows | None = None
@@ -124,7 +122,10 @@ class FrozenFit:
         right = np.zeros((*value(rows.right).shape[:-2], count + extra, m))
         right[..., :count, :] = value(rows.right)
         weights: Array = solve(right)
-        if isinstance(solve, MeasuredSystem) and self._problem.reduction is None:
+        forward, back = solve, None
+        if isinstance(solve, MeasuredSystem | WithPolynomial):
+            forward, back = solve.tangent, solve.adjoint
+        if isinstance(solve, MeasuredSystem | WithPolynomial) and self._problem.reduction is None:
             self.error_estimate = np.maximum(self.error_estimate, solve.error_estimate)
         if any(isinstance(x, Variable) for x in (rows.right, rows.normals, self._features)):
             data = join(rows.right, np.zeros((extra, m))) if extra else rows.right
@@ -132,9 +133,6 @@ class FrozenFit:
             if isinstance(solve, LeastSquares):
                 weights = solve.solution(met, data, value(weights))
             else:
-                forward, back = solve, None
-                if isinstance(solve, MeasuredSystem):
-                    forward, back = solve.tangent, solve.adjoint
                 weights = solution(met(value(weights)) - data, value(weights), forward, back)
         tail = None
         if extra:
@@ -170,17 +168,28 @@ class FrozenFit:
         self, rows: ConstraintRows, index: IntArray, level: int, stage: str
     ) -> tuple[Callable[[FloatArray], FloatArray], int]:
         """Return the solver of the system of ``rows``, and how many unknowns a polynomial adds."""
-        place = value(self._features)[:, rows.nodes]
-        normals = None if rows.normals is None else value(rows.normals)
-        if KERNELS[self._basis.kernel].polynomial:
-            return self._saddle(place, normals, f"{stage} factor {level}")
+        if self._basis.saddle:
+            return self._saddle(rows, f"{stage} factor {level}")
+        solve = self._definite(rows, index, level, stage)
+        if not self._basis.polynomial:
+            return solve, 0
+        along, name = row_terms(self._problem, rows), f"{stage} terms {level}"
+        use = self._chosen(name, lambda: independent(along))
+        made = self._fixed(f"{name} solver", lambda: WithPolynomial(solve, along, use))
+        return made, along.shape[1]
+
+    def _definite(
+        self, rows: ConstraintRows, index: IntArray, level: int, stage: str
+    ) -> Callable[..., FloatArray]:
+        """Return the solver of the positive definite system of ``rows``, without a polynomial."""
+        place, normals = self._problem.place(rows.nodes), rows.directions
         if normals is None:
             factor = self._fixed(
                 f"{stage} factor {level}", lambda: self._extended(place, index, level)
             )
             self._factors[level] = index, factor
             every = np.arange(len(index))
-            return self._measured([every], [factor], (place, None), f"{stage} system {level}"), 0
+            return self._measured([every], [factor], (place, None), f"{stage} system {level}")
         blocks = self._fixed(
             f"{stage} blocks {level}",
             lambda: parts(ConstraintRows(rows.nodes, normals, np.empty((0, 1)))),
@@ -189,7 +198,7 @@ class FrozenFit:
             f"{stage} factor {level}",
             lambda: [self._factor(place[:, b], normals[b]) for b in blocks],
         )
-        return self._measured(blocks, factors, (place, normals), f"{stage} system {level}"), 0
+        return self._measured(blocks, factors, (place, normals), f"{stage} system {level}")
 
     def _measured(
         self,
@@ -236,37 +245,35 @@ class FrozenFit:
             return full_factor(matrix(self._basis, (place, None)))
 
     def _saddle(
-        self, place: FloatArray, normals: FloatArray | None, name: str
+        self, rows: ConstraintRows, name: str
     ) -> tuple[Callable[[FloatArray], FloatArray], int]:
         """Return the solver of a system with polynomial, and how many unknowns it adds."""
-        count = place.shape[1]
-        along = linear_terms(self._basis, place)
-        if normals is not None:
-            along = np.einsum("rq,rd->rqd", along, normals).reshape(count, -1)
+        count, place = len(rows.nodes), (self._problem.place(rows.nodes), rows.directions)
+        along = row_terms(self._problem, rows)
         total = along.shape[1]
 
         def make() -> tuple[Any, IntArray]:
             use = self._chosen(
                 f"{name} terms",
-                lambda: saddle_system(matrix(self._basis, (place, normals)), along)[1],
+                lambda: independent(along),
             )
             system = np.zeros((count + len(use),) * 2)
-            system[:count, :count] = matrix(self._basis, (place, normals))
+            system[:count, :count] = matrix(self._basis, place)
             system[:count, count:] = along[:, use]
             system[count:, :count] = along[:, use].T
-            rows = np.concatenate([np.arange(count), count + use])
+            used = np.concatenate([np.arange(count), count + use])
             if self._chosen(f"{name} singular", lambda: is_singular(system)):
                 rank = self._chosen(f"{name} rank", lambda: len(pseudo_inverse(system)[0]))
-                return LeastSquares(*pseudo_inverse(system, rank), rows), rows
-            return lu_factor(system), rows
+                return LeastSquares(*pseudo_inverse(system, rank), used), used
+            return lu_factor(system), used
 
-        factor, rows = self._fixed(name, make)
+        factor, used = self._fixed(name, make)
         if isinstance(factor, LeastSquares):
             return factor, total
 
         def solve(right: FloatArray) -> FloatArray:
             out = np.zeros_like(right)
-            out[..., rows, :] = columnwise(lambda b: lu_solve(factor, b), right[..., rows, :])
+            out[..., used, :] = columnwise(lambda b: lu_solve(factor, b), right[..., used, :])
             return out
 
         return solve, total

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from scipy.linalg import lu_factor, lu_solve, solve_triangular
 
 from slideviz.case.words import wrong_by
 from slideviz.errors import ConditionWarning, DeformError
@@ -31,14 +32,18 @@ class MeasuredSystem:
         self.error_estimate: FloatArray = np.zeros(())
         """(...,): estimated error of each of the last solutions, as a part of its largest datum."""
 
-    def __call__(self, right: FloatArray, *, of_weights: bool = False) -> FloatArray:
+    def __call__(
+        self, right: FloatArray, data: FloatArray | None = None, *, of_weights: bool = False
+    ) -> FloatArray:
         """Return the solutions (..., n, m) for right-hand sides, and set ``error_estimate``.
 
+        Errors are parts of the largest of ``data`` (..., n, m), if not of the right-hand sides;
         ``of_weights``: as of ``System.refined``.
         """
         n, m = right.shape[-2:]
         wide = np.ascontiguousarray(np.moveaxis(right.reshape(-1, n, m), 0, 1).reshape(n, -1))
-        largest = np.repeat(np.abs(right).max(axis=(-1, -2), initial=0.0).ravel(), m)
+        largest = np.abs(right if data is None else data).max(axis=(-1, -2), initial=0.0)
+        largest = np.repeat(largest.ravel(), m)
         out, error_estimate = np.empty_like(wide), np.zeros(len(largest))
         for block, system in zip(self._blocks, self._systems, strict=True):
             with enough_threads(2.0 * len(block) * wide[block].size):
@@ -55,12 +60,12 @@ class MeasuredSystem:
         shaped = np.moveaxis(out.reshape(n, -1, m), 1, 0)
         return np.ascontiguousarray(shaped).reshape(right.shape)
 
-    def tangent(self, right: FloatArray) -> FloatArray:
+    def tangent(self, right: FloatArray, data: FloatArray | None = None) -> FloatArray:
         """Return the solutions (..., n, m) of the forward pass: changes of weights.
 
         Warns with ConditionWarning if the field of a solution is not accurate to `TRUSTED`.
         """
-        weights = self(right)
+        weights = self(right, data)
         worst = float(self.error_estimate.max(initial=0.0))
         if worst > TRUSTED:
             warnings.warn(
@@ -71,14 +76,14 @@ class MeasuredSystem:
             )
         return weights
 
-    def adjoint(self, right: FloatArray) -> FloatArray:
+    def adjoint(self, right: FloatArray, data: FloatArray | None = None) -> FloatArray:
         """Return the solutions (..., n, m) of the reverse pass, which are gradients themselves.
 
         Warns with ConditionWarning if the solution is not accurate to `TRUSTED`.
         """
         if not self._refined:  # the error of a field is no measure for a gradient
             return solved(self._blocks, [system.factor for system in self._systems], right)
-        weights = self(right, of_weights=True)
+        weights = self(right, data, of_weights=True)
         worst = float(self.error_estimate.max(initial=0.0))
         if worst > TRUSTED:
             warnings.warn(
@@ -89,6 +94,53 @@ class MeasuredSystem:
                 stacklevel=2,
             )
         return weights
+
+
+class WithPolynomial:
+    """Solves ``[[G, P], [P^T, 0]] [w, c] = [b, g]`` by a solver of G w = b, as `solve.polynomial`.
+
+    Both blocks of the solution follow from w = G^-1 (b - P c): so a linear motion is exact however
+    nearly singular G is.
+    """
+
+    def __init__(self, inner: Callable[..., FloatArray], terms: FloatArray, use: IntArray) -> None:
+        """Prepare the solver for P, ``terms`` (n, q), of which the columns ``use`` (k,) count."""
+        self._inner, self._n, self._rows = inner, len(terms), len(terms) + use
+        self._q, self._r = np.linalg.qr(terms[:, use])
+        self._inverse = inner(self._q)
+        self._schur = lu_factor(self._q.T @ self._inverse)
+
+    def __call__(self, right: FloatArray) -> FloatArray:
+        """Return the solutions (..., n + q, m) for right-hand sides."""
+        return self._solved(self._inner, right)
+
+    def tangent(self, right: FloatArray) -> FloatArray:
+        """Return the solutions of the forward pass (``MeasuredSystem.tangent``)."""
+        return self._solved(getattr(self._inner, "tangent", self._inner), right)
+
+    def adjoint(self, right: FloatArray) -> FloatArray:
+        """Return the solutions of the reverse pass (``MeasuredSystem.adjoint``)."""
+        return self._solved(getattr(self._inner, "adjoint", self._inner), right)
+
+    @property
+    def error_estimate(self) -> FloatArray:
+        """The estimate of ``MeasuredSystem``; 0 of a solver without."""
+        return np.asarray(getattr(self._inner, "error_estimate", 0.0))
+
+    def _solved(self, solve: Callable[..., FloatArray], right: FloatArray) -> FloatArray:
+        data, out = np.ascontiguousarray(right[..., : self._n, :]), np.zeros_like(right)
+        free = columnwise(
+            partial(solve_triangular, self._r, trans=1, check_finite=False),
+            right[..., self._rows, :],
+        )
+        along = columnwise(partial(lu_solve, self._schur), self._inverse.T @ data - free)
+        rest = data - self._q @ along
+        measured = isinstance(self._inner, MeasuredSystem)
+        out[..., : self._n, :] = solve(rest, data) if measured else solve(rest)
+        out[..., self._rows, :] = columnwise(
+            partial(solve_triangular, self._r, check_finite=False), along
+        )
+        return out
 
 
 @dataclass(frozen=True, eq=False)
