@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     )
     from slideviz.design.deformer import Constraint, Deformer
     from slideviz.design.sweeps.sweep import sweep
+    from slideviz.design.wheel import WheelQuality, wheel
     from slideviz.errors import ConditionWarning, SlidevizError, ToleranceWarning
     from slideviz.export.flat_section import section
     from slideviz.export.verbs import film, picture
@@ -52,6 +53,7 @@ _NAMES = {
     "Prescribed Radial Rotate Scale Translate",
     "design.deformer": "Constraint Deformer",
     "design.sweeps.sweep": "sweep",
+    "design.wheel": "WheelQuality wheel",
     "errors": "ConditionWarning SlidevizError ToleranceWarning",
     "export.flat_section": "section",
     "export.verbs": "film picture",
@@ -77,8 +79,9 @@ __all__ = [
     "Detail", "Ffd", "FfdCamber", "FfdThickness", "FfdTwist", "FromFile", "HicksHenne", "Marker",
     "Mesh", "MetricValues", "Prescribed", "Quality", "QualityDerivative", "Radial", "Reduction",
     "Rotate", "SafeFraction", "Scale", "Section", "SectionStyle", "SlidevizError", "Step",
-    "ToleranceWarning", "Translate", "Walls", "__version__", "compare", "convert", "deform", "film",
-    "metrics", "picture", "quality", "read", "safe_fraction", "section", "sweep", "walls", "write",
+    "ToleranceWarning", "Translate", "Walls", "WheelQuality", "__version__", "compare", "convert",
+    "deform", "film", "metrics", "picture", "quality", "read", "safe_fraction", "section", "sweep",
+    "walls", "wheel", "write",
 ]  # fmt: skip
 
 

@@ -41,6 +41,7 @@ COMMANDS = {
     "compare": "compare_command",
     "sweep": "sweep_command",
     "convert": "convert_command",
+    "wheel": "wheel_command",
     "def": "def_command",
     "dot": "dot_command",
     "sample": "sample_command",

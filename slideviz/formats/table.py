@@ -19,9 +19,10 @@ from slideviz.system.file_checks import require_regular_file
 from slideviz.terms import FileFormat, Term
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
-    from slideviz.mesh.model import Mesh
+    from slideviz.mesh.model import FloatArray, IntArray, Marker, Mesh
 
 _UNSURE = ("", ".txt", ".dat", ".mesh", ".grid")
 """Endings of files whose format may be found by their content."""
@@ -36,6 +37,24 @@ class WriteOptions:
     replaces: Path | None = None  # the input file that may be overwritten
     going_on: Callable[[], object] = lambda: None
     """Called between blocks of a file; what it raises stops the writing."""
+
+
+@dataclass(frozen=True, eq=False)
+class ZoneContent:
+    """The content of a zone to write, with functions that return parts of its large arrays.
+
+    The functions get numbers i, j and return the k = j - i items from i on.
+    """
+
+    dim: int  # 2 or 3
+    n_cells: int
+    n_points: int  # `n_cells`, `n_points`: numbers of cells and points
+    cells: Callable[[int, int], tuple[NDArray[np.uint8], IntArray, IntArray]]
+    """Returns cells in the order of the file: types (k,), nodes one after the other, and the index
+    of each (k,)."""
+    types: Callable[[int, int], NDArray[np.uint8]]  # returns the types (k,) of these cells
+    points: Callable[[int, int], FloatArray]  # returns coordinates (k, d)
+    markers: tuple[Marker, ...]  # the boundaries
 
 
 @dataclass(frozen=True)
@@ -62,6 +81,8 @@ class MeshFormat:
     require: str = ""  # raises MeshError where a file cannot hold a mesh: ``require(mesh, path)``
     zones: str = ""
     """Yields a file with several zones, block by block: ``blocks(*meshes)``; "" for one zone."""
+    content: str = ""
+    """Yields a file of a mesh whose parts are made by functions: ``blocks(content, name)``."""
     series: str = ""
     """Context with a file that holds all steps: ``series(path, mesh)``; "" where it holds one."""
     detects: str = ""  # returns whether a file is of this format, by its content: ``detects(path)``
@@ -91,6 +112,7 @@ _ROWS = (
         solver=True,
         sections=True,
         zones="su2.write:su2_zones",
+        content="su2.write:content_blocks",
         detects="su2.read:is_su2",
         term=Term("SU2", "SU2’s text"),
     ),
@@ -103,6 +125,7 @@ _ROWS = (
         solver=True,
         require="su2b.write:require_binary",
         zones="su2b.write:su2b_blocks",
+        content="su2b.write:content_blocks",
         detects="su2b.read:is_su2b",
         term=Term("SU2B", "SU2’s binary mesh"),
     ),
@@ -225,3 +248,18 @@ def write_blocks(path: Path, blocks: Iterable[bytes], options: WriteOptions) -> 
         for block in blocks:
             file.write(block)
             options.going_on()
+
+
+def write_content(path: Path, content: ZoneContent, replaces: Path | None = None) -> None:
+    """Write a mesh whose parts are made by functions, as SU2's text or binary, whole or not at all.
+
+    Raises MeshError if it cannot be written, or a name of a boundary cannot be.
+    """
+    row = format_for(path)
+    if not row.content:
+        raise MeshError(
+            f"{path}: such a file is not written piece by piece; end its name in "
+            f"{' or '.join(endings(lambda one: one.content))}, and convert it afterwards"
+        )
+    blocks = row.function("content")(content, path.name)
+    write_blocks(path, blocks, WriteOptions({}, {}, replaces))

@@ -21,7 +21,7 @@ from scipy.interpolate import RectBivariateSpline
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile
 from slideviz.errors import CaseError
-from slideviz.formats.su2b.write import ZoneContent
+from slideviz.formats.table import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.rbf.reduction import Reduction
 from slideviz.samples.passage import (

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile
-from slideviz.errors import CaseError, MeshError, nearest
-from slideviz.formats.su2b.write import ZoneContent, file_head, zone_blocks
+from slideviz.errors import CaseError, nearest
+from slideviz.formats.table import ZoneContent, write_content
 from slideviz.mesh.model import Mesh
 from slideviz.samples.airfoil import airfoil_case, airfoil_mesh
 from slideviz.samples.passage import passage_case, passage_mesh
@@ -223,7 +222,7 @@ def write_sample(
         reason = problem.strerror or problem
         raise CaseError(f"{folder}: cannot make the folder: {reason}; choose another") from problem
     if isinstance(made, StreamedSample):
-        _write_blocks(mesh, made.zone, overwrite)
+        write_content(mesh, made.zone, mesh if overwrite else None)
     else:
         write(mesh, made.mesh, overwrite)
     if made.displacement is not None:
@@ -232,12 +231,6 @@ def write_sample(
     placed = _in_folder(made.case, folder, name, file_format)
     write_case(case, placed.change(source=case if overwrite else None))
     return paths
-
-
-def _write_blocks(mesh: Path, zone: ZoneContent, overwrite: bool) -> None:
-    with atomic_write(mesh, MeshError, mesh if overwrite else None) as file:
-        for block in chain(file_head(1), zone_blocks(zone, 1)):
-            file.write(block)
 
 
 def _in_folder(case: Case, folder: Path, name: str, ending: str) -> Case:

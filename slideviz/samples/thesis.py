@@ -19,7 +19,7 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile, Motion, Rotate, Translate
 from slideviz.case.motion import displacement_of
 from slideviz.errors import CaseError
-from slideviz.formats.su2b.write import ZoneContent
+from slideviz.formats.table import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.terms import Role
 

@@ -8,16 +8,17 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slideviz.errors import printable
 from slideviz.formats.binary_copy import BinaryLayout, binary_layout, write_layout
 from slideviz.formats.losses import OTHER_ZONES, lost_of_text, sentence_of_lost
 from slideviz.formats.su2.text import Text, find_text
-from slideviz.formats.su2.write import require_text_names, text_of_parts
+from slideviz.formats.su2.write import content_blocks, require_text_names
 from slideviz.formats.su2b.layout import BinaryFile, ZonePlace, find_zone, find_zones
 from slideviz.formats.su2b.read import element_blocks, read_markers
 from slideviz.formats.su2b.write import file_head, halo_error, require_binary_names
-from slideviz.formats.table import format_of
+from slideviz.formats.table import ZoneContent, format_of
 from slideviz.mesh.model import Cells, FloatArray, IntArray
 from slideviz.streaming.resources import require_disk_space, text_size
 from slideviz.streaming.skin import index_of, read_skin
@@ -42,18 +43,23 @@ def text_of_binary(source: FileSource, folder: Path) -> Iterator[bytes]:
     with ExitStack() as stack:
         where = _places(stack, source, folder)
 
-        def cells(i: int, j: int) -> Cells:
+        def cells(i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
             if where is None:
                 block = source.elements_at(i, j - i)
-                return Cells.from_types(block.types, block.nodes)
-            return _gathered(source, where[i:j])
+                return block.types, block.nodes, block.ids
+            some = _gathered(source, where[i:j])
+            return some.types, some.connectivity, np.arange(i, j)
 
-        yield from text_of_parts(
-            source.place.dim,
-            (source.n_cells, cells),
-            (source.n_points, points),
-            read_markers(source.file, source.place),
+        content = ZoneContent(
+            dim=source.place.dim,
+            n_cells=source.n_cells,
+            n_points=source.n_points,
+            cells=cells,
+            types=lambda i, j: cells(i, j)[0],
+            points=points,
+            markers=tuple(read_markers(source.file, source.place)),
         )
+        yield from content_blocks(content, source.file.name)
 
 
 def _places(stack: ExitStack, source: FileSource, folder: Path) -> IntArray | None:

@@ -17,7 +17,7 @@ from slideviz.formats.source import Source
 from slideviz.formats.su2.lines import Piece, Rows, is_ffd
 from slideviz.formats.su2.read import Document
 from slideviz.formats.su2.text import BLOCK_BYTES, SEND_RECEIVE
-from slideviz.formats.table import WriteOptions, write_blocks
+from slideviz.formats.table import WriteOptions, ZoneContent, write_blocks
 from slideviz.mesh.check import check_mesh, check_points
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 from slideviz.system.threads import ordered_map
@@ -198,16 +198,19 @@ PointsOf = Callable[[int, int], FloatArray]
 """A function that returns the points ``i`` to ``j - 1``, (j - i, d)."""
 
 
-def text_of_parts(
-    dim: int, cells: tuple[int, CellsOf], points: tuple[int, PointsOf], markers: Sequence[Marker]
-) -> Iterator[bytes]:
+def content_blocks(content: ZoneContent, name: str) -> Iterator[bytes]:
     """Yield the SU2 file of a mesh whose parts are made by functions, called from several threads.
 
-    ``dim``: 2 or 3. ``cells`` and ``points`` (int, callable): their number, and the function that
-    returns some of them. ``markers``: the boundaries.
+    Raises MeshError if a boundary has a name that cannot stand in an SU2 file.
     """
-    yield from _zone(dim, cells, points)
-    yield from _markers(markers, 0)
+    require_text_names(name, (marker.name for marker in content.markers))
+
+    def cells(i: int, j: int) -> Cells:
+        types, nodes, _ = content.cells(i, j)
+        return Cells.from_types(types, nodes)
+
+    yield from _zone(content.dim, (content.n_cells, cells), (content.n_points, content.points))
+    yield from _markers(content.markers, 0)
 
 
 def _zone(dim: int, cells: tuple[int, CellsOf], points: tuple[int, PointsOf]) -> Iterator[bytes]:

@@ -8,8 +8,7 @@ that it had.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -19,31 +18,13 @@ from slideviz.errors import MeshError
 from slideviz.formats.su2.read import Document
 from slideviz.formats.su2b.layout import NAME_BYTES, SEND_RECEIVE
 from slideviz.formats.su2b.read import BLOCK, BinaryForm
-from slideviz.formats.table import WriteOptions, write_blocks
+from slideviz.formats.table import WriteOptions, ZoneContent, write_blocks
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.elements import SIZES
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
+from slideviz.mesh.model import Cells, IntArray, Mesh
 
 SORTED = (3, 5, 9, 10, 12, 13, 14)  # SU2's order of the types of elements
 LARGEST_4 = 2**32 - 1
-
-
-@dataclass(frozen=True, eq=False)
-class ZoneContent:
-    """The content of a zone to write, with functions that return parts of its large arrays.
-
-    The functions get numbers i, j and return the k = j - i items from i on.
-    """
-
-    dim: int  # 2 or 3
-    n_cells: int
-    n_points: int  # `n_cells`, `n_points`: numbers of cells and points
-    cells: Callable[[int, int], tuple[NDArray[np.uint8], IntArray, IntArray]]
-    """Returns cells in the order of the file: types (k,), nodes one after the other, and the index
-    of each (k,)."""
-    types: Callable[[int, int], NDArray[np.uint8]]  # returns the types (k,) of these cells
-    points: Callable[[int, int], FloatArray]  # returns coordinates (k, d)
-    markers: tuple[Marker, ...]  # the boundaries
 
 
 def write_su2b(path: Path, mesh: Mesh, options: WriteOptions) -> None:
@@ -103,6 +84,16 @@ def require_binary_names(mesh: str, names: Iterable[str]) -> None:
                 f"has room for {NAME_BYTES - 1} bytes ({size} given) and has no {SEND_RECEIVE}; "
                 "rename the marker"
             )
+
+
+def content_blocks(content: ZoneContent, name: str) -> Iterator[bytes]:
+    """Yield the SU2 binary file of a mesh whose parts are made by functions, block by block.
+
+    Raises MeshError if a boundary has a name that cannot stand in such a file.
+    """
+    require_binary_names(name, (marker.name for marker in content.markers))
+    yield from file_head(1)
+    yield from zone_blocks(content, 1)
 
 
 def file_head(zones: int, form: BinaryForm | None = None) -> Iterator[bytes]:

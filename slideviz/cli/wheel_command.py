@@ -1,0 +1,103 @@
+"""``slideviz wheel``: writes the whole wheel of a passage, deformed as a case says."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Literal
+
+from slideviz.cli.options import add_changes, add_shared, integer, read_case, require_mesh_file
+from slideviz.cli.progress import Bar
+from slideviz.cli.terminal import holding
+
+
+def add_wheel(calls: argparse._SubParsersAction) -> None:
+    """Add the command ``wheel`` to the parser."""
+    call = calls.add_parser(
+        "wheel",
+        help="write the whole wheel of a passage",
+        description="Deform a passage as a case says, and write the wheel that its copies make, "
+        "turned about the axis and merged at the periodic boundaries. Without motions the "
+        "passages are undeformed.",
+    )
+    add_shared(call, "case")
+    call.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="MESH",
+        required=True,
+        help="the wheel: .su2, or .su2b for large ones",
+    )
+    call.add_argument(
+        "--passages",
+        type=passages,
+        default="all",
+        metavar="N",
+        help="their number; all for a whole turn (default)",
+    )
+    call.add_argument(
+        "--numbered",
+        action="store_true",
+        help="boundaries of their own for each passage: blade_1, blade_2",
+    )
+    call.add_argument(
+        "--designs",
+        type=Path,
+        metavar="TABLE",
+        help="motions of passages (CSV, as of `slideviz sweep`): a row for each, from the first "
+        "one on; the others move as the case says",
+    )
+    add_changes(call)
+    add_shared(call, "json")
+    add_shared(call, "zone")
+    add_shared(call, "quiet")
+    call.set_defaults(command=wheel)
+
+
+def passages(text: str) -> int | Literal["all"]:
+    """Return a number of passages, or "all"."""
+    return "all" if text.lower() == "all" else integer(text)
+
+
+def wheel(arguments: argparse.Namespace) -> int:
+    """Write the wheel of a case; return the exit code."""
+    with holding() as arguments.begun:
+        return _wheel(arguments)
+
+
+def _wheel(arguments: argparse.Namespace) -> int:
+    from dataclasses import asdict
+
+    from slideviz import read
+    from slideviz import wheel as wheel_of
+    from slideviz.cli.output_paths import OutputPath, require_output_paths
+    from slideviz.cli.report import save_json
+    from slideviz.cli.terminal import DONE, INVERTED
+
+    case = read_case(arguments)
+    mesh_file = require_mesh_file(arguments, case)
+    require_output_paths(
+        arguments,
+        OutputPath(arguments.output, "-o", is_mesh=True),
+        OutputPath(arguments.json, "--json"),
+    )
+    mesh = read(mesh_file, case.zone, file_format=case.mesh_format)
+    with Bar(not arguments.quiet, begun=arguments.begun) as bar:
+        made = wheel_of(
+            arguments.output,
+            case,
+            mesh,
+            passages=arguments.passages,
+            numbered=arguments.numbered,
+            designs=arguments.designs,
+            progress=bar,
+        )
+    report = asdict(made) | {"path": str(made.path)}
+    if not save_json(arguments.json, report) and not arguments.quiet:
+        turn = "a whole turn" if made.is_closed else f"{made.passages * made.period:.6g}°"
+        print(f"{made.path}: {made.passages} passages of {made.period:.6g}°, {turn}")
+        print(f"  {made.cells:,} cells   {made.points:,} points")
+        print(f"  quality: lowest {made.min:.6f}, mean {made.mean:.6f}, {made.inverted} inverted")
+        print(f"  boundaries: {', '.join(made.boundaries)}")
+    return INVERTED if made.inverted else DONE

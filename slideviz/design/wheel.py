@@ -1,0 +1,149 @@
+"""The whole wheel of a case: its deformed passages, turned, merged and written to one file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from slideviz.argument_types import check_types
+from slideviz.case.model import Case
+from slideviz.design.sweeps.table import Table, read_designs
+from slideviz.errors import CaseError
+from slideviz.formats.files import read
+from slideviz.formats.table import write_content
+from slideviz.machine.wheel import Wheel
+from slideviz.mesh.halo import without_halo
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.periodic import pair_up
+from slideviz.mesh.quality import quality
+from slideviz.solver.deform import deform
+from slideviz.solver.steps import Progress
+
+
+@dataclass(frozen=True, eq=False)
+class WheelQuality:
+    """A wheel that was written, and the quality of its cells: that of its passages."""
+
+    path: Path
+    """The file."""
+    passages: int
+    """Their number."""
+    is_closed: bool
+    """Whether they make a whole turn."""
+    period: float
+    """The angle between them, in degrees."""
+    cells: int
+    points: int
+    """`cells`, `points`: their numbers in the wheel."""
+    boundaries: tuple[str, ...]
+    min: float
+    mean: float
+    """`min`, `mean`: lowest and mean size-skew quality, against the undeformed passage."""
+    inverted: int
+    unproven: int
+    """`inverted`, `unproven`: numbers of cells."""
+    gap: float
+    """Largest distance of nodes of neighboring passages that became one, in the mesh's unit."""
+
+
+@check_types
+def wheel(
+    path: str | Path,
+    case: Case,
+    mesh: Mesh | None = None,
+    *,
+    passages: int | Literal["all"] = "all",
+    numbered: bool = False,
+    designs: Table | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> WheelQuality:
+    """Deform a passage, and write the wheel that its copies make; return its quality.
+
+    The periodic boundaries of the case, images by a rotation, are where passages meet: their nodes
+    are merged. A part of a wheel keeps the two outer ones.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file: SU2 text or binary.
+    case : Case
+        What is deformed and how; without motions the passages are the undeformed mesh.
+    mesh : Mesh, optional
+        The undeformed passage; read from the case's file when left out.
+    passages : int or "all"
+        Their number; "all" for a whole turn.
+    numbered : bool
+        Whether each passage has boundaries of its own (``blade_1``, ``blade_2``), rather than one
+        for all.
+    designs : str, Path or table, optional
+        A table as of `sweep`, a row for each passage from the first one on; the others move as the
+        case says. Neighbors must agree where they meet: hold the sides by
+        ``PERIODIC_MODE= none`` and ``SLIDING_MODE= none``.
+    progress : callable, optional
+        Called with each ``Progress``; an exception it raises ends the call.
+
+    Raises
+    ------
+    CaseError, MeshError, DeformError
+        The case has no periodic boundaries that are turned images, their angle is no whole part of
+        a turn, passages do not meet, or one cannot be deformed.
+    """
+    if mesh is None:
+        if case.mesh_file is None:
+            raise CaseError("the case has no MESH_FILENAME; give the mesh")
+        mesh = read(case.mesh_file, case.zone, file_format=case.mesh_format)
+    names = case.markers_with("periodic")
+    if not names:
+        raise CaseError("the case has no periodic boundaries; passages are merged at these")
+    base = without_halo(mesh)[0]
+    known = [name for name in names if len(base.marker(name).cells)]  # halos have none
+    pairs = pair_up(base, known, "rotational", case.axis, case.origin)
+    one = Wheel((base,), pairs)
+    count = round(2.0 * np.pi / one.period) if passages == "all" else passages
+    if passages == "all" and abs(count * one.period - 2.0 * np.pi) > 1e-9:
+        raise CaseError(
+            f"the period is {np.degrees(one.period):.6g}°, which is no whole part of a turn; give "
+            "the number of passages"
+        )
+    if count < 1:
+        raise CaseError(f"{count} passages; expected 1 or more, or all")
+    rows = read_designs(case, designs).rows if designs is not None else ()
+    if len(rows) > count:
+        raise CaseError(f"the table has {len(rows)} rows for {count} passages; one for each")
+    cases = [*(row.case for row in rows), *[case] * (len(rows) < count)]
+    meshes, measured = [], []
+    for each in cases:
+        points = _deformed(each, mesh, progress).points
+        meshes.append(Mesh(points, base.cells, base.markers, name=base.name))
+        measured.append(quality(meshes[-1], base, case.quality_metric))
+    last = len(cases) - 1  # of which all further passages are copies
+    whole = Wheel([meshes[min(k, last)] for k in range(count)], pairs, numbered)
+    gap, content = whole.require_meeting(), whole.content()
+    write_content(Path(path), content)
+    qualities = [measured[min(k, last)] for k in range(count)]
+    return WheelQuality(
+        path=Path(path),
+        passages=count,
+        is_closed=whole.is_closed,
+        period=float(np.degrees(whole.period)),
+        cells=content.n_cells,
+        points=content.n_points,
+        boundaries=tuple(marker.name for marker in content.markers),
+        min=min(one.min for one in qualities),
+        mean=float(np.mean([one.mean for one in qualities])),
+        inverted=sum(one.inverted for one in qualities),
+        unproven=sum(one.unproven for one in qualities),
+        gap=gap,
+    )
+
+
+def _deformed(case: Case, mesh: Mesh, progress: Callable[[Progress], None] | None) -> Mesh:
+    """Return the mesh after all steps of a case; the same mesh where nothing moves."""
+    if not case.motions:
+        return mesh
+    *_, last = deform(case, mesh, progress)
+    return last.mesh

@@ -1,0 +1,1 @@
+"""Turbomachines: passages, wheels, blades: arrays in, arrays out."""
