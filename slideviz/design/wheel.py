@@ -91,6 +91,24 @@ def wheel(
     CaseError, MeshError, DeformError
         The case has no periodic boundaries that are turned images, their angle is no whole part of
         a turn, passages do not meet, or one cannot be deformed.
+
+    Examples
+    --------
+    A quarter of a ring of one cell:
+
+    >>> import slideviz as sv
+    >>> mesh = sv.Mesh(
+    ...     [[1, 0], [2, 0], [0, 2], [0, 1]],
+    ...     sv.Cells.from_blocks([(9, [[0, 1, 2, 3]])]),
+    ...     (
+    ...         sv.Marker("low", sv.Cells.from_blocks([(3, [[0, 1]])])),
+    ...         sv.Marker("high", sv.Cells.from_blocks([(3, [[2, 3]])])),
+    ...     ),
+    ... )
+    >>> case = sv.Case(roles={"low": "periodic", "high": "periodic"})
+    >>> made = sv.wheel("wheel.su2", case, mesh)
+    >>> made.passages, made.cells, made.points, made.is_closed
+    (4, 4, 8, True)
     """
     if mesh is None:
         if case.mesh_file is None:
