@@ -181,6 +181,7 @@ NUMBERS: Mapping[str, LimitNumber] = {
             "<>"[term.best == "high"],
             _of_metric(name),
             range=term.range,
+            compares=term.compares,
         )
         for name, term in METRICS.items()
     },

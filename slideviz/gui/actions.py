@@ -116,6 +116,7 @@ class ToolBar(QToolBar):
         tip = "What the colors of the view show; the panel Display has their range."
         self.color = Choice(labels(COLOR_BY), tip, "color_by")
         self.color.chosen.connect(lambda value: store.change(changes.set_view, color_by=value))
+        self.color.setFixedWidth(self.color.fontMetrics().horizontalAdvance("m" * 16))
         self.addWidget(self.color)
 
     def _add_range(self) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 from qtpy.QtCore import QObject, Signal
 
+from slideviz.case.limits import outcome
 from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.worker import JobRunner
@@ -18,6 +19,7 @@ from slideviz.session import changes, jobs
 from slideviz.session.jobs import compute_in_file
 from slideviz.session.run_messages import (
     inverted_words,
+    limits_words,
     notes_of,
     remedy_for,
     run_requirements,
@@ -47,6 +49,8 @@ class Running(QObject):
     """A message for the status bar."""
     worst_wanted = Signal()
     """The user wants to see the worst cell."""
+    limits_wanted = Signal()
+    """The user wants to see the limits."""
 
     def __init__(self, store: Store, banner: Banner, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -202,18 +206,24 @@ class Running(QObject):
         )
         if heights := heights_words(run.last, run.case):
             text += f", first heights {heights} of those before"
+        missed = limits_words(run)
+        text += f", {missed}" * bool(missed)
         log.info("done: %s", text)
         warnings = self._log_remarks(run)
         bad = inverted_words(run)
         if bad:
             folding = "" if session.outdated else session.folding
             warnings.insert(0, f"{bad}. {remedy_for(run, session.mesh, folding)}")
+        if missed:
+            warnings.insert(0, f"{missed}: {outcome(run.last.limits)}.")
         if file is not None:
             warnings.insert(0, f"The deformed mesh is in {file}.")
             log.info("the deformed mesh is in %s", file)
         if warnings:
-            show = {"Show the worst": self.worst_wanted.emit} if bad else NO_ANSWERS
-            self.banner.show_message("\n".join(warnings), calm=not bad, answers=show)
+            show = {"Show the worst": self.worst_wanted.emit} if bad else {}
+            show |= {"Show the limits": self.limits_wanted.emit} if missed else {}
+            calm = not bad and not missed
+            self.banner.show_message("\n".join(warnings), calm=calm, answers=show or NO_ANSWERS)
             self._about = run.number
         self.status_changed.emit(f"Done: {text}")
 

@@ -199,6 +199,7 @@ class MainWindow(Services):
             change.connect(lambda *_: self.sync_actions())
         running.status_changed.connect(self.show_status)
         running.worst_wanted.connect(self._show_worst)
+        running.limits_wanted.connect(lambda: self.dock_manager.bring_to_front("limits"))
         panel.requirement_clicked.connect(self.focus_requirement)
         self.dock_manager.panel(DesignsPanel).changed.connect(self.sync_actions)
         self.start.file_wanted.connect(self.files.open_path)

@@ -341,7 +341,7 @@ class Walls:
         value = values[corner.ravel()]
         some = ~np.isnan(value)
         with np.errstate(all="ignore"):
-            order = np.argsort(_BADNESS[name](value[some]), kind="stable")
+            order = np.argsort(BADNESS[name](value[some]), kind="stable")
         out[cell[some][order]] = value[some][order]  # of equal cells the last one stays
         return out
 
@@ -351,7 +351,7 @@ def _ratio_badness(ratio: FloatArray) -> FloatArray:
     return np.where(ratio > 0, np.abs(np.log(np.abs(ratio))), np.inf)
 
 
-_BADNESS: dict[str, Callable[[FloatArray], FloatArray]] = {
+BADNESS: dict[str, Callable[[FloatArray], FloatArray]] = {
     "first_height": np.negative,
     "growth": np.positive,
     "equal_layers": np.negative,

@@ -23,7 +23,15 @@ from slideviz.sections.model import Section
 from slideviz.session.changes import show_frame
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Run, Session, StepFrame
-from slideviz.terms import QUANTITIES, WALL_VALUES, ColorBy, Quantity, quantity_of
+from slideviz.terms import (
+    METRICS,
+    QUANTITIES,
+    SIZE_SKEW,
+    WALL_VALUES,
+    ColorBy,
+    Quantity,
+    quantity_of,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -243,7 +251,9 @@ class FrameCounts:
             return rounded_out(low, high)
         if what != "displacement":
             # A smaller range would enlarge meaningless differences.
-            return (0.0, 1.0) if full_range else rounded_out(min(low, high - LEAST_SPREAD), high)
+            ends = whole_range(what) if full_range else (low, high)
+            low, high = min(low, ends[0]), max(high, ends[1]) if ends[1] < np.inf else high
+            return rounded_out(min(low, high - LEAST_SPREAD), high)
         return rounded_out(0.0 if full_range else low, high)
 
     def of(self, session: Session, frame: StepFrame, limits: Range) -> Distribution:
@@ -253,6 +263,11 @@ class FrameCounts:
         if (what, limits) not in cache:
             cache[what, limits] = distribution(frame, what, limits, session.mesh)
         return cache[what, limits]
+
+
+def whole_range(what: Quantity) -> tuple[float, float]:
+    """Return the ends of all possible values of a quantity that are of interest."""
+    return (0.0, np.inf) if what not in METRICS else METRICS[what].colors or METRICS[what].range
 
 
 def draw_histogram(
@@ -276,7 +291,7 @@ def draw_histogram(
     shown, run = counts.of(session, session.frame, limits), session.run_shown
     label = "undeformed" if session.view.frame == 0 or run is None else run.label
     term = QUANTITIES[what]
-    metric = term.axis if term.unit or what in WALL_VALUES else f"{term.label} quality [-]"
+    metric = f"{term.label} quality [-]" if what in SIZE_SKEW else term.axis
     runs, left_out = compared(session)
     outlines = [
         Outline(other.label, counts.of(session, other.last, limits), series_of(other))

@@ -172,7 +172,10 @@ def add_color_bar(stage: Stage, mapper: Any, what: ColorByTerm, inverted: bool) 
 
     ``inverted``: with a field for inverted cells at its lower end.
     """
-    scheme, font_scale, title, unit = stage.scheme, stage.font_scale, what.label, what.unit
+    scheme, font_scale, title = stage.scheme, stage.font_scale, what.label
+    name, _, program = title.partition(" (")  # beside the name there is no place for the program
+    words = (f"({program}" * bool(program), what.unit)
+    below = " ".join(filter(None, words)) if len(program) < _LONG else "\n".join(words).strip()
     scale = stage.pixel_scale
     bar = stage.plotter.add_scalar_bar(
         title=title,
@@ -183,9 +186,9 @@ def add_color_bar(stage: Stage, mapper: Any, what: ColorByTerm, inverted: bool) 
         render=False,
     )
     bar.SetUnconstrainedFontSize(True)
-    bar.SetTitle(f"{title}\n{unit}" if unit else title)
+    bar.SetTitle(f"{name}\n{below}" if below else name)
     # Longer words would be cut off at the edge of the view.
-    size = (14 if len(title) < _LONG else 13) if not unit else 12
+    size = (14 if len(name) < _LONG else 13) if not below else 12 if len(name) < 15 else 10
     set_letters(bar.GetTitleTextProperty(), scheme, size * font_scale)
     set_letters(bar.GetLabelTextProperty(), scheme, 13 * font_scale)
     set_letters(bar.GetAnnotationTextProperty(), scheme, 12 * font_scale)

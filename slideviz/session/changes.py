@@ -14,7 +14,7 @@ from slideviz.case.model import Case, FromFile, Motion, named
 from slideviz.sections.polygons import ONLY_INVERTED
 from slideviz.session.opening import guess_by_name, has_ffd, with_periodicity
 from slideviz.session.state import PanelPlace, Run, Session, StepFrame, ViewState
-from slideviz.terms import SHOWN, WALL_VALUES, ColorBy, Role
+from slideviz.terms import SHOWN, SIZE_SKEW, ColorBy, Role
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
@@ -94,9 +94,8 @@ def set_view(session: Session, **values: Any) -> Session:
             ranges[old.color_by] = old.color_range
         values = {"color_range": ranges.pop(what, None)} | values
         values["ranges"] = tuple(sorted(ranges.items()))
-        # A threshold for a quality means nothing for a displacement, and the other way round.
-        others = {"displacement", *WALL_VALUES}
-        if others & {what, old.color_by} and old.threshold != ONLY_INVERTED:
+        # A threshold for a quality means nothing for another number, and the other way round.
+        if not {what, old.color_by} <= {"role", *SIZE_SKEW} and old.threshold != ONLY_INVERTED:
             values.setdefault("threshold", None)
     if "sections" in values:
         index = selection_after(old.section_index, old.sections, values["sections"])

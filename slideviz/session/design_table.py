@@ -13,6 +13,7 @@ import numpy as np
 
 from slideviz.case.key import FILES, MOTION, VIEW
 from slideviz.case.keys import KEYS
+from slideviz.case.limits import MET
 from slideviz.case.model import Case
 from slideviz.case.words import counted, is_number
 from slideviz.design.sweeps.columns import case_values, columns_of, numbers_of
@@ -169,6 +170,8 @@ class DesignTable:
         parts = [f"{counted(done, 'design')} done"]
         parts += [f"{failed:,} failed"] * bool(failed)
         parts += [f"{bad:,} with inverted cells"] * bool(bad)
+        missing = sum(bool(row.limits.removesuffix(MET)) for row in self.results.values())
+        parts += [f"{missing:,} that miss limits"] * bool(missing)
         lines = [f"{_named(numbers)}: {reason}" for reason, numbers in reasons.items()]
         return "\n".join(["; ".join(parts), *lines])
 

@@ -1,7 +1,8 @@
 """Facts about cells: those within a threshold, the worst ones, a single one, and where it is.
 
-The *measure* of a cell is the quality that the view is colored by, or size-skew where the view is
-colored by something else. Inverted cells count as below every value: a threshold from 0 has them.
+The *measure* of a cell is the metric or number of walls that the view is colored by, or size-skew
+where the view is colored by something else. Inverted cells count as below every value: a threshold
+from 0 has them.
 """
 
 from __future__ import annotations
@@ -18,9 +19,19 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import FloatArray, IntArray, Marker, Mesh
 from slideviz.mesh.quality import INVERTED, corner_jacobians, lowest, quality
 from slideviz.mesh.surfaces import padded
+from slideviz.mesh.walls import BADNESS
 from slideviz.session.state import Session, StepFrame
 from slideviz.system.atomic import atomic_write
-from slideviz.terms import CELL_STATES, CellState, ColorBy
+from slideviz.terms import (
+    CELL_STATES,
+    RATED,
+    SIZE_SKEW,
+    WALL_VALUES,
+    CellState,
+    ColorBy,
+    field_of,
+    quantity_of,
+)
 
 NEAR = 4  # the nearest point of a boundary is looked for in the elements at so many nearest nodes
 
@@ -155,7 +166,7 @@ class WorstCells:
     positions: FloatArray
     """(k, d): the means of their nodes, in the mesh's length unit."""
     steps: IntArray
-    """(k,): the first frame at which each was worst; 0 is the undeformed mesh."""
+    """(k,): the first frame at which each was worst; 0 is the undeformed mesh, -1 unknown."""
     kinds: tuple[str, ...]
     """The names of their element types."""
     measure: ColorBy
@@ -173,8 +184,15 @@ class WorstCells:
 
 
 def measure(color_by: ColorBy) -> ColorBy:
-    """Return ``color_by`` where it is a quality, else size-skew."""
-    return color_by if color_by in ("size", "skew") else "size-skew"
+    """Return ``color_by`` where one end of its values is worse, else size-skew."""
+    return color_by if color_by in RATED else "size-skew"
+
+
+def badness(what: ColorBy, values: FloatArray) -> FloatArray:
+    """Return numbers (m,) that are larger where values of a quantity of `RATED` are worse."""
+    if what in WALL_VALUES:
+        return BADNESS[field_of(what)](values)
+    return values if RATED[quantity_of(what)].best == "low" else -values
 
 
 def worst_cells(
@@ -182,23 +200,26 @@ def worst_cells(
 ) -> WorstCells:
     """Return the worst cells of the frame ``at``, with the frame in which each was worst.
 
-    Only these cells are followed through the frames, to save time and memory. Ties are in the
-    order of the cells' numbers.
+    Inverted cells come first, cells without a value are left out. Only these cells are followed
+    through the frames, to save time and memory, and only by the numbers of the quality. Ties are in
+    the order of the cells' numbers.
     """
     frame, what = frames[at], measure(what)
     if frame.extra is not None:
         return _listed(frame, frame.extra, at, count)
-    values = frame.values(what)
-    halo = frame.quality.halo
-    cells = lowest(values, count, None if halo is None else ~halo)
-    history = np.stack([each.values(what)[cells] for each in frames])
+    values, halo = frame.values(what, frames[0].mesh), frame.quality.halo
+    rank = np.where(frame.quality.status == INVERTED, -np.inf, -badness(what, values))
+    there = ~np.isnan(values)
+    cells = lowest(rank, count, there if halo is None else there & ~halo)
+    followed = what in SIZE_SKEW
+    history = np.stack([each.values(what)[cells] for each in frames if followed or each is frame])
     types = frame.mesh.cells.types[cells]
     return WorstCells(
         cells,
         values[cells],
         frame.quality.status[cells] == INVERTED,
         cell_centers(frame.mesh, cells),
-        history.argmin(axis=0),
+        history.argmin(axis=0) if followed else np.full(len(cells), -1),
         tuple(ELEMENTS[int(vtk)].name for vtk in types),
         what,
     )
@@ -305,7 +326,8 @@ def table_rows(worst: WorstCells, header: bool = True) -> list[list[str]]:
         numbers = (worst.values[at], *worst.positions[at])
         texts = [repr(float(number)) for number in numbers]
         state = "yes" if worst.inverted[at] else "no"
-        rows.append([str(cell), worst.kinds[at], texts[0], state, *texts[1:], str(worst.steps[at])])
+        since = "" if worst.steps[at] < 0 else str(worst.steps[at])
+        rows.append([str(cell), worst.kinds[at], texts[0], state, *texts[1:], since])
     return rows
 
 

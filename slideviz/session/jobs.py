@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.case.check import check_case
+from slideviz.case.limits import MeasuredMesh, check_case_limits, check_limits
 from slideviz.case.model import Case, FromFile
 from slideviz.case.motion import displacements
 from slideviz.errors import Cancelled, CaseError, MeshError, SlidevizError
@@ -339,6 +340,9 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         report(JobProgress(f"Step {step.index} of {step.total}: quality", step.index / step.total))
         measured = quality(step.mesh, mesh, case.quality_metric, going_on)
         frame = StepFrame(step.mesh, measured, step, walls=_walls(step.mesh, mesh, names))
+        if not unfinished and case.limits:
+            with suppress(SlidevizError):  # the panel of limits says what is wrong
+                frame = replace(frame, limits=check_case_limits(case, measured, step.mesh, mesh))
         _precompute(frame)
         report(frame)
         going_on()
@@ -368,7 +372,8 @@ def compute_in_file(
     step = done.steps[-1]
     now = skin.with_points(step.mesh.points)
     frame = frame_of(now, skin, output, done.quality.totals, case.quality_metric)
-    report(replace(frame, step=replace(step, mesh=now)))
+    limits = check_limits(case.limits, MeasuredMesh(frame.quality))
+    report(replace(frame, step=replace(step, mesh=now), limits=limits))
 
 
 _STARTS = {"classify": 0.0, "solve": 0.1, "evaluate": 0.5, "project": 0.7}

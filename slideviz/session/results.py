@@ -43,6 +43,8 @@ class StepFrame:
     """The undeformed mesh of this frame, where it is not that of the session."""
     file: Path | None = None
     """The file of the whole mesh, if only the skin is in memory."""
+    limits: tuple[LimitResult, ...] = ()
+    """Of the last step of a run: the limits of its case, as far as they could be checked."""
     walls: Walls | None = None
     """The layers at boundaries, compared with those of the undeformed mesh; None where only the
     skin is in memory. Colors show those of its ``markers``."""

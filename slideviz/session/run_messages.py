@@ -13,6 +13,7 @@ from slideviz.case.model import Case, FromFile, Motion, applies_to
 from slideviz.errors import Note
 from slideviz.mesh.model import Mesh
 from slideviz.session.state import PanelPlace, Run, Session
+from slideviz.session.walls_table import heights_words
 from slideviz.solver.remedies import MOST_NAMES, beyond_pitch, fixed_beside, remedies
 from slideviz.solver.setup import LOOSE
 from slideviz.terms import KERNELS
@@ -52,7 +53,9 @@ def end_message(run: Run) -> str:
     step = run.last.step if run.last is not None else None
     if run.last is None or step is None:
         return "Ready."
-    bad = inverted_words(run)
+    heights = heights_words(run.last, run.case)
+    heights = f"first heights {heights}" if heights else ""
+    bad = "; ".join(filter(None, (inverted_words(run), limits_words(run), heights)))
     if step.index < step.total:
         return f"Stopped after step {step.index} of {step.total}" + (f": {bad}." if bad else ".")
     return f"Done: {bad}" if bad else "Done."
@@ -62,6 +65,12 @@ def inverted_words(run: Run) -> str:
     """Return the number of inverted cells after the last step in words; "" for none."""
     count = run.last.quality.inverted if run.last is not None else 0
     return f"{count:,} inverted cell{'' if count == 1 else 's'}" if count else ""
+
+
+def limits_words(run: Run) -> str:
+    """Return how many limits a run misses in words; "" where it misses none."""
+    count = sum(not one.passed for one in run.last.limits) if run.last is not None else 0
+    return f"{count} limit{' is' if count == 1 else 's are'} not met" if count else ""
 
 
 def remedy_for(run: Run, mesh: Mesh | None, folding: str = "") -> str:

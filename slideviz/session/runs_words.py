@@ -8,6 +8,7 @@ from pathlib import Path
 
 from slideviz.case.key import METHOD, PERIODICITY, QUALITY, REDUCTION, Key
 from slideviz.case.keys import BY_WEIGHT
+from slideviz.case.limits import outcome
 from slideviz.case.model import Case
 from slideviz.case.motion_words import deformation, describe, motion_labels
 from slideviz.errors import SlidevizError
@@ -234,6 +235,7 @@ COLUMNS: tuple[Column, ...] = (
     Column("minimum quality", lambda run: _of_last(run, "min"), QUALITY_FORMAT),
     Column("mean quality", lambda run: _of_last(run, "mean"), QUALITY_FORMAT),
     Column("inverted cells", lambda run: _of_last(run, "inverted"), ",d"),
+    Column("limits", lambda run: outcome(run.last.limits) or None if run.last else None),
     Column("lowest first height, ratio", lambda run: height_ratios(run.last, run.case)[0], ".3f"),
     Column("highest first height, ratio", lambda run: height_ratios(run.last, run.case)[1], ".3f"),
     Column("largest change of a wall angle", lambda run: angle_change(run.last, run.case), ".2g"),

@@ -1,10 +1,15 @@
 """The limits of the case are checked in the background, on the step that is shown."""
 
-import pytest
+from html import unescape
 
+import pytest
+from qtpy.QtWidgets import QPushButton
+
+from slideviz.case.limits import outcome
 from slideviz.color_scheme import SELECTED_COLOR
 from slideviz.session import changes
 from slideviz.session.limits import choose_limit
+from slideviz.session.runs_words import COLUMNS
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
@@ -37,3 +42,19 @@ def test_limits_are_checked_on_what_is_shown_and_rings_are_at_cells_that_fail(wi
     store.change(changes.show_frame, 2)
     assert results()[0].actual == low.actual
     assert not store.session.outdated, "limits change no mesh"
+
+
+def test_the_end_of_a_run_says_which_limits_are_missed(with_runs):
+    shown = with_runs({"steps": 1, "limits": "min >= 0.999, inverted = 0"})
+    window, run = shown.window, shown.window.store.session.runs[-1]
+    low, folded = run.last.limits
+    assert (low.passed, folded.passed) == (False, True)
+    assert low.actual == run.last.quality.min
+    assert "1 limit is not met" in window.run_panel.text.text()
+    column = next(one for one in COLUMNS if one.title == "limits")
+    assert column.value(run) == outcome(run.last.limits) == f"min >= 0.999: {low.actual:.6g}"
+    window.running._run_done(None)
+    assert f"1 limit is not met: {column.value(run)}." in unescape(window.banner.text.text())
+    (button,) = [one for one in window.banner.findChildren(QPushButton) if "limits" in one.text()]
+    shown.click(button)
+    assert window.dock_manager.by_name["limits"].isVisible()

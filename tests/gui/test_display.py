@@ -94,6 +94,13 @@ def test_only_cells_of_a_range_are_chosen_and_steps_and_selection_leave_the_pane
     assert not box.threshold.isEnabled()
     QTest.mouseClick(box.only, Qt.MouseButton.LeftButton, pos=QPoint(8, 8))
     assert view(shown).threshold == (0.0, 0.5)
+    for what in ("non-orthogonality", "size-skew"):  # of this the high values are the worse ones
+        shown.window.store.change(changes.set_view, color_by=what)
+        half = (45.0, 90.0) if what == "non-orthogonality" else (0.0, 0.5)
+        assert (box.threshold.low.value, box.threshold.high.value) == half
+        assert not box.threshold.low.fault
+        assert not box.threshold.high.fault
+    shown.window.store.change(changes.set_view, threshold=(0.0, 0.5))
     shown.type(box.threshold.high, "0.7")
     assert view(shown).threshold == (0.0, 0.7)
     shown.type(box.threshold.low, "0.9")

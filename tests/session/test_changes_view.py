@@ -285,6 +285,7 @@ def test_cells_chosen_by_quality_are_not_chosen_by_displacement(session):
     session = changes.set_view(session, color_by="skew", threshold=(0.2, 0.4))
     assert changes.set_view(session, color_by="size").view.threshold == (0.2, 0.4)
     assert changes.set_view(session, color_by="displacement").view.threshold is None
+    assert changes.set_view(session, color_by="orthogonality").view.threshold is None
     session = changes.set_view(session, threshold=ONLY_INVERTED)
     assert changes.set_view(session, color_by="displacement").view.threshold == ONLY_INVERTED
 

@@ -11,6 +11,8 @@ from slideviz.mesh.quality import quality
 from slideviz.sections.polygons import ONLY_INVERTED, cells_in_range
 from slideviz.session import inspect
 from slideviz.session.state import StepFrame
+from slideviz.terms import RATED
+from tests.builders import layered
 
 
 def frame_of(mesh, move):
@@ -52,6 +54,35 @@ def test_the_worst_cells_are_those_of_a_full_sort(frames, what):
     assert found.values.tolist() == [values[cell] for cell in wanted]
     assert found.kinds == ("quadrilateral",) * 5
     assert not found.inverted.any()
+
+
+@pytest.mark.parametrize("what", ["aspect-ratio", "orthogonality", "expansion", "scaled-jacobian"])
+def test_the_worst_cells_are_those_of_the_metric_that_is_colored_by(frames, what):
+    values = frames[2].values(what)
+    high = RATED[what].best == "high"
+    wanted = sorted(range(16), key=lambda cell: (values[cell] if high else -values[cell], cell))
+    found = inspect.worst_cells(frames, 2, what, 5)
+    assert found.cells.tolist() == wanted[:5]
+    assert found.measure == what
+    assert (found.steps == -1).all()  # only the quality is followed through the steps
+    assert inspect.table_rows(found)[1][-1] == ""
+    folded = inspect.worst_cells(frames, 4, what, 16)  # inverted cells come first
+    assert folded.inverted[: frames[4].quality.inverted].all()
+
+
+def test_the_worst_cells_by_a_number_of_walls_are_those_at_walls():
+    mesh = layered(8, 0.001)
+    points = mesh.points.copy()
+    points[np.isclose(points[:, 1], np.unique(points[:, 1])[1]), 1] *= 1.1
+    points[12, 1] *= 0.8
+    moved = mesh.with_points(points)
+    frames = [StepFrame(mesh, quality(mesh)), StepFrame(moved, quality(moved, mesh))]
+    values = frames[1].values("height-ratio", mesh)
+    found = inspect.worst_cells(frames, 1, "height-ratio")
+    assert set(found.cells.tolist()) == set(np.flatnonzero(~np.isnan(values)).tolist())
+    far = np.abs(np.log(found.values))
+    assert (np.diff(far) <= 1e-15).all()
+    assert far[0] > 0.09
 
 
 def test_equal_cells_are_listed_by_number(frames):

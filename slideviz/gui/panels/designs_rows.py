@@ -9,6 +9,7 @@ from qtpy.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex,
 from qtpy.QtGui import QBrush, QColor
 from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QStackedWidget, QTableView, QWidget
 
+from slideviz.case.limits import MET
 from slideviz.case.model import Case
 from slideviz.design.sweeps.table import NUMBERS, DesignRow
 from slideviz.gui.widgets.build import Slot, hint_label, in_column, in_row, push_button
@@ -92,12 +93,13 @@ class DesignsModel(QAbstractTableModel):
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         if role == Qt.ItemDataRole.ToolTipRole and row is not None:
-            return wrapped("\n".join(filter(None, [row.problem, *row.warnings]))) or None
+            missed = f"Not met: {row.limits}" * bool(row.limits.removesuffix(MET))
+            return wrapped("\n".join(filter(None, [row.problem, missed, *row.warnings]))) or None
         if column < 0:
             shown = role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.EditRole)
             return self.table.rows[at][index.column()] if shown else None
         if role == Qt.ItemDataRole.ForegroundRole and row is not None:
-            bad = row.problem or row.inverted
+            bad = row.problem or row.inverted or row.limits.removesuffix(MET)
             return QBrush(QColor(alarm())) if bad and column < 3 else None
         if role == Qt.ItemDataRole.DisplayRole and row is not None:
             return self._text(row, list(RESULTS)[column])

@@ -33,7 +33,16 @@ from slideviz.session.colors import usual_range
 from slideviz.session.passages import passages_around
 from slideviz.session.state import IN_FILE, Session
 from slideviz.session.store import Store
-from slideviz.terms import COLOR_BY, COLOR_MAPS, POINTS_SHOWN, SHOWN, Shown, labels
+from slideviz.terms import (
+    COLOR_BY,
+    COLOR_MAPS,
+    POINTS_SHOWN,
+    RATED,
+    SHOWN,
+    Shown,
+    labels,
+    quantity_of,
+)
 
 TIPS = {
     "map": "The colors of values; color-blind people can distinguish all of them.",
@@ -119,7 +128,9 @@ class RangeFields(QWidget):
 
     def show_values(self, values: tuple[float, float]) -> None:
         """Show two numbers; no signal is emitted."""
-        for field, value in zip((self.low, self.high), values, strict=True):
+        fields = list(zip((self.low, self.high), values, strict=True))
+        # Each is compared with the other one: the first must be valid with its old value.
+        for field, value in fields if values[0] < self.high.value else reversed(fields):
             if value != field.value:
                 field.show_value(value)
 
@@ -286,6 +297,7 @@ def _shown(session: Session) -> object:
 
 
 def _worse_half(session: Session) -> tuple[float, float]:
-    """Return the lower half of the color range: the first threshold, as low quality is worse."""
+    """Return the worse half of the color range, which is the first threshold."""
     low, high = session.color_range
-    return low, low + 0.5 * (high - low)
+    middle, term = low + 0.5 * (high - low), RATED.get(quantity_of(session.view.color_by))
+    return (middle, high) if term is not None and term.best == "low" else (low, middle)

@@ -16,12 +16,18 @@ from slideviz.gui.widgets.build import WrappingRow, check_box, in_column, push_b
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import Draw, PlotArea, PlotCanvas, ask_and_write_plot, is_seen
 from slideviz.gui.widgets.theme import alarm
-from slideviz.plots.session_plots import FrameCounts, draw_histogram, first_value, shown_measure
+from slideviz.plots.session_plots import (
+    FrameCounts,
+    draw_histogram,
+    first_value,
+    shown_measure,
+    whole_range,
+)
 from slideviz.sections.polygons import ONLY_INVERTED, cells_in_range, range_words
 from slideviz.session import changes
 from slideviz.session.state import IN_FILE, Session, StepFrame
 from slideviz.session.store import Store
-from slideviz.terms import WALL_VALUES
+from slideviz.terms import RATED, SIZE_SKEW, WALL_VALUES
 
 END_PX = 6  # distance in pixels up to which a press moves an end of the range
 
@@ -161,9 +167,11 @@ class HistogramPanel(Panel):
     # State to widgets ------------------------------------------------------------------
     def sync(self, session: Session) -> None:
         """Plot the histogram of the session's step, with the threshold as selected range."""
-        self.whole.setText("from 0" if session.view.color_by == "displacement" else "0–1")
+        low, high = whole_range(shown_measure(session))
+        self.whole.setText(f"{low:g}–{high:g}" if high < np.inf else f"from {low:g}")
         for widget in (self.numbers, self.log, self.whole, self.save):
             widget.setVisible(session.frame is not None)
+        self.whole.setEnabled(shown_measure(session) not in WALL_VALUES)
         self.show_all.setVisible(session.frame is not None)
         self.show_all.setEnabled(session.view.threshold is not None)
         if not self._timer.isActive():
@@ -194,16 +202,17 @@ class HistogramPanel(Panel):
         if what in WALL_VALUES:
             plain = plain[~np.isnan(plain)] if not np.isnan(plain).all() else np.array([np.nan])
         bad = quality.inverted
-        low = "highest" if what == "displacement" else "min"
         mean = quality.mean if what == "size-skew" else plain.mean()
-        # The largest displacement of a node: values of cells are means over their nodes.
-        far = what == "displacement"
-        least = quality.min if what == "size-skew" else plain.min()
-        ends = session.frame.largest_displacement(session.mesh) if far else least
-        form = ".4g" if what == "displacement" else ".4f"
+        if what == "displacement":  # of a node: values of cells are means over their nodes
+            low, ends = "highest", session.frame.largest_displacement(session.mesh)
+        elif RATED[what].best == "low":
+            low, ends = "max", plain.max()
+        else:
+            low, ends = "min", quality.min if what == "size-skew" else plain.min()
+        form = ".4f" if what in SIZE_SKEW else ".4g"
         red = f" style='color:{alarm()}'" if bad else ""
         self.numbers.setText(
-            f"{low} <b>{ends:{form}}</b>&nbsp; mean <b>{mean:{form}}</b>&nbsp; "
+            f"{low} <b>{float(ends):{form}}</b>&nbsp; mean <b>{mean:{form}}</b>&nbsp; "
             f"<span{red}>inverted <b>{bad:,}</b></span>"
         )
         threshold = session.view.threshold

@@ -22,6 +22,7 @@ from slideviz.session.run_messages import (
     end_message,
     exact_cost,
     inverted_words,
+    limits_words,
     notes_of,
     remedy_for,
     run_requirements,
@@ -137,7 +138,8 @@ class RunPanel(Panel):
             design = run.panels is not None and html.escape(run.name)
             name = design or f"run {run.number}"
             self.text.setText(f"The panels differ from {name}. {link}")
-        set_style(self.text, "bad", bool(bad))
+        missed = run is not None and not session.outdated and limits_words(run)
+        set_style(self.text, "bad", bool(bad or missed))
 
     def _show_ready(self, text: str, session: Session) -> None:
         """Show ``text`` (or a warning that cells will fold), and the cost of the run."""

@@ -11,7 +11,7 @@ from qtpy.QtGui import QGuiApplication, QKeySequence, QPaintEvent, QShortcut
 from qtpy.QtWidgets import QLabel, QStackedWidget
 
 from slideviz.color_scheme import ColorScheme
-from slideviz.gui.panels.worst_table import WorstModel, WorstTable
+from slideviz.gui.panels.worst_table import SINCE, WorstModel, WorstTable
 from slideviz.gui.responsiveness.timers import REST_MS, single_shot
 from slideviz.gui.widgets.build import in_column, in_row, push_button
 from slideviz.gui.widgets.panel import Panel
@@ -33,7 +33,7 @@ from slideviz.session.inspect import (
 )
 from slideviz.session.state import Session
 from slideviz.session.store import Store
-from slideviz.terms import COLOR_BY
+from slideviz.terms import COLOR_BY, SIZE_SKEW
 
 
 class WorstPanel(Panel):
@@ -141,9 +141,10 @@ class WorstPanel(Panel):
         at = session.frames.index(session.frame)
         what = measure(session.view.color_by)
         worst = worst_cells(session.frames, at, what)
-        title = f"Quality: {COLOR_BY[what].label} of the step that is shown"
+        title = f"{COLOR_BY[what].axis}, of the step that is shown"
         self.table.horizontalHeader().setToolTip(title)
         self.model.show(worst, axis_of(session))
+        self.table.setColumnHidden(SINCE, what not in SIZE_SKEW)  # others are not followed
 
     def _sync_mark(self, session: Session) -> None:
         """Make the marked cell the current row, and show its facts."""

@@ -13,6 +13,7 @@ from slideviz.gui.widgets.labels import ModelIndex
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
 from slideviz.session.inspect import RotationAxis, WorstCells, coordinates, decimals
+from slideviz.terms import COLOR_BY, SIZE_SKEW
 
 SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
 """Short names of cell types."""
@@ -133,7 +134,16 @@ class WorstModel(QAbstractTableModel):
     @property
     def headers(self) -> tuple[str, ...]:
         """Return the titles of the columns."""
-        return (*COLUMNS, *self.names, *((LAST,) if self._mixed else ()))
+        first, _, since = COLUMNS
+        return (first, self._measure, since, *self.names, *((LAST,) if self._mixed else ()))
+
+    @property
+    def _measure(self) -> str:
+        """Return the title of the column of values, in two lines if it is long."""
+        if self.worst is None or self.worst.measure in SIZE_SKEW:
+            return COLUMNS[QUALITY]
+        words = COLOR_BY[self.worst.measure].label.partition(" (")[0]
+        return words.replace(" ", "\n").replace("-", "-\n", len(words) > 12).capitalize()
 
     def _alignment(self, column: int) -> int:
         if column == SINCE:
