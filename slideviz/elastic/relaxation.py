@@ -40,6 +40,9 @@ from slideviz.terms import SkewMetric
 ITERATIONS = 6
 """Enough to come to the mean quality of the equilibrium within 0.001 to 0.003."""
 
+SIZE = 1.5
+"""The step, as a part of the direction, at which the energy's slope is found for the best step."""
+
 TRIES, SLOWER = 20, 0.85
 """How often the safeguard changes the parts of the relaxation that it leaves, and how much slower
 they grow each time."""
@@ -175,28 +178,36 @@ class Relaxation:
         """Return the relaxed displacement, and the last residual over the first."""
         frame, forces, cycle = self.body.frame, kept.forces, kept.cycle
         assert cycle is not None
-        unknowns = _Unknowns.of(given)
-        along: Array = np.zeros((len(given.free), self.mesh.dim))
-        energies: list[float] = []
-        force: Array = along
+        unknowns, start = _Unknowns.of(given), points(frame, problem.coords + moved)
+        at, force = start, unknowns.collected(_force(forces, start))
+        along: Array = np.zeros_like(value(force))
+        before, energies = value(force), list[float]()
         for k in range(ITERATIONS):
             tick(MAKING + (1.0 - MAKING) * k / (ITERATIONS + 1))
-            at = points(frame, problem.coords + moved)
-            turns = forces.rotations(value(at))
-            before, force = value(force), unknowns.collected(_force(forces, at, turns))
             steep = unknowns.within(_preconditioned(cycle, -force))
             energies.append(-_inner(force, steep))
             if k:
                 last = max(energies[-2], 1e-300)
                 turned = max(0.0, (energies[-1] + _inner(before, steep)) / last)
                 steep = steep + multiply(along, problem.choose(f"beta {k}", partial(_one, turned)))
-            along = steep
-            size = partial(_size, unknowns, forces, turns, value(along), value(force))
-            step = unknowns.moved(multiply(along, problem.choose(f"alpha {k}", size)))
-            moved = moved + difference_from(frame, at, step)
-            if problem.curved or k == ITERATIONS - 1:
-                moved = _slid(problem, moved, tie)
-        return moved, float(np.sqrt(max(0.0, energies[-1]) / max(energies[0], 1e-300)))
+            along, before = steep, value(force)
+            step, slid = unknowns.moved(along * SIZE), moved
+            if problem.curved:
+                slid = _slid(problem, moved + difference_from(frame, at, step), tie)
+                step = points(frame, problem.coords + slid) - at
+            there = unknowns.collected(_force(forces, at + step))
+            size = partial(_size, _inner(along, force), _inner(along, there))
+            part = problem.choose(f"alpha {k}", size)
+            force = force + multiply(there - force, part)
+            if problem.curved:
+                moved = moved + multiply(slid - moved, part)
+                at = points(frame, problem.coords + moved)
+            else:
+                at = at + multiply(step, part)
+        if not problem.curved:
+            moved = moved + difference_from(frame, start, at - start)
+        residual = float(np.sqrt(max(0.0, energies[-1]) / max(energies[0], 1e-300)))
+        return _slid(problem, moved, tie), residual
 
     def _kept_part(
         self, problem: Problem, before: Array, after: Array, tie: Callable[[Array], Array]
@@ -330,9 +341,10 @@ def _slid(problem: Problem, displacement: Array, tie: Callable[[Array], Array]) 
     return tie(put(displacement, sliding, on))
 
 
-def _force(forces: Corotated, at: Array, turns: FloatArray) -> Array:
+def _force(forces: Corotated, at: Array) -> Array:
     """Return the forces (n, d) on all nodes."""
     x = value(at)
+    turns = forces.rotations(x)
     return recorded(
         forces.forces(x, turns),
         (
@@ -349,24 +361,20 @@ def _preconditioned(cycle: LaplacianCycle, right: Array) -> Array:
 
 
 def _inner(a: Array, b: Array) -> float:
-    return float(np.vdot(value(a), value(b)))
+    """Return the sum of all products, with the same bits for any number of threads."""
+    return float((value(a) * value(b)).sum())
 
 
 def _one(number: float) -> FloatArray:
     return np.array([[number]])
 
 
-def _size(
-    unknowns: _Unknowns,
-    forces: Corotated,
-    turns: FloatArray,
-    along: FloatArray,
-    force: FloatArray,
-) -> FloatArray:
-    """Return the step ``along`` (k, d) to the least energy, where rotations stay; (1, 1)."""
-    product = forces.product(turns, value(unknowns.moved(along)))
-    curvature = _inner(along, unknowns.collected(product))
-    return _one(-_inner(along, force) / curvature if curvature > 0.0 else 0.0)
+def _size(slope: float, there: float) -> FloatArray:
+    """Return the part of a step to the least energy, whose slope is as given before and after it.
+
+    (1, 1); all of it where the energy is not convex along the step.
+    """
+    return _one(slope / (slope - there) if slope < min(there, 0.0) else 1.0)
 
 
 @dataclass(frozen=True, eq=False)
