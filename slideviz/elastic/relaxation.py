@@ -5,7 +5,11 @@ mesh becomes an elastic body whose undeformed shape is without forces however it
 (`slideviz.elastic.corotated`), and goes towards its equilibrium by nonlinear conjugate gradients
 (Polak and Ribiere), preconditioned by one multigrid cycle (`slideviz.elastic.laplacian`):
 
-    r = -f(x),   p = C r + beta p,   x <- x + alpha p.
+    r = -f(x),   p = C r + beta p,   x <- x + alpha s p,   f <- f + alpha (f(x + s p) - f),
+
+with the constant s, and alpha such that the energy is least along p if rotations stay; so one
+evaluation of f gives step and next forces. (Where nodes slide on curved boundaries, they are
+projected after each step, and f is evaluated there.)
 
 Moving and fixed nodes stay, sliding ones move along their boundary, periodic images as one. A
 safeguard goes back, in part, where cells would become worse. Steps alpha and beta, tangents and the
@@ -191,23 +195,22 @@ class Relaxation:
                 turned = max(0.0, (energies[-1] + _inner(before, steep)) / last)
                 steep = steep + multiply(along, problem.choose(f"beta {k}", partial(_one, turned)))
             along, before = steep, value(force)
-            step, slid = unknowns.moved(along * SIZE), moved
-            if problem.curved:
-                slid = _slid(problem, moved + difference_from(frame, at, step), tie)
-                step = points(frame, problem.coords + slid) - at
+            step = unknowns.moved(along * SIZE)
             there = unknowns.collected(_force(forces, at + step))
             size = partial(_size, _inner(along, force), _inner(along, there))
             part = problem.choose(f"alpha {k}", size)
-            force = force + multiply(there - force, part)
             if problem.curved:
-                moved = moved + multiply(slid - moved, part)
+                moved = moved + difference_from(frame, at, multiply(step, part))
+                moved = _slid(problem, moved, tie)
                 at = points(frame, problem.coords + moved)
+                force = unknowns.collected(_force(forces, at))
             else:
                 at = at + multiply(step, part)
+                force = force + multiply(there - force, part)
         if not problem.curved:
-            moved = moved + difference_from(frame, start, at - start)
+            moved = _slid(problem, moved + difference_from(frame, start, at - start), tie)
         residual = float(np.sqrt(max(0.0, energies[-1]) / max(energies[0], 1e-300)))
-        return _slid(problem, moved, tie), residual
+        return moved, residual
 
     def _kept_part(
         self, problem: Problem, before: Array, after: Array, tie: Callable[[Array], Array]
