@@ -5,31 +5,36 @@ equivalent to its elasticity (Korn's inequality), does not care how cells are tu
 number where elasticity has d by d. It depends on the undeformed mesh and on which nodes move
 together only, so one hierarchy serves all steps, runs and designs of a mesh.
 
-Rows are smoothed in parts of fixed size, side by side. What couples a row to other parts is added
-to its diagonal, so that the sweep converges whatever the parts are (Baker, Falgout, Kolev and Yang
-2011, Multigrid smoothers for ultraparallel computing, section 5), with the same bits for any
-number of threads. Matrices are stored in single precision, and vectors in double: the cycle is a
-symmetric matrix to rounding, as derivatives need it.
+Levels are made by smoothed aggregation (Vanek, Mandel and Brezina 1996). Components that are held
+at different nodes share aggregates and the finest matrix, and have numbers of their own, side by
+side, in all others. Rows are smoothed in parts of fixed size, side by side. What couples a row to
+other parts is added to its diagonal, so that the sweep converges whatever the parts are (Baker,
+Falgout, Kolev and Yang 2011, Multigrid smoothers for ultraparallel computing, section 5), with the
+same bits for any number of threads. Matrices are stored in single precision, and vectors in double:
+the cycle is a symmetric matrix to rounding, as derivatives need it.
 """
 
 from __future__ import annotations
 
-import warnings
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numba import prange
 from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse import csr_array, csr_matrix, diags_array
+from scipy.sparse import csr_array
 
+from slideviz.elastic.corotated import Corotated, invert
 from slideviz.elastic.forces import _at
 from slideviz.elastic.multigrid import RIDGE
-from slideviz.elastic.stiffness import OPTIONS, ShapeBlock, cell_volumes
+from slideviz.elastic.stiffness import OPTIONS, ShapeBlock
 from slideviz.mesh.model import FloatArray, IntArray, sealed
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.tape import transform, value
 from slideviz.system.jit_cache import njit
+from slideviz.system.threads import in_parts
 
 COARSE = 300
 """Largest number of unknowns of the coarsest level, which has a dense factor."""
@@ -40,12 +45,17 @@ HELD = 1e60
 PART = 4096
 """Rows that are smoothed one after the other."""
 
-ELEMENTS = 200_000
-"""Elements that are added to the matrix at a time, to save memory."""
+CHUNKS = 16
+"""Into how many parts long matrices are cut while they are made."""
 
+OMEGA = 4.0 / 3.0
+"""Damping of the Jacobi step that smooths prolongations, by row sums."""
+
+PARALLEL: dict[str, Any] = {"parallel": True, "nogil": True, "cache": True}
 
 Sparse = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""indptr, indices and data of a sparse matrix."""
+"""indptr, indices and data (k, w) of a sparse matrix; w = 1, or a number for each group of
+components."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +63,10 @@ class LaplacianLevel:
     """A level of the hierarchy."""
 
     matrix: Sparse
+    middle: np.ndarray
+    """(k,): in each row, the place of its first entry that is not left of the diagonal."""
     inverse: FloatArray
-    """(k,): of the diagonal, with what couples a row to other parts added; zero in rows that are
+    """(k, w): of the diagonal, with what couples a row to other parts added; zero in rows that are
     held."""
     up: Sparse
     down: Sparse
@@ -62,163 +74,202 @@ class LaplacianLevel:
 
 
 @dataclass(frozen=True, eq=False)
-class LaplacianHierarchy:
-    """A hierarchy for the components that are held at the same nodes."""
-
-    components: IntArray
-    levels: tuple[LaplacianLevel, ...]
-    """Finest first, without the coarsest."""
-    factor: Any
-    """Dense Cholesky factor of the coarsest level."""
-
-    def cycle(self, right: FloatArray, depth: int = 0) -> FloatArray:
-        """Return what one V-cycle from a level on makes of a right-hand side (k, c)."""
-        if depth == len(self.levels):
-            return np.asarray(cho_solve(self.factor, right, check_finite=False))
-        level = self.levels[depth]
-        x = _smoothed(level, right, backward=False)
-        left = right - times(level.matrix, x)
-        x += times(level.up, self.cycle(times(level.down, left), depth + 1))
-        x += _smoothed(level, right - times(level.matrix, x), backward=True)
-        return x
-
-
-@dataclass(frozen=True, eq=False)
 class LaplacianCycle:
     """One V-cycle for the Laplacian of each component: a symmetric, positive definite map."""
 
-    parts: tuple[LaplacianHierarchy, ...]
+    levels: tuple[LaplacianLevel, ...]
+    """Finest first, without the coarsest."""
+    factors: tuple[Any, ...]
+    """Dense Cholesky factors of the coarsest level, of each group of components."""
+    group: IntArray
+    """(3,): the group of each component: those that are held at the same nodes."""
     axes: FloatArray
     """(k, d, d) or (d, d): rows are the axes of the components; Cartesian ones if (d, d)."""
 
     @classmethod
     def of(
         cls,
-        points: FloatArray,
-        parts: list[ShapeBlock],
+        body: Corotated,
         place: IntArray,
         held: np.ndarray,
         axes: FloatArray,
     ) -> LaplacianCycle:
-        """Return the cycle of a mesh.
+        """Return the cycle of an elastic body.
 
-        Parameters
-        ----------
-        points : (n, d)
-            Undeformed.
-        place : (n,)
-            Number of each node's unknown; -1 for known nodes.
-        held : (k, d)
-            Which components of the unknowns stay zero.
-        axes : (k, d, d) or (d, d)
-            Rows are the axes of these components: orthonormal, (d, d) for Cartesian ones.
+        ``place`` (n,) is the number of each node's unknown, -1
+        for known nodes. ``held`` (k, d): which components of the unknowns stay zero. Rows of
+        ``axes`` (k, d, d) or (d, d) are the axes of these components: orthonormal, (d, d) for
+        Cartesian ones.
         """
-        matrix = laplacian(points, parts, place, len(held))
-        shared = _single(matrix)
-        columns, group = np.unique(held, axis=1, return_inverse=True)
-        made = [
-            _hierarchy(matrix, shared, columns[:, k], np.flatnonzero(group.ravel() == k))
-            for k in range(columns.shape[1])
-        ]
-        return cls(tuple(made), axes)
+        matrix = laplacian(body, place, len(held))
+        columns = {column.tobytes(): column for column in held.T}  # each once
+        group = [list(columns).index(column.tobytes()) for column in held.T]
+        free = ~np.stack(list(columns.values()), axis=1)
+        levels, factors = _hierarchy(matrix, free.astype(float))
+        # A plane has a third component, which is zero.
+        return cls(levels, factors, np.array([*group, 0][:3]), axes)
 
     def __call__(self, right: FloatArray) -> FloatArray:
         """Return what one V-cycle makes of a right-hand side (k, d)."""
-        turned = self.axes.ndim == 3
-        right = np.ascontiguousarray(value(transform(self.axes, right)) if turned else right)
-        out = np.empty_like(right)
-        for part in self.parts:
-            alone = len(self.parts) == 1
-            out[:, part.components] = part.cycle(right if alone else right[:, part.components])
+        turned, d = self.axes.ndim == 3, right.shape[1]
+        wide = np.zeros((len(right), 3))
+        wide[:, :d] = value(transform(self.axes, right)) if turned else right
+        out = self._cycle(wide, 0)[:, :d]
         return value(transform(np.swapaxes(self.axes, 1, 2), out)) if turned else out
+
+    def _cycle(self, right: FloatArray, depth: int) -> FloatArray:
+        """Return what one V-cycle from a level on makes of a right-hand side (k, 3)."""
+        out = np.empty_like(right)
+        if depth == len(self.levels):
+            for g, factor in enumerate(self.factors):
+                mine = self.group == g
+                out[:, mine] = cho_solve(factor, right[:, mine], check_finite=False)
+            return out
+        level, x, group = self.levels[depth], np.empty_like(right), tuple(self.group.tolist())
+        with one_at_a_time(3 * len(level.matrix[1])):
+            forward(level.matrix, level.middle, level.inverse, group, right, x, out)
+            residual(level.matrix, level.middle, group, x, out)
+        coarse = np.zeros((len(level.down[0]) - 1, 3))
+        with one_at_a_time(3 * len(level.down[1])):
+            add_product(level.down, group, out, coarse)
+        coarse = self._cycle(coarse, depth + 1)
+        with one_at_a_time(3 * len(level.matrix[1])):
+            add_product(level.up, group, coarse, x)
+            backward(level.matrix, level.inverse, group, right, x, out)
+        return out
 
 
 def _hierarchy(
-    matrix: csr_array, shared: Sparse, held: np.ndarray, components: IntArray
-) -> LaplacianHierarchy:
-    """Return the hierarchy of a matrix (k, k) without the rows and columns ``held`` (k,).
+    matrix: Sparse, free: FloatArray
+) -> tuple[tuple[LaplacianLevel, ...], tuple[Any, ...]]:
+    """Return the levels of a matrix in double precision, and the factors of the coarsest one.
 
-    Its finest level has the matrix itself, ``shared`` between hierarchies.
+    ``free`` (k, w): 1 in the rows of each group that are not held, 0 in others.
     """
-    import pyamg
-
-    free = diags_array((~held).astype(float))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # pyamg tells of conversions that are meant
-        made = pyamg.smoothed_aggregation_solver(
-            csr_matrix(free @ matrix @ free if held.any() else matrix),
-            # By row sums: the spectral radius that is the default is found from random numbers.
-            smooth=("jacobi", {"omega": 4.0 / 3.0, "weighting": "local"}),
-            improve_candidates=None,
-            presmoother=None,
-            postsmoother=None,
-            max_coarse=COARSE,
-        ).levels
-    dense = made[-1].A.toarray()
-    # A mesh that may move as a whole makes the matrix singular; rows of nothing are held.
-    diagonal = np.diag(dense)
-    dense[np.diag_indices_from(dense)] += np.where(diagonal > 0, RIDGE * diagonal, HELD)
-    factor = cho_factor(dense, lower=True, check_finite=False)
-    levels = [_level(level) for level in made[:-1]]
-    if levels:
-        levels[0] = replace(levels[0], matrix=shared)
-    return LaplacianHierarchy(components, tuple(levels), factor)
+    levels, modes = [], free
+    while len(modes) > COARSE:
+        up, modes_below = _prolongation(matrix, modes)
+        down = _transposed(up, len(modes_below))
+        below = _sorted(_product(down, _product(matrix, up, len(modes_below)), len(modes_below)))
+        levels.append(_level(matrix, modes > 0.0, up, down))
+        matrix, modes = below, modes_below
+    factors = []
+    for g in range(modes.shape[1]):
+        dense = _of_group(matrix, g).toarray() * np.outer(modes[:, g] > 0.0, modes[:, g] > 0.0)
+        # A mesh that may move as a whole makes the matrix singular; rows of nothing are held.
+        diagonal = np.diag(dense)
+        dense[np.diag_indices_from(dense)] += np.where(diagonal > 0, RIDGE * diagonal, HELD)
+        factors.append(cho_factor(dense, lower=True, check_finite=False))
+    return tuple(levels), tuple(factors)
 
 
-def laplacian(
-    points: FloatArray, parts: list[ShapeBlock], place: IntArray, count: int
-) -> csr_array:
-    """Return the matrix (count, count) of the Laplacian; parameters as of `LaplacianCycle`."""
-    total = csr_array((count, count))
-    volume = cell_volumes(points, parts)
-    for part in parts:
-        a = part.nodes.shape[1]
-        for start in range(0, len(part.nodes), ELEMENTS):
-            nodes = sealed(part.nodes[start : start + ELEMENTS])
-            data = np.empty((len(nodes), a, a))
-            elements = sealed(points), nodes, part.shape.gradients, part.shape.weights
-            gradients(elements, part.share / volume[part.cell[start : start + ELEMENTS]], data)
-            at = place[nodes].astype(np.int32)
-            row, column = np.broadcast_arrays(at[:, :, None], at[:, None, :])
-            inside = (row >= 0) & (column >= 0)
-            entries = data[inside], (row[inside], column[inside])
-            total = total + csr_array(entries, shape=(count, count))
-    # Unknowns of no element, and cells without volume, do not spoil the others.
-    total.data[~np.isfinite(total.data)] = 0.0
-    total.sort_indices()
-    return total
+def _prolongation(matrix: Sparse, modes: FloatArray) -> tuple[Sparse, FloatArray]:
+    """Return the prolongation to the rows of a matrix, and the modes (l, w) of the coarser level.
+
+    ``modes`` (k, w) of each group are those that it keeps: nearly constant, zero in held rows.
+    """
+    from pyamg.aggregation import standard_aggregation
+
+    free = modes > 0.0
+    aggregates = standard_aggregation(_of_group(matrix, 0))[0].tocsr()
+    below = np.sqrt(aggregates.T @ modes**2)
+    owned = np.flatnonzero(np.diff(aggregates.indptr))
+    tentative = np.zeros_like(modes)
+    tentative[owned] = modes[owned] / np.maximum(below[aggregates.indices], 1e-300)
+    plain = aggregates.indptr, aggregates.indices, tentative[owned]
+    indptr, indices, data = _product(matrix, plain, len(below))
+    size = np.empty_like(modes)
+    absolute_sums(matrix, free, size)
+    scale = np.divide(OMEGA, size, out=np.zeros_like(modes), where=free)
+    row = np.repeat(np.arange(len(modes)), np.diff(indptr))
+    owner = np.full(len(modes), -1)
+    owner[owned] = aggregates.indices
+    data *= -scale[row]
+    data += tentative[row] * (indices == owner[row])[:, None]
+    return (indptr, indices, data), below
 
 
-def _level(level: Any) -> LaplacianLevel:
-    matrix = csr_array(level.A)
-    matrix.sort_indices()
-    row = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
-    outside = row // PART != matrix.indices // PART
-    diagonal = matrix.diagonal()
-    diagonal = diagonal + np.bincount(row, np.abs(matrix.data) * outside, minlength=len(diagonal))
-    inverse = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0.0)
-    up = csr_array(level.P)
-    return LaplacianLevel(_single(matrix), inverse, _single(up), _single(csr_array(up.T)))
+def _of_group(matrix: Sparse, group: int) -> csr_array:
+    """Return the square matrix of a group of components."""
+    indptr, indices, data = matrix
+    column = data[:, min(group, data.shape[1] - 1)]
+    return csr_array((column, indices, indptr), shape=(len(indptr) - 1,) * 2)
 
 
-def _single(matrix: csr_array) -> Sparse:
-    return matrix.indptr, matrix.indices, matrix.data.astype(np.float32)
+def _rearranged(matrix: Sparse, change: Callable[[csr_array], csr_array], columns: int) -> Sparse:
+    """Return a matrix whose entries ``change`` puts into another order."""
+    indptr, indices, data = matrix
+    shape = len(indptr) - 1, columns
+    changed = change(csr_array((np.arange(len(indices)), indices, indptr), shape=shape))
+    return changed.indptr, changed.indices, data[changed.data]
 
 
-def _smoothed(level: LaplacianLevel, right: FloatArray, *, backward: bool) -> FloatArray:
-    """Return what one sweep from zero makes of a right-hand side (k, c)."""
-    x = np.empty_like(right)
-    with one_at_a_time(len(level.matrix[1]) * right.shape[1]):
-        smooth(level.matrix, level.inverse, right, x, backward)
-    return x
+def _transposed(matrix: Sparse, columns: int) -> Sparse:
+    return _rearranged(matrix, lambda each: each.T.tocsr(), columns)
 
 
-def times(matrix: Sparse, x: FloatArray) -> FloatArray:
-    """Return the product of a sparse matrix (m, k) with x (k, d)."""
-    out = np.empty((len(matrix[0]) - 1, x.shape[1]))
-    with one_at_a_time(len(matrix[1]) * x.shape[1]):
-        multiply(matrix, x, out)
-    return out
+def _sorted(matrix: Sparse) -> Sparse:
+    return _rearranged(matrix, lambda each: each.sorted_indices(), len(matrix[0]) - 1)
+
+
+def _product(one: Sparse, two: Sparse, columns: int) -> Sparse:
+    """Return the product of two matrices for each group; ``two`` has ``columns`` columns."""
+    indptr = np.zeros(len(one[0]), np.int32)
+    nothing = np.empty(0, np.int32), np.empty((0, two[2].shape[1]))
+    with one_at_a_time(len(one[1]) * 10):
+        add_rows(one, two, columns, indptr, *nothing)
+        np.cumsum(indptr, out=indptr)
+        indices, data = np.empty(indptr[-1], np.int32), np.empty((indptr[-1], two[2].shape[1]))
+        add_rows(one, two, columns, indptr, indices, data)
+    return indptr, indices, data
+
+
+def laplacian(body: Corotated, place: IntArray, count: int) -> Sparse:
+    """Return the matrix (count, count) of the Laplacian; ``place`` as of `LaplacianCycle.of`.
+
+    Each row has its diagonal, which is less the sum of the others and of those of known nodes:
+    entries are rounded to single precision, but constants still have no energy.
+    """
+    sizes = np.array([part.nodes.shape for part in body.parts], np.int64).reshape(-1, 2)
+    entries = np.empty(int((sizes[:, 0] * sizes[:, 1] ** 2).sum()), np.float32)
+    first = 0
+    for part, modulus in zip(body.parts, body.moduli, strict=True):
+        m, a = part.nodes.shape
+        mine = entries[first : first + m * a * a].reshape(m, a, a)
+        first += m * a * a
+        in_parts(partial(_gradients_part, sealed(body.points), part, modulus, mine), m)
+    corners = np.concatenate([place[part.nodes].ravel() for part in body.parts]).astype(np.int32)
+    starts = np.zeros(count + 2, np.int64)
+    np.cumsum(np.bincount(corners + 1, minlength=count + 1), out=starts[1:])
+    order = np.empty(len(corners), np.int32 if len(corners) < 2**31 else np.int64)
+    invert(corners + 1, starts[:-1].copy(), order)
+    graph = starts[1:], order, corners, sizes
+    indptr = np.zeros(count + 1, np.int32)
+    with one_at_a_time(len(corners) * 10):
+        assemble(graph, entries, indptr, np.empty(0, np.int32), np.empty((0, 1)))
+        np.cumsum(indptr, out=indptr)
+        indices, data = np.empty(indptr[-1], np.int32), np.empty((indptr[-1], 1))
+        assemble(graph, entries, indptr, indices, data)
+    return indptr, indices, data
+
+
+def _gradients_part(
+    points: FloatArray, part: ShapeBlock, modulus: FloatArray, out: np.ndarray, s: slice
+) -> None:
+    shape = part.shape
+    elements = sealed(points), sealed(part.nodes[s]), shape.gradients, shape.weights
+    gradients(elements, modulus[s], out[s])
+    out[s][~np.isfinite(out[s])] = 0.0  # parts of cells without volume do not spoil the others
+
+
+def _level(matrix: Sparse, free: np.ndarray, up: Sparse, down: Sparse) -> LaplacianLevel:
+    middle, inverse = np.empty(len(free), np.int32), np.empty(free.shape)
+    diagonals(matrix, free, middle, inverse)
+    return LaplacianLevel(_single(matrix), middle, inverse, _single(up), _single(down))
+
+
+def _single(matrix: Sparse) -> Sparse:
+    return matrix[0], matrix[1], matrix[2].astype(np.float32)
 
 
 @njit(**OPTIONS)
@@ -227,47 +278,218 @@ def gradients(elements, modulus, out):  # type: ignore[no-untyped-def]
     points, nodes, _, weights = elements
     n, d = nodes.shape[1], points.shape[1]
     inverse, x, slopes = np.empty((3, 3)), np.empty((n, d)), np.empty((n, d))
-    out[:] = 0.0
+    total = np.empty((n, n))
     for e in range(len(nodes)):
+        total[:] = 0.0
         for q in range(len(weights)):
             size = modulus[e] * _at(elements, e, q, x, inverse, slopes)
             for a in range(n):
-                for b in range(n):
-                    total = 0.0
+                for b in range(a):
+                    one = 0.0
                     for i in range(d):
-                        total += slopes[a, i] * slopes[b, i]
-                    out[e, a, b] += size * total
+                        one += slopes[a, i] * slopes[b, i]
+                    total[a, b] += size * one
+        for a in range(n):
+            out[e, a, a] = 0.0
+            for b in range(a):
+                out[e, a, b] = out[e, b, a] = total[a, b]
 
 
-@njit(parallel=True, nogil=True, cache=True)
-def multiply(matrix, x, out):  # type: ignore[no-untyped-def]
-    """Write the product of a sparse matrix with x (k, d) to out (m, d); sums keep their order."""
+@njit(**PARALLEL)
+def assemble(graph, entries, indptr, indices, data):  # type: ignore[no-untyped-def]
+    """Write the rows of the Laplacian, sorted; where ``indices`` is empty, count their entries.
+
+    The number of a row's entries goes to indptr[row + 1]. ``graph``: the corners of each unknown
+    (indptr, order), the unknown of each corner, and the shape (p, 2) of the parts' nodes;
+    ``entries``: the matrices of the elements, in order.
+    """
+    starts, order, corners, sizes = graph
+    rows = len(indptr) - 1
+    chunk = max(PART, rows // CHUNKS + 1)
+    for part in prange((rows + chunk - 1) // chunk):
+        place = np.full(rows, -1)
+        stop = np.int64(indptr[part * chunk]) if len(indices) else np.int64(0)
+        for row in range(part * chunk, min(rows, (part + 1) * chunk)):
+            base, diagonal = stop, 0.0
+            place[row], stop = base, stop + 1
+            if len(indices):
+                indices[base] = row
+            for k in range(starts[row], starts[row + 1]):
+                corner, first, ahead, p = np.int64(order[k]), np.int64(0), np.int64(0), 0
+                while corner - first >= sizes[p, 0] * sizes[p, 1]:
+                    first += sizes[p, 0] * sizes[p, 1]
+                    ahead += sizes[p, 0] * sizes[p, 1] * sizes[p, 1]
+                    p += 1
+                a = sizes[p, 1]
+                ahead += (corner - first) * a
+                first = corner - (corner - first) % a
+                for b in range(a):
+                    column, entry = corners[first + b], np.float64(entries[ahead + b])
+                    if column == row:
+                        continue  # itself, or an image of it in the same element
+                    diagonal -= entry
+                    if column < 0:
+                        continue
+                    if place[column] < base:
+                        place[column], stop = stop, stop + 1
+                        if len(indices):
+                            indices[place[column]], data[place[column], 0] = column, 0.0
+                    if len(indices):
+                        data[place[column], 0] += entry
+            if len(indices) == 0:
+                indptr[row + 1] = stop - base
+                continue
+            data[base, 0] = diagonal
+            for k in range(base + 1, stop):
+                column, entry, at = indices[k], data[k, 0], k
+                while at > base and indices[at - 1] > column:
+                    indices[at], data[at, 0] = indices[at - 1], data[at - 1, 0]
+                    at -= 1
+                indices[at], data[at, 0] = column, entry
+
+
+@njit(**PARALLEL)
+def add_rows(one, two, columns, indptr, indices, data):  # type: ignore[no-untyped-def]
+    """Write the product of two sparse matrices; where ``indices`` is empty, count its entries.
+
+    As `assemble` does. ``two`` has ``columns`` columns; ``one`` may have one number for all groups.
+    """
+    rows, top, width = len(indptr) - 1, one[2].shape[1] - 1, two[2].shape[1]
+    chunk = max(PART, rows // CHUNKS + 1)
+    for part in prange((rows + chunk - 1) // chunk):
+        place = np.full(columns, -1)
+        stop = np.int64(indptr[part * chunk]) if len(indices) else np.int64(0)
+        for row in range(part * chunk, min(rows, (part + 1) * chunk)):
+            base = stop
+            for k in range(one[0][row], one[0][row + 1]):
+                j = one[1][k]
+                for m in range(two[0][j], two[0][j + 1]):
+                    column = two[1][m]
+                    if place[column] < base:
+                        place[column] = stop
+                        if len(indices):
+                            indices[stop] = column
+                            data[stop] = 0.0
+                        stop += 1
+                    if len(indices):
+                        for g in range(width):
+                            data[place[column], g] += one[2][k, min(g, top)] * two[2][m, g]
+            if len(indices) == 0:
+                indptr[row + 1] = stop - base
+
+
+@njit(**OPTIONS)
+def absolute_sums(matrix, free, out):  # type: ignore[no-untyped-def]
+    """Write the sums of absolute values of a matrix in columns that are free to out (k, w)."""
     indptr, indices, data = matrix
-    d = x.shape[1]
-    for row in prange(len(out)):
-        for i in range(d):
-            out[row, i] = 0.0
+    for row in range(len(out)):
+        for g in range(out.shape[1]):
+            out[row, g] = 0.0
+            for k in range(indptr[row], indptr[row + 1]):
+                if free[indices[k], g]:
+                    out[row, g] += abs(data[k, min(g, data.shape[1] - 1)])
+
+
+@njit(**OPTIONS)
+def diagonals(matrix, free, middle, inverse):  # type: ignore[no-untyped-def]
+    """Write ``middle`` and ``inverse`` of a `LaplacianLevel`; ``free`` (k, w): what is not held."""
+    indptr, indices, data = matrix
+    for row in range(len(middle)):
+        middle[row] = indptr[row]
+        inverse[row] = 0.0
         for k in range(indptr[row], indptr[row + 1]):
-            for i in range(d):
-                out[row, i] += data[k] * x[indices[k], i]
+            middle[row] += indices[k] < row
+            if indices[k] == row or indices[k] // PART != row // PART:
+                for g in range(free.shape[1]):
+                    inverse[row, g] += abs(data[k, min(g, data.shape[1] - 1)])
+        for g in range(free.shape[1]):
+            used = free[row, g] and inverse[row, g] > 0.0
+            inverse[row, g] = 1.0 / inverse[row, g] if used else 0.0
 
 
-@njit(parallel=True, nogil=True, cache=True)
-def smooth(matrix, inverse, right, x, backward):  # type: ignore[no-untyped-def]
-    """Write what one Gauss-Seidel sweep from zero makes of ``right`` (k, d) to x (k, d)."""
+@njit(**PARALLEL)
+def forward(matrix, middle, inverse, group, right, x, left):  # type: ignore[no-untyped-def]
+    """Write what a Gauss-Seidel sweep from zero makes of ``right`` (k, 3) to x (k, 3).
+
+    And to ``left`` (k, 3) what it subtracted from.
+    """
     indptr, indices, data = matrix
-    rows, d = x.shape
+    rows, top = len(x), data.shape[1] - 1
+    g0, g1, g2 = group
+    d0, d1, d2 = min(g0, top), min(g1, top), min(g2, top)
+    for part in prange((rows + PART - 1) // PART):
+        first = part * PART
+        for row in range(first, min(rows, first + PART)):
+            s0, s1, s2 = right[row, 0], right[row, 1], right[row, 2]
+            for k in range(indptr[row], middle[row]):
+                j = indices[k]
+                if j >= first:
+                    s0 -= data[k, d0] * x[j, 0]
+                    s1 -= data[k, d1] * x[j, 1]
+                    s2 -= data[k, d2] * x[j, 2]
+            left[row, 0], left[row, 1], left[row, 2] = s0, s1, s2
+            x[row, 0], x[row, 1] = s0 * inverse[row, g0], s1 * inverse[row, g1]
+            x[row, 2] = s2 * inverse[row, g2]
+
+
+@njit(**PARALLEL)
+def residual(matrix, middle, group, x, left):  # type: ignore[no-untyped-def]
+    """Subtract from ``left`` (k, 3), as `forward` left it, what it did not yet."""
+    indptr, indices, data = matrix
+    rows, top = len(x), data.shape[1] - 1
+    g0, g1, g2 = group
+    d0, d1, d2 = min(g0, top), min(g1, top), min(g2, top)
+    for part in prange((rows + PART - 1) // PART):
+        first = part * PART
+        for row in range(first, min(rows, first + PART)):
+            s0, s1, s2 = left[row, 0], left[row, 1], left[row, 2]
+            for k in range(indptr[row], indptr[row + 1]):
+                j = indices[k]
+                if j < first or k >= middle[row]:
+                    s0 -= data[k, d0] * x[j, 0]
+                    s1 -= data[k, d1] * x[j, 1]
+                    s2 -= data[k, d2] * x[j, 2]
+            left[row, 0], left[row, 1], left[row, 2] = s0, s1, s2
+
+
+@njit(**PARALLEL)
+def backward(matrix, inverse, group, right, x, out):  # type: ignore[no-untyped-def]
+    """Write what a backward sweep makes of x (k, 3) to out (k, 3): the transpose of `forward`."""
+    indptr, indices, data = matrix
+    rows, top = len(x), data.shape[1] - 1
+    g0, g1, g2 = group
+    d0, d1, d2 = min(g0, top), min(g1, top), min(g2, top)
     for part in prange((rows + PART - 1) // PART):
         first, last = part * PART, min(rows, (part + 1) * PART)
-        for step in range(last - first):
-            row = last - 1 - step if backward else first + step
-            low, high = (row + 1, last) if backward else (first, row)
-            for i in range(d):
-                x[row, i] = right[row, i]
+        for row in range(last - 1, first - 1, -1):
+            s0, s1, s2 = right[row, 0], right[row, 1], right[row, 2]
             for k in range(indptr[row], indptr[row + 1]):
-                column = indices[k]
-                if low <= column < high:
-                    for i in range(d):
-                        x[row, i] -= data[k] * x[column, i]
-            for i in range(d):
-                x[row, i] *= inverse[row]
+                j = indices[k]
+                if row < j < last:
+                    s0 -= data[k, d0] * out[j, 0]
+                    s1 -= data[k, d1] * out[j, 1]
+                    s2 -= data[k, d2] * out[j, 2]
+                else:
+                    s0 -= data[k, d0] * x[j, 0]
+                    s1 -= data[k, d1] * x[j, 1]
+                    s2 -= data[k, d2] * x[j, 2]
+            out[row, 0] = x[row, 0] + s0 * inverse[row, g0]
+            out[row, 1] = x[row, 1] + s1 * inverse[row, g1]
+            out[row, 2] = x[row, 2] + s2 * inverse[row, g2]
+
+
+@njit(**PARALLEL)
+def add_product(matrix, group, x, out):  # type: ignore[no-untyped-def]
+    """Add the product of a sparse matrix with x (k, 3) to out (m, 3); sums keep their order."""
+    indptr, indices, data = matrix
+    top = data.shape[1] - 1
+    g0, g1, g2 = group
+    d0, d1, d2 = min(g0, top), min(g1, top), min(g2, top)
+    for row in prange(len(out)):
+        s0, s1, s2 = out[row, 0], out[row, 1], out[row, 2]
+        for k in range(indptr[row], indptr[row + 1]):
+            j = indices[k]
+            s0 += data[k, d0] * x[j, 0]
+            s1 += data[k, d1] * x[j, 1]
+            s2 += data[k, d2] * x[j, 2]
+        out[row, 0], out[row, 1], out[row, 2] = s0, s1, s2

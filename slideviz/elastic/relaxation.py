@@ -166,7 +166,7 @@ class Relaxation:
         held = _held(axes @ free @ np.swapaxes(axes, -1, -2))
         made_for = place, held
         if kept.made_for is None or not all(map(np.array_equal, kept.made_for, made_for)):
-            make = partial(LaplacianCycle.of, x, kept.forces.parts, place, held, axes)
+            make = partial(LaplacianCycle.of, kept.forces, place, held, axes)
             kept.cycle, kept.made_for = while_ticking(make, tick), made_for
         return kept
 

@@ -8,11 +8,13 @@ from dataclasses import replace
 import numba
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.elastic import relaxation
-from slideviz.elastic.laplacian import LaplacianCycle, laplacian
+from slideviz.elastic.corotated import Corotated
+from slideviz.elastic.laplacian import PART, LaplacianCycle, laplacian
 from slideviz.elastic.stiffness import blocks
 from slideviz.errors import DeformError
 from slideviz.session.opening import guess_case, guess_roles
@@ -159,21 +161,50 @@ def test_the_bits_do_not_depend_on_threads_nor_on_what_was_kept(monkeypatch):
 
 def test_the_preconditioner_is_symmetric_positive_and_holds_components():
     mesh = builders.grid((20, 20))
-    parts, place = blocks(mesh.cells), np.arange(len(mesh.points))
+    body, place = Corotated.of(mesh.points, blocks(mesh.cells)), np.arange(len(mesh.points))
     place[mesh.marker("x_m").nodes] = -1
     place[place >= 0] = np.arange((place >= 0).sum())
     count = int(place.max()) + 1
     held = np.zeros((count, 2), bool)
     held[::7, 1] = True
-    cycle = LaplacianCycle.of(mesh.points, parts, place, held, np.eye(2))
+    cycle = LaplacianCycle.of(body, place, held, np.eye(2))
     each = [cycle(e.reshape(count, 2)).ravel() for e in np.eye(2 * count)]
     np.testing.assert_allclose(each, np.transpose(each), atol=1e-12 * np.abs(each).max())
     assert np.linalg.eigvalsh(each).min() > -1e-12
     assert np.abs(np.array(each)[:, held.ravel()]).max() < 1e-20
-    matrix = laplacian(mesh.points, parts, place, count).toarray()
+    indptr, indices, data = laplacian(body, place, count)
+    matrix = csr_array((data[:, 0], indices, indptr), shape=(count, count)).toarray()
     products = np.array(each).reshape(count, 2, count, 2)[:, 0, :, 0] @ matrix
     assert np.linalg.eigvals(products).real.min() > 0.3
     assert np.linalg.eigvals(products).real.max() < 1.5
+
+
+def test_the_cycle_in_several_parts_is_symmetric_with_the_same_bits_for_any_threads(monkeypatch):
+    monkeypatch.setattr("slideviz.rbf.compiled.SMALL", 0)
+    body = Corotated.of((mesh := builders.grid((100, 100))).points, blocks(mesh.cells))
+    place = np.arange(len(mesh.points))
+    held = np.zeros((len(place), 2), bool)
+    held[mesh.marker("x_m").nodes], held[mesh.marker("y_m").nodes, 1] = True, True
+    rng = np.random.default_rng(0)
+    u, v = np.where(held, 0.0, rng.standard_normal((2, *held.shape)))
+    cycle = LaplacianCycle.of(body, place, held, np.eye(2))
+    assert len(cycle.levels) > 1
+    assert len(cycle.levels[0].middle) > 2 * PART
+    left, right = np.vdot(u, cycle(v)), np.vdot(cycle(u), v)
+    assert abs(left - right) < 1e-12 * np.linalg.norm(u) * np.linalg.norm(cycle(v))
+    indptr, indices, data = laplacian(body, place, len(place))
+    matrix = csr_array((data[:, 0], indices, indptr))
+    np.testing.assert_allclose(matrix.sum(axis=1), 0.0, atol=1e-14)
+    for _ in range(4):  # the error of a few cycles alone
+        left, u = np.vdot(u, matrix @ u), np.where(held, 0.0, u - cycle(matrix @ u))
+        assert np.vdot(u, matrix @ u) < 0.35 * left
+    threads = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        alone = LaplacianCycle.of(body, place, held, np.eye(2))(v)
+    finally:
+        numba.set_num_threads(threads)
+    np.testing.assert_array_equal(cycle(v), alone)
 
 
 def test_the_safeguard_keeps_the_worst_cells(monkeypatch):
