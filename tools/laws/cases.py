@@ -119,6 +119,8 @@ def _radial(rng: Rng) -> dict[str, Any]:
         out["influence_factor"] = float(np.exp(rng.uniform(np.log(0.3), np.log(high))))
     elif not KERNELS[kernel].compact:
         out["influence_factor"] = 0.5
+    if rng.spawn(1)[0].random() < 0.25 and not KERNELS[kernel].polynomial:
+        out["polynomial"] = "yes"
     return out
 
 

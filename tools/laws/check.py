@@ -19,6 +19,7 @@ PLAIN = (
     "reduction",
     "steps",
     "kernel",
+    "polynomial",
     "influence_factor",
     "curved",
     "layers",

@@ -11,6 +11,7 @@ import signal
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from types import FrameType
 
 import numpy as np
@@ -19,11 +20,15 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from slideviz.case.model import Case, Translate
+from slideviz.mesh.jacobians import INVERTED, VALID
 from slideviz.mesh.model import Mesh
+from slideviz.mesh.orientation import reference_of
+from slideviz.mesh.quality import quality
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.reduction import GAMMA
 from slideviz.solver.deform import deform
 from slideviz.solver.steps import Step
+from tests.oracles.gmsh_jacobians import smallest_jacobians
 from tools.laws.cases import Run
 from tools.laws.meshes import images, renumbered
 from tools.laws.oracle import Frame, carried, goals, nodes_with
@@ -71,6 +76,9 @@ SAME = {"rbf": 1e-9, "idw": 1e-9, "elastic": 1e-7}
 where it was not solved so far, the run says it and nothing is asked."""
 
 # The like of `slideviz.solver.growth`, written again so that each checks the other.
+TINY = 1e-13
+"""Jacobian determinants are rounding below this part of the extent, squared or cubed."""
+
 GROWTH = 5.0
 """Times what the motion of boundaries carries over the mesh."""
 
@@ -188,6 +196,8 @@ def out_of_reach_keep_every_bit(run: Run, steps: list[Step]) -> Iterator[str]:
     case, mesh, radius = run.case, run.mesh, steps[-1].support_radius
     if radius is None or run.period is not None or not KERNELS[case.kernel].compact:
         return
+    if case.polynomial == "yes":
+        return
     gamma = GAMMA if case.reduction is None else case.reduction.gamma
     way = np.abs([step.mesh.points - mesh.points for step in steps]).max(axis=0)
     reach = max(radius, gamma * max(step.max_error for step in steps), case.layer_thickness)
@@ -232,6 +242,20 @@ def rest_changes_no_bit(run: Run, _steps: list[Step]) -> Iterator[str]:
         yield "a motion of zero moves nodes"
 
 
+def validity_is_that_of_gmsh(run: Run, steps: list[Step]) -> Iterator[str]:
+    """Yield a cell that is valid for us and not for Gmsh, or inverted; nothing where it is not."""
+    try:
+        gmsh = import_module("gmsh")
+    except (ImportError, OSError):
+        return
+    last, signs = steps[-1].mesh, reference_of(run.mesh)[1]
+    status, smallest = quality(last, run.mesh).status, signs * smallest_jacobians(gmsh, last)
+    tiny = TINY * last.extent**last.dim
+    wrong = ((status == VALID) & (smallest < -tiny)) | ((status == INVERTED) & (smallest > tiny))
+    for cell in np.flatnonzero(wrong)[:1]:
+        yield f"cell {cell} has status {status[cell]}, and Gmsh's Jacobian {smallest[cell]:.3g}"
+
+
 def numbers_make_sense(run: Run, steps: list[Step]) -> Iterator[str]:
     """Yield what a step says of itself that is not finite, or does not add up."""
     for step in steps:
@@ -260,6 +284,7 @@ LAWS: dict[str, Callable[[Run, list[Step]], Iterator[str]]] = {
     "sliding": sliding_stay_on_surface,
     "growth": growth_is_bounded,
     "reach": out_of_reach_keep_every_bit,
+    "gmsh": validity_is_that_of_gmsh,
     "numbers": numbers_make_sense,
     "renumbered": numbering_does_not_matter,
     "bits": same_run_same_bits,
