@@ -45,7 +45,9 @@ if TYPE_CHECKING:
     from slideviz.scene.overview import Detail
     from slideviz.sections.model import Section
     from slideviz.solver.deform import Step, deform
+    from slideviz.solver.repair import repair
     from slideviz.solver.safe_fraction import safe_fraction
+    from slideviz.solver.steps import MeshRepair
     from slideviz.study.combinations import Combination, compare
 
 _NAMES = {
@@ -69,7 +71,9 @@ _NAMES = {
     "scene.overview": "Detail",
     "sections.model": "Section",
     "solver.deform": "Step deform",
+    "solver.repair": "repair",
     "solver.safe_fraction": "safe_fraction",
+    "solver.steps": "MeshRepair",
     "study.combinations": "Combination compare",
 }  # the public names of each module
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
@@ -77,11 +81,11 @@ _HOME = {name: module for module, names in _NAMES.items() for name in names.spli
 __all__ = [
     "Bump", "Case", "Cells", "Combination", "ConditionWarning", "Constraint", "Cst", "Deformer",
     "Detail", "Ffd", "FfdCamber", "FfdThickness", "FfdTwist", "FromFile", "HicksHenne", "Marker",
-    "Mesh", "MetricValues", "Prescribed", "Quality", "QualityDerivative", "Radial", "Reduction",
-    "Rotate", "SafeFraction", "Scale", "Section", "SectionStyle", "SlidevizError", "Step",
-    "ToleranceWarning", "Translate", "Walls", "WheelQuality", "__version__", "compare", "convert",
-    "deform", "film", "metrics", "picture", "quality", "read", "safe_fraction", "section", "sweep",
-    "walls", "wheel", "write",
+    "Mesh", "MeshRepair", "MetricValues", "Prescribed", "Quality", "QualityDerivative", "Radial",
+    "Reduction", "Rotate", "SafeFraction", "Scale", "Section", "SectionStyle", "SlidevizError",
+    "Step", "ToleranceWarning", "Translate", "Walls", "WheelQuality", "__version__", "compare",
+    "convert", "deform", "film", "metrics", "picture", "quality", "read", "repair", "safe_fraction",
+    "section", "sweep", "walls", "wheel", "write",
 ]  # fmt: skip
 
 

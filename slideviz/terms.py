@@ -272,6 +272,21 @@ RELAXES: dict[Relax, Term] = {
 }
 """Whether the mesh is relaxed after the last step."""
 
+Repair = Literal["auto", "no", "yes"]
+REPAIRS: dict[Repair, Term] = {
+    "auto": Term("automatic", "Mended where cells are bad, unless the mesh stays in its file."),
+    "no": Term("off", "Cells stay as the method leaves them."),
+    "yes": Term("on", "Mended where cells are bad."),
+}
+"""Whether inverted and poor cells are mended."""
+
+RepairTarget = Literal["reference", "ideal"]
+REPAIR_TARGETS: dict[RepairTarget, Term] = {
+    "reference": Term("undeformed shapes"),
+    "ideal": Term("ideal shapes in the local size"),
+}
+"""The shapes that mended cells shall have."""
+
 Layers = Literal["auto", "no", "keep"]
 LAYERS: dict[Layers, Term] = {
     "auto": Term("automatic", "Walls with boundary layers carry these along; other walls do not."),

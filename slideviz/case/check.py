@@ -39,7 +39,7 @@ _LISTED = 12
 def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return why this mesh cannot be deformed as the case asks; displacement files are not read."""
     return (
-        *_value_problems(case),
+        *key_problems(case),
         *_radius_problems(case, mesh),
         *(sentence for _, sentence in contradictions(case)),
         *marker_problems(case, mesh),
@@ -184,7 +184,7 @@ def _prescribed_problems(case: Case, mesh: Mesh, motion: Prescribed) -> Iterator
         yield f"node {stray[0]}{more} is on none of the markers that it moves; remove it"
 
 
-def _value_problems(case: Case) -> Iterator[str]:
+def key_problems(case: Case) -> Iterator[str]:
     """Yield a sentence for each value out of range: a case made by a program may have such."""
     for key in KEYS.values():
         value = key.get(case)

@@ -22,6 +22,7 @@ from slideviz.terms import (
     METHODS,
     POLYNOMIALS,
     RELAXES,
+    REPAIRS,
     SELECTIONS,
     SLIDING,
     DataReduction,
@@ -45,6 +46,11 @@ def why_no_levels(case: Case) -> str:
     """Return why settings of levels have no effect in a case; "" where they have one."""
     levels = case.reduction is not None and case.reduction.multilevel
     return why_no_reduction(case) or ("" if levels else "there are no levels")
+
+
+def _why_no_repair(case: Case) -> str:
+    """Return why settings of repair have no effect in a case; "" where they have one."""
+    return "repair is off" if case.repair == "no" else ""
 
 
 def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Key:
@@ -411,6 +417,46 @@ METHOD_ROWS = (
         run_label="to {}",
         idle_reason=lambda case: "layers are off" if case.layers == "no" else "",
         method="rbf",
+    ),
+    setting(
+        "REPAIR",
+        METHOD,
+        one_of(REPAIRS),
+        "repair",
+        "Mend cells that are inverted, not proved valid, or of a quality below REPAIR_BELOW (and "
+        "lower than before): nodes near them move, never those of moving and fixed boundaries. "
+        "The mesh is never worse after it. AUTO does the same, but not to meshes that are "
+        "streamed.",
+        label="Repair",
+        form="main",
+        tip="Whether inverted and poor cells are then mended, by moving the nodes near them: never "
+        "those of moving and fixed boundaries.",
+        run_label="repair {}",
+    ),
+    setting(
+        "REPAIR_BELOW",
+        METHOD,
+        real(0.0, 1.0),
+        "repair_below",
+        "The quality below which REPAIR mends valid cells, too.",
+        label="Repair below",
+        form="more",
+        tip="The quality below which valid cells are mended, too.",
+        run_label="repair below {}",
+        idle_reason=_why_no_repair,
+    ),
+    setting(
+        "REPAIR_STEPS",
+        METHOD,
+        YES_NO,
+        "repair_steps",
+        "Whether REPAIR acts after each step (YES), or after the last one (NO).",
+        label="Repair each step",
+        form="more",
+        tip="Whether cells are mended after each step, so that the next one starts from a better "
+        "mesh, or only after the last.",
+        run_label="repair of each step",
+        idle_reason=_why_no_repair,
     ),
     setting(
         "IDW_POWER",

@@ -26,6 +26,7 @@ from slideviz.terms import (
     PERIODIC_TYPES,
     POLYNOMIALS,
     RELAXES,
+    REPAIRS,
     ROLES,
     SIDES,
     SKEW_METRICS,
@@ -39,6 +40,7 @@ from slideviz.terms import (
     PeriodicType,
     Polynomial,
     Relax,
+    Repair,
     Role,
     Side,
     SkewMetric,
@@ -252,7 +254,7 @@ def applies_to(motion: Motion, marker: str) -> bool:
     return not motion.marker or marker in named(motion.marker)
 
 
-NEW: dict[str, Any] = {"relax": "auto", "layers": "auto"}
+NEW: dict[str, Any] = {"relax": "auto", "layers": "auto", "repair": "auto"}
 """Settings of new cases where those of a file without their keys are others, for its results."""
 
 
@@ -274,6 +276,8 @@ class Case(CheckedFields):
       to the motion. ``support_radius``, if not None, is used instead: a length.
     * ``reduction``: None: all boundary nodes are control nodes, however many.
     * ``layer_thickness``: how far from walls ``layers`` acts: a length; 0, or "auto", finds it.
+    * ``repair``: whether cells that are inverted, or whose quality is below ``repair_below``, are
+      mended: after each step if ``repair_steps``, else after the last.
     * ``idw_power``: None: the number of dimensions.
     * ``limits``: what the deformed mesh must meet; changes no mesh.
     * ``view``: how the window showed the case, by key; changes no result.
@@ -330,6 +334,9 @@ class Case(CheckedFields):
     relax: Relax = field(default="no", metadata=RELAXES)
     layers: Layers = field(default="no", metadata=LAYERS)
     layer_thickness: Annotated[float, 'a length, or "auto"'] = 0.0
+    repair: Repair = field(default="no", metadata=REPAIRS)
+    repair_below: float = 0.1
+    repair_steps: bool = False
     idw_power: float | None = None
     idw_fixed_weight: float = 1.0
     quality_metric: SkewMetric = field(default="knupp", metadata=SKEW_METRICS)

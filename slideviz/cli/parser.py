@@ -36,6 +36,7 @@ COMMANDS = {
     "run": "run_command",
     "info": "info_command",
     "quality": "quality_command",
+    "repair": "repair_command",
     "film": "film_command",
     "section": "section_command",
     "compare": "compare_command",

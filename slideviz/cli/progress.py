@@ -22,6 +22,7 @@ _PHASES = {
     "project": "sliding",
     "relax": "relaxing cells",
     "layers": "keeping layers",
+    "repair": "mending cells",
     "read": "reading",
     "write": "writing the mesh",
     "quality": "measuring cells",

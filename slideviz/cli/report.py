@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import zip_longest
 from math import isfinite
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from slideviz.case.limits import LimitResult, check_case_limits
 from slideviz.case.method_keys import automatic_radius, get_reduction
@@ -23,7 +25,7 @@ from slideviz.mesh.quality import Quality
 from slideviz.mesh.walls import Walls, wall_words
 from slideviz.rbf.problem import Relaxed
 from slideviz.solver.deform import Step, folded_at
-from slideviz.solver.steps import safe_fraction_of
+from slideviz.solver.steps import MeshRepair, safe_fraction_of
 from slideviz.streaming.quality import CellCounts
 from slideviz.system.atomic import atomic_write
 from slideviz.terms import Metric, field_of
@@ -34,7 +36,7 @@ WORST = 10  # cells of lowest quality listed in a report
 
 PHASES = (
     *("read", "classify", "select", "solve", "evaluate", "project", "correct"),
-    *("layers", "relax"),
+    *("layers", "relax", "repair"),
     *("quality", "write"),
 )
 TRIAL_KEYS = ("planned", "steps", "min", "mean", "inverted")
@@ -108,6 +110,7 @@ def run_report(
             default=None,
         ),
         "relax": None if (relaxed := _relaxed(steps)) is None else asdict(relaxed),
+        "repair": None if (mended := _repaired(steps)) is None else mended.report(),
         "layers": None if last.kept_layers is None else last.kept_layers.report(),
         "seconds": {name: round(value, 6) for name, value in spent.items()},
         "node_counts": dict(last.node_counts),
@@ -194,6 +197,19 @@ def _relaxed(steps: Sequence[Step]) -> Relaxed | None:
         max(one.residual for one in each),
         min(one.theta for one in each),
         max(one.limited for one in each),
+    )
+
+
+def _repaired(steps: Sequence[Step]) -> MeshRepair | None:
+    """Return the repair of the last step, with all cells and nodes of the steps before, too."""
+    each = [step.repaired for step in steps if step.repaired is not None]
+    if len(each) < 2:
+        return each[0] if each else None
+    return replace(
+        each[-1],
+        cells=np.unique(np.concatenate([one.cells for one in each])),
+        nodes=np.unique(np.concatenate([one.nodes for one in each])),
+        largest_move=max(one.largest_move for one in each),
     )
 
 

@@ -193,6 +193,12 @@ def _print_run(
         if relax["limited"]:
             words += f", held back at {counted(relax['limited'], 'node')}"
         rows.append(("relaxation", words))
+    if (mended := report["repair"]) is not None and mended["cells_before"]:
+        counts = f"{mended['cells_before']} bad cells before, {mended['cells_after']} after"
+        far = f"up to {mended['largest_move']:.3g}"
+        rows.append(("repair", f"{counts}; {counted(mended['nodes_moved'], 'node')} moved, {far}"))
+    elif mended is not None:
+        rows.append(("repair", "no cell needs it"))
     if (layers := report["layers"]) is not None:
         walls = layers["walls"]
         reach = max(wall["thickness"] for wall in walls)
@@ -253,7 +259,8 @@ def advice_for(
             cells = np.array([cell for entry in missed for cell in entry["cells"]], np.int64)
         beside = fixed_beside(case, mesh, cells)
         pitch = beyond_pitch(case, mesh)
-    every = [remedy.keys for remedy in remedies(case, beside, pitch, layers)]
+    folded = found is None or found.inverted > 0
+    every = [remedy.keys for remedy in remedies(case, beside, pitch, layers, folded)]
     if found is not None and not found.inverted and case.method == "rbf":
         walls = any(NUMBERS[entry["name"]].on_boundary for entry in missed)
         keep = ["LAYERS= AUTO"] * (walls and case.layers == "no")

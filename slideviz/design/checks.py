@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.case.model import Case
 from slideviz.case.motion import ROUNDING
 from slideviz.case.words import counted, wrong_by
 from slideviz.design.frozen.solve import REMEDY
@@ -46,6 +47,17 @@ def note_of_refinement(steps: Sequence[FrozenStep]) -> tuple[str, ...]:
             "ConditionWarning names those for which that does not suffice"
         ),
     )
+
+
+def without_repair(case: Case) -> tuple[Case, tuple[str, ...]]:
+    """Return the case without repair, and a note or, where it is asked for, a warning of that."""
+    if case.repair == "no":
+        return case, ()
+    said = (
+        f"REPAIR= {case.repair.upper()} is left out here: where nodes go to mend cells is no "
+        "smooth function of the displacement; points and derivatives are those before the repair"
+    )
+    return case.change(repair="no"), (said if case.repair == "yes" else Note(said),)
 
 
 def warn_of_condition(steps: Sequence[FrozenStep]) -> None:

@@ -20,6 +20,7 @@ from slideviz.design.checks import (
     warn_of_condition,
     warn_of_error_estimate,
     warn_of_errors,
+    without_repair,
 )
 from slideviz.design.choosing import choose_steps
 from slideviz.design.frozen.step import FrozenStep, StepState
@@ -153,6 +154,7 @@ class Deformer:
         ConditionWarning
             The system is so badly conditioned that derivatives, or points too, have few digits.
         """
+        case, left_out = without_repair(case)
         if displacements is not None and not case.motions:
             case = case.change(motions=(Translate("", (0.0,) * mesh.dim),))
         asked = motion.displacements(case, mesh)
@@ -177,7 +179,7 @@ class Deformer:
             )
         self._setup, self._input = setup, known_node_map(mesh, setup, asked)
         self._references = references
-        self.warnings = (*case.warnings, *setup.warnings)
+        self.warnings = (*case.warnings, *left_out, *setup.warnings)
         """About case and mesh, zones that no longer fit at the reference, and systems that are
         solved with twice the digits (a note)."""
         targets = [value(self._input.target(reference)) for reference in references]
@@ -185,7 +187,7 @@ class Deformer:
         self._steps: tuple[FrozenStep, ...]
         self._steps, points = choose_steps(case, mesh, setup, targets, report)
         refined = any(step.refined for step in self._steps)
-        self._as_run = None if refined else points
+        self._as_run = None if refined or left_out else points
         # What is discrete is chosen at the first design, and kept.
         states = self._run(targets[0])
         if setup.relaxation is not None and not targets[0].any():

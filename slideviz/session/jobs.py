@@ -185,6 +185,7 @@ PHASES = {
     "project": "projecting onto the boundaries",
     "relax": "relaxing the cells",
     "layers": "keeping the layers at walls",
+    "repair": "mending the cells",
     "quality": "quality",
 }
 """Words in the window for the phases of a run (``Progress.phase``)."""

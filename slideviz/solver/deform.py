@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -98,8 +99,25 @@ def deform(
         with timer.phase("classify"):
             setup = make_setup(case, mesh)
     require_memory(setup, case)
-    stepping = Stepping(case, mesh, setup, report, timer.seconds, certify=certify)
-    yield from all_steps(stepping)
+    mend = None
+    if case.repair != "no" and mesh.part is None:
+        from slideviz.solver.repair import mended_step  # loads SciPy's sparse matrices
+
+        mend = partial(mended_step, case, mesh, setup, report)
+    stepping = Stepping(case, mesh, setup, report, timer.seconds, certify=certify, mend=mend)
+    for step in all_steps(stepping):
+        ends = mend is not None and step.index == step.total and step.repaired is None
+        yield _mended(stepping, step) if ends else step
+
+
+def _mended(stepping: Stepping, step: Step) -> Step:
+    """Return the last step with its bad cells mended, and checked again."""
+    assert stepping.mend is not None
+    step = stepping.mend(step)
+    assert step.repaired is not None
+    misfit, apart = stepping.misfit(step)
+    warnings = dict.fromkeys((*step.warnings, *step.repaired.warnings, *apart))
+    return replace(step, periodic_misfit=misfit, warnings=tuple(warnings))
 
 
 def all_steps(stepping: Stepping) -> Iterator[Step]:

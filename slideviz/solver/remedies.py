@@ -27,7 +27,11 @@ class Remedy:
 
 
 def remedies(
-    case: Case, beside: Sequence[str] = (), pitch: str = "", layers: float = 0.0
+    case: Case,
+    beside: Sequence[str] = (),
+    pitch: str = "",
+    layers: float = 0.0,
+    folded: bool = True,
 ) -> tuple[Remedy, ...]:
     """Return the remedies that a case has not tried yet, the most promising first.
 
@@ -35,10 +39,13 @@ def remedies(
     ``beside``: fixed boundaries with nodes of inverted cells, from `fixed_beside`.
     ``pitch``: sentence from `beyond_pitch`.
     ``layers``: of the ``Step`` with inverted cells.
+    ``folded``: whether there are inverted cells: repair is a remedy for these.
     """
     found, roles = [], set(case.roles.values())
     if case.method != "rbf":
         found.append(Remedy("METHOD= rbf", "radial basis functions as the method"))
+    if folded and case.repair == "no" and not pitch:
+        found.append(Remedy("REPAIR= YES", "repair, in the menu Run"))
     if layers:
         given = case.reduction or Reduction()
         yes = "DATA_REDUCTION= YES with " if given.auto else ""

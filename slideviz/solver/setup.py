@@ -27,7 +27,13 @@ from slideviz.rbf.projection import Tracks, find_tracks
 from slideviz.rbf.reduction import Reduction
 from slideviz.solver.domain import Domain, find_domain
 from slideviz.solver.layers import layer_zone
-from slideviz.solver.prescribed import fitted_radius, largest_of, prescribe, support_radius
+from slideviz.solver.prescribed import (
+    BoundaryConditions,
+    fitted_radius,
+    largest_of,
+    prescribe,
+    support_radius,
+)
 
 if TYPE_CHECKING:
     from slideviz.baselines.idw import Weights
@@ -229,7 +235,11 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
     """
     require_valid(case, mesh)
     domain = find_domain(case, mesh)
-    conditions = prescribe(case, mesh, domain, moved)
+    return setup_of(case, mesh, domain, prescribe(case, mesh, domain, moved))
+
+
+def setup_of(case: Case, mesh: Mesh, domain: Domain, conditions: BoundaryConditions) -> Setup:
+    """Return the setup of a deformation of a domain for what is prescribed on it."""
     case = case.change(roles=domain.roles)
     candidates = _candidates(domain.classes, conditions.known)
     gap = sliding_gap(mesh.points, domain.boundary.facets, domain.classes)
@@ -247,7 +257,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
         reach=REACH * conditions.largest,
     )
     warnings = *domain.warnings, *conditions.warnings, *loose, *idle_settings(case)
-    warnings += _not_relaxed(case, mesh)
+    warnings += _not_relaxed(case, mesh) + _not_repaired(case, mesh)
     of_domain = {each.name: getattr(domain, each.name) for each in fields(domain)}
     angle = frame.period if frame.cylindrical else 0.0
     return Setup(
@@ -301,6 +311,18 @@ def _not_relaxed(case: Case, mesh: Mesh) -> tuple[str, ...]:
             Note(f"RELAX= AUTO relaxes no mesh of more than {RELAXED_CELLS:,} cells; YES does"),
         )
     return ()
+
+
+def _not_repaired(case: Case, mesh: Mesh) -> tuple[str, ...]:
+    """Return the note that REPAIR= AUTO mends no mesh in its file; CaseError if it is YES."""
+    if case.repair == "no" or mesh.part is None:
+        return ()
+    if case.repair == "yes":
+        raise CaseError(
+            "REPAIR= YES needs the whole mesh in memory, but this run goes from file to file; use "
+            "REPAIR= NO or AUTO, or run it in memory"
+        )
+    return (Note("REPAIR= AUTO mends no mesh that goes from file to file"),)
 
 
 def relaxation_of(case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray) -> Relaxation | None:

@@ -55,6 +55,8 @@ class Stepping:
     step's mesh."""
     certify: bool = False
     """Whether each step says how far it may go (`Step.safe`)."""
+    mend: Callable[[Step], Step] | None = None
+    """Returns a step with its bad cells mended (REPAIR); None: they stay."""
 
     def steps(self, count: int | Sequence[float], halve: bool = False) -> Iterator[Step]:
         """Yield the steps that divide the displacement into ``count`` equal parts.
@@ -88,6 +90,10 @@ class Stepping:
             if not within(points, np.finfo(float).max):
                 raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
             step = self._made(index + 1, total, points, solution, timer, part)
+            if self.mend is not None and self.case.repair_steps:
+                step = self.mend(step)
+                points = step.mesh.points
+                moved = mended_coords(setup, step, moved)
             farthest = farthest_node(setup.coords, moved)
             unsound = unsoundness(setup, mesh, solution, moved, part=part, farthest=farthest.length)
             failure = UnsoundError(f"step {index + 1}: {unsound}") if unsound else None
@@ -116,6 +122,8 @@ class Stepping:
             elif not remarks:
                 remarks = _dropped_warning(setup, solution, index, total, mesh)
             warnings += [f"step {index}: {text}" for text in solution.warnings]
+            if step.repaired is not None:
+                warnings += step.repaired.warnings
             if solution.relaxed is not None and solution.relaxed.limited:
                 warnings.append(_limited_note(solution.relaxed.limited, len(coords), index))
             stray = []
@@ -126,7 +134,7 @@ class Stepping:
             least = max(
                 least, (solution.error_estimate, solution.refined, index, solution.condition)
             )
-            misfit, apart = self._misfit(step)
+            misfit, apart = self.misfit(step)
             yield replace(
                 step,
                 warnings=(
@@ -151,7 +159,7 @@ class Stepping:
             return self.rate(steps)
         return quality(steps[-1].mesh, self.mesh, self.case.quality_metric)
 
-    def _misfit(self, step: Step) -> tuple[float | None, list[str]]:
+    def misfit(self, step: Step) -> tuple[float | None, list[str]]:
         """Return the misfit of periodic images, and a warning where cells are inverted as well.
 
         Inverted cells are what a run then fails by. Raises DeformError where no cell is inverted.
@@ -198,6 +206,15 @@ class Stepping:
             relaxed=solution.relaxed,
             kept_layers=self.setup.zone.summary() if self.setup.zone is not None else None,
         )
+
+
+def mended_coords(setup: Setup, step: Step, moved: FloatArray) -> FloatArray:
+    """Return the coordinates (n, d) of a step after its repair; ``moved`` are those before."""
+    if step.repaired is None or not len(step.repaired.nodes):
+        return moved
+    nodes, now = step.repaired.nodes, moved.copy()
+    now[nodes] = setup.frame.coords(step.mesh.points[nodes])
+    return now
 
 
 def renumbered(steps: list[Step], tried: tuple[Trial, ...]) -> Iterator[Step]:

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from dataclasses import field as made_by
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from slideviz.mesh.margin import SafeFraction, chain
-from slideviz.mesh.model import IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.rbf.field import Field
 from slideviz.rbf.layers import KeptLayers
 from slideviz.rbf.problem import Cycle, Relaxed
@@ -30,8 +30,8 @@ class Progress:
     step: int
     total: int  # `step`, `total`: the number of the current step, from 1, and of all steps
     phase: str
-    """``classify``, ``select``, ``solve``, ``evaluate``, ``project``, ``correct``, ``layers`` or
-    ``relax``; in a streamed run also ``read``, ``quality`` and ``write``."""
+    """``classify``, ``select``, ``solve``, ``evaluate``, ``project``, ``correct``, ``layers``,
+    ``relax`` or ``repair``; in a streamed run also ``read``, ``quality`` and ``write``."""
     fraction: float  # the part of the phase that is done, 0 to 1
     left: float | None = None
     """Estimate of the seconds that the whole run will still take; None where there is none."""
@@ -48,6 +48,47 @@ class Trial:
     min: float
     mean: float  # `min`, `mean`: minimum and mean quality of the result
     inverted: int  # inverted cells of the result
+
+
+@dataclass(frozen=True, eq=False)
+class MeshRepair:
+    """A mesh after repair, and what was mended."""
+
+    mesh: Mesh
+    """The repaired mesh."""
+    cells: IntArray
+    left: IntArray
+    """`cells`, `left` (k,), (l,): the bad cells before and after: those that are not proved valid,
+    or below the limit."""
+    nodes: IntArray
+    """(m,): the nodes that were moved."""
+    points: FloatArray
+    """(m, d): where they were."""
+    largest_move: float
+    """The farthest that one was moved, in the mesh's length unit."""
+    unmendable: tuple[tuple[int, str], ...] = ()
+    """Cells of ``left`` that no motion of the free nodes mends, each with the reason."""
+    warnings: tuple[str, ...] = ()
+    """What the user should know."""
+
+    def report(self) -> dict[str, Any]:
+        """Return what a report has."""
+        return {
+            "cells_before": len(self.cells),
+            "cells_after": len(self.left),
+            "nodes_moved": len(self.nodes),
+            "largest_move": self.largest_move,
+            "unmendable": [{"cell": cell, "reason": why} for cell, why in self.unmendable],
+        }
+
+    def words(self) -> str:
+        """Return what was mended in words: ``303 cells mended by moving 2,968 nodes``."""
+        mended = len(self.cells) - len(self.left)
+        if not len(self.cells):
+            return "no cell needs repair"
+        count = f"{mended:,} of {len(self.cells):,} bad cells mended"
+        nodes = f"{len(self.nodes):,} node{'' if len(self.nodes) == 1 else 's'}"
+        return f"{count}, {nodes} moved by up to {self.largest_move:.3g}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +139,8 @@ class Step:
     runs."""
     relaxed: Relaxed | None = None
     """How the step was relaxed; None where it was not."""
+    repaired: MeshRepair | None = None
+    """The repair after the step; None where there was none."""
     kept_layers: KeptLayers | None = None
     """The walls that carried the nodes near them along (LAYERS); None where none did."""
     safe: SafeFraction | None = None

@@ -1,0 +1,154 @@
+"""``slideviz repair``: mends inverted and poor cells of a mesh, without a motion."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from slideviz.cli.options import add_shared
+from slideviz.cli.terminal import holding, say
+from slideviz.terms import REPAIR_TARGETS, SKEW_METRICS
+
+if TYPE_CHECKING:
+    from slideviz.mesh.quality import Quality
+
+
+def add_repair(calls: argparse._SubParsersAction) -> None:
+    """Add the command ``repair`` to the parser."""
+    call = calls.add_parser("repair", help="mend inverted and poor cells of a mesh")
+    call.add_argument("mesh", type=Path)
+    call.add_argument(
+        "-o", "--output", type=Path, metavar="OUT", required=True, help="repaired mesh to write"
+    )
+    call.add_argument(
+        "--reference", type=Path, metavar="UNDEFORMED", help="undeformed mesh, with the same cells"
+    )
+    for role, what in (
+        ("fixed", "boundaries that stay, as those that are not named"),
+        ("sliding", "boundaries along which nodes may slide"),
+        ("periodic", "pairs of periodic boundaries, which may move alike"),
+    ):
+        call.add_argument(f"--{role}", type=_names, default=(), metavar="A,B", help=what)
+    call.add_argument(
+        "--below",
+        type=float,
+        default=0.1,
+        metavar="Q",
+        help="mend valid cells of a lower quality, too (0.1)",
+    )
+    call.add_argument(
+        "--target",
+        choices=tuple(REPAIR_TARGETS),
+        help="shapes that cells shall have: of the reference (the default, if there is one), or "
+        "the ideal ones",
+    )
+    call.add_argument(
+        "--metric", choices=tuple(SKEW_METRICS), default="knupp", help="of the quality (knupp)"
+    )
+    add_shared(call, "zone")
+    add_shared(call, "json")
+    add_shared(call, "quiet")
+    call.add_argument("--force", action="store_true", help="allow writing over the input mesh")
+    call.set_defaults(command=repair)
+
+
+def _names(text: str) -> tuple[str, ...]:
+    """Return the names of a text, separated by commas."""
+    return tuple(filter(None, (name.strip() for name in text.split(","))))
+
+
+def repair(arguments: argparse.Namespace) -> int:
+    """Mend a mesh, write it, and print or write a report; return the exit code."""
+    with holding() as arguments.begun:
+        return _repair(arguments)
+
+
+def _repair(arguments: argparse.Namespace) -> int:
+    from slideviz import quality, read, write
+    from slideviz import repair as mend
+    from slideviz.cli.output_paths import OutputPath, require_output_paths
+    from slideviz.cli.progress import Bar
+    from slideviz.cli.report import print_remarks, save_json
+    from slideviz.cli.terminal import DONE, INVERTED
+    from slideviz.formats.files import quality_data
+    from slideviz.formats.losses import warning_of_losses
+
+    begin = time.perf_counter()
+    output, path = arguments.output, arguments.mesh
+    replaces = path if arguments.force else None
+    require_output_paths(
+        arguments,
+        OutputPath(
+            output,
+            "-o",
+            is_mesh=True,
+            replaces=replaces,
+            remedy="choose another name, or add --force to write over it",
+        ),
+        OutputPath(arguments.json, "--json"),
+    )
+    mesh = read(path, zone=arguments.zone)
+    reference = None
+    if arguments.reference is not None:
+        reference = read(arguments.reference, zone=arguments.zone)
+    say("warning", warning_of_losses(output, mesh, None))
+    roles = {role: getattr(arguments, role) for role in ("fixed", "sliding", "periodic")}
+    with Bar(not arguments.quiet, begun=arguments.begun) as bar:
+        done = mend(
+            mesh,
+            reference,
+            **roles,
+            below=arguments.below,
+            target=arguments.target,
+            metric=arguments.metric,
+            progress=bar.phase,
+        )
+    before = quality(mesh, reference, arguments.metric)
+    found = quality(done.mesh, reference, arguments.metric)
+    data = quality_data(output, found)
+    write(output, done.mesh, overwrite=arguments.force, cell_data=data, base=mesh)
+    report: dict[str, Any] = {
+        "mesh": str(path),
+        "output": str(output),
+        "reference": str(arguments.reference) if arguments.reference else None,
+        **{role: list(names) for role, names in roles.items()},
+        "below": arguments.below,
+        "target": arguments.target or ("ideal" if reference is None else "reference"),
+        "repair": done.report(),
+        "quality": {
+            **found.summary(),
+            "metric": found.metric,
+            "before": {"min": before.min, "mean": before.mean, "inverted": before.inverted},
+        },
+        "seconds": {"total": round(time.perf_counter() - begin, 6)},
+        "warnings": list(done.warnings),
+    }
+    if not save_json(arguments.json, report) and not arguments.quiet:
+        _print(report, done.words(), found, before)
+    print_remarks(done.warnings, quiet=arguments.quiet)
+    if found.inverted:
+        print(f"slideviz: {_inverted(found)}", file=sys.stderr)
+        return INVERTED
+    return DONE
+
+
+def _print(report: dict[str, Any], words: str, found: Quality, before: Quality) -> None:
+    from slideviz.cli.report import quality_lines
+
+    print(f"{report['mesh']}: {words}")
+    print(quality_lines(found, before).replace("undeformed", "before"))
+    print(f"  {report['seconds']['total']:.2f} s")
+    print(f"mesh: {report['output']}")
+
+
+def _inverted(found: Quality) -> str:
+    """Return a sentence with the number of inverted cells that are left, and remedies."""
+    cells = found.inverted_cells(5)
+    named = ", ".join(map(str, cells)) + " ..." * (found.inverted > len(cells))
+    return (
+        f"{found.inverted} of {found.cells} cells are still inverted ({named}); what may help: "
+        "--sliding for boundaries beside them, or another mesh of the boundary there"
+    )

@@ -1,0 +1,333 @@
+"""Repair as a stage: which nodes may move to mend bad cells, and what became of these.
+
+The nodes that the case moves or fixes stay to the bit, and so do all away from bad cells. Others
+move freely inside the mesh, along the boundary that they slide on, and as their periodic images and
+copies do. Here a boundary with the role internal is one to slide on: its nodes stay on its surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from slideviz.argument_types import check_types
+from slideviz.case.check import key_problems, raise_all, unknown_markers
+from slideviz.case.displacement import Displacements
+from slideviz.case.model import Case
+from slideviz.case.words import counted
+from slideviz.elastic.conditions import conditions
+from slideviz.errors import CaseError
+from slideviz.mesh.cached_boundary import shell_of
+from slideviz.mesh.halo import without_halo
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
+from slideviz.mesh.periodic import find_pairs, pair_up
+from slideviz.mesh.quality import VALID, checked_reference, quality
+from slideviz.mesh.repair.freedom import Freedom
+from slideviz.mesh.repair.repair import Repaired
+from slideviz.mesh.repair.repair import repair as mend_cells
+from slideviz.rbf.problem import PhaseTimer
+from slideviz.solver.domain import find_domain
+from slideviz.solver.prescribed import BoundaryConditions
+from slideviz.solver.setup import Setup, elastic_body, setup_of
+from slideviz.solver.stepping import problem_at
+from slideviz.solver.steps import MeshRepair, Progress, Step
+from slideviz.system.threads import Tick
+from slideviz.terms import RepairTarget, Role, SkewMetric
+
+
+@check_types
+def repair(
+    mesh: Mesh,
+    reference: Mesh | None = None,
+    *,
+    fixed: Sequence[str] = (),
+    sliding: Sequence[str] = (),
+    periodic: Sequence[str] = (),
+    below: float = 0.1,
+    target: RepairTarget | None = None,
+    metric: SkewMetric = "knupp",
+    progress: Callable[[Progress], None] | None = None,
+) -> MeshRepair:
+    """Return a mesh with its inverted and poor cells mended, whoever made it, without a motion.
+
+    Parameters
+    ----------
+    mesh
+        The mesh to mend.
+    reference
+        The undeformed mesh, with the same cells.
+    fixed, sliding, periodic
+        Boundaries whose nodes stay, slide along it, or move as their images (in pairs). Those that
+        are not named stay.
+    below
+        Valid cells are mended, too, if their quality is below this, and below that of all cells of
+        the reference.
+    target
+        The shapes that mended cells shall have: those of the reference, or the ideal ones in the
+        local size. By default those of the reference, if there is one.
+    metric
+        Of the quality.
+    progress
+        Called often with a ``Progress``; an exception it raises ends the work at once.
+
+    Raises
+    ------
+    CaseError
+        The mesh has no such boundary, or one is named twice; ``below`` is not from 0 to 1.
+    MeshError
+        Periodic boundaries do not match, or the reference has other cells.
+
+    Examples
+    --------
+    The node in the middle of four squares is outside of them:
+
+    >>> import slideviz as sv
+    >>> points = [[x, y] for y in (0.0, 1.0, 2.0) for x in (0.0, 1.0, 2.0)]
+    >>> points[4] = [2.5, 1.0]
+    >>> squares = [[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]]
+    >>> mended = sv.repair(sv.Mesh(points, sv.Cells.from_blocks([(9, squares)])))
+    >>> len(mended.cells), len(mended.left)
+    (2, 0)
+    >>> mended.nodes
+    array([4])
+    """
+    case = _case_alone(mesh, fixed, sliding, periodic, below)
+    if target == "reference" and reference is None:
+        raise CaseError("target: 'reference' needs the undeformed mesh; give it, or take 'ideal'")
+    if reference is not None:
+        reference = checked_reference(reference, mesh)
+    report = progress or (lambda _: None)
+    timer = PhaseTimer(lambda phase, part: report(Progress(1, 1, phase, part)))
+    shapes = None if target == "ideal" else reference
+    with timer.phase("repair") as tick:
+        return mend(case.change(quality_metric=metric), mesh, mesh, shapes, tick)
+
+
+def _case_alone(
+    mesh: Mesh,
+    fixed: Sequence[str],
+    sliding: Sequence[str],
+    periodic: Sequence[str],
+    below: float,
+) -> Case:
+    """Return the case of a repair without motion."""
+    lists: dict[Role, Sequence[str]] = {"fixed": fixed, "sliding": sliding, "periodic": periodic}
+    roles: dict[str, Role] = {}
+    for role, names in lists.items():
+        roles |= {name: role for name in names if name not in roles}
+    twice = tuple(
+        f"{name!r} is both {roles[name]} and {role}; name it once"
+        for role, names in lists.items()
+        for name in names
+        if roles[name] != role
+    )
+    raise_all((*twice, *unknown_markers(mesh, roles)))
+    case = Case(roles=roles, repair="yes", repair_below=below)
+    if sliding or periodic:
+        case = case.change(sliding="ps")
+    if periodic:
+        case = case.change(periodic="moving")
+        for pair in find_pairs(mesh):
+            if pair.first in periodic and pair.second in periodic:
+                case = case.change(axis=pair.axis, origin=pair.origin)
+        pair_up(
+            without_halo(mesh)[0], case.markers_with("periodic"), "auto", case.axis, case.origin
+        )
+    raise_all(tuple(text.replace("REPAIR_BELOW", "below") for text in key_problems(case)))
+    return case
+
+
+def mended_step(
+    case: Case, mesh: Mesh, setup: Setup, report: Callable[[Progress], None], step: Step
+) -> Step:
+    """Return a step of a run with its bad cells mended; ``mesh`` is undeformed."""
+    timer = PhaseTimer(lambda phase, part: report(Progress(step.index, step.total, phase, part)))
+    with timer.phase("repair") as tick:
+        done = mend(case, mesh, step.mesh, mesh, tick, setup)
+    seconds = {**step.seconds, "repair": timer.seconds["repair"]}
+    return replace(step, mesh=done.mesh, repaired=done, seconds=seconds)
+
+
+def mend(
+    case: Case,
+    mesh: Mesh,
+    now: Mesh,
+    reference: Mesh | None,
+    tick: Tick,
+    setup: Setup | None = None,
+) -> MeshRepair:
+    """Return a mesh with its bad cells mended.
+
+    Parameters
+    ----------
+    case
+        Roles and settings.
+    mesh, now
+        The mesh whose boundaries nodes slide on, undeformed, and the one to mend.
+    reference
+        The mesh whose shapes cells shall have; None: the ideal ones.
+    setup
+        That of the run, if there was one.
+    """
+    domain, cells = without_halo(now)
+    shapes = None if reference is None else without_halo(reference)[0]
+    found = quality(domain, shapes, case.quality_metric)
+    limit = case.repair_below
+    if shapes is not None:
+        limit = min(limit, quality(shapes, metric=case.quality_metric).min)
+    if not ((found.status != VALID) | (found.values < limit)).any():
+        none = np.empty(0, np.int64)
+        return MeshRepair(now, none, none, none, now.points[none], 0.0)
+    freedom = find_freedom(case, mesh, now.points, setup)
+    done = mend_cells(
+        domain,
+        freedom,
+        shapes,
+        below=limit,
+        metric=case.quality_metric,
+        report=lambda _, part: tick(part),
+    )
+    points = done.points
+    if now.halo is not None:
+        beyond = np.flatnonzero(np.isin(now.halo.receivers, now.halo.outer))
+        points = now.halo.move_receivers(now.points, points, beyond)
+    moved = np.flatnonzero((points != now.points).any(axis=1))
+    number = np.arange(len(now.cells)) if cells is None else cells
+    mended, before = now.with_points(sealed(points)), sealed(now.points[moved])
+    bad = number[done.bad_before], number[done.bad_after]
+    unmendable, warnings = _unmendable(now, done, number)
+    return MeshRepair(mended, *bad, moved, before, done.largest_move, unmendable, warnings)
+
+
+def _unmendable(
+    mesh: Mesh, done: Repaired, number: IntArray
+) -> tuple[tuple[tuple[int, str], ...], tuple[str, ...]]:
+    """Return the cells that no motion of free nodes mends, with reasons, and a warning of them.
+
+    ``number`` (m,): numbers of the cells that were repaired.
+    """
+    found, names = [], dict[str, None]()
+    for one in done.impossible:
+        on = [m.name for m in mesh.markers if np.isin(one.nodes, m.nodes).any()]
+        names |= dict.fromkeys(on)
+        where = f"on {' and '.join(on)}" if on else "in place"
+        found.append((int(number[one.cell]), f"its nodes that fold it are held {where}"))
+    if not found:
+        return (), ()
+    first = ", ".join(str(cell) for cell, _ in found[:5]) + " ..." * (len(found) > 5)
+    held = f"on {', '.join(names)}" if names else "in place"
+    sentence = (
+        f"{counted(len(found), 'cell')} cannot be mended ({first}): the nodes that fold them are "
+        f"held {held}, so that no motion of the others helps; let that boundary slide, move it "
+        "less, or mend its mesh"
+    )
+    return tuple(found), (sentence,)
+
+
+def repair_case(case: Case) -> Case:
+    """Return the case in which the nodes slide that repair lets slide.
+
+    Internal boundaries are sliding ones. Without a sliding method, others stay.
+    """
+    roles, periodic = dict(case.roles), case.periodic
+    if "internal" not in roles.values():
+        return case
+    if case.sliding == "none":
+        held = {"sliding"} | ({"periodic"} if periodic in ("none", "periodic") else set())
+        roles = {name: "fixed" if role in held else role for name, role in roles.items()}
+        periodic = "none" if "periodic" in held else periodic
+    roles = {name: "sliding" if role == "internal" else role for name, role in roles.items()}
+    return case.change(roles=roles, periodic=periodic, sliding="ps", relax="no", layers="no")
+
+
+def still_setup(case: Case, mesh: Mesh, points: FloatArray) -> Setup:
+    """Return the setup of a mesh whose known nodes have come to ``points`` (n, d) already."""
+    domain = find_domain(case, mesh)
+    known = np.concatenate([domain.classes.moving, domain.classes.fixed])
+    gone = domain.frame.coords(points[known]) - domain.coords[known]
+    nothing = Displacements(known[:0], points[:0])
+    return setup_of(case, mesh, domain, BoundaryConditions(known, gone, nothing, ()))
+
+
+def find_freedom(case: Case, mesh: Mesh, points: FloatArray, setup: Setup | None = None) -> Freedom:
+    """Return the freedom of the nodes of a mesh that was deformed to ``points`` (n, d).
+
+    Parameters
+    ----------
+    mesh
+        Undeformed, with its halo. Nodes slide on its boundaries.
+    setup
+        That of the run, if there was one: its known nodes stay.
+    """
+    if not mesh.markers:
+        held = np.zeros(len(points), bool)
+        held[shell_of(mesh)] = True
+        return Freedom.within(mesh.dim, held)
+    sliding = repair_case(case)
+    known = setup.known if setup is not None else np.empty(0, np.int64)
+    if setup is None or sliding is not case:
+        setup = still_setup(sliding, mesh, points)
+    held = np.concatenate([known, setup.known, _unmarked(mesh, setup.boundary.facets)])
+    if mesh.halo is not None:  # copies that are no images would have to follow their donors
+        copies = np.setdiff1d(mesh.halo.receivers, setup.images)
+        pairs = np.isin(mesh.halo.receivers, np.setdiff1d(copies, mesh.halo.outer))
+        held = np.concatenate([held, copies, mesh.halo.donors[pairs]])
+    held = np.unique(setup.classes.representative[held])
+    frame, coords = setup.frame, setup.frame.coords(points)
+    body = elastic_body(mesh, frame, setup.axis)
+    problem = problem_at(setup, coords, coords[setup.known])
+
+    def maps_at(coords: FloatArray) -> tuple[IntArray, FloatArray, np.ndarray]:
+        nodes, normals = setup.constraints(coords)
+        there = replace(problem, coords=coords, normal_nodes=nodes, normals=normals)
+        given = conditions(there, body, held, np.zeros((len(held), mesh.dim)))
+        return given.place, given.turn, given.plain
+
+    place, turn, plain = maps_at(coords)
+    bound = np.flatnonzero((place >= 0) & ~plain)
+    slides = np.zeros(len(points), bool)
+    slides[setup.classes.sliding] = True
+    if not (setup.tracks.curved or frame.cylindrical):  # an arc about the axis is straight there
+        return Freedom(sealed(place), bound, turn[bound], bound[:0])
+    curved = np.flatnonzero(slides & (place >= 0))
+    return Freedom(
+        sealed(place), bound, turn[bound], curved, _projection(setup, points, coords, maps_at)
+    )
+
+
+def _projection(
+    setup: Setup,
+    at: FloatArray,
+    start: FloatArray,
+    maps_at: Callable[[FloatArray], tuple[IntArray, FloatArray, np.ndarray]],
+) -> Callable[[IntArray, FloatArray], tuple[FloatArray, FloatArray]]:
+    """Return the function that puts sliding nodes back on their boundary (`Freedom.project`).
+
+    ``at``, ``start`` (n, d): points and coordinates before the repair.
+    ``maps_at``: returns the maps at coordinates.
+    """
+    frame, representative = setup.frame, setup.classes.representative
+
+    def project(nodes: IntArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        one = representative[nodes]
+        own = np.flatnonzero(one == nodes)
+        free = frame.coords(points[own]) - start[nodes[own]]
+        slid = np.zeros_like(start)
+        slid[nodes[own]] = setup.project(start, nodes[own], free)
+        now = start.copy()
+        now[nodes] += slid[one]
+        # A node in its place keeps its bits.
+        stays = ~slid[one].any(axis=1, keepdims=True)
+        return np.where(stays, at[nodes], frame.points(now[nodes])), maps_at(now)[1][nodes]
+
+    return project
+
+
+def _unmarked(mesh: Mesh, marked: IntArray) -> IntArray:
+    """Return the nodes of outer sides that are no facets ``marked`` (f, 2 or 4) of a boundary."""
+    shell = shell_of(without_halo(mesh)[0])
+    rows = np.sort(np.concatenate([marked, shell]), axis=1)
+    group = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
+    return np.unique(shell[~np.isin(group[len(marked) :], group[: len(marked)])])

@@ -1,0 +1,246 @@
+"""Repair as users meet it: a run's stage, alone, its report and its words."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.cli import run
+from slideviz.errors import CaseError, MeshError, Note
+from slideviz.mesh.quality import VALID
+from slideviz.solver.repair import find_freedom, repair_case
+from tests import builders
+
+MOTIONS = (sv.Translate("", (0.25, 0.1)), sv.Rotate("", 50.0))
+
+
+def last(case, mesh):
+    *_, step = sv.deform(case, mesh)
+    return step
+
+
+def folded(**values):
+    """A block that is turned in a square, so far that cells beside it fold."""
+    mesh = builders.square(12)
+    case = sv.Case(roles={"BLOCK": "moving"}, motions=MOTIONS, reduction=None)
+    return mesh, case.change(**values)
+
+
+def scrambled(mesh, share=1.0, seed=3):
+    """The mesh with its inner nodes moved at random, by up to ``share`` of its extent."""
+    rng = np.random.default_rng(seed)
+    points = mesh.points + share * mesh.extent * (rng.random(mesh.points.shape) - 0.5)
+    outer = np.unique(np.concatenate([marker.nodes for marker in mesh.markers]))
+    points[outer] = mesh.points[outer]
+    return mesh.with_points(points)
+
+
+def passage(role="sliding"):
+    """A folded passage about z, whose hub and shroud are curved."""
+    mesh = builders.passage((6, 8, 8))
+    roles = {"hub": role, "shroud": role, "blade": "fixed"}
+    roles |= {"per1": "periodic", "per2": "periodic", "inflow": "sliding", "outflow": "sliding"}
+    return mesh, sv.Case(roles=roles, sliding="ps", periodic="moving", repair="yes")
+
+
+def test_a_run_mends_its_folded_cells_and_keeps_all_else():
+    mesh, case = folded()
+    plain, mended = last(case, mesh), last(case.change(repair="yes"), mesh)
+    before, after = (sv.quality(step.mesh, mesh) for step in (plain, mended))
+    assert before.inverted
+    assert (after.status == VALID).all()
+    assert after.min >= 0.1
+    done = mended.repaired
+    assert plain.repaired is None
+    assert set(before.inverted_cells()) <= set(done.cells)
+    assert not len(done.left)
+    changed = (plain.mesh.points != mended.mesh.points).any(axis=1)
+    np.testing.assert_array_equal(np.flatnonzero(changed), done.nodes)
+    np.testing.assert_array_equal(done.points, plain.mesh.points[done.nodes])
+    held = np.concatenate([marker.nodes for marker in mesh.markers])
+    assert not changed[held].any()
+    assert not np.isin(done.nodes, held).any()
+    far = np.linalg.norm(plain.mesh.points - mended.mesh.points, axis=1).max()
+    assert done.largest_move == pytest.approx(far)
+    assert mended.seconds["repair"] > 0.0
+
+
+def test_a_good_mesh_keeps_its_bits():
+    mesh, case = folded(motions=(sv.Rotate("", 5.0),))
+    plain, mended = last(case, mesh), last(case.change(repair="auto"), mesh)
+    np.testing.assert_array_equal(plain.mesh.points, mended.mesh.points)
+    assert mended.repaired.report()["cells_before"] == 0
+    assert mended.repaired.words() == "no cell needs repair"
+
+
+def test_each_step_is_mended_on_request_and_each_trial_is_not():
+    mesh, case = folded(steps=2, motions=(sv.Translate("", (0.3, 0.15)), sv.Rotate("", 60.0)))
+    each = list(sv.deform(case.change(repair="yes", repair_steps=True), mesh))
+    assert [step.repaired is not None for step in each] == [True, True]
+    alone = list(sv.deform(case.change(repair="yes"), mesh))
+    assert [step.repaired is not None for step in alone] == [False, True]
+    assert all(not sv.quality(step.mesh, mesh).inverted for step in (each[-1], alone[-1]))
+    auto = list(sv.deform(case.change(repair="yes", steps=0), mesh))
+    assert [step.repaired is not None for step in auto] == [False] * (len(auto) - 1) + [True]
+
+
+@pytest.mark.parametrize("role", ["sliding", "internal"])
+def test_nodes_slide_on_curved_walls_and_images_move_alike(role):
+    mesh, case = passage(role)
+    bad = scrambled(mesh, 0.3)
+    done = sv.repair(
+        bad,
+        mesh,
+        sliding=("hub", "shroud", "inflow", "outflow"),
+        periodic=("per1", "per2"),
+    )
+    after = sv.quality(done.mesh, mesh)
+    assert sv.quality(bad, mesh).inverted > 100
+    assert (after.status == VALID).all()
+    radius = np.linalg.norm(done.mesh.points[:, :2], axis=1)
+    for wall, r in (("hub", 0.5), ("shroud", 1.0)):
+        np.testing.assert_allclose(radius[mesh.marker(wall).nodes], r, rtol=1e-3)
+    assert np.isin(mesh.marker("hub").nodes, done.nodes).any()
+    freedom = find_freedom(case, mesh, bad.points)
+    place, one, two = freedom.place, mesh.marker("per1").nodes, mesh.marker("per2").nodes
+    turn = np.array(
+        [[np.cos(np.pi / 6), -np.sin(np.pi / 6)], [np.sin(np.pi / 6), np.cos(np.pi / 6)]]
+    )
+    there = {int(block): node for node in two if (block := place[node]) >= 0}
+    images = [(node, there[int(place[node])]) for node in one if place[node] >= 0]
+    assert len(images) > 20
+    first, second = np.array(images).T
+    expected = done.mesh.points[first]
+    expected[:, :2] = expected[:, :2] @ turn.T
+    np.testing.assert_allclose(done.mesh.points[second], expected, atol=1e-12)
+    assert (place[mesh.marker("blade").nodes] < 0).all()
+
+
+def test_nodes_off_their_wall_are_put_back_with_their_images():
+    mesh, case = passage()
+    freedom = find_freedom(case, mesh, mesh.points)
+    hub = np.intersect1d(freedom.curved, mesh.marker("hub").nodes)
+    off = mesh.points[hub] * 1.01
+    points, maps = freedom.project(hub, off)
+    np.testing.assert_allclose(np.linalg.norm(points[:, :2], axis=1), 0.5, rtol=1e-12)
+    moved = np.linalg.norm(points[:, :2] - off[:, :2], axis=1)
+    np.testing.assert_allclose(moved, 0.005, rtol=1e-6)
+    radial = points[:, :2] / 0.5
+    np.testing.assert_allclose(np.einsum("ki,kij->kj", radial, maps[:, :2]), 0.0, atol=1e-9)
+
+
+def test_internal_boundaries_slide_and_without_a_sliding_method_others_stay():
+    roles = {"hub": "internal", "inflow": "sliding", "per1": "periodic", "per2": "periodic"}
+    held = repair_case(sv.Case(roles=roles))
+    assert held.roles == {"hub": "sliding", "inflow": "fixed", "per1": "fixed", "per2": "fixed"}
+    free = repair_case(sv.Case(roles=roles, sliding="ds", periodic="moving"))
+    assert free.roles == roles | {"hub": "sliding"}
+
+
+def test_outer_sides_without_a_boundary_stay():
+    whole = builders.square(6, block=False)
+    some = sv.Mesh(whole.points, whole.cells, whole.markers[:1])
+    bad = scrambled(whole, 0.4)
+    for mesh in (some, sv.Mesh(whole.points, whole.cells)):
+        done = sv.repair(mesh.with_points(bad.points), mesh, sliding=mesh.marker_names)
+        assert (sv.quality(done.mesh, mesh).status == VALID).all()
+        outer = np.flatnonzero(((whole.points == 0) | (whole.points == 1)).any(axis=1))
+        slid = outer[(whole.points[outer] == 0)[:, 0]] if mesh.markers else outer[:0]
+        rest = np.setdiff1d(outer, slid)
+        np.testing.assert_array_equal(done.mesh.points[rest], whole.points[rest])
+        assert (done.mesh.points[slid, 0] == 0).all()
+
+
+def test_cells_that_cannot_be_mended_are_named_with_their_boundary():
+    mesh = builders.square(6, block=False)
+    points = mesh.points.copy()
+    corner = int(np.flatnonzero((points == 0).all(axis=1))[0])
+    points[corner] = 0.9 / 6  # beyond the diagonal of its cell, whose neighbours are held
+    done = sv.repair(mesh.with_points(points), mesh)
+    assert len(done.left) == 1
+    assert [cell for cell, _ in done.unmendable] == list(done.left)
+    assert "x_m" in done.unmendable[0][1]
+    assert "cannot be mended" in done.warnings[0]
+    assert done.report()["unmendable"][0]["cell"] == done.left[0]
+
+
+def test_a_deformer_leaves_repair_out_and_says_so():
+    mesh, case = folded()
+    plain = sv.Deformer(mesh, case)
+    for value, harmless in (("auto", True), ("yes", False)):
+        deformer = sv.Deformer(mesh, case.change(repair=value))
+        assert [isinstance(text, Note) for text in deformer.warnings if "REPAIR" in text] == [
+            harmless
+        ]
+        np.testing.assert_array_equal(deformer.deform(), plain.deform())
+        assert deformer.as_run() is None
+
+
+def test_wrong_requests_are_refused():
+    mesh = builders.square(6)
+    with pytest.raises(CaseError, match="'x_m' is both fixed and sliding"):
+        sv.repair(mesh, fixed=["x_m"], sliding=["x_m"])
+    with pytest.raises(CaseError, match="no marker 'wall'"):
+        sv.repair(mesh, sliding=["wall"])
+    with pytest.raises(CaseError, match=r"below: 2\.0 is out of range"):
+        sv.repair(mesh, below=2.0)
+    with pytest.raises(CaseError, match="needs the undeformed mesh"):
+        sv.repair(mesh, target="reference")
+    with pytest.raises(MeshError, match="must have the same cells"):
+        sv.repair(mesh, builders.square(4))
+    with pytest.raises(MeshError, match="do not match"):
+        sv.repair(mesh, periodic=["x_m", "BLOCK"])
+
+
+def test_the_command_mends_a_file_and_reports(tmp_path, capsys):
+    mesh, case = folded()
+    bad = last(case, mesh).mesh
+    for name, each in (("base.su2", mesh), ("bad.su2", bad)):
+        sv.write(tmp_path / name, each)
+    out, report = tmp_path / "out.su2", tmp_path / "report.json"
+    words = ["repair", str(tmp_path / "bad.su2"), "-o", str(out)]
+    options = ["--reference", str(tmp_path / "base.su2"), "--fixed", "x_m, BLOCK"]
+    assert run([*words, *options, "--sliding", "x_p", "--json", str(report)]) == 0
+    said = json.loads(report.read_text())
+    assert said["repair"]["cells_before"] > 0 == said["repair"]["cells_after"]
+    assert said["target"] == "reference"
+    assert said["quality"]["inverted"] == 0 < said["quality"]["before"]["inverted"]
+    assert not sv.quality(sv.read(out), mesh).inverted
+    assert "bad cells mended" in capsys.readouterr().out
+    assert run([*words, "--sliding", "wall"]) == 1
+    assert "no marker 'wall'" in capsys.readouterr().err
+    assert run([*words[:2], "-o", str(tmp_path / "bad.su2")]) == 1
+
+
+def test_the_command_says_which_cells_are_left(tmp_path, capsys):
+    mesh = builders.square(6, block=False)
+    points = mesh.points.copy()
+    points[np.flatnonzero((points == 0).all(axis=1))] = 0.9 / 6
+    sv.write(tmp_path / "bad.su2", mesh.with_points(points))
+    assert run(["repair", str(tmp_path / "bad.su2"), "-o", str(tmp_path / "out.su2")]) == 3
+    said = capsys.readouterr().err
+    assert "cannot be mended" in said
+    assert "1 of 36 cells are still inverted" in said
+
+
+def test_a_run_reports_its_repair(tmp_path, capsys):
+    mesh, case = folded(generate_quality=False)
+    sv.write(tmp_path / "mesh.su2", mesh)
+    case.change(mesh_file=tmp_path / "mesh.su2").write(tmp_path / "case.cfg")
+    report = tmp_path / "report.json"
+    words = ["run", str(tmp_path / "case.cfg"), "-o", str(tmp_path / "out.su2")]
+    assert run([*words, "--set", "REPAIR=YES", "--json", str(report)]) == 0
+    found = json.loads(report.read_text())
+    assert found["repair"]["cells_before"] > 0 == found["repair"]["cells_after"]
+    assert found["seconds"]["repair"] > 0.0
+    assert "repair " in capsys.readouterr().out
+    assert run([*words, "--json", str(report)]) == 3
+    assert json.loads(report.read_text())["repair"] is None
+    assert "REPAIR= YES" in capsys.readouterr().err
+    assert run([*words, "--stream", "--set", "REPAIR=YES"]) == 1
+    assert "REPAIR= YES needs the whole mesh in memory" in capsys.readouterr().err
+    assert run([*words, "--stream", "--set", "REPAIR=AUTO"]) == 3
+    assert "REPAIR= AUTO mends no mesh that goes from file to file" in capsys.readouterr().err
