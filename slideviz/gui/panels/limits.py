@@ -36,8 +36,7 @@ LIMIT_TIPS = (
 )
 """What each column of the list of limits has."""
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-ROW_HEIGHT = 20
-"""Height of a row in pixels."""
+ROW_HEIGHT = 20  # height of a row in pixels
 NO_WALLS = "No boundary is a wall: all are periodic or internal."
 
 
@@ -80,11 +79,7 @@ def _row(texts: Sequence[str], tip: str, key: object) -> QTreeWidgetItem:
 class LimitsPanel(Panel):
     """The limits of the case, met or not at the step that is shown, and the table of its walls.
 
-    Parameters
-    ----------
-    store : Store
-    fly_to : callable
-        Moves the camera to a cell.
+    ``fly_to``: moves the camera to a cell.
     """
 
     def __init__(self, store: Store, fly_to: Callable[[int], None]) -> None:

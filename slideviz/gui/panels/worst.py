@@ -39,11 +39,7 @@ from slideviz.terms import COLOR_BY, SIZE_SKEW
 class WorstPanel(Panel):
     """The table of the worst cells (`WORST` of them); the marked cell is the current row.
 
-    Parameters
-    ----------
-    store : Store
-    fly_to, fly_back : callable
-        Move the camera to a cell; move it back to where it was.
+    ``fly_to`` and ``fly_back``: move the camera to a cell; move it back to where it was.
     """
 
     def __init__(

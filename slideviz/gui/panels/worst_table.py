@@ -22,8 +22,7 @@ COLUMNS = ("Cell", "Quality", "Worst\nstep")
 CELL, QUALITY, SINCE = range(3)
 """The first columns; then come the coordinates, and the cell type if there are several."""
 
-LAST = "Type"
-"""Title of the last column, if the cells have several types."""
+LAST = "Type"  # title of the last column, if the cells have several types
 
 ARROW, GAP = 20, "\N{NO-BREAK SPACE}"
 """Width of the sort arrow in a header, in pixels, and the space between title and arrow."""
@@ -31,11 +30,9 @@ ARROW, GAP = 20, "\N{NO-BREAK SPACE}"
 _RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
 _LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
 _MIDDLE = int(Qt.AlignmentFlag.AlignCenter)
-FEWEST, MOST = 4, 5
-"""Least and most decimals shown of a quality."""
+FEWEST, MOST = 4, 5  # least and most decimals shown of a quality
 
-MOST_MORE = 4
-"""Most decimals added to coordinates if the usual ones do not tell cells apart."""
+MOST_MORE = 4  # most decimals added to coordinates if the usual ones do not tell cells apart
 
 TIPS = {
     CELL: "Number of the cell, from 0 as in an SU2 file",
