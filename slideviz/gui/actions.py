@@ -76,7 +76,6 @@ class Actions:
             self.window.show_status(support_words(new))
 
     def sync(self, now: CommandState) -> None:
-        """Update the actions, menus and tool bar: titles, checked, enabled."""
         for name, command in COMMANDS.items():
             command.show(self.by_name[name], now)
         for name, table in self._tables.items():
@@ -134,7 +133,6 @@ class ToolBar(QToolBar):
         self.zone_shown = self.addWidget(self.zone)
 
     def sync(self, now: CommandState) -> None:
-        """Show the session's quantity and zone, and enable what can be used."""
         session: Session = now.session
         mesh = session.mesh
         self.color.setEnabled(mesh is not None)

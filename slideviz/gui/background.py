@@ -39,11 +39,9 @@ class BackgroundJob(QObject):
 
     @property
     def busy(self) -> bool:
-        """Return whether the job is running or scheduled."""
         return self._runner.busy or self._timer.isActive()
 
     def close(self) -> None:
-        """Stop the job."""
         self._timer.stop()
         self._runner.close()
 

@@ -67,7 +67,6 @@ class DockTabs(QObject):
         self._timer.start()
 
     def bars(self) -> list[QTabBar]:
-        """Return the tab bars that docks have at present."""
         direct = Qt.FindChildOption.FindDirectChildrenOnly
         return [bar for bar in self.window.findChildren(QTabBar, options=direct) if bar.count()]
 
@@ -106,7 +105,6 @@ class DockTabs(QObject):
         return self._docks.get(bar.tabText(bar.tabAt(where)))
 
     def menu_of(self, dock: QDockWidget) -> QMenu:
-        """Return the menu of a dock: make it a window of its own, close it."""
         menu = QMenu(self.window)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.addAction("Own window", lambda: self.take_out(dock))
@@ -249,7 +247,6 @@ class Docks(QObject):
         self.panels[row.name] = panel
 
     def panel(self, kind: type[Panel]) -> Panel:
-        """Return the panel of a class."""
         return next(panel for panel in self.panels.values() if isinstance(panel, kind))
 
     def save(self, settings: QSettings) -> None:

@@ -77,7 +77,6 @@ class Files(QObject):
         return here if here != Path(here.anchor) and os.access(here, os.W_OK) else Path.home()
 
     def ask_and_open(self) -> None:
-        """Ask for a file and open it."""
         if path := questions.ask_open(self.window, self.folder()):
             self.open_path(path)
 
@@ -99,7 +98,6 @@ class Files(QObject):
             )
 
     def open_zone(self, zone: int) -> None:
-        """Open another zone of the open file."""
         session = self.window.store.session
         if session.mesh is None or session.path is None or zone == session.mesh.zone:
             return

@@ -136,7 +136,6 @@ class Running(QObject):
         self.start_job("Starting", self._run_done, jobs.compute, case, session.mesh)
 
     def cancel(self) -> None:
-        """Ask the running job to stop."""
         if self.runner.busy:
             self.cancelling.emit()
             self.runner.cancel()

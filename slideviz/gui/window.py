@@ -139,37 +139,30 @@ class MainWindow(Services):
 
     @property
     def view(self) -> View3D:
-        """Return the first view."""
         return self.viewing.view
 
     @property
     def scene(self) -> Scene:
-        """Return the scene of the first view."""
         return self.viewing.scene
 
     @property
     def docks(self) -> dict[str, QDockWidget]:
-        """Return the docks, by name."""
         return self.dock_manager.by_name
 
     @property
     def boundaries(self) -> BoundariesPanel:
-        """Return the panel of the boundaries."""
         return self.dock_manager.panel(BoundariesPanel)
 
     @property
     def motions(self) -> MotionPanel:
-        """Return the panel of the motions."""
         return self.dock_manager.panel(MotionPanel)
 
     @property
     def method(self) -> MethodPanel:
-        """Return the panel of the method."""
         return self.dock_manager.panel(MethodPanel)
 
     @property
     def run_panel(self) -> RunPanel:
-        """Return the panel that starts a run."""
         return self.dock_manager.panel(RunPanel)
 
     def _make_status(self) -> None:
@@ -207,7 +200,6 @@ class MainWindow(Services):
         self.start.try_wanted.connect(self.files.try_sample)
 
     def toggle_full_screen(self) -> None:
-        """Switch full screen on or off."""
         self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
 
     def _keep_session(self, folder: Path | None) -> None:

@@ -91,7 +91,6 @@ def draw_distribution(
 
 
 def _look(outline: Outline, style: Style) -> dict[str, Any]:
-    """Return the line arguments of an outline; ``series`` None is the undeformed mesh."""
     if outline.series is None:
         return {"color": style.scheme.ghost, "linestyle": (0, (1, 2.2)), "linewidth": 1.2}
     look = style.series(outline.series)

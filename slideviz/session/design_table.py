@@ -184,7 +184,6 @@ def _named(numbers: list[int]) -> str:
 
 
 def _settings(case: Case) -> Case:
-    """Return the case without its output and source file, warnings and view."""
     return case.change(mesh_out=None, source=None, warnings=(), view={})
 
 

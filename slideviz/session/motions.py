@@ -363,7 +363,6 @@ def period_text(pair: Pair) -> str:
 
 
 def _axis(direction: Sequence[float]) -> str:
-    """Return an axis in words: x, y or z without a sign, or its components."""
     return direction_words(direction).removeprefix("-")
 
 

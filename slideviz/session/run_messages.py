@@ -213,7 +213,6 @@ def tolerance_warning(case: Case, extent: float, largest: float) -> str:
 
 
 def _problems(session: Session) -> list[str]:
-    """Return the problems of the session's case with its mesh (`check_case`) as sentences."""
     from slideviz.case.check import check_case
 
     assert session.mesh is not None

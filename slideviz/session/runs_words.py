@@ -33,7 +33,6 @@ def run_words(run: Run) -> str:
 
 
 def _number_words(value: float) -> str:
-    """Return a number as text, as short as possible without loss."""
     return repr(float(value)).removesuffix(".0")
 
 

@@ -363,7 +363,6 @@ class PictureDialog(QDialog):
     # What was chosen -------------------------------------------------------------------
     @property
     def picture_options(self) -> PictureOptions:
-        """Return the options of the picture as chosen in the dialog."""
         picked: dict[str, Any] = {name: box.isChecked() for name, box in self.options.items()}
         background, text = self.background.currentData(), float(self.text.currentData())
         if self.size_choice.currentData() != "paper":
@@ -466,7 +465,6 @@ class PictureDialog(QDialog):
         self._changed()
 
     def done(self, result: int) -> None:
-        """Close the dialog and stop drawing."""
         self._timer.stop()
         self._runner.stop()
         super().done(result)

@@ -128,7 +128,6 @@ class FilmForm(QWidget):
 
     @property
     def picture_options(self) -> PictureOptions:
-        """Return the options of the film's images."""
         size = self.width_px.value(), self.height_px.value()
         view = self.renderer.session.view
         return PictureOptions(
@@ -282,7 +281,6 @@ class FilmDialog(QDialog):
     # Filming ---------------------------------------------------------------------------
     @property
     def filming(self) -> bool:
-        """Return whether a film is being made."""
         return self._runner.busy
 
     def _start(self) -> None:
@@ -328,7 +326,6 @@ class FilmDialog(QDialog):
         self.form.setEnabled(not filming)
 
     def done(self, result: int) -> None:
-        """Close the dialog and stop a film that is being made."""
         self.cancel()
         self._soon.stop()
         self._previewing.stop()

@@ -77,17 +77,14 @@ class Help(QObject):
         self._shown: dict[str, QDialog] = {}
 
     def shortcuts(self) -> None:
-        """Show the dialog of keyboard shortcuts and mouse actions."""
         self._show("shortcuts", lambda: ShortcutsDialog(self.window))
 
     def case_keys(self) -> None:
-        """Show the dialog with the keys of a case file."""
         from slideviz.case.cfg import describe_keys
 
         self._show("keys", lambda: TextDialog(self.window, "Case keys", describe_keys()))
 
     def manual(self) -> None:
-        """Show the manual."""
         folder = manual_folder()
         if folder is None:
             self.window.banner.show_message(
@@ -97,7 +94,6 @@ class Help(QObject):
         self._show("manual", lambda: ManualDialog(self.window, folder))
 
     def about(self) -> None:
-        """Show the dialog with version, libraries and licence."""
         self._show("about", lambda: AboutDialog(self.window))
 
     def copy_details(self) -> None:
@@ -235,7 +231,6 @@ class AboutDialog(QDialog):
 
 
 def _search_field(words: str) -> QLineEdit:
-    """Return a search field with a placeholder text and a button that clears it."""
     field = QLineEdit()
     field.setPlaceholderText(words)
     field.setClearButtonEnabled(True)
@@ -387,7 +382,6 @@ class Pages(QTextBrowser):
             block = block.next()
 
     def show_page(self, path: Path) -> None:
-        """Show a page."""
         self.setSource(QUrl.fromLocalFile(str(path)))
 
 
@@ -442,7 +436,6 @@ class ManualDialog(QDialog):
             self.pages.show_page(Path(item.data(0, PATH)))
 
     def _select(self, url: QUrl) -> None:
-        """Select the page that is shown, which a link or “Back” may have led to."""
         path = f"{url.toLocalFile().removesuffix('.md')}.md"  # some links leave the ending out
         items = (one for section in self._items() for one in (section, *self._items(section)))
         places = (self.tree.indexFromItem(one) for one in items if one.data(0, PATH) == path)

@@ -124,7 +124,6 @@ class BoundariesPanel(Panel):
 
     # State to widgets ------------------------------------------------------------------
     def sync(self, session: Session) -> None:
-        """Fill the table from the session, and show how many roles are guesses."""
         names = session.mesh.marker_names if session.mesh else ()
         with QSignalBlocker(self.table):
             if names != self._names or len(self._choices) != len(names):
@@ -214,7 +213,6 @@ class BoundariesPanel(Panel):
 
     # Widgets to state ------------------------------------------------------------------
     def selected(self) -> tuple[str, ...]:
-        """Return the boundaries of the selected rows."""
         rows = sorted({index.row() for index in self.table.selectionModel().selectedRows()})
         return tuple(self._names[row] for row in rows)
 

@@ -96,7 +96,6 @@ class CurvesPanel(Panel):
 
     # State to widgets ------------------------------------------------------------------
     def sync(self, session: Session) -> None:
-        """Plot the selected curves of the session, or show why there are none."""
         kind = self.kind.currentData()
         missing = self._missing(session, kind)
         self.kind.setToolTip(TIPS[kind])
@@ -138,7 +137,6 @@ class CurvesPanel(Panel):
 
     # Drawing ---------------------------------------------------------------------------
     def drawing(self) -> Draw:
-        """Return a function that draws the selected plot into a figure."""
         session, kind = self.store.session, self.kind.currentData()
         if self._missing(session, kind):
             return lambda _figure, _style: None

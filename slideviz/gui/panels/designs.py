@@ -104,7 +104,6 @@ class DesignPlot(QWidget):
             self.area.show_text(FAILED if table.results else EMPTY)
 
     def drawing(self) -> Draw:
-        """Return a function that draws the plot into a figure; one that draws nothing if empty."""
         column, what = self.across.currentData(), self.what.currentData()
         if column is None or not self._table.count_done():
             return lambda _figure, _style: None
@@ -131,7 +130,6 @@ class DesignPlot(QWidget):
 def _draw(
     table: DesignTable, column: str, what: str, shown: int | None, figure: Figure, style: Style
 ) -> None:
-    """Draw the result ``what`` of the designs against a column, with a ring at design ``shown``."""
     curves, failed = design_curves(table, column, what), failed_designs(table, column)
     against_designs(figure.add_subplot(), curves, column, what, shown, style, failed=failed)
 
@@ -161,7 +159,6 @@ class DesignsJob(QObject):
         self.runner.failed.connect(lambda error: self._end(str(error), wrong=True))
 
     def start(self, case: Case, mesh: Mesh, table: DesignTable) -> None:
-        """Run the designs of a table that have no result."""
         self.runner.start(run_designs, case, mesh, table)
 
     def _progressed(self, doing: JobProgress) -> None:
@@ -273,7 +270,6 @@ class DesignsPanel(Panel):
         self._show_status("")
 
     def sync(self, session: Session) -> None:
-        """Offer the columns of the session's case."""
         self.rows.show_columns(session.case, session.mesh)
         if self.table.results and not self.runner.busy and not self._with_valid_results().results:
             self._show_status("The settings have changed since: Run computes all designs again.")
@@ -450,7 +446,6 @@ class DesignsPanel(Panel):
 
     # The job ---------------------------------------------------------------------------
     def start(self) -> None:
-        """Run the designs that have no result with the present settings."""
         session, table = self.store.session, self._with_valid_results()
         if self.runner.busy or session.mesh is None or session.in_file:
             return

@@ -193,7 +193,6 @@ class DesignRows(QWidget):
         self.column.show_value(chosen)
 
     def show_table(self, table: DesignTable, editable: bool) -> None:
-        """Show a table; if it has no rows, show a hint instead."""
         if table is not self.model.table:
             self.model.show(table)
         self.model.editable = editable

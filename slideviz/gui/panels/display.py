@@ -77,7 +77,6 @@ class PassagesBox(NumberBox):
         self.setRange(0, MOST_PASSAGES if around is None else max(around // 2, 1))
 
     def textFromValue(self, value: int) -> str:
-        """Return the words for a number of neighbours."""
         if value == 0:
             return "0"
         if self.around is not None and value == self.maximum():
@@ -85,14 +84,12 @@ class PassagesBox(NumberBox):
         return f"{value} on each side"
 
     def valueFromText(self, text: str) -> int:
-        """Return the number of neighbours for typed words or digits."""
         typed = _PASSAGES.fullmatch(text.strip())
         if typed is None:
             return 0
         return self.maximum() if typed[1] is None else int(typed[1])
 
     def validate(self, text: str, at: int) -> tuple[QValidator.State, str, int]:
-        """Accept any text that a number can be read from."""
         good = _PASSAGES.fullmatch(text.strip()) and self.valueFromText(text) <= self.maximum()
         return QValidator.State.Acceptable if good else QValidator.State.Intermediate, text, at
 
@@ -135,7 +132,6 @@ class RangeFields(QWidget):
                 field.show_value(value)
 
     def set_tip(self, text: str) -> None:
-        """Set the tooltip of both fields."""
         self.low.set_tip(text)
         self.high.set_tip(text)
 
@@ -225,7 +221,6 @@ class DisplayPanel(Panel):
 
     # State to widgets ------------------------------------------------------------------
     def sync(self, session: Session) -> None:
-        """Fill the panel from the session."""
         with QSignalBlocker(self.only), QSignalBlocker(self.passages):
             self._sync(session)
 

@@ -166,7 +166,6 @@ class HistogramPanel(Panel):
 
     # State to widgets ------------------------------------------------------------------
     def sync(self, session: Session) -> None:
-        """Plot the histogram of the session's step, with the threshold as selected range."""
         low, high = whole_range(shown_measure(session))
         self.whole.setText(f"{low:g}–{high:g}" if high < np.inf else f"from {low:g}")
         for widget in (self.numbers, self.log, self.whole, self.save):
@@ -232,7 +231,6 @@ class HistogramPanel(Panel):
 
     # Drawing ---------------------------------------------------------------------------
     def drawing(self) -> Draw:
-        """Return a function that draws the histogram of the shown step into a figure."""
         log, whole = self.log.isChecked(), self.whole.isChecked()
         return partial(draw_histogram, self._counts, self.store.session, log=log, full_range=whole)
 

@@ -199,7 +199,6 @@ class LimitsPanel(Panel):
             QTimer.singleShot(0, self, lambda: self._show_walls(self.store.session))
 
     def take_theme(self, _scheme: object) -> None:
-        """Fill the list again in the colors of another theme."""
         self._show_limits(self.store.session)
 
     # What the user does ----------------------------------------------------------------

@@ -63,6 +63,5 @@ class LogPanel(QPlainTextEdit):
             logger.setLevel(logging.INFO)
 
     def detach(self) -> None:
-        """Remove the panel's handler from the loggers."""
         for name in LOGGERS:
             logging.getLogger(name).removeHandler(self.handler)

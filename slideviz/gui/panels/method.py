@@ -266,7 +266,6 @@ class MethodPanel(Panel):
         bar.setValue(min(self.more.y(), bar.maximum()))
 
     def focus_requirement(self, _missing: Requirement) -> None:
-        """Put the cursor into the first invalid field, or into that for sliding."""
         if not self.watch.focus():
             self.form.fields["sliding"].setFocus()
 

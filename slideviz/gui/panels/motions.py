@@ -104,7 +104,6 @@ class TableDialog(QDialog):
 
     @property
     def text(self) -> str:
-        """Return the text of the table."""
         return self.edit.toPlainText()
 
     def _fill(self) -> None:
@@ -125,7 +124,6 @@ class TableDialog(QDialog):
         self.save.setEnabled(not wrong)
 
     def accept(self) -> None:
-        """Close the dialog if the table is valid."""
         self.check()
         if self.save.isEnabled():
             super().accept()
@@ -213,7 +211,6 @@ class MotionPanel(Panel):
 
     # State to widgets ------------------------------------------------------------------
     def sync(self, session: Session) -> None:
-        """Fill list and editor from the motions of the session's case."""
         motions, moving = session.case.motions, session.case.markers_with("moving")
         dim = session.mesh.dim if session.mesh is not None else 2
         said = (describe(motion, dim, self._extent) for motion in motions)
@@ -245,7 +242,6 @@ class MotionPanel(Panel):
         self.editor.set_chord(self._chord)
 
     def _chord(self, target: Target) -> tuple[float, float]:
-        """Return from which x to which x a target goes."""
         moving = self.store.session.case.markers_with("moving")
         return (0.0, 1.0) if self._mesh is None else chord_of(self._mesh, named(target) or moving)
 
@@ -316,7 +312,6 @@ class MotionPanel(Panel):
             self.editor.focus()
 
     def _insert(self, motion: Motion) -> None:
-        """Add a motion below the selected one, and select it."""
         row = self.list.currentRow() + 1
         self.store.change(changes.add_motion, motion, row)
         self.list.setCurrentRow(row)
@@ -347,14 +342,12 @@ class MotionPanel(Panel):
             self._insert(motion if fits else replace(motion, marker=new_target(session)))
 
     def new_table(self) -> None:
-        """Open a dialog for a table of displacements, and add a motion that uses it."""
         marker = new_target(self.store.session)
         path = self._ask_table(marker, Path())
         if path is not None:
             self.store.change(changes.add_motion, FromFile(path, marker))
 
     def edit_table(self) -> None:
-        """Open a dialog for the displacement file of a motion."""
         row = self.list.currentRow()
         motion = self.store.session.case.motions[row]
         assert isinstance(motion, FromFile)

@@ -88,7 +88,6 @@ class RunPanel(Panel):
         self._cost = exact_cost(session.case, session.mesh) if session.mesh else ""
 
     def sync(self, session: Session) -> None:
-        """Show the shown run's end, that a run can start, or the first missing requirement."""
         self.cancel.setVisible(bool(self._busy))
         self.run.setVisible(not self._busy)
         self.bar.setVisible(bool(self._busy))
@@ -177,7 +176,6 @@ class RunPanel(Panel):
         self.sync(self.store.session)
 
     def show_progress(self, progress: JobProgress) -> None:
-        """Show the progress of the job."""
         if not self._busy:
             return
         self._show_progress_text(progress.text)
@@ -198,13 +196,11 @@ class RunPanel(Panel):
         self.text.setText(html.escape(f"{text} (compiling, once)" if self._compiling else text))
 
     def show_cancelling(self) -> None:
-        """Show that the job was asked to stop."""
         self.cancel.setEnabled(False)
         self.text.setText("Cancelling…")
 
 
 def _checked(session: Session) -> object:
-    """Return what the requirements of a run depend on."""
     return session.mesh, session.case, session.intersection, session.invalid
 
 

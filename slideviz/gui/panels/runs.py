@@ -74,7 +74,6 @@ class RunActions:
             self.buttons[command.name].setEnabled(able and selected)
 
     def menu(self, number: int) -> QMenu:
-        """Return the menu of a run."""
         session, menu = self.store.session, QMenu(self.panel)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         run = session.run(number)
@@ -123,12 +122,10 @@ class RunActions:
         self.store.change(changes.adopt_settings, number or self.tree.number)
 
     def save_mesh(self, number: int | None = None) -> None:
-        """Show a run and save the mesh of its last step."""
         self.store.change(changes.show_run, number or self.tree.number)
         self._window.files.save_mesh()
 
     def remove(self, number: int | None = None) -> None:
-        """Remove a run from the list."""
         number = number or self.tree.number
         if number is None:
             return
@@ -204,7 +201,6 @@ class RunsPanel(Panel):
         self.tree.customContextMenuRequested.connect(self._menu_wanted)
 
     def take_theme(self, _scheme: ColorScheme) -> None:
-        """Draw the icons of the rows in the colors of another theme."""
         self._fill(self.store.session)
 
     # State to widgets ------------------------------------------------------------------
@@ -298,5 +294,4 @@ class RunsPanel(Panel):
         self.menu(item.data(RUN, NUMBER)).popup(self.tree.viewport().mapToGlobal(where))
 
     def menu(self, number: int) -> QMenu:
-        """Return the menu of a run."""
         return self.actions_table.menu(number)

@@ -168,7 +168,6 @@ class SectionEditor(QWidget):
         self._sync_place(section)
 
     def _sync_axes(self, flat: bool) -> None:
-        """Enable the choice of z, unless the mesh is 2D."""
         at = self.axis.findData("z")
         model = self.axis.model()
         assert isinstance(model, QStandardItemModel)
@@ -361,7 +360,6 @@ class SectionsPanel(Panel):
 
     # What is shown ---------------------------------------------------------------------
     def sync(self, session: Session) -> None:
-        """Show the sections of a session."""
         mesh, sections = session.mesh, session.view.sections
         dim = mesh.dim if mesh is not None else 3
         self.hint.setText(HINTS[dim])

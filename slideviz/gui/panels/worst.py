@@ -97,7 +97,6 @@ class WorstPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def take_theme(self, _scheme: ColorScheme) -> None:
-        """Write the facts of the marked cell again, in the colors of another theme."""
         self._info_key = ()
         self._sync_mark(self.store.session)
 
@@ -180,7 +179,6 @@ class WorstPanel(Panel):
         self._fly_to(cell)
 
     def show_worst(self) -> None:
-        """Fly to the worst cell of the last step."""
         self.store.change(changes.show_frame, len(self.store.session.frames) - 1)
         self._fill(self.store.session)
         if self.model.worst is not None:
@@ -193,7 +191,6 @@ class WorstPanel(Panel):
             self._fly_to_row(index.row())
 
     def unmark(self) -> None:
-        """Remove the mark from the marked cell."""
         if self.store.session.view.marked_cell is not None:
             self.store.change(changes.mark_cell, None)
 

@@ -112,7 +112,6 @@ class WorstModel(QAbstractTableModel):
         self.endResetModel()
 
     def cell(self, row: int) -> int:
-        """Return the index in the mesh of the cell in a row."""
         return int(self.worst.cells[self.order[row]])
 
     def row_of(self, cell: int | None) -> int:
@@ -130,7 +129,6 @@ class WorstModel(QAbstractTableModel):
 
     @property
     def headers(self) -> tuple[str, ...]:
-        """Return the titles of the columns."""
         first, _, since = COLUMNS
         return (first, self._measure, since, *self.names, *((LAST,) if self._mixed else ()))
 

@@ -51,7 +51,6 @@ class PieceRunner(QObject):
 
     @property
     def busy(self) -> bool:
-        """Return whether a generator is being run."""
         return self._pieces is not None
 
     def start(self, pieces: Generator[object, Any, Any]) -> None:

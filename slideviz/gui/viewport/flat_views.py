@@ -55,7 +55,6 @@ class Ruler(QWidget):
             self.update()
 
     def ticks(self) -> list[float]:
-        """Return the values of the ticks, ascending."""
         length = self.height() if self.upright else self.width()
         room, least = (34, 15) if self.upright else (70, 50)
         most = max(length // room, 2)
@@ -222,7 +221,6 @@ class FlatViews(QWidget):
             second.deleteLater()
 
     def set_scheme(self, scheme: ColorScheme) -> None:
-        """Draw in another color scheme."""
         self.scheme = scheme
         for view in (self.first, self.second):
             if view is not None:
@@ -314,15 +312,12 @@ class CurveView(QWidget):
             self.area.show_text(NOTHING)
 
     def drawing(self) -> Draw:
-        """Return a function that draws the present curves into a figure."""
         return partial(_draw, self.rows, self._labels, self._colors)
 
     def set_scheme(self, scheme: ColorScheme) -> None:
-        """Draw in another color scheme."""
         self.area.canvas.set_scheme(scheme)
 
     def close_view(self) -> None:
-        """Drop the curves."""
         self.rows = ()
 
     def _picked(self, position: float) -> None:
@@ -446,12 +441,10 @@ class FlatView(QWidget):
             partner.view.render_soon()
 
     def set_scheme(self, scheme: ColorScheme) -> None:
-        """Draw in another color scheme."""
         self.scene.set_scheme(scheme)
         self.view.render()
 
     def close_view(self) -> None:
-        """Release the graphics resources."""
         self._refit.stop()
         self.view.camera.RemoveObserver(self._watching)
         self.view.close()

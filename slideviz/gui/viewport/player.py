@@ -103,7 +103,6 @@ class Player(QWidget):
         self.set_speed(self.speed)
 
     def set_speed(self, speed: float) -> None:
-        """Set the speed, as a multiple of the usual one."""
         self.speed = speed
         self.speeds[speed].setChecked(True)
         self.speed_button.setText(f"{speed:g}×")
@@ -117,7 +116,6 @@ class Player(QWidget):
         return max(round(self._step_ms()), TICK_MS)
 
     def sync(self, session: Session) -> None:
-        """Show the session's step and its number of steps, with the numbers of the step."""
         last = max(len(session.frames) - 1, 0)
         at = min(session.view.frame, last)
         with QSignalBlocker(self.slider):
@@ -164,7 +162,6 @@ class Player(QWidget):
 
     @property
     def playing(self) -> bool:
-        """Return whether the steps are being played."""
         return self._timer.isActive()
 
     def go(self, index: int) -> None:
@@ -176,7 +173,6 @@ class Player(QWidget):
         self.go(self.store.session.view.frame + by)
 
     def toggle(self) -> None:
-        """Play, or stop playing."""
         if self.playing:
             self.stop()
         elif len(self.store.session.frames) > 1:
@@ -188,7 +184,6 @@ class Player(QWidget):
             set_icon(self.buttons["play"], "pause")
 
     def stop(self) -> None:
-        """Stop playing."""
         self._timer.stop()
         set_icon(self.buttons["play"], "play")
 

@@ -72,7 +72,6 @@ class PointHandle(QObject, Generic[Grasp]):
 
     @property
     def dragging(self) -> bool:
-        """Return whether the mouse is dragging the handle."""
         return self._start is not None
 
     def close(self) -> None:

@@ -79,14 +79,12 @@ class Handles:
             view.render_soon()
 
     def drop(self, view: View3D) -> None:
-        """Remove the handle from a view."""
         handle = self._of.pop(view, None)
         if handle is not None:
             handle.close()
             view.render_soon()
 
     def clear(self) -> None:
-        """Remove the handles from all views."""
         for view in list(self._of):
             self.drop(view)
 
@@ -122,7 +120,6 @@ class PlaneHandle:
             self.widget.AddObserver(event, call)  # type: ignore[arg-type]  # a name is taken, too
 
     def show(self, section: Section, scheme: ColorScheme, mesh: Mesh, _deformed: Mesh) -> None:
-        """Show the handle of a section, its frame around a mesh; during a drag the plane stays."""
         self.section = section
         self._color(scheme)
         low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
@@ -138,7 +135,6 @@ class PlaneHandle:
             self.widget.On()
 
     def close(self) -> None:
-        """Remove the handle from the view for good."""
         self._soon.stop()
         self.dragging = False
         self.widget.Off()
@@ -232,7 +228,6 @@ class SectionViews(QSplitter):
     # What is wanted --------------------------------------------------------------------
     @property
     def section(self) -> Section | None:
-        """Return the selected section, or None."""
         return self.store.session.view.section
 
     @property
@@ -242,7 +237,6 @@ class SectionViews(QSplitter):
 
     @property
     def is_flat(self) -> bool:
-        """Return whether the selected section is laid flat."""
         return self.section is not None and self.section.flat
 
     def want_flat(self, wanted: bool) -> None:
@@ -351,7 +345,6 @@ class SectionViews(QSplitter):
             self.viewing.fit()
 
     def set_scheme(self, scheme: ColorScheme) -> None:
-        """Draw in another color scheme."""
         self.scheme = scheme
         if self.flats is not None:
             self.flats.set_scheme(scheme)

@@ -78,11 +78,9 @@ class TitleBar(QFrame):
 
     @property
     def text(self) -> str:
-        """Return the whole title."""
         return self._text
 
     def set_text(self, text: str) -> None:
-        """Show another title."""
         self._text = text
         self._fit()
 
@@ -376,7 +374,6 @@ class Viewing(QWidget):
 
     # Camera and pictures ---------------------------------------------------------------
     def render(self) -> None:  # type: ignore[override]  # as the views do
-        """Repaint the views."""
         self.view.render()
         if self.second is not None:
             self.second.render()
@@ -426,12 +423,10 @@ class Viewing(QWidget):
         self.render()
 
     def set_scheme(self, scheme: ColorScheme) -> None:
-        """Draw in another color scheme."""
         for scene in self._scenes():
             scene.set_scheme(scheme)
         self.render()
 
     def close_views(self) -> None:
-        """Release the graphics resources of the views."""
         self._drop_second()
         self.view.close()

@@ -128,7 +128,6 @@ class Banner(QFrame):
         self.show_message(text, full, answers=answers)
 
     def _offer(self, answers: Answers) -> None:
-        """Replace the buttons by one for each answer."""
         for button in self.answers.values():
             self._row.removeWidget(button)
             button.hide()

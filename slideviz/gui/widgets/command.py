@@ -93,7 +93,6 @@ class Command:
     """Its text on the tool bar, if it has no icon."""
 
     def called(self, now: CommandState) -> str:
-        """Return the present title of the command."""
         return (self.title_now(now) if self.title_now else "") or self.title
 
     def action(self, window: Services) -> QAction:
@@ -149,7 +148,6 @@ class Menu:
     """Whether it shows tooltips, which say why a command is disabled."""
 
     def commands(self) -> Iterator[Command]:
-        """Yield the commands of the menu and of its submenus."""
         for entry in self.entries:
             if isinstance(entry, Menu):
                 yield from entry.commands()

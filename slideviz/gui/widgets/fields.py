@@ -209,7 +209,6 @@ class NumberField(TextField):
         return self._words.get(self._value, digits)
 
     def set_tip(self, text: str) -> None:
-        """Set the tooltip, which is shown while the value is valid."""
         self._tip = text
         self.mark()
 
@@ -416,7 +415,6 @@ class NumberBox(QSpinBox):
             self._validate()
 
     def set_tip(self, text: str) -> None:
-        """Set the tooltip, which is shown while the value is valid."""
         self._tip = text
         self.setToolTip(wrapped(self.fault or text))
 

@@ -189,7 +189,6 @@ class PlotCanvas(QWidget):
 
     @property
     def busy(self) -> bool:
-        """Return whether an image is being drawn or about to be."""
         return self._coming is not None or self._timer.isActive()
 
     # Drawing ---------------------------------------------------------------------------
@@ -235,7 +234,6 @@ class PlotCanvas(QWidget):
             self.request_draw()
 
     def set_scheme(self, scheme: ColorScheme) -> None:
-        """Draw in another color scheme."""
         self.scheme = scheme
         self.request_draw()
 
@@ -299,7 +297,6 @@ class PlotArea(QStackedWidget):
 
     @property
     def shows_text(self) -> bool:
-        """Return whether a text is shown instead of the plot."""
         return self.currentWidget() is self.words
 
     def show_text(self, text: str) -> None:
@@ -308,7 +305,6 @@ class PlotArea(QStackedWidget):
         self.setCurrentWidget(self.words)
 
     def plot(self) -> None:
-        """Show the plot and redraw it."""
         self.setCurrentWidget(self.canvas)
         self.canvas.request_draw()
 

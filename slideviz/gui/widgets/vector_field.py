@@ -103,7 +103,6 @@ class VectorField(QWidget):
             field.set_scale(scale)
 
     def set_tip(self, text: str) -> None:
-        """Set the tooltip of all numbers."""
         for field in self.fields:
             field.set_tip(text)
         self._mark()
