@@ -13,6 +13,7 @@ from slideviz.mesh.jacobians import (
     LANES,
     NODE,
     OPTIONS,
+    add3,
     corners,
     cross3,
     dot3,
@@ -214,60 +215,71 @@ _PRISM_HEIGHTS = np.array([[0, 3], [1, 4], [2, 5]])
 @njit(**OPTIONS)
 def pull_hexahedron(at, count, weights, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives of the coefficients of hexahedra, times ``weights`` (3, 3, 3, ...)."""
-    heights, factors = NODE.reshape(4, 2), np.empty((3, 4))
+    heights, factors = NODE.reshape(4, 2), np.empty((3, 4, LANES))
     for i in range(2):
         for j in range(2):
-            for c in range(count):
-                for p in range(2):
-                    for q in range(2):
-                        # As in `jacobians.hexahedron_coefficients`.
-                        weight = (0.5 if i != p else 1.0) * (0.5 if j != q else 1.0)
-                        for n in range(3):
-                            factors[n, 2 * p + q] = weight * weights[i + p, j + q, n, c]
-                _pull_heights(at, c, _SIDES[i, j], heights, factors, slope)
+            for p in range(2):
+                for q in range(2):
+                    # As in `jacobians.hexahedron_coefficients`.
+                    weight = (0.5 if i != p else 1.0) * (0.5 if j != q else 1.0)
+                    for n in range(3):
+                        for c in range(count):
+                            factors[n, 2 * p + q, c] = weight * weights[i + p, j + q, n, c]
+            _pull_heights(at, count, _SIDES[i, j], heights, factors, slope)
 
 
 @njit(**OPTIONS)
 def pull_prism(at, count, weights, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives of the coefficients of prisms, times ``weights`` (3, 3, ...)."""
-    for c in range(count):
-        _pull_heights(at, c, _PRISM_SIDES, _PRISM_HEIGHTS, weights[:, :, c], slope)
+    _pull_heights(at, count, _PRISM_SIDES, _PRISM_HEIGHTS, weights, slope)
 
 
 @njit(**OPTIONS)
-def _pull_heights(at, c, sides, heights, factors, slope):  # type: ignore[no-untyped-def]
+def _pull_heights(at, count, sides, heights, factors, slope):  # type: ignore[no-untyped-def]
     """Add derivatives of ``Σ_h w_h · (f0h u0 x v0 + f1h (u0 x v1 + u1 x v0) / 2 + f2h u1 x v1)``.
 
-    ``sides`` (4, 2) are the nodes of the edges u0, v0, u1, v1 of cell c, ``heights`` (h, 2) those
-    of w, ``factors`` (3, h).
+    ``sides`` (4, 2) are the nodes of the edges u0, v0, u1, v1 of cells, ``heights`` (h, 2) those
+    of w, ``factors`` (3, h, ...).
     """
-    u0, v0 = edge(at, sides[0, 0], sides[0, 1], c), edge(at, sides[1, 0], sides[1, 1], c)
-    u1, v1 = edge(at, sides[2, 0], sides[2, 1], c), edge(at, sides[3, 0], sides[3, 1], c)
-    low, top = cross3(u0, v0), cross3(u1, v1)
-    middle = half_sum(cross3(u0, v1), cross3(u1, v0))
-    total = np.zeros((3, 3))
+    products, total = np.empty((3, 3, LANES)), np.zeros((3, 3, LANES))
+    for c in range(count):
+        u0, v0 = edge(at, sides[0, 0], sides[0, 1], c), edge(at, sides[1, 0], sides[1, 1], c)
+        u1, v1 = edge(at, sides[2, 0], sides[2, 1], c), edge(at, sides[3, 0], sides[3, 1], c)
+        low, top = cross3(u0, v0), cross3(u1, v1)
+        middle = half_sum(cross3(u0, v1), cross3(u1, v0))
+        for axis in range(3):
+            products[0, axis, c] = low[axis]
+            products[1, axis, c] = middle[axis]
+            products[2, axis, c] = top[axis]
     for h in range(len(heights)):
         one, two = heights[h]
-        w = edge(at, one, two, c)
         for axis in range(3):
-            for n in range(3):
-                total[n, axis] += factors[n, h] * w[axis]
-            value = factors[0, h] * low[axis] + factors[1, h] * middle[axis]
-            value += factors[2, h] * top[axis]
-            slope[axis, one, c] -= value
-            slope[axis, two, c] += value
-    a, b, d = total[0], 0.5 * total[1], total[2]
-    by_edges = (
-        (cross3(v0, a), cross3(v1, b)),
-        (cross3(a, u0), cross3(b, u1)),
-        (cross3(v1, d), cross3(v0, b)),
-        (cross3(d, u1), cross3(b, u0)),
-    )
+            for c in range(count):
+                w = at[axis, two, c] - at[axis, one, c]
+                value = factors[0, h, c] * products[0, axis, c]
+                value += factors[1, h, c] * products[1, axis, c]
+                value += factors[2, h, c] * products[2, axis, c]
+                total[0, axis, c] += factors[0, h, c] * w
+                total[1, axis, c] += factors[1, h, c] * w
+                total[2, axis, c] += factors[2, h, c] * w
+                slope[axis, one, c] -= value
+                slope[axis, two, c] += value
     for k in range(4):
-        for axis in range(3):
-            value = by_edges[k][0][axis] + by_edges[k][1][axis]
-            slope[axis, sides[k, 0], c] -= value
-            slope[axis, sides[k, 1], c] += value
+        # By u0 and u1: v0 x a + v1 x b, v1 x d + v0 x b; by v0 and v1: a x u0 + b x u1, ...
+        upper, across = k // 2, 1 - k % 2
+        own, other = (across, 2 + across) if upper == 0 else (2 + across, across)
+        for c in range(count):
+            x = edge(at, sides[own, 0], sides[own, 1], c)
+            y = edge(at, sides[other, 0], sides[other, 1], c)
+            far = total[2 * upper, 0, c], total[2 * upper, 1, c], total[2 * upper, 2, c]
+            half = 0.5 * total[1, 0, c], 0.5 * total[1, 1, c], 0.5 * total[1, 2, c]
+            if across == 1:
+                value = add3(cross3(x, far), cross3(y, half))
+            else:
+                value = add3(cross3(far, x), cross3(half, y))
+            for axis in range(3):
+                slope[axis, sides[k, 0], c] -= value[axis]
+                slope[axis, sides[k, 1], c] += value[axis]
 
 
 @njit(**OPTIONS)

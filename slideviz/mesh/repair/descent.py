@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,21 +22,11 @@ TRIES = 30
 WINDOW = 10
 """Iterations over which the decrease of the value is looked at."""
 
+Pairs = deque[tuple[FloatArray, FloatArray, float, float]]
+"""Steps s, changes y of the gradient, their product, and that over the preconditioned y's."""
+
 Function = Callable[[FloatArray], tuple[float, FloatArray]]
 """Returns value and gradient (b, d) at unknowns (b, d)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Descent:
-    """How far a descent came."""
-
-    unknowns: FloatArray
-    """(b, d)"""
-    value: float
-    gradient: FloatArray
-    """(b, d)"""
-    fell: float
-    """Norm of the gradient at the end, over that at the start, in the preconditioner's norm."""
 
 
 def dot(a: FloatArray, b: FloatArray) -> float:
@@ -52,10 +41,9 @@ def descend(
     longest: Callable[[FloatArray, FloatArray], float],
     *,
     iterations: int,
-    enough: Callable[[], bool],
-    decrease: float,
-) -> Descent:
-    """Return where L-BFGS comes from ``start`` (b, d).
+    decrease: Callable[[], float],
+) -> FloatArray:
+    """Return the unknowns (b, d) to which L-BFGS comes from ``start`` (b, d).
 
     Parameters
     ----------
@@ -67,15 +55,13 @@ def descend(
         The longest step from unknowns along a direction, at most infinity.
     iterations : int
         Most of them.
-    enough : callable
-        Called after each iteration: whether to end.
-    decrease : float
-        It ends where `WINDOW` iterations lower the value by less than this part.
+    decrease : callable
+        Called after each iteration: it ends where `WINDOW` of them lowered the value by less than
+        this part.
     """
     x = start
     value, gradient = function(x)
-    pairs: deque[tuple[FloatArray, FloatArray, float]] = deque(maxlen=CORRECTIONS)
-    first = max(dot(gradient, precondition(gradient)), np.finfo(float).tiny)
+    pairs: Pairs = deque(maxlen=CORRECTIONS)
     values = [value]
     for _ in range(iterations):
         direction = -_inverse_times(gradient, pairs, precondition)
@@ -97,32 +83,29 @@ def descend(
         s, y = length * direction, new_gradient - gradient
         curvature = dot(s, y)
         if curvature > 0:
-            pairs.append((s, y, curvature))
+            pairs.append((s, y, curvature, curvature / dot(y, precondition(y))))
         x, value, gradient = x + s, new_value, new_gradient
         values.append(value)
-        if enough():
+        least = decrease()
+        if len(values) > WINDOW and values[-1 - WINDOW] - value <= least * abs(value):
             break
-        if len(values) > WINDOW and values[-1 - WINDOW] - value <= decrease * abs(value):
-            break
-    fell = float(np.sqrt(max(dot(gradient, precondition(gradient)), 0.0) / first))
-    return Descent(x, value, gradient, fell)
+    return x
 
 
 def _inverse_times(
     gradient: FloatArray,
-    pairs: deque[tuple[FloatArray, FloatArray, float]],
+    pairs: Pairs,
     precondition: Callable[[FloatArray], FloatArray],
 ) -> FloatArray:
     """Return the inverse Hessian of L-BFGS times the gradient (Nocedal's two loops)."""
     out, factors = gradient.copy(), []
-    for s, y, curvature in reversed(pairs):
+    for s, y, curvature, _ in reversed(pairs):
         factors.append(dot(s, out) / curvature)
         out -= factors[-1] * y
     out = precondition(out)
     if pairs:
-        s, y, curvature = pairs[-1]
-        out *= curvature / dot(y, precondition(y))
-    for (s, y, curvature), factor in zip(pairs, reversed(factors), strict=True):
+        out *= pairs[-1][3]
+    for (s, y, curvature, _), factor in zip(pairs, reversed(factors), strict=True):
         out += (factor - dot(y, out) / curvature) * s
     return out
 

@@ -43,8 +43,8 @@ CORNER_AT = {
 LEAST_SCALE = 0.1
 """Least coefficient of a target, over its mean one."""
 
-LEAST_ANGLE = 0.05
-"""Least eigenvalue of the matrix of cosines between the edges of a target's corner."""
+LEAST_SINE = 0.01
+"""Least Jacobian of a target's corner over the product of its edges; flatter ones are opened."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +55,9 @@ class Targets:
     nodes: IntArray
     """(m, n)"""
     scale: FloatArray
-    """(m, k): factors of the coefficients that make D of them."""
+    """(k, m): factors of the coefficients that make D of them."""
     shape: FloatArray
-    """(m, c, 1 + s): of each corner, the factor of its Jacobian, and the matrix G with
+    """(c, 1 + s, m): of each corner, the factor of its Jacobian, and the matrix G with
     ``tr(JᵀJ) = Σ G_ij e_i·e_j``: diagonal, then 01 (2D) or 01, 12, 20 (3D)."""
 
 
@@ -73,27 +73,44 @@ def targets(vtk: int, nodes: IntArray, at: FloatArray, signs: FloatArray) -> Tar
     signs : (m,)
         1, or -1 for a target that is numbered the other way round.
     """
-    m, n, d = at.shape
-    found = np.empty((m, COEFFICIENTS[vtk]))
-    all_nodes = np.arange(m * n).reshape(m, n)
-    write_coefficients(vtk, np.ascontiguousarray(at.reshape(-1, d)), all_nodes, CORNERS[vtk], found)
-    found *= signs[:, None]
-    mean = np.maximum(found.mean(axis=1, keepdims=True), np.finfo(float).tiny)
-    table = CORNERS[vtk]
+    (m, n, d), table = at.shape, CORNERS[vtk]
+    found = np.empty((COEFFICIENTS[vtk], m))
+    each = np.arange(m * n).reshape(m, n)
+    write_coefficients(vtk, np.ascontiguousarray(at.reshape(-1, d)), each, table, found)
+    found *= signs
+    mean = np.maximum(found.mean(axis=0), np.finfo(float).tiny)
     edges = at[:, table[:, 1:]] - at[:, table[:, :1]]
     gram = edges @ np.swapaxes(edges, 2, 3)
     length = np.sqrt(np.maximum(np.einsum("mcii->mci", gram), np.finfo(float).tiny))
-    cosines = gram / (length[..., None] * length[:, :, None])
-    value, vector = np.linalg.eigh(cosines)
-    value = np.maximum(value, LEAST_ANGLE)
-    inverse = (vector / value[..., None, :]) @ np.swapaxes(vector, 2, 3)
-    inverse /= length[..., None] * length[:, :, None]
-    shape = np.empty((m, len(table), 1 + d * (d + 1) // 2))
-    shape[..., 0] = signs[:, None] / (np.sqrt(value.prod(axis=2)) * length.prod(axis=2))
+    size, jacobian = length.prod(axis=2), found[CORNER_AT[vtk]].T
+    flat = ~(jacobian > LEAST_SINE * size)
+    edges[flat], jacobian[flat] = np.eye(d), 1.0
+    if d == 2:
+        dual = np.stack([edges[..., 1, ::-1], edges[..., 0, ::-1]], axis=2) * [[1, -1], [-1, 1]]
+    else:
+        one, two, three = np.moveaxis(edges, 2, 0)
+        dual = np.stack([np.cross(two, three), np.cross(three, one), np.cross(one, two)], axis=2)
+    dual /= jacobian[..., None, None]
+    inverse = dual @ np.swapaxes(dual, 2, 3)
+    inverse[flat], jacobian[flat] = _opened(gram[flat], length[flat])
+    shape = np.empty((len(table), 1 + d * (d + 1) // 2, m))
+    shape[:, 0] = signs / jacobian.T
     for k, (i, j) in enumerate([(i, i) for i in range(d)] + [(0, 1), (1, 2), (2, 0)][: 2 * d - 3]):
-        shape[..., 1 + k] = inverse[..., i, j]
-    scale = signs[:, None] / np.maximum(found, LEAST_SCALE * mean)
+        shape[:, 1 + k] = inverse[..., i, j].T
+    scale = signs / np.maximum(found, LEAST_SCALE * mean)
     return Targets(vtk, np.ascontiguousarray(nodes), scale, shape)
+
+
+def _opened(gram: FloatArray, length: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the inverse of matrices of edges (f, d, d), and the Jacobian, of flat corners.
+
+    Their edges keep their lengths (f, d), but are turned away from each other.
+    """
+    outer = length[:, None] * length[:, :, None]
+    value, vector = np.linalg.eigh(gram / outer)
+    value = np.maximum(value, LEAST_SINE)
+    inverse = (vector / value[:, None, :]) @ np.swapaxes(vector, 1, 2) / outer
+    return inverse, np.sqrt(value.prod(axis=1)) * length.prod(axis=1)
 
 
 @njit(**OPTIONS)
@@ -122,105 +139,102 @@ def _pull(vtk, at, table, count, weights, none, slope):  # type: ignore[no-untyp
 
 @njit(**OPTIONS)
 def write_coefficients(vtk, points, nodes, table, out):  # type: ignore[no-untyped-def]
-    """Write the coefficients of the proof of cells into ``out`` (m, k)."""
+    """Write the coefficients of the proof of cells into ``out`` (k, m)."""
     at = np.empty((points.shape[1], nodes.shape[1], LANES))
-    found = np.empty((out.shape[1], LANES))
+    found = np.empty((len(out), LANES))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
         gather(points, nodes, first, count, at)
         _coefficients(vtk, at, table, count, found)
-        for c in range(count):
-            for k in range(out.shape[1]):
-                out[first + c, k] = found[k, c]
+        out[:, first : first + count] = found[:, :count]
 
 
 @njit(inline="always", **OPTIONS)
 def _chi(depth, epsilon):  # type: ignore[no-untyped-def]
     """Return chi, and the root in it; chi' is chi / root."""
     root = np.sqrt(epsilon * epsilon + depth * depth)
-    if depth > 0.0:
-        return 0.5 * (depth + root), root
-    return 0.5 * epsilon * epsilon / (root - depth), root
+    folded = 0.5 * epsilon * epsilon / (root + abs(depth))
+    return 0.5 * (depth + root) if depth > 0.0 else folded, root
 
 
 @njit(**OPTIONS)
-def _square(at, corner, shape, first, k, count, total):  # type: ignore[no-untyped-def]
-    """Write ``tr(JᵀJ)`` of corner k of cells into ``total`` (LANES,)."""
+def _squares(at, corner, shape, count, total):  # type: ignore[no-untyped-def]
+    """Write ``tr(JᵀJ)`` of a corner of cells into ``total`` (LANES,); ``shape`` (1 + s, LANES)."""
     d = at.shape[0]
-    pairs = d * (d + 1) // 2
-    for c in range(count):
-        total[c] = 0.0
-    for s in range(pairs):
-        i = s if s < d else s - d
-        j = s if s < d else (s - d + 1) % d
-        o, a, b = corner[0], corner[1 + i], corner[1 + j]
-        factor = 1.0 if s < d else 2.0
-        for c in range(count):
-            product = 0.0
-            for axis in range(d):
-                product += (at[axis, a, c] - at[axis, o, c]) * (at[axis, b, c] - at[axis, o, c])
-            total[c] += factor * shape[first + c, k, 1 + s] * product
-
-
-@njit(**OPTIONS)
-def _pull_square(at, corner, shape, first, k, count, weight, slope):  # type: ignore[no-untyped-def]
-    """Add the slopes of ``tr(JᵀJ)`` of corner k, times ``weight`` (LANES,), to (d, n, LANES)."""
-    d = at.shape[0]
+    total[:] = 0.0
     for s in range(d * (d + 1) // 2):
-        i = s if s < d else s - d
-        j = s if s < d else (s - d + 1) % d
-        o, a, b = corner[0], corner[1 + i], corner[1 + j]
+        o, a, b = corner[0], corner[1 + s % d], corner[1 + (s if s < d else (s - d + 1) % d)]
+        factor = 1.0 if s < d else 2.0
         for axis in range(d):
             for c in range(count):
-                factor = 2.0 * weight[c] * shape[first + c, k, 1 + s]
+                one, two = at[axis, a, c] - at[axis, o, c], at[axis, b, c] - at[axis, o, c]
+                total[c] += factor * shape[1 + s, c] * (one * two)
+
+
+@njit(**OPTIONS)
+def _pull_squares(at, corner, shape, count, weight, slope):  # type: ignore[no-untyped-def]
+    """Add the slopes of ``tr(JᵀJ)`` of a corner, times ``weight`` (LANES,), to (d, n, LANES)."""
+    d = at.shape[0]
+    for s in range(d * (d + 1) // 2):
+        o, a, b = corner[0], corner[1 + s % d], corner[1 + (s if s < d else (s - d + 1) % d)]
+        share = 1.0 if s < d else 2.0
+        for axis in range(d):
+            for c in range(count):
+                factor = share * weight[c] * shape[1 + s, c]
                 one = factor * (at[axis, b, c] - at[axis, o, c])
+                two = factor * (at[axis, a, c] - at[axis, o, c])
                 slope[axis, a, c] += one
-                slope[axis, o, c] -= one
-                if s >= d:
-                    two = factor * (at[axis, a, c] - at[axis, o, c])
-                    slope[axis, b, c] += two
-                    slope[axis, o, c] -= two
+                slope[axis, b, c] += two
+                slope[axis, o, c] -= one + two
 
 
 @njit(**OPTIONS)
 def write_energy(  # type: ignore[no-untyped-def]
-    vtk, points, nodes, table, corner_at, scale, shape, epsilon, values, slopes, least
+    vtk, points, nodes, table, corner_at, scale, shape, epsilon, low, high, values, slopes, least
 ):
-    """Write energies (m,) of cells, slopes (m, n, d) by their nodes, and their least D (m,)."""
-    d, n, parts, outer = points.shape[1], nodes.shape[1], scale.shape[1], len(table)
+    """Write energies (m,) of cells, slopes (m, n, d) by their nodes, and their least D (m,).
+
+    ``low`` and ``high`` are the range of the cells.
+    """
+    d, n, parts, outer = points.shape[1], nodes.shape[1], len(scale), len(table)
     power = 2.0 / d
     at, slope = np.empty((d, n, LANES)), np.empty((d, n, LANES))
     found, pull = np.empty((parts, LANES)), np.empty((parts, LANES))
     none, total, weight = np.zeros((parts, LANES)), np.empty(LANES), np.empty(LANES)
-    for first in range(0, len(nodes), LANES):
-        count = min(LANES, len(nodes) - first)
+    value, lowest = np.empty(LANES), np.empty(LANES)
+    factors, shapes = np.empty((parts, LANES)), np.empty((*shape.shape[:2], LANES))
+    for first in range(low, high, LANES):
+        count = min(LANES, high - first)
         gather(points, nodes, first, count, at)
+        factors[:, :count] = scale[:, first : first + count]
+        shapes[:, :, :count] = shape[:, :, first : first + count]
         _coefficients(vtk, at, table, count, found)
-        for c in range(count):
-            values[first + c] = 0.0
-            least[first + c] = np.inf
+        value[:] = 0.0
+        lowest[:] = np.inf
         for k in range(parts):
             for c in range(count):
-                factor = scale[first + c, k]
-                depth = factor * found[k, c]
+                depth = factors[k, c] * found[k, c]
                 chi, root = _chi(depth, epsilon)
                 g = (1.0 + depth * depth) / chi
-                values[first + c] += 0.5 / parts * g
-                pull[k, c] = 0.5 / parts * factor * (2.0 * depth / chi - g / root)
-                least[first + c] = min(least[first + c], depth)
+                value[c] += 0.5 / parts * g
+                pull[k, c] = 0.5 / parts * factors[k, c] * (2.0 * depth / chi - g / root)
+                lowest[c] = min(lowest[c], depth)
         slope[:] = 0.0
         for k in range(outer):
-            _square(at, table[k], shape, first, k, count, total)
+            _squares(at, table[k], shapes[k], count, total)
+            at_corner = corner_at[k]
             for c in range(count):
-                factor = shape[first + c, k, 0]
-                chi, root = _chi(factor * found[corner_at[k], c], epsilon)
-                part = 0.5 / outer / (chi if d == 2 else np.cbrt(chi * chi))
-                values[first + c] += part * total[c]
-                pull[corner_at[k], c] -= power * part * total[c] / root * factor
-                weight[c] = part
-            _pull_square(at, table[k], shape, first, k, count, weight, slope)
+                chi, root = _chi(shapes[k, 0, c] * found[at_corner, c], epsilon)
+                weight[c] = chi if d == 2 else np.cbrt(chi * chi)
+            for c in range(count):
+                chi, root = _chi(shapes[k, 0, c] * found[at_corner, c], epsilon)
+                weight[c] = 0.5 / outer / weight[c]
+                value[c] += weight[c] * total[c]
+                pull[at_corner, c] -= power * weight[c] * total[c] / root * shapes[k, 0, c]
+            _pull_squares(at, table[k], shapes[k], count, weight, slope)
         _pull(vtk, at, table, count, pull, none, slope)
         for c in range(count):
+            values[first + c], least[first + c] = value[c], lowest[c]
             for j in range(n):
                 for axis in range(d):
                     slopes[first + c, j, axis] = slope[axis, j, c]
@@ -228,54 +242,47 @@ def write_energy(  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def write_curvatures(  # type: ignore[no-untyped-def]
-    vtk, points, nodes, table, corner_at, scale, shape, epsilon, curvatures
+    points, nodes, table, shape, epsilon, low, high, curvatures
 ):
-    """Write the diagonal blocks (m, n, d, d) by node of the positive part of the Hessian.
+    """Write the diagonal blocks (m, n, d, d) by node of the positive part of the Hessian, about.
 
-    That is the one in which chi has no second derivative, and D neither.
+    That is the part without second derivatives of chi and D, and with coefficients at corners
+    alone.
     """
-    d, n, parts, outer = points.shape[1], nodes.shape[1], scale.shape[1], len(table)
-    power = 2.0 / d
+    d, n, outer = points.shape[1], nodes.shape[1], len(table)
+    power, parts = 2.0 / d, shape.shape[1] - 1
     at, slope = np.empty((d, n, LANES)), np.empty((d, n, LANES))
-    found, unit = np.empty((parts, LANES)), np.zeros((parts, LANES))
-    none, total, bend = np.zeros((parts, LANES)), np.empty(LANES), np.empty((parts, LANES))
-    for first in range(0, len(nodes), LANES):
-        count = min(LANES, len(nodes) - first)
+    alpha, total = np.empty((outer, LANES)), np.empty(LANES)
+    unit, none = np.ones((1, LANES)), np.zeros((1, LANES))
+    for first in range(low, high, LANES):
+        count = min(LANES, high - first)
         gather(points, nodes, first, count, at)
-        _coefficients(vtk, at, table, count, found)
+        corners(at, table, count, alpha)
         curvatures[first : first + count] = 0.0
-        for k in range(parts):
-            for c in range(count):
-                factor = scale[first + c, k]
-                depth = factor * found[k, c]
-                chi, root = _chi(depth, epsilon)
-                bent = ((1.0 - depth / root) ** 2 + 1.0 / (root * root)) / chi
-                bend[k, c] = factor * factor / parts * bent
         for k in range(outer):
-            _square(at, table[k], shape, first, k, count, total)
-            for c in range(count):
-                factor = shape[first + c, k, 0]
-                chi, root = _chi(factor * found[corner_at[k], c], epsilon)
-                part = 0.5 / outer / (chi if d == 2 else np.cbrt(chi * chi))
-                bent = power * (power + 1.0) * part * total[c] / (root * root)
-                bend[corner_at[k], c] += bent * factor * factor
-                own = 0.0
-                for s in range(d * (d + 1) // 2):
-                    stiff = 2.0 * part * shape[first + c, k, 1 + s]
-                    own += stiff if s < d else 2.0 * stiff
-                    if s < d:
-                        for axis in range(d):
-                            curvatures[first + c, table[k, 1 + s], axis, axis] += stiff
-                for axis in range(d):
-                    curvatures[first + c, table[k, 0], axis, axis] += own
-        for k in range(parts):
-            unit[:] = 0.0
-            unit[k] = 1.0
+            here = np.ascontiguousarray(shape[k, :, first : first + count])
+            _squares(at, table[k], here, count, total)
             slope[:] = 0.0
-            _pull(vtk, at, table, count, unit, none, slope)
+            if d == 2:
+                pull_plane(5, at, table[k : k + 1], count, unit, none, slope)
+            else:
+                pull_solid(14, at, table[k : k + 1], count, unit, none, slope)
             for c in range(count):
-                for j in range(n):
+                depth = here[0, c] * alpha[k, c]
+                chi, root = _chi(depth, epsilon)
+                part = 0.5 / outer / (chi if d == 2 else np.cbrt(chi * chi))
+                bend = ((1.0 - depth / root) ** 2 + 1.0 / (root * root)) / (outer * chi)
+                bend += power * (power + 1.0) * part * total[c] / (root * root)
+                bend *= here[0, c] * here[0, c]
+                own = 0.0
+                for s in range(parts):
+                    own += (2.0 if s < d else 4.0) * part * here[1 + s, c]
+                for j in table[k]:
                     for a in range(d):
                         for b in range(d):
-                            part = slope[a, j, c] * slope[b, j, c]
-                            curvatures[first + c, j, a, b] += bend[k, c] * part
+                            curvatures[first + c, j, a, b] += bend * slope[a, j, c] * slope[b, j, c]
+                for a in range(d):
+                    curvatures[first + c, table[k, 0], a, a] += own
+                    for s in range(d):
+                        stiff = 2.0 * part * here[1 + s, c]
+                        curvatures[first + c, table[k, 1 + s], a, a] += stiff

@@ -48,11 +48,8 @@ class Freedom:
     def of_part(self, nodes: IntArray) -> Freedom:
         """Return the freedom of some nodes (k,), ascending, in that order, as of a mesh of its own.
 
-        Blocks of which a node is left out stay blocks. `project` gets numbers of the whole.
+        Blocks keep their numbers. `project` of the whole gets the numbers of the whole.
         """
-        place = self.place[nodes]
-        used = np.unique(place[place >= 0])
-        place = np.where(place >= 0, np.searchsorted(used, place), -1)
         bound = np.isin(self.bound, nodes)
         whole = self.project
 
@@ -61,9 +58,23 @@ class Freedom:
             return whole(nodes[some], points)
 
         return Freedom(
-            sealed(place),
+            sealed(self.place[nodes]),
             np.searchsorted(nodes, self.bound[bound]),
             self.maps[bound],
             np.searchsorted(nodes, self.curved[np.isin(self.curved, nodes)]),
             None if whole is None else project,
+        )
+
+    def only(self, moves: NDArray[np.bool_]) -> Freedom:
+        """Return the freedom in which the nodes of the mask (n,) move alone; blocks from 0."""
+        place = np.unique(self.place[moves], return_inverse=True)[1]
+        every = np.full(len(moves), -1)
+        every[moves] = place
+        bound = moves[self.bound]
+        return Freedom(
+            sealed(every),
+            self.bound[bound],
+            self.maps[bound],
+            self.curved[moves[self.curved]],
+            self.project,
         )

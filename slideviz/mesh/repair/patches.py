@@ -6,20 +6,26 @@ images and copies) are in the patch, so that everything outside keeps its bits.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Executor
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.mesh.fans import components
-from slideviz.mesh.jacobians import CORNERS
+from slideviz.mesh.jacobians import CORNERS, LANES
+from slideviz.mesh.margin import margins
 from slideviz.mesh.model import Cells, FloatArray, IntArray
 from slideviz.mesh.repair.energy import CORNER_AT, Targets, write_curvatures, write_energy
 from slideviz.mesh.repair.freedom import Freedom
 from slideviz.system.jit_cache import njit
+from slideviz.system.threads import cores
 
-CHUNK = 512
-"""Cells that a thread works on at a time."""
+CHUNK = 4 * LANES
+"""Least number of cells that a thread works on at a time."""
+
+SAFE, NEAR = 4.0, 0.9
+"""Longest step that is looked at, and the part of the safe one that is taken."""
 
 FLAT = 1e-12
 """Curvature of a block, over its largest one, below which a direction counts as held."""
@@ -78,12 +84,7 @@ class Patch:
     """A patch with numbers of its own, and the sums over its cells."""
 
     def __init__(
-        self,
-        points: FloatArray,
-        nodes: IntArray,
-        freedom: Freedom,
-        parts: list[Targets],
-        pool: Executor,
+        self, points: FloatArray, freedom: Freedom, parts: list[Targets], pool: Executor
     ) -> None:
         """Take a patch.
 
@@ -91,19 +92,18 @@ class Patch:
         ----------
         points : (k, d)
             Of its nodes.
-        nodes : (k,)
-            Their numbers in the whole mesh, ascending.
         freedom : Freedom
-            Of them; blocks that do not move have no number.
+            Of them; each block moves.
         parts : list
             Its cells; their nodes count from 0.
         pool : Executor
             Does chunks of cells.
         """
-        self.start, self.nodes, self.freedom, self.parts = points, nodes, freedom, parts
+        self.start, self.freedom, self.parts = points, freedom, parts
         self.blocks = int(freedom.place.max(initial=-1)) + 1
-        self.maps = np.ascontiguousarray(freedom.maps)
-        self.row = np.full(len(nodes), -1)
+        self.maps = np.array(freedom.maps)
+        self.still = np.zeros((self.blocks, points.shape[1]))
+        self.row = np.full(len(points), -1)
         self.row[freedom.bound] = np.arange(len(freedom.bound))
         self._pool = pool
         self._flat = np.concatenate([part.nodes.ravel() for part in parts])
@@ -118,11 +118,16 @@ class Patch:
         for part, size in zip(parts, sizes, strict=True):
             width = part.nodes.shape[1]
             slopes = self._slopes[entry : entry + size * width].reshape(size, width, -1)
-            for low in range(0, size, CHUNK):
-                here = slice(low, min(low + CHUNK, size))
-                whole = slice(first + here.start, first + here.stop)
-                self._chunks.append((part, here, whole, slopes[here]))
+            step = self._step(size)
+            for low in range(0, size, step):
+                here, whole = slice(low, min(low + step, size)), slice(first, first + size)
+                self._chunks.append((part, here, whole, slopes))
             first, entry = first + size, entry + size * width
+
+    @staticmethod
+    def _step(cells: int) -> int:
+        """Return the number of cells in a chunk; results do not depend on it."""
+        return max(CHUNK, -(-cells // (2 * cores()) // LANES) * LANES)
 
     def points(self, unknowns: FloatArray) -> FloatArray:
         """Return the points (k, d) of unknowns (b, d)."""
@@ -130,9 +135,12 @@ class Patch:
         _move(self.freedom.place, self.row, self.maps, unknowns, out)
         return out
 
-    def of_cells(self, work: object) -> None:
-        """Call ``work(part, here, whole, slopes)`` for each chunk of cells, on all cores."""
-        assert callable(work)
+    def of_cells(self, work: Callable[[Targets, slice, slice, FloatArray], None]) -> None:
+        """Call ``work(part, here, whole, slopes)`` for each chunk of cells, on all cores.
+
+        ``here`` is the chunk within the part, ``whole`` the part within all cells, and ``slopes``
+        (m, n, d) are the part's, for `gathered`.
+        """
         if len(self._chunks) == 1:
             work(*self._chunks[0])
         else:
@@ -152,27 +160,41 @@ class Patch:
 
         def work(part: Targets, here: slice, whole: slice, slopes: FloatArray) -> None:
             table, at = CORNERS[part.vtk], CORNER_AT[part.vtk]
-            cells = part.nodes[here], table, at, part.scale[here], part.shape[here]
+            cells = part.nodes, table, at, part.scale, part.shape
             out = self.values[whole], slopes, self.least[whole]
-            write_energy(part.vtk, points, *cells, epsilon, *out)
+            write_energy(part.vtk, points, *cells, epsilon, here.start, here.stop, *out)
 
         self.of_cells(work)
         return float(self.values.sum()), self.gathered()
 
-    def curvature(self, unknowns: FloatArray, epsilon: float) -> FloatArray:
-        """Return the inverse (b, d, d) of each block of the positive Hessian, where it can move."""
-        points, d = self.points(unknowns), self.start.shape[1]
-        total = np.zeros((self.blocks, d, d))
+    def margin(self, unknowns: FloatArray, direction: FloatArray, signs: NDArray[np.int8]) -> float:
+        """Return a step along a direction (b, d) before which no cell folds.
+
+        ``signs`` (m,) are those of the cells, in the order of the parts.
+        """
+        points, first, least = self.points(unknowns), 0, SAFE
+        way = np.zeros_like(points)
+        _move(self.freedom.place, self.row, self.maps, direction, way)
         for part in self.parts:
-            table, at = CORNERS[part.vtk], CORNER_AT[part.vtk]
-            out = np.empty((*part.nodes.shape, d, d))
+            cells = Cells.from_blocks([(part.vtk, part.nodes)])
+            turn = signs[first : first + len(part.nodes)]
+            first += len(part.nodes)
+            least = min(least, float(margins(points, way, cells, SAFE, turn).min()))
+        return NEAR * least
 
-            def work(low: int, part=part, table=table, at=at, out=out) -> None:  # type: ignore[no-untyped-def]
-                here = slice(low, low + CHUNK)
-                cells = part.nodes[here], table, at, part.scale[here], part.shape[here]
-                write_curvatures(part.vtk, points, *cells, epsilon, out[here])
+    def curvature(self, epsilon: float) -> FloatArray:
+        """Return the inverse (b, d, d) of each block of the positive Hessian, where it can move."""
+        points, d = self.start, self.start.shape[1]
+        total = np.zeros((self.blocks, d, d))
+        blocks = {part.vtk: np.empty((*part.nodes.shape, d, d)) for part in self.parts}
 
-            list(self._pool.map(work, range(0, len(part.nodes), CHUNK)))
+        def work(part: Targets, here: slice, _whole: slice, _slopes: FloatArray) -> None:
+            cells = part.nodes, CORNERS[part.vtk], part.shape
+            write_curvatures(points, *cells, epsilon, here.start, here.stop, blocks[part.vtk])
+
+        self.of_cells(work)
+        for part in self.parts:
+            out = blocks[part.vtk]
             place = self.freedom.place[part.nodes]
             bound = self.row[part.nodes] >= 0
             maps = self.maps[self.row[part.nodes[bound]]]

@@ -15,13 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.mesh.jacobians import CORNERS, VALID, write_corners
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.jacobians import CORNERS, VALID
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality import Quality, cell_quality, checked_reference, quality
 from slideviz.mesh.repair.descent import descend
 from slideviz.mesh.repair.energy import targets
 from slideviz.mesh.repair.freedom import Freedom
+from slideviz.mesh.repair.lift import lift_energy
 from slideviz.mesh.repair.patches import Patch, find_patches
 from slideviz.system.threads import cores
 from slideviz.terms import SkewMetric
@@ -32,8 +34,17 @@ RINGS = 3, 5, 8
 ROUNDS, VAIN = 40, 10
 """Most outer rounds of a patch, and those in a row that may mend nothing."""
 
-ITERATIONS, DECREASE = 200, 1e-3
-"""Most iterations of a descent, and the least relative decrease in ten of them."""
+ITERATIONS, DECREASE, ENOUGH = 200, 1e-3, 0.03
+"""Most iterations of a descent, and the least relative decrease of the energy in ten of them, while
+a cell is folded and when none is."""
+
+LIFTS, LIFTED, BETA, GAIN = 40, 1e-3, 1.01, 0.003
+"""Of a round that lifts the worst: most iterations, the epsilon of the preconditioner, the limit
+over the largest 1 / quality, and the least relative gain, of which two rounds may bring less."""
+
+FLAT_SIDE = 1e-6
+"""Sine of the angle between the normals of a side's corners, up to which it is flat. In a flat side
+that folds on itself the Jacobian vanishes, wherever the other nodes are."""
 
 BELOW = 0.1
 """Cells of a lower quality are mended, too."""
@@ -83,6 +94,8 @@ class _Work:
     metric: SkewMetric
     below: float
     report: Callable[[float], object]
+    hopeless: NDArray[np.bool_]
+    """(m,): cells that cannot be mended, which no energy counts."""
     pool: ThreadPoolExecutor
 
 
@@ -122,9 +135,10 @@ def repair(
     found = quality(mesh, reference, metric)
     before = _bad(found, below)
     sums, signs = reference_of(mesh if reference is None else checked_reference(reference, mesh))
-    points, hopeless = np.array(mesh.points), _impossible(mesh, found, freedom)
-    bad = before.copy()
-    bad[[one.cell for one in hopeless]] = False
+    points, hopeless = np.array(mesh.points), np.zeros(len(before), bool)
+    impossible = _impossible(mesh, found, before, freedom)
+    hopeless[[one.cell for one in impossible]] = True
+    after, bad = before, before & ~hopeless
     with ThreadPoolExecutor(cores(), "slideviz-repair") as pool:
         for stage, rings in enumerate(RINGS):
             if not bad.any():
@@ -134,11 +148,10 @@ def repair(
                 report("Repair", (stage + fraction) / len(RINGS))
 
             now = mesh.with_points(points)
-            work = _Work(now, reference, freedom, sums, signs, metric, below, staged, pool)
-            _mend_patches(work, bad, rings, points)
+            settings = freedom, sums, signs, metric, below, staged, hopeless, pool
+            _mend_patches(_Work(now, reference, *settings), bad, rings, points)
             after = _bad(quality(mesh.with_points(points), reference, metric), below)
-            bad &= after
-    after = _bad(quality(mesh.with_points(points), reference, metric), below)
+            bad = bad & after
     way = np.linalg.norm(points - mesh.points, axis=1)
     return Repaired(
         points=sealed(points),
@@ -146,7 +159,7 @@ def repair(
         bad_after=sealed(np.flatnonzero(after)),
         moved=sealed(np.flatnonzero((points != mesh.points).any(axis=1))),
         largest_move=float(way.max(initial=0.0)),
-        impossible=hopeless,
+        impossible=impossible,
     )
 
 
@@ -154,20 +167,46 @@ def _bad(found: Quality, below: float) -> NDArray[np.bool_]:
     return (found.status != VALID) | (found.values < below)
 
 
-def _impossible(mesh: Mesh, found: Quality, freedom: Freedom) -> tuple[Impossible, ...]:
-    """Return the cells with a corner that folds and whose nodes are all held."""
+def _impossible(
+    mesh: Mesh, found: Quality, bad: NDArray[np.bool_], freedom: Freedom
+) -> tuple[Impossible, ...]:
+    """Return the bad cells (mask (m,)) that no motion of free nodes mends.
+
+    All their nodes are held, or those of a corner that folds, or of a side that folds on itself.
+    """
     out = []
+    held = freedom.place < 0
     for vtk, (ids, nodes) in mesh.cells.by_type.items():
-        some = np.flatnonzero(found.status[ids] != VALID)
-        table = CORNERS[vtk]
-        alpha = np.empty((len(table), len(some)))
-        write_corners(mesh.points, nodes[some], table, alpha)
-        held = (freedom.place[nodes[some][:, table]] < 0).all(axis=2)
-        wrong = held & ~(alpha.T * found.signs[ids[some], None] > 0)
-        for row in np.flatnonzero(wrong.any(axis=1)):
-            corner = nodes[some[row]][table[wrong[row].argmax()]]
-            out.append(Impossible(int(ids[some[row]]), sealed(np.sort(corner)), ()))
+        for row in np.flatnonzero(bad[ids] & (held[nodes].sum(axis=1) >= mesh.dim)):
+            cell, own = int(ids[row]), nodes[row]
+            wrong = own if held[own].all() else None
+            if wrong is None and found.status[cell] != VALID:
+                wrong = _fold(vtk, own, held[own], mesh.points[own], int(found.signs[cell]))
+            if wrong is not None:
+                wrong = np.sort(wrong)
+                on = (m.name for m in mesh.markers if np.isin(wrong, m.nodes).any())
+                out.append(Impossible(cell, sealed(wrong), tuple(on)))
     return tuple(sorted(out, key=lambda one: one.cell))
+
+
+def _fold(
+    vtk: int, nodes: IntArray, held: NDArray[np.bool_], at: FloatArray, sign: int
+) -> IntArray | None:
+    """Return the nodes of a folded corner or side of a cell that are all held, or None."""
+    for corner in CORNERS[vtk]:
+        if held[corner].all() and not sign * np.linalg.det(at[corner[1:]] - at[corner[0]]) > 0:
+            return nodes[corner]
+    for side in ELEMENTS[vtk].facets if at.shape[1] == 3 else ():
+        local = np.array(side)
+        if held[local].all():
+            x = at[local]
+            normals = np.cross(np.roll(x, -1, 0) - x, np.roll(x, 1, 0) - x)
+            mean = normals.sum(axis=0)
+            size = np.linalg.norm(normals, axis=1).max()
+            flat = np.abs(np.cross(normals, mean)).max() <= FLAT_SIDE * size * np.linalg.norm(mean)
+            if flat and not (normals @ mean).min() > 0:
+                return nodes[local]
+    return None
 
 
 def _mend_patches(work: _Work, bad: NDArray[np.bool_], rings: int, points: FloatArray) -> None:
@@ -179,8 +218,8 @@ def _mend_patches(work: _Work, bad: NDArray[np.bool_], rings: int, points: Float
             work.report((number + fraction) / len(patches))
 
         numbered(0.0)
-        patch = _Mending(work, cells, free, numbered)
-        if patch.nodes_free:
+        if free[work.mesh.cells.take(cells).nodes].any():
+            patch = _Mending(work, cells, free, numbered)
             points[patch.nodes] = patch.mended()
 
 
@@ -195,81 +234,199 @@ class _Mending:
         tell: Callable[[float], object],
     ) -> None:
         """Take the cells (k,) of a patch, and a mask (n,) of the nodes that may move."""
-        self.work, self.tell, self.cells = work, tell, cells
-        part = work.mesh.cells.take(cells)
-        self.nodes = part.nodes
-        place = np.where(free[self.nodes], work.freedom.place[self.nodes], -1)
-        used = np.unique(place[place >= 0])
-        here = work.freedom.of_part(self.nodes)
-        moves = free[self.nodes]
-        self.nodes_free = len(used)
-        bound = moves[here.bound]
-        self.freedom = Freedom(
-            np.where(place >= 0, np.searchsorted(used, place), -1),
-            here.bound[bound],
-            here.maps[bound],
-            here.curved[moves[here.curved]],
-            here.project,
-        )
-        self.parts, self.of_part = [], []
-        shapes = work.reference or work.mesh
+        self.work, self.tell, self.round = work, tell, 0
+        self.nodes = work.mesh.cells.take(cells).nodes
+        cells = cells[~work.hopeless[cells]]
+        part, shapes = work.mesh.cells.take(cells), work.reference
+        self.parts, order = [], []
+        length = _local_lengths(work.mesh.points, part, self.nodes)
         for vtk, (some, nodes) in part.by_type.items():
+            local = np.searchsorted(self.nodes, nodes)
             signs = work.signs[cells[some]].astype(float)
-            at = shapes.points[nodes]
-            self.parts.append(targets(vtk, np.searchsorted(self.nodes, nodes), at, signs))
-            self.of_part.append(some)
-        start = np.array(work.mesh.points[self.nodes])
-        self.patch = Patch(start, self.nodes, self.freedom, self.parts, work.pool)
+            if shapes is not None:
+                at = shapes.points[nodes]
+            else:
+                at = IDEAL[vtk] * length[local].mean(axis=1)[:, None, None]
+                at[..., 0] *= signs[:, None]
+            self.parts.append(targets(vtk, local, at, signs))
+            order.append(cells[some])
+        ids = np.concatenate(order)
+        self.signs, self.sums = work.signs[ids], work.sums[ids]
+        self.patch = self._patch(np.array(work.mesh.points[self.nodes]), free[self.nodes])
+        # With sliding nodes held, to go on where projection folds a cell.
+        moves = free[self.nodes]
+        moves[self.patch.freedom.curved] = False
+        self.moves = moves
 
-    def score(self, points: FloatArray) -> tuple[int, float, bool]:
-        """Return (minus cells not proved, lowest quality) at points, and whether all is good."""
-        unproved, lowest = 0, np.inf
-        for part, some in zip(self.parts, self.of_part, strict=True):
-            ids = self.cells[some]
-            signs, sums = self.work.signs[ids], self.work.sums[ids]
-            size, skew, status = cell_quality(
-                points, part.vtk, part.nodes, signs, sums, self.work.metric
-            )
+    def _patch(self, points: FloatArray, moves: NDArray[np.bool_]) -> Patch:
+        """Return the patch, in which the nodes of the mask ``moves`` (k,) move."""
+        freedom = self.work.freedom.of_part(self.nodes).only(moves)
+        return Patch(points, freedom, self.parts, self.work.pool)
+
+    def score(self, points: FloatArray) -> tuple[int, float]:
+        """Return (minus the number of cells not proved, the lowest quality) at points (k, d)."""
+        unproved, lowest, first = 0, np.inf, 0
+        for part in self.parts:
+            here = slice(first, first + len(part.nodes))
+            cells = part.nodes, self.signs[here], self.sums[here]
+            size, skew, status = cell_quality(points, part.vtk, *cells, self.work.metric)
             unproved += int((status != VALID).sum())
-            lowest = min(lowest, float((np.sqrt(size) * skew).min()))
-        return -unproved, lowest, unproved == 0 and lowest >= self.work.below
+            values = np.sqrt(size) * skew if self.work.reference is not None else skew
+            lowest, first = min(lowest, float(values.min())), here.stop
+        return -unproved, lowest
+
+    def good(self, score: tuple[int, float]) -> bool:
+        """Return whether all cells are as they should be."""
+        return score[0] == 0 and score[1] >= self.work.below
 
     def mended(self) -> FloatArray:
         """Return the best points (k, d)."""
-        patch = self.patch
-        best_points, best = patch.start, self.score(patch.start)
-        epsilon, vain, unknowns = 1.0, 0, np.zeros((patch.blocks, patch.start.shape[1]))
-        for _ in range(ROUNDS):
-            unknowns = self.descended(unknowns, epsilon)
-            points = patch.points(unknowns)
-            score = self.score(points)
-            vain += 1
-            if score > best:
-                vain = 0 if score[0] > best[0] else vain
-                best_points, best = points, score
-            if best[2] or vain >= VAIN:
-                break
-            depth = min(float(patch.least.min()), 0.0)
-            epsilon = float(np.sqrt(1e-12 + (0.2 * depth) ** 2))
+        best_points = self.patch.start
+        best = self.score(best_points)
+        if best[0] < 0:
+            best_points, best = self._unfolded(best_points, best)
+        if best[0] == 0 and not self.good(best):
+            best_points, best = self._lifted(best_points, best)
         return best_points
 
-    def descended(self, unknowns: FloatArray, epsilon: float) -> FloatArray:
-        """Return unknowns (b, d) of lower energy."""
-        patch = self.patch
-        inverse = patch.curvature(unknowns, epsilon)
+    def _unfolded(
+        self, best_points: FloatArray, best: tuple[int, float]
+    ) -> tuple[FloatArray, tuple[int, float]]:
+        """Return the best points (k, d) and their score, after rounds in which epsilon falls."""
+        patch, epsilon, vain = self.patch, 1.0, 0
+        for _ in range(ROUNDS):
+            before = patch.energy(patch.still, epsilon)[0]
+            patch.start = self._settled(self._descended(patch, epsilon), epsilon)
+            after = patch.energy(patch.still, epsilon)[0]
+            score = self.score(patch.start)
+            vain = 0 if score[0] > best[0] else vain + 1
+            if score > best:
+                best_points, best = patch.start, score
+            if best[0] == 0 or vain >= VAIN:
+                break
+            depth = float(patch.least.min())
+            if vain < 3:
+                epsilon = float(np.hypot(1e-6, 0.2 * min(depth, 0.0)))
+            else:  # the paper's rule, which ends after a finite number of rounds
+                chi = 0.5 * (depth + np.hypot(epsilon, depth))
+                bound = (1 - max(1 - after / before, 0.1)) * chi
+                epsilon = float(2 * np.sqrt(bound * (bound - depth))) if depth < bound else 1e-10
+        return best_points, best
 
-        def cancelled() -> bool:
-            self.tell(0.0)
-            return False
+    def _descended(self, patch: Patch, epsilon: float) -> FloatArray:
+        """Return points (k, d) of lower energy."""
+        inverse, edges = patch.curvature(epsilon), self._edges(patch)
+
+        def decrease() -> float:
+            self._progress()
+            return DECREASE if patch.least.min() <= 0 else ENOUGH
 
         found = descend(
-            lambda q: patch.energy(q, epsilon),
-            unknowns,
+            lambda unknowns: patch.energy(unknowns, epsilon),
+            patch.still,
             lambda gradient: np.einsum("bij,bj->bi", inverse, gradient),
-            lambda _q, _p: np.inf,
+            lambda _unknowns, direction: self._longest(patch, edges, direction),
             iterations=ITERATIONS,
-            enough=cancelled,
-            decrease=DECREASE,
+            decrease=decrease,
         )
-        patch.energy(found.unknowns, epsilon)
-        return found.unknowns
+        return patch.points(found)
+
+    def _settled(self, points: FloatArray, epsilon: float) -> FloatArray:
+        """Return points (k, d) with sliding nodes on their boundary, and tangents there."""
+        freedom = self.patch.freedom
+        if freedom.project is None or not len(freedom.curved):
+            return points
+        points = points.copy()
+        points[freedom.curved], maps = freedom.project(freedom.curved, points[freedom.curved])
+        self.patch.maps[self.patch.row[freedom.curved]] = maps
+        self.patch.start = points
+        self.patch.energy(self.patch.still, epsilon)
+        if self.patch.least.min() > 0 or not self.moves.any():
+            return points
+        return self._descended(self._patch(points, self.moves), epsilon)
+
+    def _edges(self, patch: Patch) -> FloatArray:
+        """Return the length (s,) of the shortest edge at each node on a curved boundary."""
+        out = np.full(len(self.nodes), np.inf)
+        for part in self.parts if len(patch.freedom.curved) else ():
+            for local in ELEMENTS[part.vtk].edges:
+                pair = part.nodes[:, local]
+                length = np.linalg.norm(patch.start[pair[:, 1]] - patch.start[pair[:, 0]], axis=1)
+                np.minimum.at(out, pair, length[:, None])
+        return out[patch.freedom.curved]
+
+    def _longest(self, patch: Patch, edges: FloatArray, direction: FloatArray) -> float:
+        """Return the step by which no node on a curved boundary goes further than half an edge."""
+        curved = patch.freedom.curved
+        way = np.linalg.norm(direction[patch.freedom.place[curved]], axis=1)
+        return float(np.min(0.5 * edges[way > 0] / way[way > 0], initial=np.inf))
+
+    def _lifted(
+        self, best_points: FloatArray, best: tuple[int, float]
+    ) -> tuple[FloatArray, tuple[int, float]]:
+        """Return the best points (k, d) and their score, after rounds that lift the worst cells."""
+        patch, work, vain = self.patch, self.work, 0
+        sized = work.reference is not None
+        for _ in range(ROUNDS):
+            patch.start = best_points
+            beta = BETA / best[1]
+            inverse, edges = patch.curvature(LIFTED), self._edges(patch)
+
+            def longest(unknowns: FloatArray, direction: FloatArray) -> float:
+                self._progress()
+                bound = self._longest(patch, edges, direction)  # noqa: B023
+                return min(bound, patch.margin(unknowns, direction, self.signs))
+
+            found = descend(
+                lambda unknowns: lift_energy(
+                    patch,
+                    unknowns,
+                    self.signs,
+                    self.sums,
+                    sized,
+                    work.metric,
+                    beta,  # noqa: B023
+                ),
+                patch.still,
+                lambda gradient: np.einsum("bij,bj->bi", inverse, gradient),  # noqa: B023
+                longest,
+                iterations=LIFTS,
+                decrease=lambda: ENOUGH,
+            )
+            points = self._settled(patch.points(found), LIFTED)
+            score = self.score(points)
+            vain = 0 if score[1] > best[1] * (1 + GAIN) else vain + 1
+            if score > best:
+                best_points, best = points, score
+            if self.good(best) or vain >= 2:
+                break
+        return best_points, best
+
+    def _progress(self) -> None:
+        self.round += 1
+        self.tell(1 - 0.995**self.round)
+
+
+def _local_lengths(points: FloatArray, cells: Cells, nodes: IntArray) -> FloatArray:
+    """Return the mean length (k,) of the edges at each of the nodes (k,) of cells."""
+    total, count = np.zeros(len(nodes)), np.zeros(len(nodes))
+    for vtk, (_, table) in cells.by_type.items():
+        for pair in ELEMENTS[vtk].edges:
+            ends = table[:, pair]
+            length = np.linalg.norm(points[ends[:, 1]] - points[ends[:, 0]], axis=1)
+            for end in np.searchsorted(nodes, ends).T:
+                total += np.bincount(end, length, len(nodes))
+                count += np.bincount(end, minlength=len(nodes))
+    return total / count
+
+
+_H = np.sqrt(3) / 2
+IDEAL: dict[int, FloatArray] = {
+    5: np.array([[0, 0], [1, 0], [0.5, _H]]),
+    9: np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]),
+    10: np.array([[0, 0, 0], [1, 0, 0], [0.5, _H, 0], [0.5, _H / 3, np.sqrt(2 / 3)]]),
+    12: np.array([[i, j, k] for k in (0.0, 1) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))]),
+    13: np.array([[i, j, k] for k in (0.0, 1) for i, j in ((0, 0), (1, 0), (0.5, _H))]),
+    14: np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, np.sqrt(0.5)]]),
+}
+"""Nodes (n, d) of the ideal cell with edges of length 1, by VTK identifier."""
