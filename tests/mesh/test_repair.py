@@ -1,12 +1,21 @@
 """Repair of folded cells: all types are mended, and everything else keeps its bits."""
 
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from slideviz.mesh.jacobians import VALID
+from slideviz.mesh.model import Cells
+from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality import quality
+from slideviz.mesh.repair.energy import targets
 from slideviz.mesh.repair.freedom import Freedom
+from slideviz.mesh.repair.lift import lift_energy
+from slideviz.mesh.repair.patches import Patch
 from slideviz.mesh.repair.repair import repair
+from slideviz.system.threads import core_limit
 from tests.builders import grid
 
 SHAPES = [
@@ -45,3 +54,251 @@ def test_scrambled_nodes_are_put_in_order(shape, kind):
     assert after.min >= 0.1
     assert not len(result.bad_after)
     assert np.array_equal(result.points[held], mesh.points[held])
+
+
+def patch_of(mesh, points):
+    held = held_boundary(mesh)
+    parts = [
+        targets(vtk, np.array(nodes), mesh.points[nodes], np.ones(len(nodes)))
+        for vtk, (_, nodes) in mesh.cells.by_type.items()
+    ]
+    return Patch(points, Freedom.within(mesh.dim, held), parts, ThreadPoolExecutor(1))
+
+
+@pytest.mark.parametrize(("shape", "kind"), SHAPES)
+def test_the_gradient_is_that_of_the_energy_where_cells_are_folded_too(shape, kind):
+    mesh = grid(tuple(min(s, 3) for s in shape), kind=kind)
+    rng = np.random.default_rng(3)
+    patch = patch_of(mesh, mesh.points + 0.2 * rng.normal(size=mesh.points.shape))
+    way, step = rng.normal(size=patch.still.shape), 1e-5
+    _, gradient = patch.energy(patch.still, 0.3)
+    assert patch.least.min() < 0
+    values = [patch.energy(k * step * way, 0.3)[0] for k in (-2, -1, 1, 2)]
+    slope = (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * step)
+    assert (gradient * way).sum() == pytest.approx(slope, rel=1e-7)
+
+
+def test_the_preconditioner_has_the_curvature_of_a_cell_that_keeps_its_shape():
+    mesh = grid((2, 2, 2))
+    patch = patch_of(mesh, mesh.points)
+    (block,) = patch.curvature(1e-6)
+    step = 1e-3 * np.eye(3)
+    bent = [patch.energy(way[None], 1e-6)[0] + patch.energy(-way[None], 1e-6)[0] for way in step]
+    second = (np.array(bent) - 2 * patch.energy(patch.still, 1e-6)[0]) / 1e-6
+    assert np.diag(np.linalg.inv(block)) == pytest.approx(second, rel=0.5)
+
+
+def test_the_gradient_of_the_lift_is_that_of_its_value():
+    mesh = grid((3, 3, 3), kind="mixed")
+    rng = np.random.default_rng(3)
+    patch = patch_of(mesh, mesh.points + 0.01 * rng.normal(size=mesh.points.shape))
+    ids = np.concatenate([ids for ids, _ in mesh.cells.by_type.values()])
+    sums, signs = (array[ids] for array in reference_of(mesh))
+    beta = 1.2 / quality(mesh.with_points(patch.start), mesh).min
+    way, step = rng.normal(size=patch.still.shape), 1e-5
+
+    def value(unknowns):
+        return lift_energy(patch, unknowns, signs, sums, True, "knupp", beta)
+
+    _, gradient = value(patch.still)
+    values = [value(k * step * way)[0] for k in (-2, -1, 1, 2)]
+    slope = (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * step)
+    assert (gradient * way).sum() == pytest.approx(slope, rel=1e-7)
+    assert value(0.1 * way)[0] == np.inf
+
+
+def pushed(mesh, far=0.14, at=0.5):
+    """Push the nodes near the middle to one side, so that a few cells fold."""
+    centre = at * np.ones(mesh.dim)
+    near = np.linalg.norm(mesh.points - centre, axis=1) < 0.1
+    move = np.where(near[:, None], far, 0.0) * np.eye(mesh.dim)[0]
+    return mesh.with_points(mesh.points + move)
+
+
+def test_only_nodes_near_folded_cells_move():
+    mesh = grid((30, 30), kind="mixed")
+    folded = pushed(mesh)
+    result = repair(folded, Freedom.within(2, held_boundary(mesh)), mesh)
+    assert len(result.bad_before)
+    assert not len(result.bad_after)
+    same = np.setdiff1d(np.arange(len(mesh.points)), result.moved)
+    assert np.array_equal(result.points[same], folded.points[same])
+    far = np.abs(folded.points[result.moved] - 0.5).max()
+    assert far < 0.35
+    way = np.linalg.norm(result.points - folded.points, axis=1)
+    assert result.largest_move == way.max()
+
+
+def test_threads_do_not_change_bits():
+    mesh = grid((12, 12, 12))
+    held = held_boundary(mesh)
+    folded = scrambled(mesh, held)
+    results = []
+    for threads in (1, 3):
+        with core_limit(threads):
+            results.append(repair(folded, Freedom.within(3, held), mesh).points)
+    assert np.array_equal(*results)
+
+
+def test_the_lowest_quality_is_lifted_above_the_limit():
+    mesh = grid((12, 12))
+    folded = pushed(mesh, 0.07)
+    before = quality(folded, mesh)
+    assert before.inverted == 0
+    result = repair(folded, Freedom.within(2, held_boundary(mesh)), mesh, below=0.7)
+    assert before.min < 0.6
+    assert quality(mesh.with_points(result.points), mesh).min >= 0.7
+
+
+def test_without_a_reference_cells_become_ideal():
+    mesh = grid((8, 8, 8), kind="prism")
+    folded = pushed(mesh, 0.2)
+    result = repair(folded, Freedom.within(3, held_boundary(mesh)))
+    after = quality(mesh.with_points(result.points), mesh)
+    assert len(result.bad_before)
+    assert after.valid == len(mesh.cells)
+
+
+def test_cells_numbered_the_other_way_round_are_mended():
+    mesh = grid((10, 10))
+    turned = mesh.cells.connectivity.reshape(-1, 4)[:, ::-1].ravel()
+    mesh = replace(mesh, cells=Cells.from_types(mesh.cells.types, turned), markers=())
+    held = np.abs(mesh.points - 0.5).max(axis=1) == 0.5
+    result = repair(scrambled(mesh, held), Freedom.within(2, held), mesh)
+    assert len(result.bad_before)
+    assert quality(mesh.with_points(result.points), mesh).valid == len(mesh.cells)
+
+
+def shell():
+    """A block of a hollow cylinder, whose inner and outer sides are curved."""
+
+    def place(p):
+        angle, radius = 0.1 * p[:, 0], 1 + 0.1 * p[:, 1]
+        return np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.1 * p[:, 2]], axis=1)
+
+    return grid((8, 4, 8), place=place)
+
+
+def tangents(points):
+    normal = points * [1, 1, 0] / np.hypot(points[:, 0], points[:, 1])[:, None]
+    return np.eye(3) - normal[:, :, None] * normal[:, None, :]
+
+
+def test_nodes_that_slide_stay_on_their_curved_boundary():
+    mesh = shell()
+    held = held_boundary(mesh)
+    rims = np.isin(np.arange(len(held)), [mesh.marker(m).nodes for m in ("x_m", "x_p")])
+    rims |= np.isin(np.arange(len(held)), [mesh.marker(m).nodes for m in ("z_m", "z_p")])
+    slides = np.flatnonzero(held & ~rims)
+    radius = np.hypot(*mesh.points[:, :2].T)
+
+    def project(nodes, points):
+        out = points.copy()
+        out[:, :2] *= (radius[nodes] / np.hypot(*points[:, :2].T))[:, None]
+        return out, tangents(out)
+
+    place = np.where(rims, -1, np.cumsum(~rims) - 1)
+    freedom = Freedom(place, slides, tangents(mesh.points[slides]), slides, project)
+    at, turn = mesh.points, 0.25 * np.exp(-40 * ((mesh.points[:, 2] - 0.4) ** 2))
+    turn[rims] = 0.0
+    turn *= np.exp(-60 * (np.arctan2(at[:, 1], at[:, 0]) - 0.4) ** 2)
+    cos, sin = np.cos(turn), np.sin(turn)
+    moved = np.stack(
+        [cos * at[:, 0] - sin * at[:, 1], sin * at[:, 0] + cos * at[:, 1], at[:, 2]], 1
+    )
+    folded = mesh.with_points(moved)
+    result = repair(folded, freedom, mesh)
+    assert len(result.bad_before)
+    assert not len(result.bad_after)
+    assert np.intersect1d(result.moved, slides).size
+    assert np.abs(np.hypot(*result.points[:, :2].T) - radius)[slides].max() < 1e-12
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_periodic_images_move_as_one(angle):
+    """Sides x_m and x_p, with a second mesh's worth of turn between their displacements."""
+    mesh = grid((10, 10))
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    if angle:  # a sector of a ring
+        r, phi = 1 + mesh.points[:, 1], angle * mesh.points[:, 0]
+        mesh = mesh.with_points(np.stack([r * np.cos(phi), r * np.sin(phi)], 1))
+        mesh = replace(mesh, cells=_reversed(mesh))
+    held = np.zeros(len(mesh.points), bool)
+    for name in ("y_m", "y_p"):
+        held[mesh.marker(name).nodes] = True
+    low, high = mesh.marker("x_m").nodes, mesh.marker("x_p").nodes
+    place = np.where(held, -1, np.arange(len(held)))
+    place[high[~held[high]]] = low[~held[low]]
+    place[place >= 0] = np.unique(place[place >= 0], return_inverse=True)[1]
+    bound = high[~held[high]]
+    freedom = Freedom(place, bound, np.tile(turn, (len(bound), 1, 1)), np.empty(0, int))
+    rng = np.random.default_rng(0)
+    moves = 0.15 * rng.normal(size=(int(place.max()) + 1, 2))
+    shift = np.where(held[:, None], 0.0, moves[place])
+    shift[bound] = shift[bound] @ turn.T
+    folded = mesh.with_points(mesh.points + shift)
+    result = repair(folded, freedom, mesh)
+    assert len(result.bad_before)
+    assert not len(result.bad_after)
+    move = result.points - folded.points
+    assert np.abs(move[low[~held[low]]]).max() > 0.01
+    assert move[bound] == pytest.approx(move[low[~held[low]]] @ turn.T, abs=1e-14)
+
+
+def _reversed(mesh):
+    table = mesh.cells.connectivity.reshape(-1, 4)[:, ::-1]
+    return Cells.from_types(mesh.cells.types, table.ravel())
+
+
+def test_cells_that_no_motion_mends_are_named():
+    mesh = grid((8, 8))
+    held = held_boundary(mesh)
+    corner = int(np.flatnonzero((mesh.points == 0).all(axis=1))[0])
+    points = np.array(mesh.points)
+    points[corner] = 0.15, 0.15
+    inner = int(np.argmin(np.linalg.norm(points - 0.5, axis=1)))
+    points[inner] += 0.2
+    folded = mesh.with_points(points)
+    result = repair(folded, Freedom.within(2, held), mesh)
+    (cell,) = result.impossible
+    assert corner in cell.nodes
+    assert cell.boundaries == ("x_m", "y_m")
+    assert len(result.bad_before) > 1
+    assert result.bad_after.tolist() == [cell.cell]
+
+
+def test_a_side_that_folds_on_itself_is_named():
+    mesh = grid((3, 3, 3))
+    held = held_boundary(mesh)
+    points = np.array(mesh.points)
+    node = int(np.argmin(np.linalg.norm(points - [1 / 3, 1 / 3, 0], axis=1)))
+    points[node] = 0.6, 0.6, 0.0
+    result = repair(mesh.with_points(points), Freedom.within(3, held), mesh, below=0.0)
+    assert {one.boundaries for one in result.impossible} == {("z_m",)}
+    assert {one.cell for one in result.impossible} == set(result.bad_after.tolist())
+
+
+def test_a_patch_grows_where_three_rings_are_not_enough():
+    mesh = grid((40, 3))
+    points = np.array(mesh.points)
+    inside = ~held_boundary(mesh)
+    x = points[inside, 0]
+    points[inside, 0] = np.where(x < 0.75, x / 3, 1 - 3 * (1 - x))  # all but the last quarter
+    result = repair(mesh.with_points(points), Freedom.within(2, ~inside), mesh, below=0.5)
+    assert len(result.bad_after) < len(result.bad_before)
+
+
+def test_a_report_may_cancel():
+    mesh = grid((10, 10))
+    held = held_boundary(mesh)
+    seen = []
+
+    def report(phase, fraction):
+        seen.append(fraction)
+        if len(seen) > 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        repair(scrambled(mesh, held), Freedom.within(2, held), mesh, report=report)
+    assert all(0 <= fraction <= 1 for fraction in seen)
+    assert seen == sorted(seen)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 
 import numpy as np
 
+from slideviz.mesh.jacobians import LANES
 from slideviz.mesh.model import FloatArray
+from slideviz.system.jit_cache import njit
 
 CORRECTIONS = 15
 """Pairs of steps and changes of the gradient that L-BFGS remembers."""
@@ -22,16 +23,82 @@ TRIES = 30
 WINDOW = 10
 """Iterations over which the decrease of the value is looked at."""
 
-Pairs = deque[tuple[FloatArray, FloatArray, float, float]]
-"""Steps s, changes y of the gradient, their product, and that over the preconditioned y's."""
-
 Function = Callable[[FloatArray], tuple[float, FloatArray]]
 """Returns value and gradient (b, d) at unknowns (b, d)."""
 
 
-def dot(a: FloatArray, b: FloatArray) -> float:
-    """Return the sum of products of (b, d); its bits do not depend on a number of threads."""
-    return float(np.einsum("i,i", a.ravel(), b.ravel()))
+@njit(nogil=True, cache=True)
+def dot(a, b):  # type: ignore[no-untyped-def]
+    """Return the sum of products of (n,); its bits do not depend on a number of threads."""
+    part = np.zeros(LANES)
+    whole = len(a) // LANES * LANES
+    for first in range(0, whole, LANES):
+        for c in range(LANES):
+            part[c] += a[first + c] * b[first + c]
+    total = part.sum()
+    for k in range(whole, len(a)):
+        total += a[k] * b[k]
+    return total
+
+
+@njit(nogil=True, cache=True)
+def _add(factor, a, out):  # type: ignore[no-untyped-def]
+    for k in range(len(out)):
+        out[k] += factor * a[k]
+
+
+@njit(nogil=True, cache=True)
+def _first_loop(steps, changes, products, order, out, factors):  # type: ignore[no-untyped-def]
+    """Take the newest pairs first from ``out`` (n,), with ``factors`` (c,): Nocedal's first loop.
+
+    ``steps`` and ``changes`` are (c, n), ``products`` (c,); ``order`` (k,) has the oldest first.
+    """
+    for i in range(len(order) - 1, -1, -1):
+        k = order[i]
+        factors[k] = dot(steps[k], out) / products[k]
+        _add(-factors[k], changes[k], out)
+
+
+@njit(nogil=True, cache=True)
+def _second_loop(steps, changes, products, order, out, factors):  # type: ignore[no-untyped-def]
+    for k in order:
+        _add(factors[k] - dot(changes[k], out) / products[k], steps[k], out)
+
+
+class Memory:
+    """The last pairs of steps and changes of the gradient, and the inverse Hessian by them."""
+
+    def __init__(self, count: int, precondition: Callable[[FloatArray], FloatArray]) -> None:
+        self._precondition = precondition
+        self._steps, self._changes = np.empty((2, CORRECTIONS, count))
+        self._products, self._factors = np.empty((2, CORRECTIONS))
+        self._order, self._scale = np.empty(0, np.int64), 1.0
+
+    def __len__(self) -> int:
+        return len(self._order)
+
+    def clear(self) -> None:
+        """Forget all pairs."""
+        self._order, self._scale = self._order[:0], 1.0
+
+    def add(self, step: FloatArray, change: FloatArray) -> None:
+        """Take a pair (b, d), (b, d), in place of the oldest; none without positive curvature."""
+        product = dot(step.ravel(), change.ravel())
+        if product > 0:
+            full = len(self) == CORRECTIONS
+            k = self._order[0] if full else len(self)
+            self._order = np.append(self._order[1:] if full else self._order, k)
+            self._steps[k], self._changes[k] = step.ravel(), change.ravel()
+            self._products[k] = product
+            self._scale = product / dot(change.ravel(), self._precondition(change).ravel())
+
+    def inverse_times(self, gradient: FloatArray) -> FloatArray:
+        """Return the inverse Hessian times a gradient (b, d)."""
+        pairs, out = (self._steps, self._changes, self._products, self._order), gradient.copy()
+        _first_loop(*pairs, out.ravel(), self._factors)
+        out = self._scale * self._precondition(out)
+        _second_loop(*pairs, out.ravel(), self._factors)
+        return out
 
 
 def descend(
@@ -61,53 +128,33 @@ def descend(
     """
     x = start
     value, gradient = function(x)
-    pairs: Pairs = deque(maxlen=CORRECTIONS)
+    memory = Memory(x.size, precondition)
     values = [value]
     for _ in range(iterations):
-        direction = -_inverse_times(gradient, pairs, precondition)
-        slope = dot(gradient, direction)
+        direction = -memory.inverse_times(gradient)
+        slope = dot(gradient.ravel(), direction.ravel())
         if not slope < 0:  # by rounding only
-            pairs.clear()
+            memory.clear()
             direction = -precondition(gradient)
-            slope = dot(gradient, direction)
+            slope = dot(gradient.ravel(), direction.ravel())
             if not slope < 0:
                 break
         most = longest(x, direction)
         step = _search(function, x, value, direction, slope, most)
         if step is None:
-            if not pairs:
+            if not len(memory):
                 break
-            pairs.clear()
+            memory.clear()
             continue
         length, new_value, new_gradient = step
-        s, y = length * direction, new_gradient - gradient
-        curvature = dot(s, y)
-        if curvature > 0:
-            pairs.append((s, y, curvature, curvature / dot(y, precondition(y))))
+        s = length * direction
+        memory.add(s, new_gradient - gradient)
         x, value, gradient = x + s, new_value, new_gradient
         values.append(value)
         least = decrease()
         if len(values) > WINDOW and values[-1 - WINDOW] - value <= least * abs(value):
             break
     return x
-
-
-def _inverse_times(
-    gradient: FloatArray,
-    pairs: Pairs,
-    precondition: Callable[[FloatArray], FloatArray],
-) -> FloatArray:
-    """Return the inverse Hessian of L-BFGS times the gradient (Nocedal's two loops)."""
-    out, factors = gradient.copy(), []
-    for s, y, curvature, _ in reversed(pairs):
-        factors.append(dot(s, out) / curvature)
-        out -= factors[-1] * y
-    out = precondition(out)
-    if pairs:
-        out *= pairs[-1][3]
-    for (s, y, curvature, _), factor in zip(pairs, reversed(factors), strict=True):
-        out += (factor - dot(y, out) / curvature) * s
-    return out
 
 
 def _search(
@@ -130,7 +177,7 @@ def _search(
             high = step
         else:
             best = step, new_value, gradient
-            if step >= most or dot(gradient, direction) >= WOLFE * slope:
+            if step >= most or dot(gradient.ravel(), direction.ravel()) >= WOLFE * slope:
                 break
             low = step
         step = 0.5 * (low + high) if high < np.inf else 2.0 * step

@@ -242,47 +242,56 @@ def write_energy(  # type: ignore[no-untyped-def]
 
 @njit(**OPTIONS)
 def write_curvatures(  # type: ignore[no-untyped-def]
-    points, nodes, table, shape, epsilon, low, high, curvatures
+    vtk, points, nodes, table, corner_at, scale, shape, epsilon, low, high, curvatures
 ):
-    """Write the diagonal blocks (m, n, d, d) by node of the positive part of the Hessian, about.
+    """Write the diagonal blocks (m, n, d, d) by node of the positive part of the Hessian.
 
-    That is the part without second derivatives of chi and D, and with coefficients at corners
-    alone.
+    That is the part without second derivatives of chi and D. Else as `write_energy`.
     """
-    d, n, outer = points.shape[1], nodes.shape[1], len(table)
-    power, parts = 2.0 / d, shape.shape[1] - 1
+    d, n, parts, outer = points.shape[1], nodes.shape[1], len(scale), len(table)
+    power = 2.0 / d
     at, slope = np.empty((d, n, LANES)), np.empty((d, n, LANES))
-    alpha, total = np.empty((outer, LANES)), np.empty(LANES)
-    unit, none = np.ones((1, LANES)), np.zeros((1, LANES))
+    found, unit = np.empty((parts, LANES)), np.zeros((parts, LANES))
+    none, total, bend = np.zeros((parts, LANES)), np.empty(LANES), np.empty((parts, LANES))
+    blocks = np.empty((n, d, d, LANES))
     for first in range(low, high, LANES):
         count = min(LANES, high - first)
         gather(points, nodes, first, count, at)
-        corners(at, table, count, alpha)
-        curvatures[first : first + count] = 0.0
+        _coefficients(vtk, at, table, count, found)
+        blocks[:] = 0.0
+        for k in range(parts):
+            for c in range(count):
+                factor = scale[k, first + c]
+                chi, root = _chi(factor * found[k, c], epsilon)
+                bent = (1.0 - factor * found[k, c] / root) ** 2 + 1.0 / (root * root)
+                bend[k, c] = factor * factor / parts * bent / chi
         for k in range(outer):
             here = np.ascontiguousarray(shape[k, :, first : first + count])
             _squares(at, table[k], here, count, total)
-            slope[:] = 0.0
-            if d == 2:
-                pull_plane(5, at, table[k : k + 1], count, unit, none, slope)
-            else:
-                pull_solid(14, at, table[k : k + 1], count, unit, none, slope)
             for c in range(count):
-                depth = here[0, c] * alpha[k, c]
-                chi, root = _chi(depth, epsilon)
+                factor = here[0, c]
+                chi, root = _chi(factor * found[corner_at[k], c], epsilon)
                 part = 0.5 / outer / (chi if d == 2 else np.cbrt(chi * chi))
-                bend = ((1.0 - depth / root) ** 2 + 1.0 / (root * root)) / (outer * chi)
-                bend += power * (power + 1.0) * part * total[c] / (root * root)
-                bend *= here[0, c] * here[0, c]
-                own = 0.0
-                for s in range(parts):
-                    own += (2.0 if s < d else 4.0) * part * here[1 + s, c]
-                for j in table[k]:
+                bent = power * (power + 1.0) * part * total[c] / (root * root)
+                bend[corner_at[k], c] += factor * factor * bent
+                for s in range(len(here) - 1):
+                    stiff = (2.0 if s < d else 4.0) * part * here[1 + s, c]
                     for a in range(d):
-                        for b in range(d):
-                            curvatures[first + c, j, a, b] += bend * slope[a, j, c] * slope[b, j, c]
+                        blocks[table[k, 0], a, a, c] += stiff
+                        if s < d:
+                            blocks[table[k, 1 + s], a, a, c] += stiff
+        for k in range(parts):
+            unit[:] = 0.0
+            unit[k] = 1.0
+            slope[:] = 0.0
+            _pull(vtk, at, table, count, unit, none, slope)
+            for j in range(n):
                 for a in range(d):
-                    curvatures[first + c, table[k, 0], a, a] += own
-                    for s in range(d):
-                        stiff = 2.0 * part * here[1 + s, c]
-                        curvatures[first + c, table[k, 1 + s], a, a] += stiff
+                    for b in range(d):
+                        for c in range(count):
+                            blocks[j, a, b, c] += bend[k, c] * slope[a, j, c] * slope[b, j, c]
+        for c in range(count):
+            for j in range(n):
+                for a in range(d):
+                    for b in range(d):
+                        curvatures[first + c, j, a, b] = blocks[j, a, b, c]

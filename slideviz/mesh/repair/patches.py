@@ -189,8 +189,9 @@ class Patch:
         blocks = {part.vtk: np.empty((*part.nodes.shape, d, d)) for part in self.parts}
 
         def work(part: Targets, here: slice, _whole: slice, _slopes: FloatArray) -> None:
-            cells = part.nodes, CORNERS[part.vtk], part.shape
-            write_curvatures(points, *cells, epsilon, here.start, here.stop, blocks[part.vtk])
+            cells = part.nodes, CORNERS[part.vtk], CORNER_AT[part.vtk], part.scale, part.shape
+            out = epsilon, here.start, here.stop, blocks[part.vtk]
+            write_curvatures(part.vtk, points, *cells, *out)
 
         self.of_cells(work)
         for part in self.parts:

@@ -34,7 +34,7 @@ RINGS = 3, 5, 8
 ROUNDS, VAIN = 40, 10
 """Most outer rounds of a patch, and those in a row that may mend nothing."""
 
-ITERATIONS, DECREASE, ENOUGH = 200, 1e-3, 0.03
+ITERATIONS, DECREASE, ENOUGH = 200, 5e-3, 0.01
 """Most iterations of a descent, and the least relative decrease of the energy in ten of them, while
 a cell is folded and when none is."""
 
