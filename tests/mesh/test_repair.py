@@ -145,9 +145,9 @@ def test_the_lowest_quality_is_lifted_above_the_limit():
     folded = pushed(mesh, 0.07)
     before = quality(folded, mesh)
     assert before.inverted == 0
-    result = repair(folded, Freedom.within(2, held_boundary(mesh)), mesh, below=0.7)
-    assert before.min < 0.6
-    assert quality(mesh.with_points(result.points), mesh).min >= 0.7
+    result = repair(folded, Freedom.within(2, held_boundary(mesh)), mesh, below=0.8)
+    assert before.min < 0.7
+    assert quality(mesh.with_points(result.points), mesh).min >= 0.8
 
 
 def test_without_a_reference_cells_become_ideal():
@@ -222,7 +222,6 @@ def test_periodic_images_move_as_one(angle):
     if angle:  # a sector of a ring
         r, phi = 1 + mesh.points[:, 1], angle * mesh.points[:, 0]
         mesh = mesh.with_points(np.stack([r * np.cos(phi), r * np.sin(phi)], 1))
-        mesh = replace(mesh, cells=_reversed(mesh))
     held = np.zeros(len(mesh.points), bool)
     for name in ("y_m", "y_p"):
         held[mesh.marker(name).nodes] = True
@@ -243,11 +242,6 @@ def test_periodic_images_move_as_one(angle):
     move = result.points - folded.points
     assert np.abs(move[low[~held[low]]]).max() > 0.01
     assert move[bound] == pytest.approx(move[low[~held[low]]] @ turn.T, abs=1e-14)
-
-
-def _reversed(mesh):
-    table = mesh.cells.connectivity.reshape(-1, 4)[:, ::-1]
-    return Cells.from_types(mesh.cells.types, table.ravel())
 
 
 def test_cells_that_no_motion_mends_are_named():
