@@ -75,16 +75,7 @@ def check_film(
 ) -> None:
     """Raise SlidevizError if a film cannot be made with these settings or in this file.
 
-    Parameters
-    ----------
-    file : Path
-        A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
-    film_options : Reel
-        The settings.
-    frames : int, optional
-        The number of frames, if it is known already.
-    overwrite : bool
-        Allow files that exist.
+    ``file``: see `film`. ``frames``: the number of frames, if it is known already.
     """
     kind, size = film_kind(file), film_options.pixels(file)
     check_size(size)
@@ -149,15 +140,9 @@ def render_frames(
 ) -> Generator[object, Any, None]:
     """Draw and encode all images; yield `FilmProgress` after each one, and between its pieces.
 
-    Encoding is yielded as `InThread`, to be done in a thread.
-
-    Parameters
-    ----------
-    frames : int
-        Number of the undeformed mesh and all steps.
-    draw : callable
-        Given a position (the number of a step, or a number between two), returns a generator that
-        draws the image in pieces and returns it.
+    Encoding is yielded as `InThread`, to be done in a thread. ``frames``: number of the undeformed
+    mesh and all steps. ``draw``: given a position (the number of a step, or a number between two),
+    returns a generator that draws the image in pieces and returns it.
     """
     total, pace = film_options.count(frames), film_options.pace(frames)
     samples = []
@@ -219,20 +204,10 @@ def film(
     A film of two runs has the steps of the run with more of them. Of the other run it shows the
     step that is as far deformed, or, with images in between, a mesh between two steps. Raises
     SlidevizError if there are no steps, the film cannot be made like that, or the file cannot be
-    written.
-
-    Parameters
-    ----------
-    session : Session
-        Made of the runs (`slideviz.session.opening.session_of_runs`).
-    file : str or Path
-        A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
-    film_options : Reel
-        Size, speed, and images in between.
-    zoom : Detail, "auto" or "all"
-        What part of the mesh is seen; "auto" is the whole, unless what moved is tiny in it.
-    overwrite : bool
-        Allow files that exist.
+    written. ``session``: made by `slideviz.session.opening.session_of_runs`. ``file``: a name
+    ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``. ``zoom``: what part
+    of the mesh is seen; "auto" is the whole, unless what moved is tiny in it. ``overwrite``: allow
+    files that exist.
     """
     path = Path(file)
     options = image_options(film_options.pixels(path), both=session.view.beside is not None)
@@ -262,23 +237,8 @@ def film_steps(
 ) -> Generator[object, Any, None]:
     """Write a film drawn by a renderer; yield `FilmProgress` after each image, and between pieces.
 
-    Raises SlidevizError if there are no steps, the film cannot be made like that, or the file
-    cannot be written.
-
-    Parameters
-    ----------
-    renderer : OffscreenRenderer
-        Holds the session, whose steps are shown, and the camera.
-    options : PictureOptions
-        The options of each image.
-    file : Path
-        A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
-    film_options : Reel
-        Speed, and images in between.
-    titles : callable, optional
-        Returns the titles of the images; by default run, step and quality.
-    overwrite : bool
-        Allow files that exist.
+    The rest is as for `film`. ``renderer``: holds the session, whose steps are shown, and the
+    camera. ``titles`` returns those of the images; by default run, step and quality.
     """
     runs = renderer.shown(renderer.session, options)
     for one in runs:

@@ -44,16 +44,9 @@ if TYPE_CHECKING:
 class OffscreenRenderer:
     """An off-screen scene that draws pictures of a session, into memory or a file.
 
-    Parameters
-    ----------
-    session : Session
-        The session that is drawn.
-    surfaces : sequence of Surface
-        The boundaries of its mesh.
-    like : Scene, optional
-        The scene of a view whose camera, color scheme and ghosts are used.
-    overview : Overview, optional
-        The cells and the camera without such a view; all steps of the runs are fitted.
+    ``surfaces``: the boundaries of its mesh. ``like``: the scene of a view whose camera, color
+    scheme and ghosts are used. ``overview``: the cells and the camera without such a view; all
+    steps of the runs are fitted.
     """
 
     def __init__(

@@ -74,18 +74,8 @@ def title_words(
 ) -> str:
     """Return the longest title of a frame that fits into a number of letters.
 
-    Parameters
-    ----------
-    session : Session
-        Has the runs, and the shown one.
-    frame : StepFrame
-        The frame that is shown.
-    place : str
-        Its position in the run (`place_words`).
-    letters : float
-        The number of letters that fit.
-    longest : str
-        The longest place of a film, so that all its titles have the same form.
+    ``place``: its position in the run (`place_words`). ``longest``: the longest place of a film, so
+    that all its titles have the same form.
     """
     what = session.view.color_by
 

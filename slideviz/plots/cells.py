@@ -224,20 +224,10 @@ def bar_below(axes: Any, length: float, gap: float = BAR_BELOW) -> Any:
 def color_bar(
     axes: Any, scale: Any, label: str, letters: float, *, inverted: bool, upright: bool
 ) -> Any:
-    """Draw a color bar, with as many numbers as fit, and return it.
+    """Draw a color bar of a `color_scale`, with as many numbers as fit, and return it.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        The axes for the bar; see `bar_beside` and `bar_below`.
-    scale : matplotlib.cm.ScalarMappable
-        See `slideviz.plots.cells.color_scale`.
-    letters : float
-        Size of the numbers in points; the label's is one point more.
-    inverted : bool
-        Whether the color of inverted cells is shown at the lower end.
-    upright : bool
-        Whether the bar is vertical.
+    ``axes``: see `bar_beside` and `bar_below`. ``letters``: size of the numbers in points; the
+    label's is one more. ``inverted``: the lower end has the color of inverted cells.
     """
     from matplotlib.cm import ScalarMappable
 

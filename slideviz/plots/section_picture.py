@@ -77,14 +77,9 @@ def laid_flat(
 ) -> tuple[Polygons, tuple[Label, Label] | None]:
     """Return the pieces as drawn on paper, the nearest polygons last, and the axes' labels.
 
-    Parameters
-    ----------
-    pieces : mapping of int to Polygons
-        The cuts of each passage, by number; 0 is the mesh itself.
-    space : bool
-        Whether they are shown in space, where the axes have no labels (None).
-    beside : float, optional
-        Middle angle, in radians, of another run's section: this one is unrolled next to it.
+    ``pieces``: the cuts of each passage, by number; 0 is the mesh itself. ``space``: they are shown
+    in space, where axes have no labels (None). ``beside``: middle angle, in radians, of another
+    run's section, next to which this one is unrolled.
     """
     if space:
         return in_space(list(pieces.values()), section), None

@@ -46,16 +46,10 @@ def tick_format(at: FloatArray) -> str:
 def bar_ticks(
     low: float, high: float, part: Callable[[str], float], most: int = 6
 ) -> tuple[FloatArray, str]:
-    """Return the numbers (k,) beside a color bar, and their printf format.
+    """Return the numbers (k,) beside a color bar, those of its ends among them, and their format.
 
-    Parameters
-    ----------
-    low, high : float
-        The values at the ends of the bar, which are always among the numbers.
-    part : callable
-        Returns the size of a label, relative to the length of the bar.
-    most : int
-        Most steps between the round numbers within; fewer if labels would overlap.
+    ``part`` returns the size of a label, relative to the length of the bar. ``most``: most steps
+    between the round numbers within; fewer if labels would overlap.
     """
     width, ends = high - low, np.array([low, high])
     for count in range(most, 0, -1):

@@ -61,26 +61,10 @@ def frame_of(section: Section, patch: Patch) -> list[FloatArray]:
 def pixel_and_slope(
     pixels_of: PixelsOf, section: Section, place: PlaceOnSection, size: float
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Return the pixel of a place on a section, and how it moves with the section's size.
+    """Return the pixel (2,) of a place on a section, and its derivative (2,) by the section's size.
 
-    Parameters
-    ----------
-    pixels_of : callable
-        Returns display coordinates.
-    place : (float, float)
-        Angle in radians, and position along the axis.
-    size : float
-        The size at which the derivative is taken.
-
-    Returns
-    -------
-    at : (2,) float64
-        The place's pixel.
-    way : (2,) float64
-        Derivative of the pixel by the size. If ``steep``, it points upwards, as a replacement.
-    steep : bool
-        Whether the size's direction is nearly along the line of sight, so that the place would
-        hardly move on the screen.
+    Then whether it is steep: nearly along the line of sight, so that the place would hardly move on
+    the screen. The derivative points upwards then, as a replacement.
     """
     shape, lever = axis_shape(section), axis_shape(section).lever(section, place[1])
     # Outwards, around and along the section: one of the three is hardly foreshortened.
@@ -104,21 +88,11 @@ def dragged_size(
 ) -> float:
     """Return the size of a section after one of its places was dragged.
 
-    Parameters
-    ----------
-    pixels_of : callable
-        Returns display coordinates.
-    section : Section
-        The section when the drag began.
-    place : (float, float)
-        The dragged place: angle in radians, and position along the axis.
-    start, now : (2,) float64
-        Where the drag began, and where the mouse is now, in pixels.
+    ``section``: as it was when the drag began. ``start`` and ``now`` (2,): where the drag began,
+    and where the mouse is now, in pixels.
     """
-    size, ends = (
-        section.size,
-        (_LEAST * section.size, axis_shape(section).size.high * (1.0 - _LEAST)),
-    )
+    size = section.size
+    ends = _LEAST * size, axis_shape(section).size.high * (1.0 - _LEAST)
     at, slope, steep = pixel_and_slope(pixels_of, section, place, size)
     target = at + now - start
     if steep:

@@ -143,15 +143,9 @@ class Camera:
         return view if place == self.place else ()
 
     def aim(self, centre: Any, half: float, depth: float = 0.0) -> None:
-        """Move the camera to look at a point with a given height of view; the direction stays.
+        """Move the camera to look at a point (3,) with half a height of view; the direction stays.
 
-        Parameters
-        ----------
-        centre : (3,)
-        half : float
-            Half the height of the view at the point, in the mesh's length unit.
-        depth : float
-            Extent along the line of sight of what should be seen, which keeps the camera outside.
+        ``depth``: extent along the line of sight of what should be seen; the camera stays outside.
         """
         camera = self._camera
         direction = self._axes()[2]

@@ -248,16 +248,8 @@ class FlatScene:
 def flat_matrix(section: Section, pair: Pair, number: int, matrix: FloatArray) -> FloatArray:
     """Return the matrix (4, 4) that moves a flat section to that of a neighbouring passage.
 
-    Parameters
-    ----------
-    section : Section
-        A section that ``matrix`` maps onto itself.
-    pair : Pair
-        The periodic boundaries.
-    number : int
-        The number of the passage: the power of the period.
-    matrix : (4, 4) float64
-        The transformation to the passage in space.
+    ``matrix`` (4, 4), the transformation to the passage in space, maps the section onto itself;
+    ``number`` is that of the passage: the power of the period.
     """
     turn = np.sign(section.basis[2] @ np.asarray(pair.axis)) if pair.kind == "rotational" else 0.0
     angle = turn * np.copysign(pair.period, pair.angle) * number

@@ -43,14 +43,12 @@ class BoxLayer(KeyedLayer):
     names = (BASE, MOVED, BEHIND, f"{MOVED}:behind", LABELS)
 
     def key(self, session: Session) -> tuple[object, ...]:
-        """Return the boxes, their motions and the style, if they are shown."""
         if session.mesh is None or "ffd" not in session.view.drawn:
             return ()
         case, style = session.case, (self.stage.scheme, self.stage.pixel_scale)
         return session.mesh, box_motions(case), box_definition(case), style
 
     def draw(self, session: Session) -> None:
-        """Draw the lattices and their labels."""
         mesh = session.mesh
         if not self._key or mesh is None:
             return
@@ -171,7 +169,6 @@ class GhostLayer(Layer):
     """The ghosts: boundaries as they were undeformed, and as the motions will move them."""
 
     def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
         self.moved: dict[str, FloatArray] = {}
         """The points (u, d) of the nodes of each boundary that will move."""
         self._surfaces: dict[str, Surface] = {}
@@ -181,7 +178,6 @@ class GhostLayer(Layer):
         self._session = Session()
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
-        """Draw another mesh."""
         self._session = session
         self._surfaces = {surface.name: surface for surface in surfaces}
 
@@ -197,7 +193,6 @@ class GhostLayer(Layer):
         self._draw_moved(self._session)
 
     def update(self, _old: Session | None, new: Session) -> None:
-        """Draw another state of the session."""
         self._session = new
         self._draw_undeformed(new)
         self._draw_moved(new)
@@ -354,14 +349,12 @@ class SupportLayer(KeyedLayer):
     names = (HALO, NAME)
 
     def key(self, session: Session) -> tuple[object, ...]:
-        """Return the support radius, the moving bodies and the style, if they are shown."""
         if session.mesh is None or "support" not in session.view.drawn:
             return ()
         style = self.stage.pixel_scale, self.stage.scheme
         return (*support_key(support_case(session), session.mesh), *style)
 
     def draw(self, session: Session) -> None:
-        """Draw the circles, if there is a support radius."""
         if not self._key or session.mesh is None:
             return
         radius, boxes = support_of(support_case(session), session.mesh)

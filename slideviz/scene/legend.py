@@ -36,19 +36,16 @@ class LegendLayer(KeyedLayer):
         self._placed: tuple[float, ...] = ()
 
     def clear(self) -> None:
-        """Remove the legend."""
         clear_legend(self.stage.plotter)
         self._key = ()
         self._bar: tuple[str, float] | None = None
         self._plate: LegendPlate | None = None
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Draw another state of the session; make the legend anew if its content has changed."""
         super().update(old, new)
         self._place()
 
     def draw(self, session: Session) -> None:
-        """Make the legend, if it is shown."""
         clear_legend(self.stage.plotter)
         self._bar = self._plate = None
         stage, mesh, what = self.stage, session.mesh, session.view.color_by
@@ -87,7 +84,6 @@ class LegendLayer(KeyedLayer):
             self._plate.place(rect)
 
     def key(self, session: Session) -> tuple[object, ...]:
-        """Return everything that the legend's content depends on."""
         mesh, view = session.mesh, session.view
         names = mesh.marker_names if mesh is not None and view.color_by == "role" else ()
         content = frozenset(session.role(name) for name in names) or has_inverted(session)
@@ -115,20 +111,17 @@ class TriadLayer(KeyedLayer):
     _axes: Any = None
 
     def clear(self) -> None:
-        """Hide the arrows, which are no actors of the scene."""
         if self._axes is not None:
             self.stage.plotter.hide_axes()
         self._key = ()
 
     def key(self, session: Session) -> tuple[object, ...]:
-        """Return dimension, style and size of the view, if the axes are shown."""
         if "triad" not in session.view.drawn or session.mesh is None:
             return ()
         style = (self.stage.scheme, self.stage.pixel_scale, self.stage.has_plate)
         return session.mesh.dim, style, tuple(self.stage.plotter.window_size)
 
     def draw(self, session: Session) -> None:
-        """Draw the axes in the size of the view, or hide them."""
         plotter = self.stage.plotter
         if not self._key or session.mesh is None:
             if self._axes is not None:

@@ -34,7 +34,6 @@ class MarkLayer(Layer):
     """
 
     def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
         self.cell: int | None = None
         """The index of the cell that is drawn."""
         self._drawn: dict[str, Any] = {}
@@ -42,7 +41,6 @@ class MarkLayer(Layer):
         self._shapes: dict[str, Any] = {}
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Draw another state of the session."""
         cell, frame = new.view.marked_cell, new.frame
         if cell is None or frame is None or not frame.has(cell):
             for name in self._drawn:
@@ -115,14 +113,12 @@ class InvertedLayer(Layer):
         self.sections = sections
 
     def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
         self._key: tuple[object, ...] = ()
         self._cut: list[IntArray] = []
         self._shape: Any = None  # a reference in Python: VTK alone may return it without points
         self.stage.ring_words = ()
 
     def update(self, _old: Session | None, new: Session) -> None:
-        """Draw another state of the session."""
         key = (new.frame, _wanted(new), new.limit_chosen, self.stage.pixel_scale)
         cut = self._cut_cells(new)
         same = len(cut) == len(self._cut) and all(map(operator.is_, cut, self._cut))

@@ -48,7 +48,6 @@ class CellLayer(Layer):
     """(k,): indices of the cells of a 3D mesh whose outside is drawn; None for all."""
 
     def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
         self.order: IntArray | None = None
         """(m,): indices of the cells of a 2D mesh in the order of drawing; None: the mesh's."""
         self.shape: Any = None
@@ -56,7 +55,6 @@ class CellLayer(Layer):
         self._veil: tuple[Any, Any] | None = None
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
-        """Draw another mesh."""
         mesh = session.mesh
         assert mesh is not None
         if mesh.dim == 2:
@@ -88,7 +86,6 @@ class CellLayer(Layer):
             actors.set_order(self.shape, frame.mesh, every)
 
     def shapes(self) -> list[Any]:
-        """Return the data set of the cells."""
         return [] if self.shape is None else [self.shape]
 
     def points(self, mesh: Mesh) -> FloatArray:
@@ -98,7 +95,6 @@ class CellLayer(Layer):
         return np.asarray(mesh.points[self.shape.point_data[POINT]])
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Draw another state of the session."""
         if self.actor is None or new.mesh is None or new.frame is None:
             return
         by_value = new.view.color_by != "role"
@@ -132,7 +128,6 @@ class BoundaryLayer(Layer):
     """The boundaries, an actor each, with a band around the selected ones."""
 
     def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
         self.drawn: dict[str, DrawnBoundary] = {}
         """The boundaries by name."""
         self.bands: dict[str, Band] = {}
@@ -144,7 +139,6 @@ class BoundaryLayer(Layer):
         self._enclosed: frozenset[str] = frozenset()
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
-        """Draw another mesh."""
         assert session.mesh is not None
         self._lift = self.stage.lift(session.mesh)
         for surface in surfaces:
@@ -153,7 +147,6 @@ class BoundaryLayer(Layer):
         self._closed, self._enclosed = enclosing.closed, enclosing.inner
 
     def shapes(self) -> list[Any]:
-        """Return the data sets of all boundaries."""
         return [one.shape for one in self.drawn.values()]
 
     def _add(self, surface: Surface, points: FloatArray) -> DrawnBoundary:
@@ -175,7 +168,6 @@ class BoundaryLayer(Layer):
         return Band(rim, band)
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Draw another state of the session."""
         if new.mesh is None or new.frame is None or not self.drawn:
             return
         if old is None or old.frame is not new.frame:
@@ -270,13 +262,7 @@ class ThresholdLayer(Layer):
     """The cells within the threshold of the view.
 
     In 2D the other cells are a faint area without edges; in 3D only the outer faces of the cells
-    within the threshold are drawn.
-
-    Parameters
-    ----------
-    others : CellLayer
-        Draws all cells; made faint while there is a threshold.
-
+    within the threshold are drawn. ``others`` draws all cells; made faint while there is one.
     """
 
     def __init__(self, stage: Stage, others: CellLayer) -> None:
@@ -284,7 +270,6 @@ class ThresholdLayer(Layer):
         self.others = others
 
     def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
         self.cells: IntArray | None = None
         """(k,): the cells within the threshold, in 2D the inverted ones last; None without one."""
         self.shape: Any = None
@@ -304,7 +289,6 @@ class ThresholdLayer(Layer):
         return [(self.actor, self.owner)]
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Draw another state of the session."""
         on = new.view.threshold is not None and new.frame is not None
         self._fade(new, on)
         if not on:
@@ -357,13 +341,7 @@ class ThresholdLayer(Layer):
 class CoarseLayer(Layer):
     """The coarse boundaries, drawn in place of those in full detail while ``on``.
 
-    Parameters
-    ----------
-    boundaries : BoundaryLayer
-        Draws the boundaries in full detail; their properties are copied.
-    sections : SectionLayer
-        Draws sections, whose edges are switched off meanwhile.
-
+    They copy the properties of ``boundaries``; the edges of ``sections`` are off meanwhile.
     """
 
     surfaces: Mapping[str, Surface] = MappingProxyType({})
@@ -374,7 +352,6 @@ class CoarseLayer(Layer):
         self._sections, self._boundaries = sections, boundaries
 
     def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
         self.on = False
         """Whether they are drawn."""
         self.drawn: dict[str, DrawnBoundary] = {}
@@ -383,7 +360,6 @@ class CoarseLayer(Layer):
         self._edged: list[Any] = []
 
     def update(self, _old: Session | None, new: Session) -> None:
-        """Draw another state of the session, after the boundaries in full detail were updated."""
         self._session = new
         if self.on:
             self._draw()

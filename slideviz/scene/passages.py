@@ -98,7 +98,6 @@ class PassageLayer(KeyedLayer):
         super().__init__(stage)
 
     def clear(self) -> None:
-        """Forget the mesh, and remove the actors of all passages."""
         self._period = Period()
         self._key = ()
         self._matrices: dict[int, FloatArray] = {}
@@ -109,7 +108,6 @@ class PassageLayer(KeyedLayer):
         self._actors = {}
 
     def shapes(self) -> list[Any]:
-        """Return the outermost points of each passage, as a data set each."""
         if not self._matrices:
             return []
         # The cells within the threshold are inside the boundaries.
@@ -119,7 +117,6 @@ class PassageLayer(KeyedLayer):
         return [pv.PolyData(transformed(ends, matrix)) for matrix in self._matrices.values()]
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Draw another state of the session, after the layers whose data sets are shared."""
         super().update(old, new)
         if self._matrices:
             self._style()
@@ -128,7 +125,6 @@ class PassageLayer(KeyedLayer):
         return self._period.of(session) if session.view.passages else None
 
     def key(self, session: Session) -> tuple[object, ...]:
-        """Return period and number of passages, and the actor of the threshold."""
         # The threshold's actor is made when it first has cells.
         return self._pair(session), session.view.passages, self._threshold.actor
 
@@ -142,7 +138,6 @@ class PassageLayer(KeyedLayer):
         return sources
 
     def draw(self, session: Session) -> None:
-        """Replace the actors of all passages."""
         wanted = matrices(session, self._pair(session))
         # Not through the plotter, which goes through all its actors for each one.
         renderer = self.stage.plotter.renderer

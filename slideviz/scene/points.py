@@ -28,7 +28,6 @@ class PointLayer(Layer):
     """The nodes that the view asks for, drawn as small balls."""
 
     def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
         self._types = NodeTypes()
         self._surfaces: tuple[Surface, ...] = ()
         self._drawn: TypedNodes = NOTHING
@@ -38,11 +37,9 @@ class PointLayer(Layer):
         self.stage.point_words = ()
 
     def open(self, _session: Session, surfaces: Sequence[Surface]) -> None:
-        """Draw another mesh."""
         self._surfaces = tuple(surfaces)
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Draw another state of the session."""
         if new.mesh is None or new.frame is None:
             return
         typed = self._types.of(new)

@@ -67,7 +67,6 @@ class SectionLayer(Layer):
         super().__init__(stage)
 
     def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
         self.drawn: dict[str, SectionDrawn] = {}
         """The sections by name of their actor: ``section:0`` is the first section through the mesh
         itself, ``section:0:1`` that through its next passage."""
@@ -100,7 +99,6 @@ class SectionLayer(Layer):
         return [*(one.actor for one in self.drawn.values() if len(one.polygons)), *instances]
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Draw another state of the session; cut or color anew only what differs."""
         if new.frame is None or not (new.view.sections or self.drawn):
             return
         wanted = self._wanted(new)

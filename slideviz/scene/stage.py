@@ -52,11 +52,9 @@ class KeyedLayer(Layer):
     """The names of its actors, removed before each drawing."""
 
     def clear(self) -> None:
-        """Forget the mesh; the scene removes its actors."""
         self._key: tuple[object, ...] = ()
 
     def update(self, _old: Session | None, new: Session) -> None:
-        """Draw another state of the session, if its key differs."""
         key = self.key(new)
         if key == self._key:
             return

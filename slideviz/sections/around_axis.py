@@ -144,7 +144,6 @@ class AboutAxis(Shape):
     # What follows from these ------------------------------------------------------------
     @property
     def size(self) -> Size:
-        """Return the row of the size: label, unit and range."""
         assert self.terms.size is not None
         return self.terms.size
 
@@ -174,11 +173,9 @@ class AboutAxis(Shape):
         return np.asarray(np.clip(np.nan_to_num(roots), 0.0, 1.0))
 
     def position(self, section: Section) -> float:
-        """Return the size: a radius, or a half angle in degrees."""
         return section.size
 
     def at_position(self, section: Section, value: float) -> Section:
-        """Return the section with another size; raise CaseError where the shape cannot have it."""
         return section.sized(value)
 
     def first(self, section: Section, points: FloatArray) -> Section:
@@ -201,7 +198,6 @@ class AboutAxis(Shape):
     def middle_angle(
         self, section: Section, polygons: Polygons, near: float | None = None
     ) -> float | None:
-        """Return the middle of the range of angles of polygons, in radians; None without any."""
         return unrolled(section, polygons, near).middle if len(polygons) else None
 
     def ways(self, section: Section, angle: float) -> FloatArray:
@@ -221,7 +217,6 @@ class AboutAxis(Shape):
         return np.stack([right, np.cross(to_eye, right), to_eye])
 
     def aslant(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the camera's axes (3, 3) from the normal at the middle of points; see `Shape`."""
         axis = section.basis[2]
         middle = points.mean(axis=0) - np.asarray(section.origin)
         middle = middle - (middle @ axis) * axis

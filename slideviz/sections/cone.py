@@ -93,11 +93,9 @@ class Cone(AboutAxis):
         return float(np.linalg.norm(step)) if turned @ section.basis[2] > 0 else np.inf
 
     def describe(self, section: Section) -> str:
-        """Return half angle, axis and apex in words."""
         return self._words(section, DIGITS, "from apex")
 
     def brief(self, section: Section) -> str:
-        """Return half angle, axis and apex in few words."""
         return self._words(section, FEW, "from")
 
     def _words(self, section: Section, digits: int, apex: str) -> str:
@@ -108,7 +106,6 @@ class Cone(AboutAxis):
         return f"cone {section.half_angle_deg:.6g}° about {where} {apex} {at}"
 
     def miss(self, section: Section, points: FloatArray) -> str:
-        """Return that the cone misses the mesh, and between which half angles it would cut."""
         angles = self.positions(section, points)
         return (
             f"misses the mesh, which its apex sees at {angles.min():.4g} to {angles.max():.4g} "
@@ -130,7 +127,6 @@ class Cone(AboutAxis):
         return np.stack([length * np.cos(angle), length * np.sin(angle), outwards], axis=1)
 
     def ahead(self, section: Section, points: FloatArray) -> float | None:
-        """Return the middle of the range of angles of points, in radians."""
         return float(np.mean(patch_of(section, points).angles))
 
     def flat_labels(self, section: Section) -> tuple[Label, Label]:
@@ -141,7 +137,6 @@ class Cone(AboutAxis):
         return Label("s cos(θ sin α)", "s cos"), Label("s sin(θ sin α)", "s sin")
 
     def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
-        """Return the matrix of a rotation about the apex."""
         sin, _ = _lines(section)
         flat = np.eye(4)
         c, s = np.cos(angle * sin), np.sin(angle * sin)
@@ -156,7 +151,6 @@ class Cone(AboutAxis):
         return np.column_stack([np.arctan2(local[:, 1], local[:, 0]), length])
 
     def surface(self, section: Section, places: FloatArray, size: float) -> FloatArray:
-        """Return points at places of the cone with the half angle ``size``, in degrees."""
         turn, length, lean = places[:, 0], np.maximum(places[:, 1], 0.0), np.radians(size)
         radius = length * np.sin(lean)
         local = [radius * np.cos(turn), radius * np.sin(turn), length * np.cos(lean)]
@@ -171,5 +165,4 @@ class Cone(AboutAxis):
         return float(np.radians(abs(along))) or 1.0
 
     def girth(self, section: Section, along: float) -> float:
-        """Return the distance from the axis at a length from the apex."""
         return abs(along) * _lines(section)[0]

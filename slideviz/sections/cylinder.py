@@ -37,16 +37,13 @@ class Circle(InPlane):
     """A cylinder in 2D; see `slideviz.sections.shape.InPlane`."""
 
     def can_cut(self, section: Section) -> bool:
-        """Return whether the axis is z."""
         return axis_word(section.direction) == "z"
 
     def describe(self, section: Section) -> str:
-        """Return radius and centre in words; "" where the axis is not z."""
         at = triple_words(section.origin[:2])
         return f"circle r = {section.radius:.6g} about {at}" if self.can_cut(section) else ""
 
     def trace(self, section: Section, box: Box) -> list[FloatArray]:
-        """Return the arcs of the circle inside a box."""
         angle = np.linspace(0.0, 2.0 * np.pi, _CHORDS + 1)
         ring = section.radius * np.column_stack([np.cos(angle), np.sin(angle)])
         ring += section.origin[:2]
@@ -56,7 +53,6 @@ class Circle(InPlane):
         return [part for part, kept in parts if kept[0] and len(part) > 1]
 
     def middle(self, section: Section) -> FloatArray:
-        """Return the centre of the circle (2,)."""
         return np.asarray(section.origin)[:2]
 
     def handle_parts(self, section: Section, parts: list[FloatArray], box: Box) -> HandleParts:
@@ -88,7 +84,6 @@ class Circle(InPlane):
         return np.column_stack([start - turn, end - turn])
 
     def position_label(self, section: Section) -> Label:
-        """Return the label of angles."""
         return Label("angle [°]", "θ [°]")
 
 
@@ -100,7 +95,6 @@ class Cylinder(AboutAxis):
     directed = False
 
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
-        """Return signed distances (n,) of points from the cylinder, positive outside."""
         return np.asarray(np.hypot(along(0), along(1)) - section.radius)
 
     def quadric(self, section: Section) -> tuple[FloatArray, float]:
@@ -108,7 +102,6 @@ class Cylinder(AboutAxis):
         return np.array([1.0, 1.0, 0.0]), section.radius**2
 
     def positions(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the distances (n,) of points from the axis."""
         return np.asarray(np.hypot(section.along(points, 0), section.along(points, 1)))
 
     def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
@@ -116,11 +109,9 @@ class Cylinder(AboutAxis):
         return float(np.linalg.norm(np.cross(step, section.basis[2])))
 
     def describe(self, section: Section) -> str:
-        """Return radius and axis in words."""
         return self._words(section, axis_word(section.direction), " through", DIGITS)
 
     def brief(self, section: Section) -> str:
-        """Return radius and axis in few words."""
         return self._words(section, axis_word(section.direction, FEW), " at", FEW)
 
     def _words(self, section: Section, where: str, point: str, digits: int) -> str:
@@ -129,7 +120,6 @@ class Cylinder(AboutAxis):
         return f"cylinder r = {section.radius:.6g} about {where}{at}"
 
     def miss(self, section: Section, points: FloatArray) -> str:
-        """Return that the cylinder misses the mesh, and between which radii it would cut."""
         radii = self.positions(section, points)
         return (
             f"misses the mesh, which has radii {radii.min():.6g} to {radii.max():.6g} about this "
@@ -171,7 +161,6 @@ class Cylinder(AboutAxis):
         return np.asarray(np.asarray(section.origin) + local @ section.basis)
 
     def lean(self, section: Section) -> float:
-        """Return 0: its lines are parallel to its axis."""
         return 0.0
 
     def lever(self, section: Section, along: float) -> float:
@@ -179,5 +168,4 @@ class Cylinder(AboutAxis):
         return 1.0
 
     def girth(self, section: Section, along: float) -> float:
-        """Return the radius."""
         return section.radius

@@ -57,17 +57,9 @@ def part_at(shown: list[tuple[Part, FloatArray]], at: FloatArray, reach: float) 
 def dragged(section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box) -> Section:
     """Return a section after a part of its handle was dragged.
 
-    Parameters
-    ----------
-    section : Section
-        The section before the drag.
-    part : {"middle", "end", "line"}
-        The part that was dragged. A line is turned by its ends, and moved by the other parts; a
-        circle is moved by its middle, and gets another radius by the other parts.
-    way : (2,), (2,) float64
-        Where the mouse began and where it is now, in coordinates of the mesh.
-    box : (2,), (2,) float64
-        The visible box before the drag.
+    A line is turned by its ends, and moved by the other parts; a circle is moved by its middle, and
+    gets another radius by the other parts. ``way``: where the mouse began and where it is now, (2,)
+    each, in coordinates of the mesh. ``box``: the visible box before the drag.
     """
     return section.in_plane.dragged(section, part, way, box)
 

@@ -26,14 +26,7 @@ def box_around(points: FloatArray) -> Box:
 
 
 def trace(section: Section, box: Box) -> list[FloatArray]:
-    """Return the parts of a line or circle inside a box, as polylines (k, 2) each.
-
-    Parameters
-    ----------
-    section : Section
-        A section that can cut 2D meshes.
-    box : (2,), (2,) float64
-    """
+    """Return the parts of a line or circle in 2D inside a box, as polylines (k, 2) each."""
     return section.in_plane.trace(section, box)
 
 
@@ -86,7 +79,6 @@ class Line(InPlane):
         return f"line at {(slope + 90.0) % 180.0 - 90.0:.4g}° through {at}"
 
     def trace(self, section: Section, box: Box) -> list[FloatArray]:
-        """Return a list with the part of the line inside a box, (2, 2); or an empty list."""
         ends = line_ends(section, box)
         return [] if ends is None else [ends]
 
@@ -119,13 +111,11 @@ class Line(InPlane):
         return replace(section, origin=rounded_place(self.middle(section) + shift, size))
 
     def positions(self, section: Section, corners: FloatArray) -> FloatArray:
-        """Return the coordinates along the line of both ends of lines."""
         way = along(section)
         assert way is not None
         return np.asarray(corners @ way)
 
     def position_label(self, section: Section) -> Label:
-        """Return the label of the direction of the line."""
         way = along(section)
         assert way is not None
         return direction_label(np.append(way, 0.0))

@@ -69,13 +69,11 @@ class Plane(Shape):
     handle = "push"
 
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
-        """Return the coordinates (n,) along the normal."""
         return along(2)
 
     def crossings(
         self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
     ) -> FloatArray:
-        """Return where edges cross the plane, as parts of the edge (k,)."""
         before, after = level
         return np.asarray(before / (before - after))
 
@@ -89,7 +87,6 @@ class Plane(Shape):
         return replace(section, origin=triple(np.asarray(section.origin) + shift))
 
     def positions(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the signed distances (n,) of points from the origin, along the normal."""
         return section.along(points, 2) + self.position(section)
 
     def first(self, section: Section, points: FloatArray) -> Section:
@@ -105,21 +102,18 @@ class Plane(Shape):
         return float(abs(step @ section.basis[2]))
 
     def describe(self, section: Section) -> str:
-        """Return the plane in words: its x, y or z, or normal and point."""
         where = axis_word(section.direction)
         if where in "xyz":
             return f"plane {where} = {section.origin['xyz'.index(where)]:.6g}"
         return f"plane with normal {where} through {triple_words(section.origin)}"
 
     def brief(self, section: Section) -> str:
-        """Return the plane in few words."""
         where = axis_word(section.direction, FEW)
         if where in "xyz":
             return self.describe(section)
         return f"plane ⊥ {where} at {self.position(section):.3g}"
 
     def miss(self, section: Section, points: FloatArray) -> str:
-        """Return that the plane misses the mesh, and between which coordinates it would cut."""
         normal = np.abs(section.basis[2])
         if not normal[: points.shape[1]].any():
             return "does not cut this 2D mesh; give a normal in x and y, as in y=0"
@@ -153,11 +147,9 @@ class Plane(Shape):
         return None
 
     def flat_labels(self, section: Section) -> tuple[Label, Label]:
-        """Return the labels of the coordinates in the plane."""
         return plane_axes(section).labels
 
     def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
-        """Return the matrix (4, 4) in the coordinates of the flat plane."""
         rows, flat = plane_axes(section).rows, np.eye(4)
         flat[:3, :3] = rows @ matrix[:3, :3] @ rows.T
         flat[:3, 3] = rows @ matrix[:3, 3]
@@ -165,7 +157,6 @@ class Plane(Shape):
         return flat
 
     def facing(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the camera's axes along the normal, (3, 3)."""
         return plane_axes(section).rows
 
     def aslant(self, section: Section, points: FloatArray) -> FloatArray:

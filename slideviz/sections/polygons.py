@@ -40,12 +40,8 @@ class CellsInRange:
 def cells_in_range(values: FloatArray, threshold: tuple[float, float]) -> IntArray:
     """Return the ascending numbers of the cells whose value is in a closed range.
 
-    Parameters
-    ----------
-    values : (m,) float64
-        Values of the cells, nan for an inverted cell, as of ``Frame.shown_values``.
-    threshold : (float, float)
-        Lowest and highest value. Where the lowest is 0 or below, inverted cells are in, too.
+    ``values`` (m,): nan for an inverted cell, as ``StepFrame.shown_values`` has them. Inverted
+    cells are in, too, where the lowest value of the range is 0 or below.
     """
     low, high = threshold
     inside = (values >= low) & (values <= high)

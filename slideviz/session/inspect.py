@@ -57,19 +57,9 @@ def axis_of(session: Session) -> RotationAxis | None:
 def coordinates(
     positions: FloatArray, around: RotationAxis | None
 ) -> tuple[tuple[str, ...], FloatArray]:
-    """Return names and values of coordinates: cylindrical about an axis, or Cartesian.
+    """Return d names and the values (k, d) of coordinates, of Cartesian ``positions`` (k, d).
 
-    Parameters
-    ----------
-    positions : (k, d) float64
-        Cartesian, in the mesh's length unit.
-    around : Around or None
-        The axis for radius, angle in degrees and height; None: Cartesian.
-
-    Returns
-    -------
-    names : tuple of d str
-    values : (k, d) float64
+    They are radius, angle in degrees and height about an axis ``around``, or Cartesian for None.
     """
     dim = positions.shape[1]
     if around is None:
@@ -291,13 +281,7 @@ def cell_info(frame: StepFrame, cell: int) -> CellInfo:
 def cell_at(mesh: Mesh, x: float, y: float, values: FloatArray) -> int | None:
     """Return the number of the cell of a 2D mesh around a point, or None.
 
-    Parameters
-    ----------
-    x, y : float
-        The point, in the mesh's length unit.
-    values : (m,) float64
-        Values of the cells: of several cells around the point, that of the lowest is returned.
-        Cells whose value is nan are ignored.
+    Of several cells around it, that with the lowest of ``values`` (m,) is returned; nan is ignored.
     """
     at, first = mesh.points[mesh.cells.connectivity], mesh.cells.offsets[:-1]
     low, high = np.minimum.reduceat(at, first), np.maximum.reduceat(at, first)

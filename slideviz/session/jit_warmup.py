@@ -36,13 +36,8 @@ _RUNS: tuple[tuple[str, Mapping[str, Any]], ...] = (
 def warm_up(compiling: Callable[[], None], stopped: Stopped) -> None:
     """Write, read, cut and deform samples of few cells in memory, to compile all loops.
 
-    Parameters
-    ----------
-    compiling
-        Called when a loop is compiled; never when all come from the cache on disk.
-    stopped
-        Returns whether to stop; called between and during the deformations, for compilation itself
-        cannot be interrupted.
+    ``compiling``: called when a loop is compiled; never when all come from the cache on disk.
+    ``stopped`` returns whether to stop; compilation itself cannot be interrupted.
     """
     # An error here is one in the user's run too, where it gets a message.
     with contextlib.suppress(Cancelled, SlidevizError), compilation_watched(compiling):

@@ -27,16 +27,7 @@ def open_mesh(
 ) -> Session:
     """Return the session of a mesh just read; without a case its roles are guessed.
 
-    Parameters
-    ----------
-    first : StepFrame
-        The undeformed mesh.
-    path : Path or None
-        The mesh file.
-    pairs : sequence of Pair
-        Boundaries that match each other.
-    case : Case, optional
-        The case of the mesh, which may have a view.
+    ``pairs``: boundaries that match each other.
     """
     mesh = first.mesh
     guesses = {} if case is not None else guess_roles(mesh, pairs)

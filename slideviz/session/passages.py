@@ -66,14 +66,8 @@ def passages_around(pair: Pair) -> int | None:
 def passages(pair: Pair, count: int | Literal["wheel"]) -> dict[int, FloatArray]:
     """Return the transformation (4, 4) of each passage by its number; 0 is the mesh itself.
 
-    Raises CaseError if the count is negative, or the period makes no whole wheel.
-
-    Parameters
-    ----------
-    pair : Pair
-        The period, from its first marker to its second.
-    count : int or "wheel"
-        Neighbours on each side, or all around. On a wheel each passage is there once at most.
+    ``count``: neighbours on each side, or all around; on a wheel each passage is there once at
+    most. Raises CaseError if it is negative, or the period makes no whole wheel.
     """
     around = passages_around(pair)
     if count == "wheel" and around is None:

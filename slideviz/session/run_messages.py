@@ -191,13 +191,7 @@ def moves_nothing(motion: Motion) -> bool:
 def tolerance_warning(case: Case, extent: float, largest: float) -> str:
     """Return a sentence where the typed tolerance is not far below the largest displacement.
 
-    Parameters
-    ----------
-    case
-    extent
-        The extent of the mesh.
-    largest
-        The largest displacement that the motions prescribe; 0 where it is not known.
+    ``extent``: that of the mesh. ``largest``: the prescribed one; 0 where it is not known.
     """
     reduction = case.reduction
     if reduction is None or reduction.auto or case.method != "rbf" or not largest > 0.0:

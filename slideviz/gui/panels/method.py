@@ -77,22 +77,12 @@ field's signal that carries a new value."""
 
 
 class KeyForm(QFormLayout):
-    """A form with the settings of a case.
+    """A form with the settings of a case whose keys have the form ``place``: main or more.
 
-    Parameters
-    ----------
-    place : "main" or "more"
-        The form whose keys are shown: that of the method panel, or “More settings” there.
-    own : mapping
-        Fields that the caller makes, connects and fills, by the name of their key.
-
-    Signals
-    -------
-    changed(object, object)
-        The `Key` whose value changed, and the new value.
+    ``own``: fields that the caller makes, connects and fills, by the name of their key.
     """
 
-    changed = Signal(object, object)
+    changed = Signal(object, object)  # the `Key` whose value changed, and the new value
 
     def __init__(self, place: Form, own: Mapping[str, Field] | None = None) -> None:
         super().__init__()
@@ -152,15 +142,9 @@ LEVEL_ENDS = {"size": KEYS["LVL_SIZE"], "tol": KEYS["LVL_TOL_CRIT"]}
 
 
 class MoreSettings(QWidget):
-    """The button “More settings”, and the form that it opens and closes.
+    """The button “More settings”, and the form that it opens and closes."""
 
-    Signals
-    -------
-    changed(object, object)
-        The `Key` whose value changed, and the new value.
-    """
-
-    changed = Signal(object, object)
+    changed = Signal(object, object)  # as that of `KeyForm`
 
     def __init__(self) -> None:
         super().__init__()

@@ -37,15 +37,9 @@ SETTINGS, NOTES = "settings", "notes"
 
 
 class RunPanel(Panel):
-    """The panel to run and cancel, with a line of text: progress, result or what is missing.
+    """The panel to run and cancel, with a line of text: progress, result or what is missing."""
 
-    Signals
-    -------
-    requirement_clicked(Requirement)
-        The user clicked on a missing requirement, and wants to be led to where it is met.
-    """
-
-    requirement_clicked = Signal(object)
+    requirement_clicked = Signal(object)  # a missing `Requirement`, to be led to where it is met
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)

@@ -213,16 +213,11 @@ class WorstModel(QAbstractTableModel):
 
 
 class WorstTable(QTableView):
-    """The view of the worst cells.
-
-    Signals
-    -------
-    row_activated(int)
-        The row to which a key moved, or on which Return was pressed. Qt's own signal of the
-        current row is emitted too often: the focus alone makes the first row current.
-    """
+    """The view of the worst cells."""
 
     row_activated = Signal(int)
+    """The row to which a key moved, or on which Return was pressed. Qt's own signal of the current
+    row is emitted too often: the focus alone makes the first row current."""
 
     def __init__(self, model: WorstModel) -> None:
         super().__init__()

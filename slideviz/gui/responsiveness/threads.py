@@ -128,13 +128,7 @@ def import_numerics() -> None:
 
 
 def tune_interpreter() -> GarbageCollector:
-    """Set Python's thread switching and garbage collection up for a responsive window.
-
-    Returns
-    -------
-    GarbageCollector
-        Collects garbage from now on; a child of the application.
-    """
+    """Set thread switching and garbage collection up for a responsive window."""
     # The modules live as long as the window, and need not be searched for garbage.
     gc.collect()
     gc.freeze()

@@ -147,11 +147,8 @@ PLOT_FILTERS = "PNG picture (*.png);;SVG drawing (*.svg);;PDF drawing (*.pdf)"
 class PlotCanvas(QWidget):
     """A widget with a plot that is drawn in a thread; it shows the newest image of it.
 
-    Parameters
-    ----------
-    drawing : callable
-        Returns a function that fills a figure with the present data. It is called in the GUI
-        thread; the function it returns is called in another one, and must not use widgets.
+    ``drawing``, called in the GUI thread, returns a function that fills a figure with the present
+    data; this function is called in another thread, and must not use widgets.
     """
 
     drawn = Signal()
