@@ -236,9 +236,10 @@ def ffd_displacements(
             motion = case.motions[place]
             mine = {name: nodes for name, nodes in on.items() if applies_to(motion, name)}
             moved = _moved(boxes[name], mesh, q, change, mine)
-            if moved is not None and not alone and _is_in(name, mesh, system_of(case)):
-                moved = replace(moved, warnings=(*moved.warnings, _stays(name)))
             if moved is not None:
+                if not alone and any(b.name == name for b in boxes_of(mesh, system_of(case))):
+                    stays = Note(_STAYS.format(repr(name)))
+                    moved = replace(moved, warnings=(*moved.warnings, stays))
                 displacements.setdefault(motion, []).append(moved)
             elif mine:
                 of = " or ".join(repr(one) for one in named(motion.marker)) or "a moving marker"
@@ -251,11 +252,10 @@ def ffd_displacements(
     return {motion: _mean(several) for motion, several in displacements.items()}
 
 
-def _stays(name: str) -> Note:
-    return Note(
-        f"the FFD box {name!r} in the deformed mesh stays where it was, because boxes are nested "
-        f"or other motions move boundaries, too; define it again to use it with that mesh"
-    )
+_STAYS = (
+    "the FFD box {} in the deformed mesh stays where it was, because boxes are nested or other "
+    "motions move boundaries, too; define it again to use it with that mesh"
+)
 
 
 def _mean(several: list[Displacements]) -> Displacements:
@@ -263,10 +263,6 @@ def _mean(several: list[Displacements]) -> Displacements:
         return several[0]
     vectors = np.mean([each.vectors for each in several], axis=0)
     return replace(several[0], vectors=vectors)
-
-
-def _is_in(name: str, mesh: Mesh, system: CoordinateSystem) -> bool:
-    return any(box.name == name for box in boxes_of(mesh, system))
 
 
 def _moved(

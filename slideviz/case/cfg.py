@@ -84,7 +84,8 @@ def set_key(case: Case, key: str, value: str) -> Case:
     try:
         wanted = row.kind.read(value.strip())
         if row.name in _ROLE_OF:
-            case = _without_role(case, _ROLE_OF[row.name], wanted)
+            role, roles = _ROLE_OF[row.name], case.roles.items()
+            case = case.change(roles={k: r for k, r in roles if r != role and k not in wanted})
         changed = row.put(case, wanted)
     except CaseError as problem:
         lines = str(problem).splitlines()
@@ -181,11 +182,6 @@ def _text(case: Case, path: Path) -> str:
 
 def _unknown(key: str) -> str:
     return f"unknown key {shown(key)}{nearest(key, KEYS) or '; `slideviz keys` lists all'}"
-
-
-def _without_role(case: Case, role: str, names: tuple[str, ...]) -> Case:
-    roles = {name: r for name, r in case.roles.items() if r != role and name not in names}
-    return case.change(roles=roles)
 
 
 def _with_paths(case: Case, change: Callable[[Path], Path]) -> Case:

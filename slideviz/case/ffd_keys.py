@@ -28,8 +28,9 @@ def _read_definition(text: str) -> tuple[Definition, ...]:
     groups = _groups(text)
     for group in groups:
         name, *corners = group
-        if group is groups[-1]:  # what is after the last box, SU2 passes over
-            corners = _without_zeros(corners)
+        extra = corners[NUMBERS:] if group is groups[-1] else []
+        if all(word.is_number and not number(word.text) for word in extra):
+            corners = corners[: len(corners) - len(extra)]  # SU2 passes over zeros at the end
         if len(corners) != NUMBERS or name.is_number:
             raise CaseError(
                 f"box {shown(name.text)} has {len(corners)} numbers; expected its name and "
@@ -41,13 +42,6 @@ def _read_definition(text: str) -> tuple[Definition, ...]:
         if names.count(box) > 1:
             raise CaseError(f"box {box!r} is defined twice; rename one")
     return tuple(problems)
-
-
-def _without_zeros(words: list[Word]) -> list[Word]:
-    """Return the numbers of a box without zeros that are too many."""
-    extra = words[NUMBERS:]
-    harmless = all(word.is_number and not number(word.text) for word in extra)
-    return words[:NUMBERS] if harmless else words
 
 
 def _write_definition(boxes: tuple[Definition, ...]) -> str:
@@ -64,18 +58,6 @@ def _integers(words: list[Word], least: int) -> Degrees:
         raise CaseError(f"({listed}) is not three whole numbers from {least}")
     i, j, k = (int(value) for value in values)
     return i, j, k
-
-
-def _read_degrees(text: str) -> tuple[Degrees, ...]:
-    return tuple(_integers(group, 0) for group in _groups(text))
-
-
-def _write_degrees(degrees: tuple[Degrees, ...]) -> str:
-    return " ; ".join(f"({i}, {j}, {k})" for i, j, k in degrees)
-
-
-def _write_orders(orders: Degrees) -> str:
-    return ", ".join(map(str, orders))
 
 
 def _said_where_needed(row: Key) -> Key:
@@ -111,8 +93,16 @@ def ffd_contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
 
 
 DEFINITION = Kind("(NAME, 8 corners x, y, z) ; ...", _read_definition, _write_definition)
-DEGREES = Kind("(i, j, k) ; ...", _read_degrees, _write_degrees)
-ORDERS = Kind("i, j, k", lambda text: _integers(list_of(text), 1), _write_orders)
+DEGREES = Kind(
+    "(i, j, k) ; ...",
+    lambda text: tuple(_integers(group, 0) for group in _groups(text)),
+    lambda degrees: " ; ".join(f"({i}, {j}, {k})" for i, j, k in degrees),
+)
+ORDERS = Kind(
+    "i, j, k",
+    lambda text: _integers(list_of(text), 1),
+    lambda orders: ", ".join(map(str, orders)),
+)
 
 _ROWS = (
     setting(

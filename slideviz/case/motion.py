@@ -25,7 +25,6 @@ from slideviz.case.model import (
     HicksHenne,
     Motion,
     OnAirfoil,
-    Point,
     Prescribed,
     Radial,
     Rotate,
@@ -340,7 +339,11 @@ def _change(
 ) -> FloatArray:
     """Return the displacement (k, d) by one motion of the nodes of a marker, now at ``points``."""
     if isinstance(motion, Prescribed):
-        return _prescribed(motion, points, nodes)
+        out = np.zeros_like(points)
+        if nodes is not None:
+            _, here, given = np.intersect1d(nodes, motion.nodes, return_indices=True)
+            out[here] = motion.vectors[given]
+        return out
     if not isinstance(motion, FromFile | BoxMotion | OnAirfoil):
         return _increment(motion, points)
     key = key_of(motion)
@@ -349,30 +352,17 @@ def _change(
     return files[key].at(nodes)
 
 
-def _prescribed(motion: Prescribed, points: FloatArray, nodes: IntArray | None) -> FloatArray:
-    """Return the displacement (k, d) of nodes (k,) by a motion, zero for nodes it does not have."""
-    out = np.zeros_like(points)
-    if nodes is not None:
-        _, here, given = np.intersect1d(nodes, motion.nodes, return_indices=True)
-        out[here] = motion.vectors[given]
-    return out
-
-
 def _increment(motion: Translate | Rotate | Scale | Radial, points: FloatArray) -> FloatArray:
     if isinstance(motion, Translate):
         return np.broadcast_to(np.array(motion.vector, np.float64), points.shape)
     if isinstance(motion, Radial):
         return _pushed(motion, points)
-    arm = points - _centre(motion.point, points)
+    at_centroid = motion.point == "centroid"
+    centre = ordered_sum(points) / max(1, len(points)) if at_centroid else np.array(motion.point)
+    arm = points - centre
     if isinstance(motion, Scale):
         return arm * (np.array(motion.factors, np.float64) - 1.0)
     return _turned(arm, math.radians(motion.angle_deg), motion.axis)
-
-
-def _centre(point: Point, points: FloatArray) -> FloatArray:
-    if point == "centroid":
-        return ordered_sum(points) / max(1, len(points))
-    return np.array(point, np.float64)
 
 
 def _turned(arm: FloatArray, angle: float, axis: tuple[float, float, float]) -> FloatArray:

@@ -150,11 +150,8 @@ def path_text(path: Path, plain: re.Pattern[str] = _PLAIN_PATH) -> str:
     return '"' + text.replace('"', '""') + '"'
 
 
-def _read_names(text: str) -> tuple[str, ...]:
-    return _checked_names([item.text for item in list_of(text)])
-
-
-def _checked_names(names: list[str]) -> tuple[str, ...]:
+def _names(items: list[Word]) -> tuple[str, ...]:
+    names = [item.text for item in items]
     if "" in names:
         raise CaseError("a marker has an empty name; give one")
     for name in names:
@@ -183,7 +180,7 @@ def _read_pairs(text: str) -> tuple[str, ...]:
             "there are numbers among the names; write ( A, B ), or nine numbers after each pair "
             "as SU2 does; a name that looks like a number needs quotes"
         )
-    return _checked_names([item.text for item in items])
+    return _names(items)
 
 
 def _remark_pairs(text: str) -> str:
@@ -240,7 +237,7 @@ YES_NO = replace(
     words={True: "on", False: "off"},
 )
 PATH = Kind("a file name", _read_path, path_text)
-NAMES = Kind("( A, B, ... )", _read_names, _write_names)
+NAMES = Kind("( A, B, ... )", lambda text: _names(list_of(text)), _write_names)
 PAIRS = Kind("( A, B, ... ), also with SU2's numbers", _read_pairs, _write_names, _remark_pairs)
 AXIS = Kind("x | y | z | (x, y, z)", lambda text: read_axis(list_of(text)), axis_text, entry="axis")
 POINT = Kind("(x, y) | (x, y, z)", _read_origin, vector_text, entry="point")

@@ -56,29 +56,15 @@ class SampleKind:
     """Returns the same as a `StreamedSample`; None if that is not possible."""
 
 
-def _thesis(name: str, size: int, variant: str) -> Sample:
-    return Sample(name, *thesis_case(name, size, variant))
-
-
-def _streamed_thesis(name: str, size: int, variant: str) -> StreamedSample:
-    """Return the same as `_thesis` with a mesh made while it is written."""
-    return StreamedSample(*thesis_zone(name, size, variant))
-
-
-def _passage(name: str, size: int, _variant: str) -> Sample:
-    return Sample(name, passage_mesh(size), passage_case())
-
-
-def _airfoil(name: str, size: int, variant: str) -> Sample:
-    return Sample(name, airfoil_mesh(size, variant), airfoil_case())
-
-
-def _turbine_row(name: str, size: int, _variant: str) -> Sample:
-    return Sample(name, row_mesh(size), row_case(size))
-
-
-def _extruded_row(name: str, size: int, _variant: str) -> Sample:
-    return Sample(name, extruded_row(size), extruded_case(size))
+def _thesis(about: str, variants: tuple[str, ...]) -> SampleKind:
+    """Return the row of a case of the thesis."""
+    return SampleKind(
+        about,
+        25,
+        lambda name, size, variant: Sample(name, *thesis_case(name, size, variant)),
+        variants,
+        lambda name, size, variant: StreamedSample(*thesis_zone(name, size, variant)),
+    )
 
 
 def _stator(name: str, size: int, _variant: str) -> Sample:
@@ -95,53 +81,40 @@ def _streamed_stator(_name: str, size: int, _variant: str) -> StreamedSample:
 
 
 SAMPLES: Mapping[str, SampleKind] = {
-    "square": SampleKind(
+    "square": _thesis(
         "2D: turned block in a square, periodic in y (thesis 4.1.1); size 25 or 200 there",
-        25,
-        _thesis,
         ("file", "motion", "translate"),
-        _streamed_thesis,
     ),
-    "polar": SampleKind(
-        "2D: block in a 30 degree sector, rotationally periodic (thesis 4.1.2)",
-        25,
-        _thesis,
-        ("file",),
-        _streamed_thesis,
+    "polar": _thesis(
+        "2D: block in a 30 degree sector, rotationally periodic (thesis 4.1.2)", ("file",)
     ),
-    "hexahedron": SampleKind(
-        "3D: turned block in a cube, periodic in y (thesis 4.2.1)",
-        25,
-        _thesis,
-        ("file", "motion", "flat"),
-        _streamed_thesis,
+    "hexahedron": _thesis(
+        "3D: turned block in a cube, periodic in y (thesis 4.2.1)", ("file", "motion", "flat")
     ),
-    "cylindrical": SampleKind(
-        "3D: block in a 30 degree sector, rotationally periodic (thesis 4.2.2)",
-        25,
-        _thesis,
-        ("file",),
-        _streamed_thesis,
+    "cylindrical": _thesis(
+        "3D: block in a 30 degree sector, rotationally periodic (thesis 4.2.2)", ("file",)
     ),
     "passage": SampleKind(
-        "2D: turbine blade in a periodic passage; size: cells along the inflow (36)", 36, _passage
+        "2D: turbine blade in a periodic passage; size: cells along the inflow (36)",
+        36,
+        lambda name, size, _: Sample(name, passage_mesh(size), passage_case()),
     ),
     "airfoil": SampleKind(
         "2D: airfoil turned in a far field of 50 chords; size: cells around it (96)",
         96,
-        _airfoil,
+        lambda name, size, variant: Sample(name, airfoil_mesh(size, variant), airfoil_case()),
         ("motion", "layers"),
     ),
     "turbine-row": SampleKind(
         "2D: supersonic vane in a cascade, layer and triangles (thesis 4.1.3); "
         "size: cells (224180)",
         224_180,
-        _turbine_row,
+        lambda name, size, _: Sample(name, row_mesh(size), row_case(size)),
     ),
     "turbine-row-3d": SampleKind(
         "3D: that vane from hub to shroud, twisted; hexahedra and prisms; size: cells (25000)",
         25_000,
-        _extruded_row,
+        lambda name, size, _: Sample(name, extruded_row(size), extruded_case(size)),
     ),
     "stator": SampleKind(
         "3D: stator passage, 41 around, hexahedra (thesis 4.2.3); size: cells (240000)",
@@ -226,8 +199,10 @@ def write_sample(
     else:
         write(mesh, made.mesh, overwrite)
     if made.displacement is not None:
+        nodes, vectors = made.displacement.nodes.tolist(), made.displacement.vectors.tolist()
         with atomic_write(table, CaseError, table if overwrite else None) as file:
-            file.write(_displacement_text(made.displacement).encode())
+            for node, vector in zip(nodes, vectors, strict=True):
+                file.write(("\t".join([str(node), *map(repr, vector)]) + "\n").encode())
     placed = _in_folder(made.case, folder, name, file_format)
     write_case(case, placed.change(source=case if overwrite else None))
     return paths
@@ -241,8 +216,3 @@ def _in_folder(case: Case, folder: Path, name: str, ending: str) -> Case:
     )
     mesh, out = folder / f"mesh.{ending}", folder / f"{name}_deformed.{ending}"
     return case.change(mesh_file=mesh, mesh_out=out, motions=motions)
-
-
-def _displacement_text(table: Displacements) -> str:
-    rows = zip(table.nodes.tolist(), table.vectors.tolist(), strict=True)
-    return "".join("\t".join([str(node), *map(repr, row)]) + "\n" for node, row in rows)
