@@ -597,6 +597,7 @@ Shown = Literal[
     "legend",
     "triad",
     "inverted",
+    "repaired",
     "ffd",
     "support",
     "perspective",
@@ -644,6 +645,14 @@ SHOWN: dict[Shown, ShownTerm] = {
         standalone="Rings at inverted cells",
         shortcut="I",
         at_first=True,
+        in_bar=False,
+    ),
+    "repaired": ShownTerm(
+        "Repaired cells",
+        "Draw the cells that repair mended as they were, as a ghost, and the nodes that it moved, "
+        "as dots.",
+        standalone="Repaired cells as they were",
+        shortcut="M",
         in_bar=False,
     ),
     "ffd": ShownTerm(

@@ -30,6 +30,7 @@ from slideviz.gui.widgets.command import (
     is_2d,
     is_3d,
     is_idle,
+    needs_repair,
     target_boundaries,
     why_not,
 )
@@ -157,6 +158,12 @@ _RUN = Menu("run", "&Run", entries=(
             lambda window: window.running.cancel(), image="cancel", enabled=lambda now: now.busy,
             button_tip="Stop within a second (Esc); finished steps are kept.",
             button_key="Esc"),
+    Command("repair", "Re&pair",
+            "Mend the inverted and poor cells of the last step of the run that is shown, or of the "
+            "mesh: by moving nodes near them, never those of moving and fixed boundaries.",
+            lambda window: window.running.repair(), ("F7",), enabled=needs_repair,
+            tip_now=why_not(needs_repair, "No cell needs repair: all are proved valid, and their "
+                            "quality is above the limit in the method panel.")),
     None,
     Command("designs", "&Designs…",
             "Show or hide the panel of designs: a table of runs with other numbers of the motions "

@@ -22,7 +22,9 @@ from slideviz.session.run_messages import (
     limits_words,
     notes_of,
     remedy_for,
+    repair_words,
     run_requirements,
+    to_mend,
     warnings_of,
     with_field_labels,
 )
@@ -99,6 +101,22 @@ class Running(QObject):
         if not self.runner.busy and not run_requirements(self.store.session):
             self._start_run(self.store.session.case, output=output)
 
+    def repair(self) -> None:
+        """Mend the last step of the run that is shown, or the mesh, as a new run."""
+        session = self.store.session
+        frame, run = to_mend(session), session.run_shown
+        if self.runner.busy or frame is None:
+            return
+        settings = {"repair": "yes", "repair_steps": False}
+        ran = run is not None and frame is run.last
+        case = (run.case if ran and run is not None else session.case).change(**settings)
+        frames = run.frames if ran and run is not None else (frame,)
+        if not ran or not session.outdated:
+            self.store.change(changes.set_case, **settings)
+        self._show_started(case)
+        log.info("repair")
+        self.start_job("Repairing", self._run_done, jobs.repair, case, session.mesh, frames)
+
     def show_design(self, case: Case, name: str) -> bool:
         """Show the run of a design, started first unless there is one already.
 
@@ -117,17 +135,21 @@ class Running(QObject):
         self._start_run(case, name)
         return True
 
-    def _start_run(self, case: Case, name: str = "", output: Path | None = None) -> None:
+    def _show_started(self, case: Case, name: str = "") -> None:
+        """Show a new run, without steps yet."""
         self.banner.hide()
         self.store.change(changes.start_run, case, name)
-        session = self.store.session
-        if session.view.color_by == "role":
+        if self.store.session.view.color_by == "role":
             self.store.change(changes.set_view, color_by="size-skew")
+        self._deforms = True
+
+    def _start_run(self, case: Case, name: str = "", output: Path | None = None) -> None:
+        self._show_started(case, name)
+        session = self.store.session
         periodic = PERIODIC_MODES[case.periodic].name
         steps = case.steps or "automatic"
         words = "1 step" if steps == 1 else f"{steps} steps"
         log.info("run: %s, %s, %s", method_words(case), periodic, words)
-        self._deforms = True
         if session.in_file:
             assert output is not None
             call = self._run_done, compute_in_file, case, session.first, output
@@ -207,6 +229,8 @@ class Running(QObject):
             text += f", first heights {heights} of those before"
         missed = limits_words(run)
         text += f", {missed}" * bool(missed)
+        if words := repair_words(run):
+            text += f", {words}"
         log.info("done: %s", text)
         warnings = self._log_remarks(run)
         bad = inverted_words(run)
@@ -219,7 +243,9 @@ class Running(QObject):
             warnings.insert(0, f"The deformed mesh is in {file}.")
             log.info("the deformed mesh is in %s", file)
         if warnings:
-            show = {"Show the worst": self.worst_wanted.emit} if bad else {}
+            again = run.last.step is not None and run.last.step.repaired is None
+            show = {"Repair": self.repair} if bad and again and to_mend(session) else {}
+            show |= {"Show the worst": self.worst_wanted.emit} if bad else {}
             show |= {"Show the limits": self.limits_wanted.emit} if missed else {}
             calm = not bad and not missed
             self.banner.show_message("\n".join(warnings), calm=calm, answers=show or NO_ANSWERS)

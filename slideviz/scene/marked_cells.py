@@ -19,7 +19,7 @@ from slideviz.mesh.surfaces import lifted
 from slideviz.scene import actors
 from slideviz.scene.actors import VALUES, draw_in_front, part_shape
 from slideviz.scene.sections import SectionLayer
-from slideviz.scene.stage import Layer, Stage
+from slideviz.scene.stage import KeyedLayer, Layer, Stage
 from slideviz.session.inspect import cell_centers, nodes_of
 from slideviz.session.state import Session, StepFrame
 
@@ -180,3 +180,53 @@ def _wanted(session: Session) -> bool:
     if frame is None or not frame.quality.inverted or "inverted" not in view.drawn:
         return False
     return view.threshold is None or view.threshold[0] <= 0.0
+
+
+CELLS_BEFORE, MOVED_NODES = "repair:cells", "repair:nodes"
+
+
+class RepairLayer(KeyedLayer):
+    """The edges of the cells that repair mended, where they were, and the nodes that it moved."""
+
+    names = (CELLS_BEFORE, MOVED_NODES)
+
+    def key(self, session: Session) -> tuple[object, ...]:
+        """Return the repaired step and the style, if it is shown."""
+        step = session.frame.step if session.frame is not None else None
+        if step is None or step.repaired is None or "repaired" not in session.view.drawn:
+            return ()
+        return step.repaired, self.stage.pixel_scale, self.stage.scheme
+
+    def draw(self, session: Session) -> None:
+        """Draw the cells and the nodes."""
+        if not self._key:
+            return
+        assert session.frame is not None
+        assert session.frame.step is not None
+        done = session.frame.step.repaired
+        assert done is not None
+        if not len(done.nodes):
+            return
+        mesh, before = done.mesh, np.array(done.mesh.points)
+        before[done.nodes] = done.points
+        lift = 4.0 * self.stage.lift(mesh)
+        edges = np.concatenate(
+            [
+                nodes[:, np.array(ELEMENTS[vtk].edges)].reshape(-1, 2)
+                for vtk, (_, nodes) in mesh.cells.take(done.cells).by_type.items()
+            ]
+        )
+        used, ends = np.unique(edges, return_inverse=True)
+        lines = np.insert(ends.reshape(-1, 2), 0, 2, axis=1).ravel()
+        ghost = pv.PolyData(lifted(before[used], lift), lines=lines)
+        dots = pv.PolyData(lifted(mesh.points[done.nodes], lift))
+        self._shapes = ghost, dots  # a data set that only VTK holds may come back without points
+        for name, shape, color in (
+            (CELLS_BEFORE, ghost, INVERTED_COLOR),
+            (MOVED_NODES, dots, SELECTED_COLOR),
+        ):
+            actor = self.stage.add(shape, name, lighting=False, pickable=False)
+            actor.prop.color = color
+            actor.prop.line_width = 1.5 * self.stage.pixel_scale
+            actor.prop.point_size = 4.0 * self.stage.pixel_scale
+            draw_in_front(actor.mapper)

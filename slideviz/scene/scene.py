@@ -20,7 +20,7 @@ from slideviz.scene.actors import CELL, DrawnBoundary
 from slideviz.scene.camera import Camera
 from slideviz.scene.ghosts import BoxLayer, GhostLayer, SupportLayer
 from slideviz.scene.legend import LegendLayer, TriadLayer
-from slideviz.scene.marked_cells import InvertedLayer, MarkLayer
+from slideviz.scene.marked_cells import InvertedLayer, MarkLayer, RepairLayer
 from slideviz.scene.mesh import BoundaryLayer, CellLayer, CoarseLayer, ThresholdLayer
 from slideviz.scene.overview import Overview
 from slideviz.scene.passages import PassageLayer
@@ -62,6 +62,7 @@ class Scene:
             PassageLayer(self.stage, self._cells, self._boundaries, self._threshold),
             PointLayer(self.stage),
             InvertedLayer(self.stage, self.sections),
+            RepairLayer(self.stage),
             LegendLayer(self.stage),
             TriadLayer(self.stage),
             self._coarse,

@@ -25,7 +25,7 @@ _RUNS: tuple[tuple[str, Mapping[str, Any]], ...] = (
     ("cylindrical", {"sliding": "ps"}),
     ("cylindrical", {"sliding": "ds"}),
     ("hexahedron", {"sliding": "ps"}),
-    ("square", {"sliding": "ps"}),
+    ("square", {"sliding": "ps", "repair": "yes", "repair_below": 0.999999}),
     ("cylindrical", {"sliding": "ps", "method": "idw"}),
     ("square", {"sliding": "ps", "method": "idw"}),
     ("hexahedron", {"sliding": "ds", "method": "elastic"}),

@@ -349,6 +349,33 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         going_on()
 
 
+def repair(
+    case: Case, mesh: Mesh, frames: Sequence[StepFrame], report: Report, stopped: Stopped
+) -> None:
+    """Mend the last of some frames; report all of them, that one mended.
+
+    ``mesh`` is the undeformed mesh; with its frame alone, that is mended, and all moving boundaries
+    stay.
+    """
+    from slideviz.solver.repair import mended_frame
+
+    *earlier, last = frames
+
+    def progress(now: object) -> None:
+        raise_if_cancelled(stopped)
+        report(JobProgress(f"Repair: {PHASES['repair']}", getattr(now, "fraction", 0.0)))
+
+    step = mended_frame(case, mesh, last.step, progress)
+    for frame in earlier:
+        report(frame)
+    undeformed = mesh if last.step is not None else None
+    measured = quality(step.mesh, undeformed, case.quality_metric)
+    names = case.walls(mesh.marker_names)
+    frame = StepFrame(step.mesh, measured, step, walls=_walls(step.mesh, mesh, names))
+    _precompute(frame)
+    report(frame)
+
+
 def compute_in_file(
     case: Case, first: StepFrame, output: Path, report: Report, stopped: Stopped
 ) -> None:

@@ -12,7 +12,7 @@ from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, FromFile, Motion, applies_to
 from slideviz.errors import Note
 from slideviz.mesh.model import Mesh
-from slideviz.session.state import PanelPlace, Run, Session
+from slideviz.session.state import PanelPlace, Run, Session, StepFrame
 from slideviz.session.walls_table import heights_words
 from slideviz.solver.remedies import MOST_NAMES, beyond_pitch, fixed_beside, remedies
 from slideviz.solver.setup import LOOSE
@@ -58,7 +58,29 @@ def end_message(run: Run) -> str:
     bad = "; ".join(filter(None, (inverted_words(run), limits_words(run), heights)))
     if step.index < step.total:
         return f"Stopped after step {step.index} of {step.total}" + (f": {bad}." if bad else ".")
-    return f"Done: {bad}" if bad else "Done."
+    done = bad or repair_words(run)
+    return f"Done: {done}." if done else "Done."
+
+
+def repair_words(run: Run) -> str:
+    """Return what the repair of a run's last step mended in words; "" if no cell needed it."""
+    step = run.last.step if run.last is not None else None
+    if step is None or step.repaired is None or not len(step.repaired.cells):
+        return ""
+    return step.repaired.words()
+
+
+def to_mend(session: Session) -> StepFrame | None:
+    """Return the frame that a repair would mend: the last step of the shown run, or the mesh.
+
+    None where all its cells are proved valid and above the limit of the case.
+    """
+    frame = session.deformed or session.first
+    if frame is None or session.in_file:
+        return None
+    found = frame.quality
+    bad = found.inverted + found.unproven or found.min < session.case.repair_below
+    return frame if bad else None
 
 
 def inverted_words(run: Run) -> str:

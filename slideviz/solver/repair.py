@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from slideviz.mesh.repair.repair import repair as mend_cells
 from slideviz.rbf.problem import PhaseTimer
 from slideviz.solver.domain import find_domain
 from slideviz.solver.prescribed import BoundaryConditions
-from slideviz.solver.setup import Setup, elastic_body, setup_of
+from slideviz.solver.setup import Setup, elastic_body, make_setup, setup_of
 from slideviz.solver.stepping import problem_at
 from slideviz.solver.steps import MeshRepair, Progress, Step
 from slideviz.system.threads import Tick
@@ -148,6 +149,24 @@ def mended_step(
         done = mend(case, mesh, step.mesh, mesh, tick, setup)
     seconds = {**step.seconds, "repair": timer.seconds["repair"]}
     return replace(step, mesh=done.mesh, repaired=done, seconds=seconds)
+
+
+def mended_frame(
+    case: Case, mesh: Mesh, step: Step | None, report: Callable[[Progress], None]
+) -> Step:
+    """Return the last step of a run, mended afterwards; without one, the mesh as a mended step."""
+    if step is not None:
+        done = mended_step(case, mesh, make_setup(case, mesh), report, step)
+    else:
+        moving = dict.fromkeys(case.markers_with("moving"), "fixed")
+        case = case.change(roles={**case.roles, **moving}, motions=())
+        step = Step(1, 1, mesh, 0, 0.0, nan, node_counts={}, seconds={}, warnings=())
+        timer = PhaseTimer(lambda phase, part: report(Progress(1, 1, phase, part)))
+        with timer.phase("repair") as tick:
+            mended = mend(case, mesh, mesh, None, tick)
+        done = replace(step, mesh=mended.mesh, repaired=mended, seconds=timer.seconds)
+    assert done.repaired is not None
+    return replace(done, warnings=tuple(dict.fromkeys((*done.warnings, *done.repaired.warnings))))
 
 
 def mend(

@@ -14,6 +14,7 @@ from slideviz.gui.widgets.labels import wrapped
 from slideviz.session import changes
 from slideviz.session.motions import box_names
 from slideviz.session.panes import choices, panes, show_in
+from slideviz.session.run_messages import to_mend
 from slideviz.session.state import IN_FILE, Session
 from slideviz.session.store import Store
 
@@ -215,6 +216,11 @@ def has_steps(now: CommandState) -> bool:
 def is_idle(now: CommandState) -> bool:
     """Return whether a mesh is open and no job runs."""
     return has_mesh(now) and not now.busy
+
+
+def needs_repair(now: CommandState) -> bool:
+    """Return whether a mesh in memory has cells to mend, and no job runs."""
+    return is_idle(now) and to_mend(now.session) is not None
 
 
 def has_steps_and_is_idle(now: CommandState) -> bool:
