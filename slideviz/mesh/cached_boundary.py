@@ -6,6 +6,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from slideviz.mesh.adjacency import NONE, sides_of
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.fans import find_pieces
 from slideviz.mesh.model import DEFAULT_FEATURE_ANGLE_DEG, Cells, IntArray, Marker, Mesh
@@ -13,8 +14,6 @@ from slideviz.mesh.topology import Boundary, find_boundary
 
 _MOST_PARTS = 64
 """Most parts that `smooth_parts` returns; a surface with more is rough, its edges no borders."""
-_WIDTH = {2: 2, 3: 4}
-"""Columns of a table of facets, by the dimension of the mesh."""
 _VTK = {2: 3, 3: 5, 4: 9}
 """VTK identifier of a facet by its number of nodes."""
 
@@ -26,35 +25,13 @@ _SHELLS: WeakKeyDictionary[Mesh, IntArray] = WeakKeyDictionary()
 
 def outer_facets(mesh: Mesh) -> Cells:
     """Return the sides that only one cell has, as lines (2D) or triangles and quadrilaterals."""
-    width = _WIDTH[mesh.dim]
-    tables = [np.empty((0, width), np.int64)]
-    for vtk, (_, nodes) in mesh.cells.by_type.items():
-        for local in ELEMENTS[vtk].facets:
-            table = np.full((len(nodes), width), -1, np.int64)
-            table[:, : len(local)] = nodes[:, local]
-            tables.append(table)
-    facets = np.concatenate(tables)
-    outer = facets[_once(np.sort(facets, axis=1), len(mesh.points))]
-    sizes = (outer >= 0).sum(axis=1)
-    return Cells.from_blocks(
-        (_VTK[int(size)], outer[sizes == size][:, :size]) for size in np.unique(sizes)
-    )
-
-
-def _once(keys: IntArray, n_points: int) -> IntArray:
-    """Return ascending indices (k,) of the rows of ``keys`` (f, 2 or 4) that occur only once.
-
-    A row has the sorted nodes of a side, padded with -1.
-    """
-    # Two nodes in one integer make the sort twice as fast; 3e9 points would be needed to overflow.
-    base = n_points + 1
-    packed = [(keys[:, k] + 1) * base + keys[:, k + 1] + 1 for k in range(0, keys.shape[1], 2)]
-    order = np.lexsort(packed)
-    same = np.ones(len(order) - 1, bool)
-    for column in packed:
-        same &= column[order[1:]] == column[order[:-1]]
-    alone = ~np.append(False, same) & ~np.append(same, False)
-    return np.sort(order[alone])
+    sides, tables = sides_of(mesh.cells), dict[int, list[IntArray]]()
+    for vtk, (ids, nodes) in mesh.cells.by_type.items():
+        for k, local in enumerate(ELEMENTS[vtk].facets):
+            alone = sides.neighbour[sides.first[ids] + k] == NONE
+            tables.setdefault(len(local), []).append(nodes[alone][:, local])
+    blocks = ((_VTK[size], np.concatenate(found)) for size, found in sorted(tables.items()))
+    return Cells.from_blocks([block for block in blocks if len(block[1])])
 
 
 def smooth_parts(mesh: Mesh, facets: Cells) -> tuple[Marker, ...]:

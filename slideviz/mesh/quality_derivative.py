@@ -12,7 +12,7 @@ with + for a cell that is smaller than the undeformed one, - for one that is lar
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -32,7 +32,7 @@ from slideviz.mesh.jacobians import (
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.skew import EXPONENTS
-from slideviz.system.threads import PART, cores, in_parts
+from slideviz.system.threads import PART, cores, in_parts, ordered_map
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -340,9 +340,15 @@ def cell_margins(mesh: Mesh, reference: Mesh) -> FloatArray:
     MeshError
         An undeformed cell has no positive volume to compare with.
     """
-    out = np.empty(len(mesh.cells))
-    for ids, _, _, _, ratio in _ratios(mesh, reference):
-        out[ids] = ratio.min(axis=0)
+    out, blocks = np.empty(len(mesh.cells)), _blocks(mesh)
+    _, signs = reference_of(reference)
+
+    def least_of(block: Block) -> FloatArray:
+        least: FloatArray = _ratios(mesh, reference, signs, block)[1].min(axis=0)
+        return least
+
+    for (_, ids, _), least in zip(blocks, ordered_map(least_of, blocks), strict=True):
+        out[ids] = least
     return out
 
 
@@ -368,44 +374,59 @@ def smooth_margin(mesh: Mesh, reference: Mesh, p: float = 50.0) -> SmoothMargin:
     halo = np.zeros(len(margins), bool) if mesh.halo is None else mesh.halo.cells
     least = float(margins[~halo].min())
     total, gradient = 0.0, np.zeros(mesh.points.shape)
-    for ids, vtk, nodes, factor, ratio in _ratios(mesh, reference):
+    power = p + 1 if least > 0 else p - 1 if least < 0 else 1
+    _, signs = reference_of(reference)
+
+    def pull(block: Block) -> tuple[float, IntArray, FloatArray]:
+        vtk, ids, nodes = block
+        factor, ratio = _ratios(mesh, reference, signs, block)
         ratio[:, halo[ids]] = np.inf
         part = np.array(ratio == 0, float)
         if least != 0:
             part = np.maximum(least / ratio if least > 0 else ratio / least, 0.0)
-        power = p + 1 if least > 0 else p - 1 if least < 0 else 1
         some = np.flatnonzero(part.max(axis=0) ** power > NEGLIGIBLE)
         part, used = part[:, some], nodes[some]
-        total += float((part**p).sum())
         # The derivatives of the minimum by the ratios, up to a factor that all have.
         weights = np.where(part > 0, part**power, 0.0) * factor[:, some]
         by_nodes = np.empty((*used.shape, mesh.dim))
         pull_coefficients(vtk, mesh.points, used, CORNERS[vtk], weights, by_nodes)
+        return float((part**p).sum()), used, by_nodes
+
+    for share, used, by_nodes in ordered_map(pull, _blocks(mesh)):  # the order fixes the bits
+        total += share
         np.add.at(gradient, used, by_nodes)
     power = -1 / p if least > 0 else 1 / p
     gradient *= total ** (power - 1) if least else 1 / total
     return SmoothMargin(float(p), least * total**power, sealed(gradient))
 
 
-def _ratios(
-    mesh: Mesh, reference: Mesh
-) -> Iterator[tuple[IntArray, int, IntArray, FloatArray, FloatArray]]:
-    """Yield blocks of cells: numbers (m,), VTK type, nodes (m, n), and for each coefficient (k, m).
+Block = tuple[int, IntArray, IntArray]
+"""Some cells of one type: VTK type, numbers (m,) and nodes (m, n)."""
 
-    That is the factor by which it is multiplied (its sign, over its undeformed value), and the
-    product.
+
+def _blocks(mesh: Mesh) -> list[Block]:
+    return [
+        (vtk, ids[first : first + PART], nodes[first : first + PART])
+        for vtk, (ids, nodes) in mesh.cells.by_type.items()
+        for first in range(0, len(ids), PART)
+    ]
+
+
+def _ratios(
+    mesh: Mesh, reference: Mesh, signs: NDArray[np.int8], block: Block
+) -> tuple[FloatArray, FloatArray]:
+    """Return for each coefficient (k, m) of a block of cells its factor, and the product.
+
+    The factor is the cell's sign over the coefficient's undeformed value.
     """
-    _, signs = reference_of(reference)
-    for vtk, (every, all_nodes) in mesh.cells.by_type.items():
-        for first in range(0, len(every), PART):
-            ids, nodes = every[first : first + PART], all_nodes[first : first + PART]
-            before = signs[ids] * _proved(vtk, _at(reference, nodes))
-            scale = np.maximum(before, LEAST_SCALE * before.mean(axis=0))
-            flat = ~(scale > 0).all(axis=0)
-            if flat.any():
-                raise MeshError(_flat_sentence(int(ids[flat.argmax()]), mesh))
-            factor = signs[ids] / scale
-            yield ids, vtk, nodes, factor, factor * _proved(vtk, _at(mesh, nodes))
+    vtk, ids, nodes = block
+    before = signs[ids] * _proved(vtk, _at(reference, nodes))
+    scale = np.maximum(before, LEAST_SCALE * before.mean(axis=0))
+    flat = ~(scale > 0).all(axis=0)
+    if flat.any():
+        raise MeshError(_flat_sentence(int(ids[flat.argmax()]), mesh))
+    factor = signs[ids] / scale
+    return factor, factor * _proved(vtk, _at(mesh, nodes))
 
 
 def _proved(vtk: int, at: FloatArray) -> FloatArray:

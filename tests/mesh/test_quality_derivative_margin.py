@@ -9,6 +9,7 @@ from slideviz.errors import CaseError, MeshError
 from slideviz.formats.files import read
 from slideviz.mesh.quality import VALID, quality
 from slideviz.mesh.quality_derivative import cell_margins, smooth_margin
+from slideviz.system.threads import ordered_map
 from tests.builders import grid, halo_text
 from tests.mesh.test_quality_derivative import TYPES, shaken, shaken_mesh, soup
 
@@ -112,3 +113,24 @@ def test_what_cannot_be_a_margin_is_told():
     flat = mesh.with_points(mesh.points * (1, 0))
     with pytest.raises(MeshError, match="cell 0 of the undeformed mesh has no positive volume"):
         cell_margins(moved, flat)
+
+
+def test_bits_do_not_depend_on_the_number_of_threads(monkeypatch):
+    monkeypatch.setattr("slideviz.mesh.quality_derivative.PART", 4)
+    mesh = grid((5, 4, 3))
+    rng = np.random.default_rng(3)
+    moved = mesh.with_points(mesh.points + rng.uniform(-0.2, 0.2, mesh.points.shape))
+    ran = set()
+
+    def seen(work, blocks):
+        ran.add(len(blocks))
+        return ordered_map(work, blocks)
+
+    monkeypatch.setattr("slideviz.mesh.quality_derivative.ordered_map", seen)
+    found = []
+    for threads in (1, 2, 4):
+        monkeypatch.setattr("slideviz.system.threads.cores", lambda threads=threads: threads)
+        one = smooth_margin(moved, mesh)
+        found.append((one.value, one.of_points.tobytes(), cell_margins(moved, mesh).tobytes()))
+    assert found[0] == found[1] == found[2]
+    assert ran == {15}, "it works on all cores"
