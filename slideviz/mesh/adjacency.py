@@ -80,28 +80,50 @@ def cells_around(cells: Cells, n_points: int) -> CellsAround:
     """Return the cells of each of ``n_points`` nodes, cached as long as the cells live."""
     known = _AROUND.get(cells)
     if known is None or len(known.offsets) != n_points + 1:
-        offsets = np.zeros(n_points + 1, np.int64)
-        order = np.empty(len(cells.connectivity), np.int64)
-        _sort(cells.connectivity, offsets, order)
-        owner = np.repeat(np.arange(len(cells), dtype=np.int32), np.diff(cells.offsets))[order]
-        local = (order - cells.offsets[owner]).astype(np.int8)
+        offsets, count = np.zeros(n_points + 1, np.int64), len(cells.connectivity)
+        owner, local = np.empty(count, np.int32), np.empty(count, np.int8)
+        _write_around(cells.connectivity, cells.offsets, offsets, owner, local)
         known = _AROUND[cells] = CellsAround(sealed(offsets), sealed(owner), sealed(local))
     return known
 
 
 @njit(nogil=True, cache=True)
+def _count(keys, ends):  # type: ignore[no-untyped-def]
+    """Write where each of the integers ``keys`` (k,) begins in their order, to ``ends`` (n + 1,).
+
+    It is one place further on: `_place` moves each to its end, which is where the next begins.
+    """
+    for key in keys:
+        if key + 2 < len(ends):
+            ends[key + 2] += 1
+    for key in range(2, len(ends)):
+        ends[key] += ends[key - 1]
+
+
+@njit(inline="always", nogil=True, cache=True)
+def _place(key, ends):  # type: ignore[no-untyped-def]
+    """Return the next place of a key in the order."""
+    at = ends[key + 1]
+    ends[key + 1] = at + 1
+    return at
+
+
+@njit(nogil=True, cache=True)
 def _sort(keys, begins, order):  # type: ignore[no-untyped-def]
     """Write the stable order (k,) of integers ``keys`` (k,), and where each begins, (n + 1,)."""
-    for key in keys:
-        begins[key + 1] += 1
-    for key in range(len(begins) - 1):
-        begins[key + 1] += begins[key]
+    _count(keys, begins)
     for k in range(len(keys)):
-        order[begins[keys[k]]] = k
-        begins[keys[k]] += 1
-    for key in range(len(begins) - 1, 0, -1):
-        begins[key] = begins[key - 1]
-    begins[0] = 0
+        order[_place(keys[k], begins)] = k
+
+
+@njit(nogil=True, cache=True)
+def _write_around(connectivity, offsets, begins, owner, local):  # type: ignore[no-untyped-def]
+    """Write the arrays of `CellsAround`; ``begins`` are its offsets."""
+    _count(connectivity, begins)
+    for cell in range(len(offsets) - 1):
+        for k in range(offsets[cell], offsets[cell + 1]):
+            at = _place(connectivity[k], begins)
+            owner[at], local[at] = cell, k - offsets[cell]
 
 
 @njit(inline="always", nogil=True, cache=True)

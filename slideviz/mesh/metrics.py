@@ -19,13 +19,14 @@ from slideviz.argument_types import check_types
 from slideviz.errors import CaseError, not_one_of
 from slideviz.mesh import dual_loops, face_loops, shape_loops
 from slideviz.mesh.adjacency import SIDE_NODES, SIDES, cells_around, sides_of
+from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size
 from slideviz.mesh.jacobians import check_cells
 from slideviz.mesh.margin import path_margins
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality import Quality, checked_reference, quality
-from slideviz.mesh.topology import find_boundary, vertex_normals
+from slideviz.mesh.topology import vertex_normals
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 from slideviz.terms import METRICS, SIZE_SKEW, Metric, MetricTerm, field_of
@@ -342,7 +343,7 @@ def _outer_facets(mesh: Mesh) -> list[IntArray]:
     """Return the facets (f, 2 or 4) of each marker that only one cell has; cached for its cells."""
     known = _OUTER.get(mesh.cells)
     if known is None or known[0] is not mesh.markers:
-        boundary, sides = find_boundary(mesh), sides_of(mesh.cells)
+        boundary, sides = boundary_of(mesh), sides_of(mesh.cells)
         inner = np.zeros(len(boundary.facets), bool)
         types, first = mesh.cells.types[boundary.owner], sides.first[boundary.owner]
         begin = mesh.cells.offsets[boundary.owner]
