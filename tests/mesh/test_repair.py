@@ -296,3 +296,31 @@ def test_a_report_may_cancel():
         repair(scrambled(mesh, held), Freedom.within(2, held), mesh, report=report)
     assert all(0 <= fraction <= 1 for fraction in seen)
     assert seen == sorted(seen)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_boundary_layers_keep_their_heights(dim):
+    """Cells of aspect 1,000 in a patch come back to their shape; walls outside keep their bits."""
+    n = 16
+    heights = np.cumsum(np.r_[0, 1.5 ** np.arange(18)]) / (1000 * n)
+
+    def place(p):
+        out = p / n
+        out[:, 1] = heights[p[:, 1].astype(int)]
+        return out
+
+    mesh = grid((n, 18, n)[:dim] if dim == 2 else (n, 18, 8), place=place)
+    held = held_boundary(mesh)
+    row = np.searchsorted(heights, mesh.points[:, 1] - 1e-12)
+    near = (np.abs(mesh.points - mesh.points.mean(axis=0)) < 1.6 / n)[:, ::2].all(axis=1)
+    points = np.array(mesh.points)
+    points[near & ~held & (row >= 2) & (row <= 4), 1] -= 1.3 * heights[4]
+    folded = mesh.with_points(points)
+    result = repair(folded, Freedom.within(dim, held), mesh)
+    assert len(result.bad_before)
+    assert not len(result.bad_after)
+    first = np.flatnonzero((row == 1) & ~held)
+    assert np.intersect1d(first, result.moved).size
+    assert result.points[first, 1] / heights[1] == pytest.approx(1, abs=0.1)
+    same = np.setdiff1d(first, result.moved)
+    assert np.array_equal(result.points[same], mesh.points[same])

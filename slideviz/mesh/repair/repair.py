@@ -34,9 +34,9 @@ RINGS = 3, 5, 8
 ROUNDS, VAIN = 40, 10
 """Most outer rounds of a patch, and those in a row that may mend nothing."""
 
-ITERATIONS, DECREASE, ENOUGH = 200, 5e-3, 0.01
-"""Most iterations of a descent, and the least relative decrease of the energy in ten of them, while
-a cell is folded and when none is."""
+ITERATIONS, DECREASE, ENOUGH, POLISH = 200, 5e-3, 0.01, 1e-4
+"""Most iterations of a descent, and the least relative decrease of the energy in ten of them: while
+a cell is folded, when none is, and in the last descent, which brings cells near their targets."""
 
 LIFTS, LIFTED, BETA, GAIN = 40, 1e-3, 1.01, 0.003
 """Of a round that lifts the worst: most iterations, the epsilon of the preconditioner, the limit
@@ -285,6 +285,11 @@ class _Mending:
         best = self.score(best_points)
         if best[0] < 0:
             best_points, best = self._unfolded(best_points, best)
+        if best[0] == 0:
+            self.patch.start = best_points
+            points = self._settled(self._descended(self.patch, LIFTED, POLISH), LIFTED)
+            if (score := self.score(points)) > best:
+                best_points, best = points, score
         if best[0] == 0 and not self.good(best):
             best_points, best = self._lifted(best_points, best)
         return best_points
@@ -313,13 +318,13 @@ class _Mending:
                 epsilon = float(2 * np.sqrt(bound * (bound - depth))) if depth < bound else 1e-10
         return best_points, best
 
-    def _descended(self, patch: Patch, epsilon: float) -> FloatArray:
-        """Return points (k, d) of lower energy."""
+    def _descended(self, patch: Patch, epsilon: float, least: float | None = None) -> FloatArray:
+        """Return points (k, d) of lower energy; ``least`` is the decrease that ends it."""
         inverse, edges = patch.curvature(epsilon), self._edges(patch)
 
         def decrease() -> float:
             self._progress()
-            return DECREASE if patch.least.min() <= 0 else ENOUGH
+            return least or (DECREASE if patch.least.min() <= 0 else ENOUGH)
 
         found = descend(
             lambda unknowns: patch.energy(unknowns, epsilon),
@@ -417,7 +422,7 @@ def _local_lengths(points: FloatArray, cells: Cells, nodes: IntArray) -> FloatAr
             for end in np.searchsorted(nodes, ends).T:
                 total += np.bincount(end, length, len(nodes))
                 count += np.bincount(end, minlength=len(nodes))
-    return total / count
+    return total / np.maximum(count, 1)
 
 
 _H = np.sqrt(3) / 2
