@@ -33,7 +33,7 @@ ELASTIC_BYTES = {2: 2_000, 3: 8_000}
 quadrilaterals and hexahedra, whose matrix has the most entries."""
 
 
-RELAX_BYTES = 3_000  # bytes of memory that relaxation takes for each node: measured on hexahedra
+RELAX_BYTES = 1_700  # bytes of memory that relaxation takes for each node: measured on hexahedra
 
 
 @check_types

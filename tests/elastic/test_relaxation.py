@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from dataclasses import replace
 
@@ -177,6 +178,30 @@ def test_the_preconditioner_is_symmetric_positive_and_holds_components():
     products = np.array(each).reshape(count, 2, count, 2)[:, 0, :, 0] @ matrix
     assert np.linalg.eigvals(products).real.min() > 0.3
     assert np.linalg.eigvals(products).real.max() < 1.5
+
+
+@pytest.mark.parametrize("kind", ["plain", "prism", "pyramid", "tetra"])
+def test_the_laplacian_is_the_sum_of_that_of_its_elements(kind):
+    mesh = builders.cube(3, kind)
+    body = Corotated.of(mesh.points, blocks(mesh.cells))
+    place = np.arange(len(mesh.points)) // 2 - 3  # images in and across elements, known nodes
+    count = int(place.max()) + 1
+    place[:6], dense = -1, np.zeros((count, count))
+    for part, modulus in zip(body.parts, body.moduli, strict=True):
+        shape = part.shape
+        for nodes, stiff in zip(part.nodes, modulus, strict=True):
+            for slopes, weight in zip(shape.gradients, shape.weights, strict=True):
+                jacobian = slopes.T @ mesh.points[nodes]
+                real = np.linalg.solve(jacobian, slopes.T)
+                one = stiff * weight * abs(np.linalg.det(jacobian)) * real.T @ real
+                at = place[nodes]
+                use = np.ix_(at >= 0, at >= 0)
+                np.add.at(dense, np.ix_(at[at >= 0], at[at >= 0]), one[use])
+    indptr, indices, data = laplacian(body, place, count)
+    assert all(np.all(np.diff(indices[a:b]) > 0) for a, b in itertools.pairwise(indptr))
+    found = csr_array((data[:, 0], indices, indptr), shape=dense.shape).toarray()
+    np.testing.assert_array_equal(found, found.T)
+    np.testing.assert_allclose(found, dense, rtol=0, atol=1e-6 * np.abs(dense).max())
 
 
 def test_the_cycle_in_several_parts_is_symmetric_with_the_same_bits_for_any_threads(monkeypatch):
