@@ -33,7 +33,6 @@ Add = Callable[[Pixels, float], None]
 """A function that writes an image (height, width, 3) to be shown for a number of seconds."""
 
 SUFFIXES = (".mp4", ".gif", ".png")  # the kinds of films (see `film_kind`)
-
 MIN_FPS = 10
 """Least frame rate of an MP4, as players fail with lower ones; images shown longer are repeated."""
 MAX_FPS = {".mp4": 60.0, ".gif": 50.0, ".png": float("inf")}

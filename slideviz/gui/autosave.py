@@ -131,7 +131,6 @@ def _time_text(when: datetime) -> str:
 
 
 HALF_WRITTEN_S = 60.0  # age in seconds from which a temporary file is not being written any more
-
 SOURCE = "saved as: "
 """Begin of the remark in a session's file that names the case file it belongs to."""
 

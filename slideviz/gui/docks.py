@@ -132,12 +132,10 @@ LEFT_WIDTH, RIGHT_WIDTH = 356, 316
 
 NARROWEST = {LEFT: 236, RIGHT: 224}  # least width in pixels of the docks on each side
 FULL_WIDTH = 1280  # width of a window in pixels below which the initial widths shrink in proportion
-
 LOW_HEIGHT = 600
 """Height of the window in pixels below which the boundaries are a tab beside motion and method."""
 
 TITLE_BAR_HEIGHT = 40  # height in pixels of a screen that is left for the window's title bar
-
 HEIGHTS = {
     LEFT: {"boundaries": 240, "motion": 330, "run": 90},
     RIGHT: {"histogram": 410, "runs": 290},

@@ -38,7 +38,6 @@ COLUMNS = 4  # most cards of samples in a row
 NARROWEST = 126  # least width of a card in pixels, for its name
 SIZE = (152, 96)  # width and height of a card's picture in pixels, at a device pixel ratio of 1
 TRIED = "passage"  # the sample that is deformed by one click
-
 TRY = "Try it: deform a blade passage"
 """The text of the button for that; only its beginning where the page is narrow."""
 

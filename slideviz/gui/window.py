@@ -9,7 +9,7 @@ from pathlib import Path
 
 from qtpy.QtCore import QSettings, QSize, Qt, QTimer
 from qtpy.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
-from qtpy.QtWidgets import QDockWidget, QGridLayout, QLabel, QLineEdit, QSpinBox, QWidget
+from qtpy.QtWidgets import QGridLayout, QLabel, QLineEdit, QSpinBox, QWidget
 
 from slideviz.case.motion_words import mesh_words
 from slideviz.color_scheme import ColorScheme
@@ -30,7 +30,6 @@ from slideviz.gui.panels.worst import WorstPanel
 from slideviz.gui.responsiveness.threads import WarmupThread
 from slideviz.gui.running import Running
 from slideviz.gui.start import StartPage
-from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.player import Player
 from slideviz.gui.viewport.section_views import SectionViews
 from slideviz.gui.viewport.viewing import Viewing
@@ -44,7 +43,6 @@ from slideviz.gui.widgets.labels import plain_labels, wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import Services
 from slideviz.mesh.model import Mesh
-from slideviz.scene.scene import Scene
 from slideviz.session import changes, jobs
 from slideviz.session.motions import boxes_hint
 from slideviz.session.run_messages import Requirement, run_requirements
@@ -58,14 +56,9 @@ log = logging.getLogger("slideviz")
 class MainWindow(Services):
     """The main window of slideviz.
 
-    Parameters
-    ----------
-    settings : QSettings, optional
-        Keeps recent files, theme and layout; by default those of the user.
-    multi_samples : int
-        Samples per pixel for antialiasing in the views; 0 for none, which is the fastest.
-    kept : Path, optional
-        The folder for autosaved sessions; without it nothing is autosaved.
+    ``settings`` keep recent files, theme and layout; by default those of the user.
+    ``multi_samples``: samples per pixel for antialiasing in the views; 0 for none, which is the
+    fastest. ``kept``: the folder for autosaved sessions; without it nothing is autosaved.
     """
 
     def __init__(
@@ -96,6 +89,9 @@ class MainWindow(Services):
         self._kept.enter_context(protected(self._inputs))
         self._make_centre(multi_samples)
         self.dock_manager = Docks(self)
+        self.docks, panel = self.dock_manager.by_name, self.dock_manager.panel
+        self.boundaries, self.motions = panel(BoundariesPanel), panel(MotionPanel)
+        self.method, self.run_panel = panel(MethodPanel), panel(RunPanel)
         self._make_status()
         self.actions_table = Actions(self)
         self._connect()
@@ -122,6 +118,7 @@ class MainWindow(Services):
         grid.setContentsMargins(0, 0, 0, 0)
         # The start page covers the view, which must be shown to have a size.
         self.viewing = Viewing(self.store, multi_samples, stack)
+        self.view, self.scene = self.viewing.view, self.viewing.scene
         self.section_views = SectionViews(self.viewing, multi_samples, stack)
         self.start = StartPage(self.files.samples, stack)
         self.start.setAutoFillBackground(True)
@@ -136,34 +133,6 @@ class MainWindow(Services):
 
     def _inputs(self) -> Mapping[Path, str]:
         return self.store.session.inputs()
-
-    @property
-    def view(self) -> View3D:
-        return self.viewing.view
-
-    @property
-    def scene(self) -> Scene:
-        return self.viewing.scene
-
-    @property
-    def docks(self) -> dict[str, QDockWidget]:
-        return self.dock_manager.by_name
-
-    @property
-    def boundaries(self) -> BoundariesPanel:
-        return self.dock_manager.panel(BoundariesPanel)
-
-    @property
-    def motions(self) -> MotionPanel:
-        return self.dock_manager.panel(MotionPanel)
-
-    @property
-    def method(self) -> MethodPanel:
-        return self.dock_manager.panel(MethodPanel)
-
-    @property
-    def run_panel(self) -> RunPanel:
-        return self.dock_manager.panel(RunPanel)
 
     def _make_status(self) -> None:
         self.mesh_text = QLabel()

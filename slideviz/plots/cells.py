@@ -51,25 +51,13 @@ def draw_cells(
     lit: bool = False,
     **options: Any,
 ) -> Any:
-    """Draw polygons onto axes, and return their PolyCollection.
+    """Draw polygons onto axes, the last one over the others, and return their PolyCollection.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        Laid out already, with their limits, as the widths of edges depend on the scale.
-    cells : Polygons
-        x and y are drawn; the last polygon is drawn over the others.
-    values : (q,) float64 or None
-        The value of each polygon, NaN if inverted; None: all have one color.
-    scale : matplotlib.cm.ScalarMappable
-        The colors of the values; see `color_scale`.
-    edges : float
-        Largest width of mesh lines in points; they are thinner around thin cells, so that boundary
-        layers do not turn black. 0: no lines.
-    lit : bool
-        Whether polygons are darker, the more they are tilted.
-    **options
-        Arguments of the PolyCollection.
+    ``axes``: laid out already, with their limits, as the widths of edges depend on the scale.
+    ``values`` (q,): of each polygon, NaN if inverted; None: all have one color. ``scale``: see
+    `color_scale`. ``edges``: largest width of mesh lines in points; they are thinner around thin
+    cells, so that boundary layers do not turn black; 0: no lines. ``lit``: polygons are darker, the
+    more they are tilted. ``options``: arguments of the PolyCollection.
     """
     from matplotlib.collections import PolyCollection
 

@@ -30,7 +30,6 @@ RESULTS = {
 _MOST_LINES = 12
 """Most curves drawn as lines in different colors; if there are more, only points are drawn."""
 _MOST_WORDS = 12  # most texts along an axis whose column has no numbers
-
 _SIGN, _AXIS, _HIGHEST = 7, 0.6, 0.35
 """Width of a legend's sign and the gap beside it, in letters; width of the labels left of the axes,
 in inches; largest height of a legend above the axes, relative to the figure."""

@@ -35,7 +35,6 @@ from slideviz.terms import QUANTITIES, WALL_VALUES
 
 TITLE, LETTERS = 10.0, 9.0  # size in points of the title's letters, and of all others
 _LETTER_WIDTH = 0.075  # width of a label's letter in inches
-
 SIDES, ENDS, BAR = 0.7, 1.0, 0.7
 """Approximate room in inches for numbers and labels beside the axes; for these and titles above and
 below the axes; and for the color bar. They decide the arrangement."""

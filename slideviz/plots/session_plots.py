@@ -217,7 +217,6 @@ def _line(section: Section) -> Section:
 
 LEAST_SPREAD = 0.05  # least range of qualities that the axis shows
 MOST_COMPARED = 4  # most runs that are compared with the shown one, so that lines can be told apart
-
 Range = tuple[float, float]
 
 

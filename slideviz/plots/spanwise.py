@@ -62,19 +62,11 @@ def along_radius(
 ) -> Profile:
     """Return the quality in layers of equal height along the radius about an axis.
 
-    Raises SlidevizError if there is not a value for each cell, no layer, or the mesh has no span,
-    and MeshError if the axis has length zero.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The deformed mesh, or the undeformed one to keep layers of cells together.
-    values : (m,) float64
-        A value for each cell.
-    axis, origin : (3,) floats
-        Direction of the axis, of any length but zero, and a point on it.
-    layers : int, optional
-        At least 1; when left out, one for each layer of cells of usual height, 40 at most.
+    ``mesh``: the deformed mesh, or the undeformed one to keep layers of cells together. ``values``
+    (m,): one for each cell. ``axis`` and ``origin``: a direction and a point. ``layers``: at least
+    1; by default one for each layer of cells of usual height, 40 at most. Raises SlidevizError if
+    there is not a value for each cell, no layer, or the mesh has no span, and MeshError if the axis
+    has length zero.
     """
     local = in_axis_frame(mesh.points, axis, origin)
     return _profile(

@@ -10,7 +10,6 @@ import numpy as np
 from slideviz.mesh.model import FloatArray
 
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # the round steps, up to a power of ten
-
 _LARGE, _SMALL = 1e5, 1e-5
 """Numbers from `_LARGE` on, or with steps below `_SMALL`, are written with powers of ten."""
 _BETWEEN = 1.2  # least distance of two labels, relative to the size of a label

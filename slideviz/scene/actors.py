@@ -14,7 +14,6 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted, padded
 
 VALUES = "values"  # name of the cell data by which shapes are colored
-
 CELL, POINT = "vtkOriginalCellIds", "vtkOriginalPointIds"
 """Names of cell and point data with the indices of cells and nodes in the mesh."""
 

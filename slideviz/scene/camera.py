@@ -13,7 +13,6 @@ from slideviz.scene.pick import to_display
 from slideviz.scene.stage import Stage
 
 FILL = 0.92  # part of the free height or width that a fitted mesh takes
-
 DETAIL = 0.5
 """Height of the view, relative to that which shows everything, below which it shows a detail."""
 

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from slideviz.scene.stage import Stage
 
 OPACITY = 0.82  # opacity of a plate, which covers the mesh
-
 Rect = tuple[float, float, float, float]
 """Left, bottom, right and top, in pixels from the lower left corner of the view."""
 

@@ -100,7 +100,6 @@ def has_inverted(session: Session) -> bool:
 
 
 SIZE = 92  # width and height in pixels of the corner with the axes, at normal letter size
-
 COLORS = ("#c8452f", "#4c9a2a", "#3b7dd8")
 """Colors of the axes x, y and z, visible on light and dark backgrounds."""
 

@@ -21,7 +21,6 @@ PALER = 0.45
 """Part of the cells' plain color that is mixed into the colors of a neighbouring passage."""
 
 DIRECTIONS = 200  # number of directions, evenly spread over the sphere, in `outermost`
-
 UNENDING = 2
 """Neighbours drawn on each side if all are wanted of a translational period, which is endless."""
 

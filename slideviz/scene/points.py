@@ -19,7 +19,6 @@ SIZES = ((0, 9.0), (1500, 7.0), (6000, 5.0))
 """Pairs of a number of points, and their diameter in pixels from that number on."""
 
 _COLOR = "point_color"  # name of the point data with the colors
-
 _RGB = np.array([pv.Color(term.color).int_rgb for term in NODE_TYPES.values()], np.uint8)
 """Red, green and blue (0 to 255) of each type of node, (t, 3)."""
 

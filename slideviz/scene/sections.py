@@ -225,7 +225,6 @@ def shown_sections(session: Session) -> Iterator[tuple[int, Section]]:
 
 LINE = "line:"  # prefix of the actors' names of thin lines
 WIDTH = 1.2  # width of the thin line of a 2D section, in pixels
-
 ABOVE, BELOW = 0.9, 0.4
 """Heights of the thin line above the mesh's cells, relative to `Stage.lift`: above whole cells, and
 below a band in the cells' colors."""

@@ -51,24 +51,12 @@ class Cutter:
     def cut(self, points: FloatArray, section: Section) -> Polygons:
         """Return the polygons in which the section cuts the cells; none where all are missed.
 
-        Raises CaseError if the mesh is 2D, and the section is neither a plane nor a cylinder about
-        z.
-
-        Parameters
-        ----------
-        points : (n, d) float64
-            The nodes of the mesh.
-        section : Section
-            Its ``whole`` has no effect here; see `show`.
-
-        Returns
-        -------
-        Polygons
-            Convex cells give one polygon, folded ones perhaps more. Corners lie on the edges of
-            the cells and, up to rounding, on the section, a curved one too. A side of a cell that
-            lies in the section belongs to the cell where the distance from the section is
-            negative; where no cell is cut so, to the other, since the section is at the rim of
-            the mesh.
+        ``points`` (n, d): the nodes of the mesh. Convex cells give one polygon, folded ones perhaps
+        more. Corners lie on the edges of the cells and, up to rounding, on the section, a curved
+        one too. A side of a cell that lies in the section belongs to the cell where the distance
+        from the section is negative; where no cell is cut so, to the other, since the section is at
+        the rim of the mesh. For ``whole_cells`` see `show`. Raises CaseError if the mesh is 2D, and
+        the section is neither a plane nor a cylinder about z.
         """
         level = self._level(points, section)
         owners, low, high = self._corners(level)

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 UNDEFORMED = 0
 """The number of the undeformed mesh where a run's number is asked for; those begin with 1."""
 MOST_REMOVED = 2  # removed runs that undo can bring back: each may take hundreds of megabytes
-
 Change = TypeVar("Change", bound=Callable[..., Any])
 Row = TypeVar("Row")
 Words = str | Callable[[Mapping[str, Any]], str | None]

@@ -21,7 +21,7 @@ from slideviz.mesh.quality import INVERTED, corner_jacobians, lowest, quality
 from slideviz.mesh.surfaces import padded
 from slideviz.mesh.walls import BADNESS
 from slideviz.session.state import Session, StepFrame
-from slideviz.system.atomic import atomic_write
+from slideviz.system.csv_table import write_csv
 from slideviz.terms import (
     CELL_STATES,
     RATED,
@@ -256,10 +256,7 @@ def surroundings(mesh: Mesh, cell: int) -> tuple[FloatArray, float]:
 
 
 def cell_info(frame: StepFrame, cell: int) -> CellInfo:
-    """Return the facts about a cell.
-
-    Raises MeshError if there is no such cell.
-    """
+    """Return the facts about a cell; raises MeshError if there is no such cell."""
     frame, cell = frame.place_of(cell)
     mesh, found = frame.mesh, frame.quality
     sign = int(found.signs[cell]) if 0 <= cell < len(mesh.cells) else 1
@@ -320,6 +317,4 @@ def write_table(worst: WorstCells, path: Path) -> None:
 
     Raises SlidevizError if the file cannot be written.
     """
-    lines = [",".join(row) for row in table_rows(worst)]
-    with atomic_write(path, SlidevizError) as file:
-        file.write(("\n".join(lines) + "\n").encode())
+    write_csv(path, table_rows(worst), SlidevizError)

@@ -185,6 +185,11 @@ class Run:
         return self.frames[-1] if self.frames else None
 
     @property
+    def last_step(self) -> Step | None:
+        """Return the last step, or None."""
+        return None if self.last is None else self.last.step
+
+    @property
     def seconds(self) -> float:
         """Return the seconds that the steps took, without reading and drawing."""
         return sum(sum(f.step.seconds.values()) for f in self.frames if f.step is not None)

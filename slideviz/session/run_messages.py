@@ -50,7 +50,7 @@ def exact_cost(case: Case, mesh: Mesh) -> str:
 
 def end_message(run: Run) -> str:
     """Return the end of a run in a few words."""
-    step = run.last.step if run.last is not None else None
+    step = run.last_step
     if run.last is None or step is None:
         return "Ready."
     heights = heights_words(run.last, run.case)
@@ -110,8 +110,7 @@ def remedy_for(run: Run, mesh: Mesh | None, folding: str = "") -> str:
     if run.last is not None:
         beside = fixed_beside(run.case, mesh, run.last.quality.inverted_cells())
     pitch = beyond_pitch(run.case, mesh)
-    step = run.last.step if run.last is not None else None
-    layers = step.layers if step is not None else 0.0
+    layers = run.last_step.layers if run.last_step is not None else 0.0
     helps = "; ".join(remedy.window for remedy in remedies(run.case, beside, pitch, layers))
     words = (_last_valid_words(run), f"{pitch}." if pitch else "", f"What may help: {helps}.")
     return " ".join(filter(None, words))
@@ -125,16 +124,17 @@ def _last_valid_words(run: Run) -> str:
 
 def warnings_of(run: Run) -> tuple[str, ...]:
     """Return the warnings of a run, without its notes."""
-    step = run.last.step if run.last is not None else None
-    warnings = () if step is None else step.warnings
-    return tuple(with_field_labels(text) for text in warnings if not isinstance(text, Note))
+    return _remarks(run, notes=False)
 
 
 def notes_of(run: Run) -> tuple[str, ...]:
     """Return the notes of a run: remarks that are harmless."""
-    step = run.last.step if run.last is not None else None
-    warnings = () if step is None else step.warnings
-    return tuple(with_field_labels(text) for text in warnings if isinstance(text, Note))
+    return _remarks(run, notes=True)
+
+
+def _remarks(run: Run, notes: bool) -> tuple[str, ...]:
+    texts = () if run.last_step is None else run.last_step.warnings
+    return tuple(with_field_labels(text) for text in texts if isinstance(text, Note) == notes)
 
 
 @dataclass(frozen=True)

@@ -53,8 +53,7 @@ def reduction_words(case: Case) -> str:
 def steps_words(run: Run) -> str:
     """Return the number of steps of a run in words; of a run not done, how many of all it made."""
     made = len(run.frames)
-    step = run.last.step if run.last is not None else None
-    total = step.total if step is not None else run.case.steps
+    total = run.last_step.total if run.last_step is not None else run.case.steps
     auto = ", automatic" if not run.case.steps else ""
     if run.end == "done" or made == total:
         return f"{made} step{'' if made == 1 else 's'}{auto}"
@@ -75,8 +74,7 @@ def end_words(run: Run) -> str:
 
 def control_nodes(run: Run) -> int | None:
     """Return the number of control nodes in a run's last step, or None."""
-    step = run.last.step if run.last is not None else None
-    return step.control_nodes if step is not None else None
+    return run.last_step.control_nodes if run.last_step is not None else None
 
 
 SETTINGS: tuple[Key, ...] = tuple(
@@ -192,16 +190,6 @@ def _motions(run: Run) -> str | None:
     return "; ".join(describe(motion, dim) for motion in run.case.motions) or None
 
 
-def _error(run: Run) -> float | None:
-    step = run.last.step if run.last is not None else None
-    return step.max_error if step is not None else None
-
-
-def _radius(run: Run) -> float | None:
-    step = run.last.step if run.last is not None else None
-    return step.support_radius if step is not None else None
-
-
 def _misfit(run: Run) -> float | None:
     misfits = [frame.step.periodic_misfit for frame in run.frames if frame.step is not None]
     return max((value for value in misfits if value is not None), default=None)
@@ -229,7 +217,7 @@ COLUMNS: tuple[Column, ...] = (
     Column("periodicity", lambda run: PERIODIC_MODES[run.case.periodic].name),
     Column("steps", lambda run: len(run.frames)),
     Column("kernel", lambda run: KERNELS[run.case.kernel].name),
-    Column("support radius", _radius, ".4g"),
+    Column("support radius", lambda run: getattr(run.last_step, "support_radius", None), ".4g"),
     Column("control nodes chosen", lambda run: reduction_words(run.case)),
     Column("minimum quality", lambda run: _of_last(run, "min"), QUALITY_FORMAT),
     Column("mean quality", lambda run: _of_last(run, "mean"), QUALITY_FORMAT),
@@ -239,7 +227,7 @@ COLUMNS: tuple[Column, ...] = (
     Column("highest first height, ratio", lambda run: height_ratios(run.last, run.case)[1], ".3f"),
     Column("largest change of a wall angle", lambda run: angle_change(run.last, run.case), ".2g"),
     Column("control nodes", control_nodes, ",d"),
-    Column("largest error at control", _error, ".3g"),
+    Column("largest error at control", lambda r: getattr(r.last_step, "max_error", None), ".3g"),
     Column("periodic misfit", _misfit, ".3g"),
     Column("seconds", lambda run: run.seconds, ".3f"),
     Column("end", end_words),
@@ -281,10 +269,7 @@ def table_text(runs: Sequence[Run], delimiter: str = ",") -> str:
 
 
 def write_table(path: Path, runs: Sequence[Run]) -> None:
-    """Write the table as CSV.
-
-    Raises SlidevizError if the file cannot be written.
-    """
+    """Write the table as CSV; raises SlidevizError if the file cannot be written."""
     write_csv(path, _rows(runs), SlidevizError)
 
 

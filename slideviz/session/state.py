@@ -78,15 +78,8 @@ class ViewState:
 
     def in_style(self, style: ViewState) -> ViewState:
         """Return ``style`` with step, selection, marked cell and second view of this view."""
-        return replace(
-            style,
-            selected=self.selected,
-            frame=self.frame,
-            marked_cell=self.marked_cell,
-            marked_in=self.marked_in,
-            beside=self.beside,
-            swapped=self.swapped,
-        )
+        kept = ("selected", "frame", "marked_cell", "marked_in", "beside", "swapped")
+        return replace(style, **{name: getattr(self, name) for name in kept})
 
     def with_drawn(self, drawn: Mapping[Shown, bool]) -> ViewState:
         """Return the view with things drawn (True) or not (False), by name."""

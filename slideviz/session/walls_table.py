@@ -124,10 +124,7 @@ def table_text(session: Session, delimiter: str = ",") -> str:
 
 
 def write_table(path: Path, session: Session) -> None:
-    """Write the table as CSV.
-
-    Raises SlidevizError if the file cannot be written.
-    """
+    """Write the table as CSV; raises SlidevizError if the file cannot be written."""
     write_csv(path, _csv_rows(session), SlidevizError)
 
 

@@ -244,7 +244,6 @@ def new_folder(parent: Path, name: str) -> Path:
 
 
 PREVIEW = (470, 330)  # largest width and height of the preview, in pixels
-
 SIZES = {
     "view": "as the view",
     "1600x1000": "1600 × 1000, for a report",
@@ -256,12 +255,10 @@ SIZES = {
 """Sizes that can be chosen: in pixels, or by a name."""
 
 TEXT = {0.8: "small", 1.0: "normal", 1.4: "large"}  # sizes of letters relative to the normal one
-
 PAPER = (16.0, 10.0, 300.0)
 """Initial width and height on paper in cm, as wide as a page's text; pixels per inch."""
 
 PAPER_POINTS = 8.5  # size of normal letters on paper in points; journals ask for 8 at least
-
 OPTIONS = {
     "legend": ("Legend or color bar", "What the colors mean, at the right."),
     "edges": (SHOWN["edges"].name, SHOWN["edges"].tip),

@@ -34,7 +34,6 @@ from slideviz.gui.widgets.labels import fixed_font
 from slideviz.gui.widgets.services import Services
 
 LOG_LINES = 40  # number of the log's last lines in a bug report
-
 CLOSE = QDialogButtonBox.StandardButton.Close
 PANELS = (
     ("Boundaries: choose the role", "F2, Return, Alt+Down", ""),
@@ -393,9 +392,7 @@ class ManualDialog(QDialog):
         self.setWindowTitle("Manual")
         self.resize(QSize(1120, 760).boundedTo(parent.screen().availableSize()))
         self.pages = Pages()
-        self.search = QLineEdit()
-        self.search.setPlaceholderText("Find pages with these words (Enter: the next place)")
-        self.search.setClearButtonEnabled(True)
+        self.search = _search_field("Find pages with these words (Enter: the next place)")
         self.count = hint_label()
         self.count.setWordWrap(False)
         self._found: list[Path] = []
@@ -414,8 +411,8 @@ class ManualDialog(QDialog):
         split.addWidget(self.tree)
         split.addWidget(self.pages)
         split.setSizes([300, 820])
-        buttons = dialog_buttons(self, QDialogButtonBox.StandardButton.Close)
-        for button in (back, buttons.button(QDialogButtonBox.StandardButton.Close)):
+        buttons = dialog_buttons(self, CLOSE)
+        for button in (back, buttons.button(CLOSE)):
             button.setAutoDefault(False)  # Enter belongs to the search
         head = in_row(self.search, self.count, back, wide=[self.search])
         self.setLayout(in_column(head, split, buttons, wide=[split]))

@@ -223,18 +223,19 @@ class BoundariesPanel(Panel):
         if item.column() != NAME:
             return
         shown = item.checkState() == Qt.CheckState.Checked
-        name = self._names[item.row()]
-        chosen = self.selected()
-        self.store.change(changes.show_boundaries, chosen if name in chosen else (name,), shown)
+        names = self._with_selected(self._names[item.row()])
+        self.store.change(changes.show_boundaries, names, shown)
 
     def _role_chosen(self, name: str, role: object) -> None:
+        self.store.change(changes.set_role, self._with_selected(name), role)
+
+    def _with_selected(self, name: str) -> tuple[str, ...]:
+        """Return the selected boundaries if one is among them; else only this one."""
         chosen = self.selected()
-        self.store.change(changes.set_role, chosen if name in chosen else (name,), role)
+        return chosen if name in chosen else (name,)
 
     def _menu_wanted(self, row: int, where: QPoint) -> None:
-        name = self._names[row]
-        names = self.selected()
-        boundary_menu(self, self.store, names if name in names else (name,)).popup(where)
+        boundary_menu(self, self.store, self._with_selected(self._names[row])).popup(where)
 
 
 def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMenu:

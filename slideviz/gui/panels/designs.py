@@ -50,9 +50,10 @@ FAILED = "No design has a result yet: those that were run failed."
 class DesignCanvas(PlotCanvas):
     """A plot that calls ``picked`` with a click's position, in the figure's pixels from below."""
 
+    picked: Callable[[float, float], None]
+
     def __init__(self, drawing: Callable[[], Draw]) -> None:
         super().__init__(drawing)
-        self.picked: Callable[[float, float], None] = lambda *_: None
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:

@@ -60,6 +60,10 @@ _PASSAGES = re.compile(r"(\d{1,9})(?: on each side)?|all(?: \d+ around)?")
 """What can be typed as a number of passages."""
 
 ONLY = "Draw only the cells whose value is within these two numbers."
+POINTS = (
+    "Draw nodes as points: boundary nodes by the way they may move, or the control nodes of the "
+    "step."
+)
 
 
 class PassagesBox(NumberBox):
@@ -185,12 +189,7 @@ class DisplayPanel(Panel):
 
     def _make_rest(self) -> None:
         self.points = self._choice("points", labels(POINTS_SHOWN), "points")
-        self.points.setToolTip(
-            wrapped(
-                "Draw nodes as points: boundary nodes by the way they may move, or the control "
-                "nodes of the step."
-            )
-        )
+        self.points.setToolTip(wrapped(POINTS))
         self.form.addRow("Points", self.points)
         self.passages = PassagesBox()
         # As high as the fields above it, so that the arrows are.

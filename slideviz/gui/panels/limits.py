@@ -115,7 +115,6 @@ class LimitsPanel(Panel):
         self.follow(lambda one: (one.frame, one.case.roles, one.mesh), self._show_walls)
 
     # State to widgets ------------------------------------------------------------------
-
     def _show_text(self, session: Session) -> None:
         text = write_limits(session.case.limits).strip("() ")
         if text != self.field.text():
@@ -202,7 +201,6 @@ class LimitsPanel(Panel):
         self._show_limits(self.store.session)
 
     # What the user does ----------------------------------------------------------------
-
     def _typed(self) -> None:
         try:
             limits = read_limits(f"( {self.field.text()} )")

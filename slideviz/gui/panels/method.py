@@ -254,7 +254,6 @@ class MethodPanel(Panel):
             self.form.fields["sliding"].setFocus()
 
     # Widgets to state ------------------------------------------------------------------
-
     def _set(self, key: Key, value: object) -> None:
         """Change the case by the new value of a key; data reduction is handled by this panel."""
         special: dict[str, Callable[[Case, Any], Case]] = {
@@ -281,7 +280,6 @@ class MethodPanel(Panel):
         return case.change(reduction=replace(reduction, tolerance=value, relative=None))
 
     # State to widgets ------------------------------------------------------------------
-
     def sync(self, session: Session) -> None:
         """Fill the panel from the session's case."""
         self._reduction = session.case.reduction or self._reduction

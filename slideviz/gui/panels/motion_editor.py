@@ -144,10 +144,14 @@ class MotionEditor(QWidget):
         self._motion: Motion | None = None
         self._dim = 3
         self._targets: tuple[Target, ...] = ()
-        self._centroid: Callable[[Target], tuple[float, ...]] = lambda _: (0.0,) * self._dim
-        self._chord: Callable[[Target], tuple[float, float]] = lambda _: (0.0, 1.0)
-        self._machine: Axis | None = None
-        self._boxes: tuple[str, ...] = ()
+        self.centroid_of: Callable[[Target], tuple[float, ...]] = lambda _: (0.0,) * self._dim
+        """Returns a target's centroid, offered as the first fixed point."""
+        self.chord_of: Callable[[Target], tuple[float, float]] = lambda _: (0.0, 1.0)
+        """Returns from which x to which x a target goes."""
+        self.machine: Axis | None = None
+        """The axis about which the mesh repeats; None if it does not."""
+        self.boxes: tuple[str, ...] = ()
+        """The names of the boxes for free-form deformation that can be chosen."""
         self._as_point = False
         self._connect()
         self.show_motion(None, (), 3)
@@ -300,7 +304,7 @@ class MotionEditor(QWidget):
     def _show_place(self, motion: Rotate | Scale | Radial, dim: int) -> set[str]:
         """Fill the fields for a motion's fixed point and axis; return the names of their rows."""
         offered = ["point"] if isinstance(motion, Radial) else ["centroid", "point"]
-        if self._machine is not None and not isinstance(motion, Scale):
+        if self.machine is not None and not isinstance(motion, Scale):
             offered.insert(-1, "axis")
         if self._radial(motion) is not None:
             offered.insert(-1, "radial")
@@ -327,22 +331,22 @@ class MotionEditor(QWidget):
 
         None if the motion is no rotation, or the mesh is 2D or does not repeat about an axis.
         """
-        if self._machine is None or self._dim == 2 or not isinstance(motion, Rotate):
+        if self.machine is None or self._dim == 2 or not isinstance(motion, Rotate):
             return None
-        return radial(self._machine, self._centroid(motion.marker))
+        return radial(self.machine, self.centroid_of(motion.marker))
 
     def _about_words(self, what: str) -> str:
         if what in ("centroid", "radial") and len(named(self._motion.marker)) != 1:
             return ABOUT[what].replace("its", "their")
-        if what != "axis" or self._dim == 2 or self._machine is None:
+        if what != "axis" or self._dim == 2 or self.machine is None:
             return ABOUT[what]
-        axis, _ = self._machine
+        axis, _ = self.machine
         return f"{ABOUT[what]} ({direction_words(axis)})"
 
     def _is_machine(self, motion: Rotate | Scale | Radial) -> bool:
-        if self._machine is None or isinstance(motion, Scale):
+        if self.machine is None or isinstance(motion, Scale):
             return False
-        axis, origin = self._machine
+        axis, origin = self.machine
         return motion.axis == axis and motion.point == origin[: self._dim]
 
     def _sync_targets(self, motion: Motion, targets: tuple[Target, ...]) -> None:
@@ -356,7 +360,7 @@ class MotionEditor(QWidget):
         self.marker.show_value(targets.index(motion.marker))
 
     def _sync_boxes(self, chosen: str) -> None:
-        names = tuple(dict.fromkeys((*self._boxes, chosen)))
+        names = tuple(dict.fromkeys((*self.boxes, chosen)))
         if [self.box.itemData(row) for row in range(self.box.count())] != list(names):
             self.box.clear()
             for name in names:
@@ -366,8 +370,8 @@ class MotionEditor(QWidget):
     def _kind_chosen(self, kind: type) -> None:
         if self._motion is not None and type(self._motion) is not kind:
             marker = self._motion.marker
-            chord = self._chord(marker)
-            motion = new_motion(kind, marker, self._dim, self._machine, self._boxes, chord)
+            chord = self.chord_of(marker)
+            motion = new_motion(kind, marker, self._dim, self.machine, self.boxes, chord)
             self.changed.emit(motion)
 
     def _about_chosen(self, what: str) -> None:
@@ -378,15 +382,15 @@ class MotionEditor(QWidget):
         radially = across is not None and getattr(motion, "axis", None) == across
         self._as_point = what == "point"
         if what == "point" and getattr(motion, "point", None) == "centroid":
-            self.point.show_value(self._centroid(motion.marker))
-        elif what == "axis" and self._machine is not None:
-            axis, origin = self._machine
+            self.point.show_value(self.centroid_of(motion.marker))
+        elif what == "axis" and self.machine is not None:
+            axis, origin = self.machine
             self.axis.show_value(axis)
             self.point.show_value(origin)
         elif what == "radial" and across is not None:
             self.axis.show_value(across)
-        elif what == "centroid" and radially and self._machine is not None:
-            self.axis.show_value(self._machine[0])
+        elif what == "centroid" and radially and self.machine is not None:
+            self.axis.show_value(self.machine[0])
         self._emit_changed()
         # The motion may be the same, but other fields belong to this choice.
         self.show_motion(self._motion, self._targets, self._dim)
@@ -407,25 +411,9 @@ class MotionEditor(QWidget):
         first.setFocus()
         first.selectAll()
 
-    def set_centroid(self, centroid: Callable[[Target], tuple[float, ...]]) -> None:
-        """Set the function that returns a target's centroid, offered as the first fixed point."""
-        self._centroid = centroid
-
-    def set_chord(self, chord: Callable[[Target], tuple[float, float]]) -> None:
-        """Set the function that returns from which x to which x a target goes."""
-        self._chord = chord
-
     def set_extent(self, extent: float) -> None:
         """Set the size of the mesh; coordinates that are rounding errors beside it show as 0."""
         self.point.set_scale(extent)
-
-    def set_machine(self, machine: Axis | None) -> None:
-        """Set the axis about which the mesh repeats; None if it does not."""
-        self._machine = machine
-
-    def set_boxes(self, names: tuple[str, ...]) -> None:
-        """Set the names of the boxes for free-form deformation that can be chosen."""
-        self._boxes = names
 
     def _emit_changed(self) -> None:
         """Emit the motion that the fields describe, if it differs from the shown one."""

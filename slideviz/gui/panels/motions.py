@@ -168,6 +168,7 @@ class MotionPanel(Panel):
         self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.list.addActions(list(self.actions_table.values()))
         self.editor = MotionEditor()
+        self.editor.centroid_of, self.editor.chord_of = self._centroid, self._chord
         self.editor.changed.connect(self._edited)
         self.editor.table_wanted.connect(self.edit_table)
         self.hint = hint_label(align=Qt.AlignmentFlag.AlignTop)
@@ -227,8 +228,7 @@ class MotionPanel(Panel):
                 self.list.item(row).setText(text)
                 self.list.item(row).setToolTip(wrapped(text))
             self.list.setCurrentRow(min(max(current, 0), len(texts) - 1))
-        self.editor.set_machine(machine_axis(session))
-        self.editor.set_boxes(box_names(session))
+        self.editor.machine, self.editor.boxes = machine_axis(session), box_names(session)
         self._sync_editor(session)
         self._sync_buttons(session, moving)
 
@@ -237,9 +237,7 @@ class MotionPanel(Panel):
         mesh = session.mesh
         self._mesh, self._extent = mesh, mesh.extent if mesh is not None else 0.0
         self.add_actions[FfdTwist].setEnabled(mesh is None or mesh.dim == 3)  # as in the editor
-        self.editor.set_centroid(self._centroid)
         self.editor.set_extent(self._extent)
-        self.editor.set_chord(self._chord)
 
     def _chord(self, target: Target) -> tuple[float, float]:
         moving = self.store.session.case.markers_with("moving")

@@ -31,7 +31,6 @@ from slideviz.session.state import Run, Session
 from slideviz.session.store import Store
 
 LONGEST_TEXT = 100  # number of letters from which a text is shortened (see `_shortened`)
-
 SETTINGS, NOTES = "settings", "notes"
 """Targets of links in the text: take the settings of the shown run, show its notes."""
 

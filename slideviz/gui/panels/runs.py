@@ -291,7 +291,5 @@ class RunsPanel(Panel):
         item = self.tree.itemAt(where)
         if item is None:
             return
-        self.menu(item.data(RUN, NUMBER)).popup(self.tree.viewport().mapToGlobal(where))
-
-    def menu(self, number: int) -> QMenu:
-        return self.actions_table.menu(number)
+        menu = self.actions_table.menu(item.data(RUN, NUMBER))
+        menu.popup(self.tree.viewport().mapToGlobal(where))

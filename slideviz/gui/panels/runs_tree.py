@@ -22,14 +22,12 @@ from slideviz.gui.widgets.labels import ModelIndex, wrapped
 from slideviz.session.state import Session
 
 RUN, MIN, MEAN, INVERTED = range(4)  # the columns of the list
-
 NUMBER = Qt.ItemDataRole.UserRole
 WORDS, NAME = NUMBER + 1, NUMBER + 2
 """Item data roles of column `RUN`: the run's number (0: the undeformed mesh), the row's second
 line, the run's own name."""
 
 PAD = 4  # space around the text of a row, in pixels
-
 TIPS = (
     "Number, and name (F2) or method; below it what sets it apart. Ctrl+click shows it beside.",
     "Lowest quality of a cell after the last step; the best of the runs with one motion is bold.",

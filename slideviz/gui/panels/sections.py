@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from qtpy.QtCore import QSignalBlocker, Qt, Signal
-from qtpy.QtGui import QKeySequence, QShortcut, QStandardItemModel
+from qtpy.QtGui import QKeySequence, QShortcut
 from qtpy.QtWidgets import (
     QFormLayout,
     QLabel,
@@ -56,7 +56,6 @@ if TYPE_CHECKING:
 
 
 STEPS = 1000  # positions of the slider
-
 FREE = "free"
 AXES: dict[str, Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 """The directions that can be chosen by name."""
@@ -164,14 +163,8 @@ class SectionEditor(QWidget):
             self.form.setRowVisible(widget, shown)
         with QSignalBlocker(self.whole):
             self.whole.setChecked(section.whole_cells)
-        self._sync_axes(flat)
+        self.axis.set_item_enabled("z", not flat)
         self._sync_place(section)
-
-    def _sync_axes(self, flat: bool) -> None:
-        at = self.axis.findData("z")
-        model = self.axis.model()
-        assert isinstance(model, QStandardItemModel)
-        model.item(at).setEnabled(not flat)
 
     def _sync_place(self, section: Section) -> None:
         """Show position or size; the slider's range is found again only if it may have changed."""
@@ -268,7 +261,6 @@ HINTS = {
 """Hint shown while there are no sections, by the mesh's dimension."""
 
 BUTTONS_IN_ROW = 3  # most buttons that add a section in one row
-
 UNSEEN = "Tick the section in the list to show it."
 """Tip of the tools of a section that is not shown."""
 
@@ -327,7 +319,7 @@ class SectionsPanel(Panel):
 
     def _make_tools(self) -> None:
         self.handle, self.flat = check_box("Handle", ""), check_box("Flat view", "")
-        self.handle.clicked.connect(self._want_handle)
+        self.handle.clicked.connect(lambda on: self.store.change(changes.show_handle, on))
         self.flat.clicked.connect(self.section_views.want_flat)
         self.look = tool_button("", self.section_views.look_along, image="along")
         self.sizes = QMenu()
@@ -428,9 +420,6 @@ class SectionsPanel(Panel):
         session = self.store.session
         pair = self._period.of(session)
         self.store.change(changes.add_section, first_section(kind, session, pair))
-
-    def _want_handle(self, shown: bool) -> None:
-        self.store.change(changes.show_handle, shown)
 
     def _want_picture(self, paper: PageFormat) -> None:
         title, axes = self.titled.isChecked(), self.with_axes.isChecked()

@@ -95,7 +95,6 @@ class WorstPanel(Panel):
         return table
 
     # State to widgets ------------------------------------------------------------------
-
     def take_theme(self, _scheme: ColorScheme) -> None:
         self._info_key = ()
         self._sync_mark(self.store.session)
@@ -172,7 +171,6 @@ class WorstPanel(Panel):
             QTimer.singleShot(0, self, lambda: self.sync(self.store.session))
 
     # What the user does ----------------------------------------------------------------
-
     def _fly_to_row(self, row: int) -> None:
         cell = self.model.cell(row)
         self.store.change(changes.mark_cell, cell)

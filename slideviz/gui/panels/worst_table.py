@@ -23,7 +23,6 @@ CELL, QUALITY, SINCE = range(3)
 """The first columns; then come the coordinates, and the cell type if there are several."""
 
 LAST = "Type"  # title of the last column, if the cells have several types
-
 ARROW, GAP = 20, "\N{NO-BREAK SPACE}"
 """Width of the sort arrow in a header, in pixels, and the space between title and arrow."""
 
@@ -31,9 +30,7 @@ _RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
 _LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
 _MIDDLE = int(Qt.AlignmentFlag.AlignCenter)
 FEWEST, MOST = 4, 5  # least and most decimals shown of a quality
-
 MOST_MORE = 4  # most decimals added to coordinates if the usual ones do not tell cells apart
-
 TIPS = {
     CELL: "Number of the cell, from 0 as in an SU2 file",
     QUALITY: "Quality of the step that is shown",

@@ -31,7 +31,6 @@ The GUI thread multiplies matrices, too; on a busy machine the threads of BLAS w
 0.14 s instead of 3 ms for the points of a large mesh.
 """
 GARBAGE_MS = 200  # least time between two garbage collections: one blocks the window for some ms
-
 GARBAGE_OBJECTS = 2000
 """Least number of objects made since the last garbage collection for another one."""
 
@@ -76,7 +75,6 @@ COUNTING_MS = 300
 
 # Plots and tables --------------------------------------------------------------------------
 REST_MS = 200  # least time between two drawings of a plot or table while steps are played
-
 REST_TIMES, MOST_REST = 4.0, 4
 """Pause of a plot relative to the time its drawing took; and its limit, in units of `REST_MS`."""
 
@@ -99,7 +97,6 @@ INTERSECTION_MS = 200
 """Delay from the last change of the case to the job that checks boundaries for intersections."""
 
 AUTOSAVE_MS = 5000  # delay from the first unsaved change to writing the session
-
 READ_MS = 100
 """Interval at which a run that was asked for at the start checks whether its file is read."""
 

@@ -26,7 +26,6 @@ STEP_MS = (50, 500)
 
 SPEEDS = (0.5, 1.0, 2.0, 4.0)  # the speeds in the player's menu, as multiples of the usual one
 NARROW = 540  # width in pixels below which the player hides speed and loop and shortens its text
-
 NARROWEST = 330
 """Width in pixels below which the player also hides the slider and the buttons of both ends."""
 

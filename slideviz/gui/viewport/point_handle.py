@@ -33,7 +33,6 @@ from slideviz.sections.model import Section
 HANDLE_COLOR = "#2f6fb5"  # color of a handle that the mouse is not over
 POINT_PX, RIM_PX = 11.0, 15.0  # diameters of a handle's point and of the rim around it, in pixels
 REACH_PX = 10.0  # distance from a point up to which the mouse takes it, in pixels
-
 EDGE_PX = 22.0
 """Distance that a handle's points keep from the view's edges and the legend, in pixels."""
 
@@ -361,12 +360,10 @@ class AxisHandle(PointHandle[tuple[Section, PlaceOnSection]]):
 
 
 _CORNERS = 32  # number of corners of the polygon that is drawn as a point
-
 _FAR_PX, _HEAD_PX, _SHAFT_PX = 25.0, 8.0, 2.5
 """Of an arrow, in pixels: distance of its tip from the middle, head length, shaft thickness."""
 
 _NECK_PX = _FAR_PX - _HEAD_PX  # distance from the middle to where an arrow's head begins, in pixels
-
 _ARROW = (
     np.array([(0.0, -0.5), (_NECK_PX, -0.5), (_NECK_PX, 0.5), (0.0, 0.5)]) * (1.0, _SHAFT_PX),
     np.array([(_FAR_PX, 0.0), (_NECK_PX, 0.5), (_NECK_PX, -0.5)]) * (1.0, _HEAD_PX),

@@ -195,7 +195,6 @@ BESIDE_PX = 1000
 """Width of the splitter, in pixels, below which the flat view is always below the 3D view."""
 
 _SHARE = 9 / 20  # largest part of the splitter's length that the flat view gets
-
 _LONG = 1.5
 """Ratio of the drawn sizes, below to beside, from which the flat view goes below the 3D view."""
 

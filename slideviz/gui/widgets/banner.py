@@ -33,7 +33,6 @@ from slideviz.gui.widgets.error_reporter import details_of
 from slideviz.gui.widgets.labels import rich_label
 
 MOST_LINES = 4  # most lines of a message in the banner; all of them are behind “Details”
-
 Answers = Mapping[str, Callable[[], object]]
 """The functions that buttons call, by the buttons' texts."""
 

@@ -18,7 +18,6 @@ from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.services import main_window
 
 _ALLOWED = re.compile(r"[\d.eE+\-*/() ]+\Z")  # the letters that an expression may have
-
 _SIGNS: dict[type[ast.unaryop], Callable[[float], float]] = {
     ast.UAdd: operator.pos,
     ast.USub: operator.neg,

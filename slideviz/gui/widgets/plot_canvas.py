@@ -33,7 +33,6 @@ DPI = 100  # resolution of a figure on a screen with a device pixel ratio of 1
 
 THREAD = "slideviz-plot"  # name of the threads that draw plots
 _DRAWING_LOCK = Lock()  # matplotlib is not made for several threads
-
 Draw = Callable[[Figure, Style], None]
 """A function that fills a figure in a style; it is called in another thread: without widgets."""
 
@@ -140,7 +139,6 @@ def draw_in_thread(draw_on: Draw, paper: PlotFormat, place: AxesPlace) -> Future
 
 
 FIGURE_INCHES = (4.2, 3.1)  # width and height of a saved figure, in inches
-
 PLOT_FILTERS = "PNG picture (*.png);;SVG drawing (*.svg);;PDF drawing (*.pdf)"
 
 

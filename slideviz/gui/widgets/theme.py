@@ -12,7 +12,6 @@ from qtpy.QtWidgets import QApplication, QToolTip
 from slideviz.color_scheme import DARK, LIGHT, ColorScheme
 
 THEMES = ("system", "light", "dark")  # the themes that can be chosen
-
 _PALETTE = {
     "Window": ("#f4f6f8", "#262b31"),
     "WindowText": ("#20262e", "#e6eaf0"),
