@@ -28,7 +28,7 @@ from slideviz.mesh.repair.patches import Patch, find_patches
 from slideviz.system.threads import cores
 from slideviz.terms import SkewMetric
 
-RINGS = 3, 5, 8
+RINGS = 3, 5, 8, 13, 21
 """Rings of cells around bad ones; a patch that fails grows to the next."""
 
 ROUNDS, VAIN = 40, 10
