@@ -417,14 +417,12 @@ class MetricTerm(ColorByTerm):
     """Whether it belongs to cells, or to nodes: a cell then has the worst of its nodes."""
     alone: bool = True
     """Whether the nodes of a cell, deformed and undeformed, are enough to compute its value."""
-    compares: bool = False
-    """Whether there is none without the undeformed mesh."""
+    compares: bool = False  # whether there is none without the undeformed mesh
     colors: tuple[float, float] | None = None
     """The default ends of the color bar; None: those of ``range``, or of the mesh if infinite."""
 
 
-FARTHEST = 10.0
-"""Largest safe fraction of a motion that is looked for."""
+FARTHEST = 10.0  # largest safe fraction of a motion that is looked for
 
 METRICS: dict[Metric, MetricTerm] = {
     "size-skew": MetricTerm("size-skew", "Knupp's: √size · skew. 1 is best."),

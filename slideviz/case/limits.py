@@ -59,10 +59,8 @@ class MeasuredMesh:
 class Values(NamedTuple):
     """The values of a number in cells."""
 
-    values: FloatArray
-    """(k,): NaN where a cell has none."""
-    cells: IntArray | None = None
-    """(k,): the numbers of the cells; None: all."""
+    values: FloatArray  # (k,): NaN where a cell has none
+    cells: IntArray | None = None  # (k,): the numbers of the cells; None: all
     boundary: IntArray | None = None
     """(k,): the place in `names` of the boundary that a value belongs to; None: to none."""
     names: Sequence[str] = ()

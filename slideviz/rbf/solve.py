@@ -121,13 +121,9 @@ def polynomial(terms: FloatArray, forward: FloatArray, right: FloatArray) -> Flo
 
     With them, w solves ``G w = b - P c``. They are least squares of L^-1 (b - P c): so a definite
     system keeps its factor, pivot guard and blocks.
-
-    Parameters
-    ----------
-    terms, forward : (n, q)
-        P, and L^-1 P of the rows that the factor retains, in any order.
-    right : (n, m)
-        L^-1 b of the same rows.
+    ``terms`` and ``forward`` (n, q): P, and L^-1 P of the rows that the factor retains, in any
+    order.
+    ``right`` (n, m): L^-1 b of the same rows.
     """
     use = independent(terms)
     tail = np.zeros((terms.shape[1], right.shape[1]))

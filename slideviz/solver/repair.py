@@ -179,16 +179,10 @@ def mend(
 ) -> MeshRepair:
     """Return a mesh with its bad cells mended.
 
-    Parameters
-    ----------
-    case
-        Roles and settings.
-    mesh, now
-        The mesh whose boundaries nodes slide on, undeformed, and the one to mend.
-    reference
-        The mesh whose shapes cells shall have; None: the ideal ones.
-    setup
-        That of the run, if there was one.
+    ``case``: roles and settings.
+    ``mesh`` and ``now``: the mesh whose boundaries nodes slide on, undeformed, and the one to mend.
+    ``reference``: the mesh whose shapes cells shall have; None: the ideal ones.
+    ``setup``: that of the run, if there was one.
     """
     domain, cells = without_halo(now)
     shapes = None if reference is None else without_halo(reference)[0]
@@ -273,12 +267,8 @@ def still_setup(case: Case, mesh: Mesh, points: FloatArray) -> Setup:
 def find_freedom(case: Case, mesh: Mesh, points: FloatArray, setup: Setup | None = None) -> Freedom:
     """Return the freedom of the nodes of a mesh that was deformed to ``points`` (n, d).
 
-    Parameters
-    ----------
-    mesh
-        Undeformed, with its halo. Nodes slide on its boundaries.
-    setup
-        That of the run, if there was one: its known nodes stay.
+    ``mesh``: undeformed, with its halo. Nodes slide on its boundaries.
+    ``setup``: that of the run, if there was one: its known nodes stay.
     """
     if not mesh.markers:
         held = np.zeros(len(points), bool)

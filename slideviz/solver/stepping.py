@@ -53,8 +53,7 @@ class Stepping:
     """Returns the quality of all cells after the last of the steps it is given, where ``mesh`` is
     only the skin of a streamed mesh; the steps then have a ``field``. None: the quality of the last
     step's mesh."""
-    certify: bool = False
-    """Whether each step says how far it may go (`Step.safe`)."""
+    certify: bool = False  # whether each step says how far it may go (`Step.safe`)
     mend: Callable[[Step], Step] | None = None
     """Returns a step with its bad cells mended (REPAIR); None: they stay."""
 

@@ -54,22 +54,17 @@ class Trial:
 class MeshRepair:
     """A mesh after repair, and what was mended."""
 
-    mesh: Mesh
-    """The repaired mesh."""
+    mesh: Mesh  # the repaired mesh
     cells: IntArray
     left: IntArray
     """`cells`, `left` (k,), (l,): the bad cells before and after: those that are not proved valid,
     or below the limit."""
-    nodes: IntArray
-    """(m,): the nodes that were moved."""
-    points: FloatArray
-    """(m, d): where they were."""
-    largest_move: float
-    """The farthest that one was moved, in the mesh's length unit."""
+    nodes: IntArray  # (m,): the nodes that were moved
+    points: FloatArray  # (m, d): where they were
+    largest_move: float  # the farthest that one was moved, in the mesh's length unit
     unmendable: tuple[tuple[int, str], ...] = ()
     """Cells of ``left`` that no motion of the free nodes mends, each with the reason."""
-    warnings: tuple[str, ...] = ()
-    """What the user should know."""
+    warnings: tuple[str, ...] = ()  # what the user should know
 
     def report(self) -> dict[str, Any]:
         """Return what a report has."""
