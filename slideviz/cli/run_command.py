@@ -156,8 +156,8 @@ def _run(arguments: argparse.Namespace) -> int:
     )
     if arguments.metrics:
         report["metrics"] = {
-            "before": metrics_report(_rated(arguments, done.mesh, before, done.mesh)),
-            "after": metrics_report(_rated(arguments, done.steps[-1].mesh, found, done.mesh)),
+            "before": metrics_report(_metrics_of(arguments, done.mesh, before, done.mesh)),
+            "after": metrics_report(_metrics_of(arguments, done.steps[-1].mesh, found, done.mesh)),
         }
     in_memory = None if streamed else done.mesh
     advice = advice_for(case, done.steps[-1].layers, in_memory, found, report["limits"])
@@ -167,7 +167,7 @@ def _run(arguments: argparse.Namespace) -> int:
     return report_outcome(arguments, report, files, found, before, folded, advice=advice)
 
 
-def _rated(
+def _metrics_of(
     arguments: argparse.Namespace, mesh: Mesh, found: Quality, base: Mesh
 ) -> dict[Metric, MetricValues]:
     """Return the metrics that ``--metrics`` asks for, of a mesh with its quality."""
@@ -192,8 +192,8 @@ def _fields(
         return data, {}
     asked = set(arguments.metrics) & set(WALL_VALUES)
     layers = walls(mesh, base, case.walls(mesh.marker_names)) if asked else None
-    rated = _rated(arguments, mesh, found, base)
-    cells, points = metric_data(rated, layers, arguments.metrics)
+    values = _metrics_of(arguments, mesh, found, base)
+    cells, points = metric_data(values, layers, arguments.metrics)
     return data | cells, points
 
 
