@@ -118,7 +118,8 @@ def _require_streamed(arguments: argparse.Namespace) -> None:
         raise CaseError("-o needs the mesh in memory; leave it out, or --stream")
     several = [name for name in arguments.metrics if name not in METRICS or not METRICS[name].alone]
     if several:
-        known = ",".join(field_of(name) for name, term in METRICS.items() if term.alone)
+        usable = [k for k, one in METRICS.items() if arguments.reference or not one.compares]
+        known = ",".join(field_of(name) for name in usable if METRICS[name].alone)
         raise CaseError(
             f"--metrics {','.join(map(field_of, several))} needs the mesh in memory, for a "
             f"stream has one cell at a time; use --metrics {known}, or leave out --stream"
