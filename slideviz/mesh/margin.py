@@ -52,9 +52,26 @@ ROUNDING = 64 * np.finfo(float).eps
 """Bound for the error of a determinant, divided by the largest coordinate and by the squared (in 2D
 simple) size of the cell."""
 
-STRIDES = {12: np.array([9, 3, 1]), 13: np.array([3])}
-"""Distances of neighbouring coefficients along the axes in which a cell is cut, by type."""
-_NO_STRIDES = np.empty(0, np.int64)
+THIRD = 1 / 3  # a multiplication with it is faster than a division
+
+
+def _cuts(strides: tuple[int, ...], size: int) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
+    """Return how cells of a type with ``size`` coefficients are cut in halves.
+
+    That is, for the axes in which they can be cut: the distances (a,) of neighbouring coefficients
+    and the first one of each line (a, size / 3); and which coefficients are of corners, (size,).
+    """
+    digit = np.arange(size) // np.array(strides, np.int64).reshape(-1, 1) % 3
+    firsts = [np.flatnonzero(row == 0) for row in digit]
+    shaped = np.array(firsts, np.int64).reshape(len(strides), -1 if strides else 0)
+    return np.array(strides, np.int64), shaped, (digit != 1).all(axis=0)
+
+
+CUTS = {
+    vtk: _cuts({12: (9, 3, 1), 13: (3,)}.get(vtk, ()), {12: 27, 13: 9}.get(vtk, len(table)))
+    for vtk, table in CORNERS.items()
+}
+"""Results of `_cuts` by element type."""
 
 
 def margins(
@@ -88,9 +105,8 @@ def margins(
 
         def of_part(part: slice, vtk: int, ids: IntArray, nodes: IntArray) -> None:
             here, values = ids[part], np.empty(part.stop - part.start)
-            strides = STRIDES.get(vtk, _NO_STRIDES)
-            arrays = points, displacement, nodes[part], CORNERS[vtk], turns[here], strides
-            _write_margins(vtk, *arrays, cap, values)
+            arrays = points, displacement, nodes[part], CORNERS[vtk], turns[here]
+            _write_margins(vtk, *arrays, CUTS[vtk], cap, values)
             found[here] = values
 
         in_parts(partial(of_part, vtk=vtk, ids=ids, nodes=nodes), len(ids), lambda _: going_on())
@@ -119,10 +135,7 @@ class SafeFraction:
             return f"the motion could go more than {self.fraction:g} times as far"
         if self.fraction <= 0:
             return f"the undeformed mesh is not valid: {who}"
-        reach = f"could go {floor(100 * self.fraction) / 100:.3g} times as far"
-        if self.fraction < 1:
-            reach = f"is safe up to {floor(1000 * self.fraction) / 10:g} %"
-        return f"the motion {reach}, until {who} folds"
+        return f"the motion {reach_words(self.fraction)}, until {who} folds"
 
     def report(self) -> dict[str, object]:
         """Return the keys of a report: ``safe_fraction``, ``safe_cell`` and so on."""
@@ -134,6 +147,13 @@ class SafeFraction:
         if "safe_fraction" not in report:
             return None
         return cls(**{one.name: report[f"safe_{one.name}"] for one in fields(cls)})
+
+
+def reach_words(fraction: float) -> str:
+    """Return in few words how far a motion may go, rounded down."""
+    if fraction >= 1.01:
+        return f"could go {floor(100 * fraction) / 100:.3g} times as far"
+    return f"is safe up to {floor(1000 * fraction) / 10:g} %"
 
 
 def path_margins(mesh: Mesh, reference: Mesh, signs_of: Mesh | None = None) -> FloatArray:
@@ -185,14 +205,13 @@ def chain(steps: Iterable[tuple[float, SafeFraction]]) -> SafeFraction:
 
 
 @njit(**OPTIONS)
-def _write_margins(vtk, points, displacement, nodes, table, turn, strides, cap, found):  # type: ignore[no-untyped-def]
+def _write_margins(vtk, points, displacement, nodes, table, turn, cuts, cap, found):  # type: ignore[no-untyped-def]
     """Write the margins of cells of one type, ``nodes`` (m, n), into ``found`` (m,)."""
-    dim, size = points.shape[1], 3 ** len(strides) if len(strides) != 1 else 9
-    size = size if len(strides) else len(table)
+    dim, size = points.shape[1], len(cuts[2])
     start, motion, at = np.empty((3, dim, nodes.shape[1], LANES))
     values, errors = np.empty((4, size, LANES)), np.empty((4, LANES))
     scale, poly = np.empty(LANES), np.empty((size, 4))
-    stack = np.empty((len(strides) * LEVELS + 2, size, 4))
+    stack = np.empty((len(cuts[0]) * LEVELS + 2, size, 4))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
         gather(points, nodes, first, count, start)
@@ -215,7 +234,7 @@ def _write_margins(vtk, points, displacement, nodes, table, turn, strides, cap, 
             found[first + c], end = cap, cap / scale[c]
             if not safe[c]:
                 poly[:] = values[:, :, c].T
-                root = _margin(poly, strides, end, stack)
+                root = _margin(poly, cuts, end, stack)
                 if root < end:
                     found[first + c] = min(cap, scale[c] * root)
 
@@ -276,26 +295,28 @@ def _write_polynomials(dim, values, errors, turn, ends):  # type: ignore[no-unty
             d2, d3 = sign * square - errors[2, c], sign * cubic - errors[3, c]
             values[0, k, c], values[1, k, c] = d0, d1
             values[2, k, c], values[3, k, c] = d2, d3
-            low, high = d0 + d1 * t / 3, d0 + (2 * d1 + d2 * t) * t / 3
+            third = t * THIRD
+            low, high = d0 + d1 * third, d0 + (2 * d1 + d2 * t) * third
             end = d0 + (d1 + (d2 + d3 * t) * t) * t
             safe[c] = safe[c] and d0 > 0 and low > 0 and high > 0 and 0 < end < np.inf
     return safe
 
 
 @njit(**OPTIONS)
-def _margin(poly, strides, end, stack):  # type: ignore[no-untyped-def]
+def _margin(poly, cuts, end, stack):  # type: ignore[no-untyped-def]
     """Return a lower bound for the first t, up to ``end``, at which a cell is not valid.
 
     Parameters
     ----------
     poly : (k, 4)
         Polynomials in t of the corner Jacobians, or of a cell's Bézier coefficients.
-    strides : (a,)
-        Distances of neighbouring coefficients along the axes in which it can be cut.
+    cuts : tuple
+        Of `_cuts`.
     stack : (b, k, 4)
         Memory for parts of the cell.
     """
-    low, high = _bounds(poly, strides, end)
+    strides, firsts, corner = cuts
+    low, high = _bounds(poly, corner, end)
     if len(strides) == 0 or low >= high * (1 - GAP):
         return min(low, high)
     lows, depths = np.empty(len(stack)), np.empty(len(stack), np.int64)
@@ -308,9 +329,10 @@ def _margin(poly, strides, end, stack):  # type: ignore[no-untyped-def]
             least = min(least, low)
             continue
         # The second half takes the place of the part, the first half the next place.
-        _cut(stack[top], strides[depth % len(strides)], stack[top + 1])
+        axis = depth % len(strides)
+        _cut(stack[top], strides[axis], firsts[axis], stack[top + 1])
         for k in range(2):
-            lows[top + k], upper = _bounds(stack[top + k], strides, high)
+            lows[top + k], upper = _bounds(stack[top + k], corner, high)
             high, depths[top + k] = min(high, upper), depth + 1
         if lows[top] < lows[top + 1]:  # the part that limits comes first
             for k in range(poly.shape[0]):
@@ -324,32 +346,29 @@ def _margin(poly, strides, end, stack):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _bounds(poly, strides, end):  # type: ignore[no-untyped-def]
+def _bounds(poly, corner, end):  # type: ignore[no-untyped-def]
     """Return the first roots, up to ``end``, of all coefficients and of the values in corners."""
-    high = low = end
+    high = end
     for k in range(len(poly)):
-        corner = True
-        for stride in strides:
-            corner = corner and k // stride % 3 != 1
-        if corner:
+        if corner[k]:
             high = first_root(poly[k, 0], poly[k, 1], poly[k, 2], poly[k, 3], high)
     low = high
     for k in range(len(poly)):
-        low = first_root(poly[k, 0], poly[k, 1], poly[k, 2], poly[k, 3], low)
+        if not corner[k]:
+            low = first_root(poly[k, 0], poly[k, 1], poly[k, 2], poly[k, 3], low)
     return low, high
 
 
 @njit(**OPTIONS)
-def _cut(poly, stride, half):  # type: ignore[no-untyped-def]
+def _cut(poly, stride, firsts, half):  # type: ignore[no-untyped-def]
     """Cut a part in two along an axis: ``poly`` becomes the second half, ``half`` the first."""
-    for k in range(len(poly)):
-        if k // stride % 3 == 0:
-            for j in range(4):
-                a, b, c = poly[k, j], poly[k + stride, j], poly[k + 2 * stride, j]
-                ab, bc = 0.5 * (a + b), 0.5 * (b + c)
-                middle = 0.5 * (ab + bc)
-                half[k, j], half[k + stride, j], half[k + 2 * stride, j] = a, ab, middle
-                poly[k, j], poly[k + stride, j] = middle, bc
+    for k in firsts:
+        for j in range(4):
+            a, b, c = poly[k, j], poly[k + stride, j], poly[k + 2 * stride, j]
+            ab, bc = 0.5 * (a + b), 0.5 * (b + c)
+            middle = 0.5 * (ab + bc)
+            half[k, j], half[k + stride, j], half[k + 2 * stride, j] = a, ab, middle
+            poly[k, j], poly[k + stride, j] = middle, bc
 
 
 @njit(**OPTIONS)
@@ -360,7 +379,8 @@ def first_root(a, b, c, d, end):  # type: ignore[no-untyped-def]
     """
     if not 0.0 < a < np.inf:
         return 0.0
-    low, high = a + b * end / 3, a + (2 * b + c * end) * end / 3
+    third = end * THIRD
+    low, high = a + b * third, a + (2 * b + c * end) * third
     at_end = a + (b + (c + d * end) * end) * end
     if low > 0 and high > 0 and at_end > 0:
         return end

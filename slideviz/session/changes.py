@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from slideviz.case.model import Case, FromFile, Motion, named
 from slideviz.sections.polygons import ONLY_INVERTED
+from slideviz.session.motion_scale import scaled
 from slideviz.session.opening import guess_by_name, has_ffd, with_periodicity
 from slideviz.session.state import PanelPlace, Run, Session, StepFrame, ViewState
 from slideviz.terms import SHOWN, SIZE_SKEW, ColorBy, Role
@@ -295,6 +296,14 @@ def _with_motions(session: Session, motions: Sequence[Motion]) -> Session:
 def replace_motion(session: Session, index: int, motion: Motion) -> Session:
     """Return the session with another motion at the place ``index``."""
     return _with_motions(session, _replaced(session.case.motions, index, motion))
+
+
+@undoable("scaled motion")
+def scale_motions(session: Session, part: float) -> Session:
+    """Return the session with the motions of the run that is shown, ``part`` times as far."""
+    run = session.run_shown
+    motions = scaled(run.case.motions, part) if run is not None else None
+    return session if motions is None else _with_motions(session, motions)
 
 
 @undoable("removing a motion")

@@ -401,7 +401,7 @@ def compute_in_file(
     now = skin.with_points(step.mesh.points)
     frame = frame_of(now, skin, output, done.quality.totals, case.quality_metric)
     limits = check_limits(case.limits, MeasuredMesh(frame.quality))
-    report(replace(frame, step=replace(step, mesh=now), limits=limits))
+    report(replace(frame, step=replace(step, mesh=now, safe=done.safe), limits=limits))
 
 
 _STARTS = {"classify": 0.0, "solve": 0.1, "evaluate": 0.5, "project": 0.7}

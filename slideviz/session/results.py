@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 from weakref import WeakKeyDictionary
@@ -12,10 +13,12 @@ import numpy as np
 from slideviz.case.limits import Limit, LimitResult
 from slideviz.case.model import Case
 from slideviz.errors import MeshError
+from slideviz.mesh.margin import SafeFraction
 from slideviz.mesh.metrics import metric
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.mesh.walls import Walls, walls
+from slideviz.solver.steps import safe_fraction_of
 from slideviz.system.jit_cache import njit
 from slideviz.system.threads import in_parts
 from slideviz.terms import METRICS, SIZE_SKEW, WALL_VALUES, ColorBy, field_of
@@ -183,6 +186,11 @@ class Run:
     def last(self) -> StepFrame | None:
         """Return the frame of the last step, or None."""
         return self.frames[-1] if self.frames else None
+
+    @cached_property
+    def safe(self) -> SafeFraction | None:
+        """Return how far the motion may go, as the steps say; None where they do not."""
+        return safe_fraction_of(frame.step for frame in self.frames if frame.step is not None)
 
     @property
     def last_step(self) -> Step | None:

@@ -11,6 +11,7 @@ import numpy as np
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, FromFile, Motion, applies_to
 from slideviz.errors import Note
+from slideviz.mesh.margin import reach_words
 from slideviz.mesh.model import Mesh
 from slideviz.session.state import PanelPlace, Run, Session, StepFrame
 from slideviz.session.walls_table import heights_words
@@ -58,8 +59,14 @@ def end_message(run: Run) -> str:
     bad = "; ".join(filter(None, (inverted_words(run), limits_words(run), heights)))
     if step.index < step.total:
         return f"Stopped after step {step.index} of {step.total}" + (f": {bad}." if bad else ".")
-    done = bad or repair_words(run)
-    return f"Done: {done}." if done else "Done."
+    done, reach = bad or repair_words(run), ""
+    if run.safe is not None and run.safe.fraction > 0:
+        reach = f"the motion {reach_words(run.safe.fraction)}"
+        if run.safe.cell is None:
+            reach = run.safe.words
+    if done:
+        return f"Done: {done}; {reach}." if reach else f"Done: {done}."
+    return f"Done. {reach[:1].upper()}{reach[1:]}." if reach else "Done."
 
 
 def repair_words(run: Run) -> str:

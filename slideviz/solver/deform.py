@@ -15,6 +15,7 @@ import numpy as np
 from slideviz.argument_types import check_types
 from slideviz.case.model import Case
 from slideviz.errors import DeformError, UnsoundError
+from slideviz.mesh.margin import step_safety
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
@@ -105,15 +106,23 @@ def deform(
 
         mend = partial(mended_step, case, mesh, setup, report)
     stepping = Stepping(case, mesh, setup, report, timer.seconds, certify=certify, mend=mend)
+    before, done = mesh, 0.0
     for step in all_steps(stepping):
         ends = mend is not None and step.index == step.total and step.repaired is None
-        yield _mended(stepping, step) if ends else step
+        yield _mended(stepping, step, before, done) if ends else step
+        before, done = step.mesh, step.part
 
 
-def _mended(stepping: Stepping, step: Step) -> Step:
-    """Return the last step with its bad cells mended, and checked again."""
+def _mended(stepping: Stepping, step: Step, before: Mesh, done: float) -> Step:
+    """Return the last step with its bad cells mended, and checked again.
+
+    ``before``, ``done``: the mesh before this step, and the part of the motion that it has.
+    """
     assert stepping.mend is not None
-    step = stepping.mend(step)
+    plain, step = step.mesh, stepping.mend(step)
+    if stepping.certify and step.mesh is not plain:
+        part = done, step.part
+        step = replace(step, safe=step_safety(before, step.mesh, stepping.mesh, part, step.index))
     assert step.repaired is not None
     misfit, apart = stepping.misfit(step)
     warnings = dict.fromkeys((*step.warnings, *step.repaired.warnings, *apart))

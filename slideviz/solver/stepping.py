@@ -15,7 +15,7 @@ from slideviz.errors import DeformError, Note, UnsoundError
 from slideviz.mesh.check import within
 from slideviz.mesh.halo import Halo
 from slideviz.mesh.interfaces import torn_interfaces
-from slideviz.mesh.margin import step_safety
+from slideviz.mesh.margin import path_margins, step_safety
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.quality import Quality, quality
 from slideviz.rbf.constraint_rows import AGREE
@@ -35,6 +35,8 @@ RIGID = 0.99
 """Nodes that walls carry with a share above this stay where they carry them in relaxation."""
 
 HALVINGS = 3  # how often at most a step that folds a cell is halved: into eighths
+ALIKE = 1.1
+"""A shorter step may go farther than the straight paths of a longer one by this factor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +104,11 @@ class Stepping:
                 except UnsoundError as problem:
                     now, failure = folded, failure or problem
                 if (now > folded or failure) and halvings < HALVINGS:
-                    ahead[0] = part, halvings + 1
-                    ahead.insert(0, ((done + part) / 2, halvings + 1))
+                    needed = 1 if failure else self._halvings(last, step.mesh)
+                    for k in range(halvings + 1, min(halvings + needed, HALVINGS) + 1):
+                        ahead[0] = part, k
+                        part = (done + part) / 2
+                        ahead.insert(0, (part, k))
                     continue
                 folded = now
                 made.append(step)
@@ -157,6 +162,18 @@ class Stepping:
         if self.rate is not None:
             return self.rate(steps)
         return quality(steps[-1].mesh, self.mesh, self.case.quality_metric)
+
+    def _halvings(self, before: Mesh, after: Mesh) -> int:
+        """Return how often to halve a step that folds cells, at least once.
+
+        A shorter step nearly takes the same straight paths, so that it folds a cell that folds on
+        them before its end: solving it would be in vain.
+        """
+        if not len(self.mesh.cells):  # the skin of a streamed mesh
+            return 1
+        found = path_margins(after, before, self.mesh)
+        safe = float(found[found > 0].min(initial=1.0)) * ALIKE
+        return next((k for k in range(1, HALVINGS) if 0.5**k <= safe), HALVINGS)
 
     def misfit(self, step: Step) -> tuple[float | None, list[str]]:
         """Return the misfit of periodic images, and a warning where cells are inverted as well.

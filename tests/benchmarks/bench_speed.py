@@ -6,16 +6,20 @@ pairs of nodes a second, cells a second, and the ratio to a plain NumPy evaluati
 
 from __future__ import annotations
 
+from timeit import timeit
+
 import numpy as np
 import pytest
 
 import slideviz as sv
 from slideviz.mesh.fans import find_fans
+from slideviz.mesh.margin import path_margins
 from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
 from slideviz.rbf.solve import factorise
 from slideviz.samples.table import sample, write_sample
+from slideviz.terms import FARTHEST
 
 TARGETS, CONTROLS = 200_000, 1_000
 RULES = {"euclidean": (3, 0.0), "translational": (4, 0.0), "rotational": (4, 0.5)}
@@ -90,6 +94,18 @@ def test_topology(benchmark, cube):
 def test_quality(benchmark, cube):
     benchmark.pedantic(sv.quality, (cube, cube), rounds=3, warmup_rounds=1)
     benchmark.extra_info["cells_per_second"] = len(cube.cells) / benchmark.stats["min"]
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 1.0], ids=lambda share: f"{share:.0%}-limited")
+def test_margins_beside_the_proof(benchmark, cube, share):
+    """Margins up to 10 times a motion that shakes a part of the cells, beside their quality."""
+    shaken = np.random.default_rng(5).uniform(-1, 1, cube.points.shape) / 250
+    moved = cube.with_points(cube.points + shaken * (cube.points[:, :1] < share))
+    proof = min(timeit(lambda: sv.quality(moved, cube), number=1) for _ in range(5))
+    found = benchmark.pedantic(path_margins, (moved, cube), rounds=5, warmup_rounds=1)
+    benchmark.extra_info.update(
+        limited=float((found < FARTHEST).mean()), over_proof=benchmark.stats["min"] / proof
+    )
 
 
 def test_quality_with_derivative(benchmark, cube):

@@ -4,13 +4,16 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from qtpy.QtCore import QPoint, Qt
+from qtpy.QtCore import QEvent, QPoint, QPointF, Qt
+from qtpy.QtGui import QMouseEvent
 from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication
 
+from slideviz.case.model import Translate
 from slideviz.color_scheme import DARK
 from slideviz.gui.panels.curves import CurvesPanel
-from slideviz.session import changes
-from slideviz.session.state import Session
+from slideviz.session import changes, jobs
+from slideviz.session.state import Session, StepFrame
 from tests.gui.test_worst import session_with_runs
 
 
@@ -36,7 +39,7 @@ def lines(panel):
     return {line.get_gid() or line.get_label(): line for line in axes.lines}
 
 
-@pytest.mark.parametrize("kind", ["steps", "greedy", "span"])
+@pytest.mark.parametrize("kind", ["steps", "reach", "greedy", "span"])
 def test_without_a_mesh_it_says_what_to_do(panel, kind):
     choose(panel, kind)
     assert panel.area.shows_text
@@ -75,6 +78,57 @@ def test_a_click_in_the_plot_goes_to_that_step(full):
         where = QPoint(round(x), full.canvas.height() // 2)
         QTest.mouseClick(full.canvas, Qt.MouseButton.LeftButton, pos=where)
         assert full.store.session.view.frame == step
+
+
+@pytest.fixture
+def safe(full, qtbot):
+    """The panel with the curve of a run of the sample square whose case has a motion to scale."""
+    session = full.store.session
+    moves = {"roles": {"BLOCK": "moving"}, "motions": (Translate("BLOCK", (0.0, 0.1)),)}
+    session = changes.set_case(session, **moves, steps=1)
+    found = []
+    jobs.compute(session.case, session.mesh, found.append, lambda: False)
+    frames = [one for one in found if isinstance(one, StepFrame)]
+    session = changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
+    full.store.put(session)
+    with qtbot.waitSignal(full.canvas.drawn):
+        choose(full, "reach")
+    qtbot.waitUntil(lambda: not full.canvas.busy)
+    return full
+
+
+def test_how_far_the_motion_may_go_and_a_drag_scales_it(safe, qtbot):
+    found = safe.store.session.run_shown.safe
+    drawn = lines(safe)
+    assert list(drawn["proved"].get_xdata()) == [100 * found.fraction] * 2
+    assert drawn["q"].get_ydata()[0] == pytest.approx(1.0)
+    canvas, y = safe.canvas, safe.canvas.height() // 2
+    start, end = (QPoint(round(canvas.to_pixel(at)), y) for at in (100 * found.fraction, 50))
+    QTest.mouseClick(canvas, Qt.MouseButton.LeftButton, pos=end)
+    assert safe.store.session.case.motions[0].vector == (0.0, 0.1)  # a click scales nothing
+    QTest.mousePress(canvas, Qt.MouseButton.LeftButton, pos=start)
+    drag(canvas, end)
+    with qtbot.waitSignal(canvas.drawn):
+        QTest.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=end)
+    assert safe.store.session.case.motions[0].vector[1] == pytest.approx(0.05, abs=2e-3)
+    qtbot.waitUntil(lambda: not canvas.busy)
+    assert lines(safe)["typed"].get_xdata()[0] == pytest.approx(50, abs=2)
+    safe.store.undo()
+    assert safe.store.session.case.motions[0].vector == (0.0, 0.1)
+
+
+def drag(widget, to):
+    """Move the mouse with its left button held: `QTest.mouseMove` holds none."""
+    buttons = Qt.MouseButton.NoButton, Qt.MouseButton.LeftButton
+    where = QPointF(to), QPointF(widget.mapToGlobal(to))
+    kind, keys = QEvent.Type.MouseMove, Qt.KeyboardModifier.NoModifier
+    QApplication.sendEvent(widget, QMouseEvent(kind, *where, *buttons, keys))
+    widget.grab()
+
+
+def test_without_a_number_there_is_no_curve_of_how_far(full):
+    choose(full, "reach")
+    assert "Run the case to see how far its motion may go" in full.area.words.text()
 
 
 def test_a_click_in_another_plot_goes_nowhere(full, qtbot):

@@ -1,18 +1,19 @@
-"""The curves: quality by step, convergence of the selection, quality along the span."""
+"""The curves: quality by step and by fraction of the motion, convergence, quality by span."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import partial
+from math import floor
 from typing import Literal
 
 import numpy as np
 from matplotlib.figure import Figure
-from qtpy.QtCore import Qt
-from qtpy.QtGui import QMouseEvent
+from qtpy.QtCore import QPointF, Qt
+from qtpy.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
 from qtpy.QtWidgets import QHBoxLayout, QWidget
 
-from slideviz.color_scheme import SELECTED_COLOR
+from slideviz.color_scheme import INVERTED_COLOR, SELECTED_COLOR
 from slideviz.errors import SlidevizError
 from slideviz.gui.widgets.build import as_widget, check_box, in_column, in_row, push_button
 from slideviz.gui.widgets.choice import Choice
@@ -22,17 +23,26 @@ from slideviz.mesh.model import FloatArray
 from slideviz.plots import session_plots as curves
 from slideviz.plots.draw import convergence, quality_by_step
 from slideviz.plots.spanwise import Profile, spanwise
-from slideviz.plots.style import Style, add_legend
+from slideviz.plots.style import Style, add_legend, series_number, style_axes
 from slideviz.plots.ticks import rounded_out
 from slideviz.session import changes
+from slideviz.session.motion_scale import can_scale, factor_of
+from slideviz.session.reach import reach_of, reach_run
 from slideviz.session.state import IN_FILE, Session
 from slideviz.session.store import Store
 
-KINDS = {"steps": "Quality by step", "greedy": "Convergence", "span": "Along the span"}
+KINDS = {
+    "steps": "Quality by step",
+    "reach": "How far may I go",
+    "greedy": "Convergence",
+    "span": "Along the span",
+}
 """The plots that can be chosen."""
 
 TIPS = {
     "steps": "Minimum and mean quality against the step; click at a step to go there.",
+    "reach": "Lowest quality against the fraction of the run's motion, and up to where all cells "
+    "are proved valid. Drag to scale the motion.",
     "greedy": "Largest error against control nodes, as the greedy selection adds them.",
     "span": "Quality in layers from hub to shroud, or along an axis.",
 }
@@ -40,17 +50,46 @@ WHAT = {"minimum": "minimum", "mean": "mean"}
 
 
 class CurveCanvas(PlotCanvas):
-    """A plot that calls ``picked`` with the value of the horizontal axis where it is clicked."""
+    """A plot that calls ``picked`` with the value of the horizontal axis where it is clicked.
+
+    While ``draggable``, a line with this value, in percent, follows the mouse until then.
+    """
 
     def __init__(self, drawing: Callable[[], Draw]) -> None:
         super().__init__(drawing)
         self.picked: Callable[[float], None] = lambda _: None
+        self.draggable = False
+        self._line: float | None = None
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if self.draggable and event.buttons() & Qt.MouseButton.LeftButton and self._has_axes:
+            self._line = event.position().x()
+            self.update()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        was_dragged, self._line = self._line is not None, None
+        self.update()
         left = event.button() == Qt.MouseButton.LeftButton
-        if not left or self.wiped or not self.figure.axes:
+        if left and self._has_axes and was_dragged >= self.draggable:
+            self.picked(self.to_value(event.position().x()))
+
+    @property
+    def _has_axes(self) -> bool:
+        return not self.wiped and bool(self.figure.axes)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        if self._line is None or not self._has_axes:
             return
-        self.picked(self.to_value(event.position().x()))
+        painter, (top, height) = QPainter(self), self.axes_rows()
+        painter.setPen(QPen(QColor(SELECTED_COLOR), 2.0))
+        painter.drawLine(QPointF(self._line, top), QPointF(self._line, top + height))
+        words = f" {self.to_value(self._line):.0f} % "
+        painter.setPen(QColor(self.scheme.text))
+        wide = painter.fontMetrics().horizontalAdvance(words)
+        at = QPointF(min(self._line, self.width() - wide), top + 0.5 * height)
+        painter.drawText(at, words)
+        painter.end()
 
 
 class CurvesPanel(Panel):
@@ -102,9 +141,13 @@ class CurvesPanel(Panel):
         self.span_row.setVisible(kind == "span" and not missing)
         self.whole.setVisible(kind != "greedy" and not missing)
         self.save.setEnabled(not missing)
-        shape = Qt.CursorShape.PointingHandCursor if kind == "steps" else Qt.CursorShape.ArrowCursor
-        self.canvas.setCursor(shape)
-        self.canvas.setToolTip(TIPS["steps"] if kind == "steps" else "")
+        run = session.run_shown
+        self.canvas.draggable = kind == "reach" and run is not None and can_scale(run.case.motions)
+        shapes = {"steps": Qt.CursorShape.PointingHandCursor}
+        if self.canvas.draggable:
+            shapes["reach"] = Qt.CursorShape.SplitHCursor
+        self.canvas.setCursor(shapes.get(kind, Qt.CursorShape.ArrowCursor))
+        self.canvas.setToolTip(TIPS[kind] if kind in shapes else "")
         if missing:
             self.area.show_text(missing)
         else:
@@ -120,8 +163,10 @@ class CurvesPanel(Panel):
         """Return why the session has no plot of a kind; an empty text if it has one."""
         if session.mesh is None:
             return "Open a mesh first. Then this panel shows the curves of its runs."
-        if kind == "span" and session.in_file:
+        if kind in ("span", "reach") and session.in_file:
             return IN_FILE
+        if kind == "reach" and reach_run(session) is None:
+            return "Run the case to see how far its motion may go."
         if kind == "steps" and not curves.step_runs(session):
             return "Run the case to see minimum and mean quality of each step."
         if kind == "greedy" and curves.greedy_run(session) is None:
@@ -145,6 +190,8 @@ class CurvesPanel(Panel):
             return partial(draw_greedy, session)
         if kind == "steps":
             return partial(draw_steps, session, whole)
+        if kind == "reach":
+            return partial(draw_reach, session, whole)
         coordinate, what = self.coordinate.currentData(), self.what.currentData()
         find = partial(self._profiles.of, session, coordinate)
         return partial(draw_span, find, coordinate, what, whole)
@@ -158,6 +205,8 @@ class CurvesPanel(Panel):
     def _picked(self, value: float) -> None:
         if self.kind.currentData() == "steps" and not self.area.shows_text:
             self.store.change(changes.show_frame, round(value))
+        elif self.canvas.draggable and round(value) > 0:
+            self.store.change(changes.scale_motions, part=round(value) / 100)
 
     def _save(self) -> None:
         name = self.kind.currentText().lower().replace(" ", "_")
@@ -165,7 +214,8 @@ class CurvesPanel(Panel):
 
 
 def _shown(session: Session) -> object:
-    return session.frame, session.runs, session.shown, session.case.axis, session.case.origin
+    case = session.case
+    return session.frame, session.runs, session.shown, case.axis, case.origin, case.motions
 
 
 def close_limits(values: Iterable[FloatArray]) -> tuple[float, float]:
@@ -189,6 +239,32 @@ def draw_steps(session: Session, whole: bool, figure: Figure, style: Style) -> N
     axes.axvline(at, color=SELECTED_COLOR, linewidth=2.0, zorder=0.5, gid="shown")
     last = max(len(run.frames) for run in session.runs)
     axes.set_xlim(-0.03 * last, 1.03 * last)
+
+
+def draw_reach(session: Session, whole: bool, figure: Figure, style: Style) -> None:
+    """Draw the lowest quality against the fraction of the motion, and the end of what is proved."""
+    axes, found, run = figure.add_subplot(), reach_of(session), reach_run(session)
+    assert run is not None
+    style_axes(axes, style, "fraction of the motion [%]", "lowest quality [-]")
+    look = style.series(series_number(curves.series_of(run), 0))
+    axes.plot(100 * found.fractions, found.lowest, color=look.color, linewidth=style.width, gid="q")
+    axes.axvline(100.0, color=style.scheme.edge, linewidth=1.0, zorder=0.5)
+    factor = factor_of(session.case.motions, run.case.motions)
+    if factor is not None and factor != 1:
+        axes.axvline(100 * factor, color=SELECTED_COLOR, linewidth=2.0, zorder=0.5, gid="typed")
+    end = 100 * found.safe.fraction
+    axes.set_xlim(0.0, 100 * found.fractions[-1])
+    axes.set_ylim((0.0, 1.0) if whole else (0.0, 1.1 * max(found.lowest.max(), 0.1)))
+    axes.set_title(run.label, fontsize=style.size, color=style.scheme.text)
+    if end <= 100 * found.fractions[-1]:
+        axes.axvline(end, color=INVERTED_COLOR, linewidth=2.0, gid="proved")
+        words = f"proved up to {floor(10 * end) / 10:g} %"
+        left = end > 50 * found.fractions[-1]
+        axes.annotate(
+            words, (end, 1.0), xycoords=axes.get_xaxis_transform(),
+            xytext=(-4 if left else 4, -3), textcoords="offset points",
+            ha="right" if left else "left", va="top", fontsize=style.size, color=INVERTED_COLOR,
+        )  # fmt: skip
 
 
 def draw_greedy(session: Session, figure: Figure, style: Style) -> None:

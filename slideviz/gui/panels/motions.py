@@ -55,6 +55,7 @@ from slideviz.session.motions import (
     targets,
     write_table,
 )
+from slideviz.session.reach import TYPED_TIP, typed_words
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -275,8 +276,10 @@ class MotionPanel(Panel):
             why = ""
         self.add.setToolTip(why or "Add a motion; several are performed in sequence.")
         usual = "Add the motions of the boundary; the view shows them at once."
-        hints = [why or (usual if count == 0 else ""), boxes_hint(session)]
+        reach = typed_words(session)
+        hints = [why or (usual if count == 0 else ""), boxes_hint(session), reach]
         self.hint.setText("\n".join(filter(None, hints)))
+        self.hint.setToolTip(wrapped(TYPED_TIP) if reach else "")
         self.hint.setVisible(any(hints))
 
     # Widgets to state ------------------------------------------------------------------

@@ -120,7 +120,9 @@ class RunPanel(Panel):
                 # The boundaries beside its cells are searched once.
                 remedy = remedy_for(run, session.mesh, session.folding)
                 self._remedy = (run, session.folding, remedy)
-            lines = [self._remedy[2], *notes] if bad else notes
+            lines = [self._remedy[2], *notes] if bad else list(notes)
+            if run.safe is not None:
+                lines.append(f"{run.safe.words[:1].upper()}{run.safe.words[1:]}.")
             self.text.setToolTip(wrapped("\n".join(lines)))
         elif run is session.runs[-1] and run.panels != session.case:
             self._show_ready("Settings changed since the last run.", session)

@@ -1,0 +1,90 @@
+"""How far a motion may go: in words, and as a curve of the lowest quality."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from slideviz.mesh.margin import SafeFraction, reach_words
+from slideviz.mesh.model import FloatArray
+from slideviz.mesh.quality import quality
+from slideviz.session.motion_scale import factor_of
+from slideviz.session.state import Run, Session, StepFrame, result_settings
+
+SAMPLES = 17  # fractions at which the curve is computed, besides steps
+FARTHEST_SHOWN = 3.0  # largest fraction of the curve
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """The lowest quality of a run along its steps, and straight on."""
+
+    fractions: FloatArray  # (k,): of the motion, ascending
+    lowest: FloatArray  # (k,): 0 where a cell is inverted
+    safe: SafeFraction
+
+
+_REACHES: WeakKeyDictionary[StepFrame, Reach] = WeakKeyDictionary()
+"""Results of `reach_of`, by the last frame."""
+
+
+def reach_run(session: Session) -> Run | None:
+    """Return the run that is shown, if it is known how far it may go and it is in memory."""
+    run = session.run_shown
+    return run if run is not None and run.safe is not None and not session.in_file else None
+
+
+def reach_of(session: Session) -> Reach:
+    """Return the curve of the run that is shown, which `reach_run` has; cached."""
+    run = reach_run(session)
+    assert run is not None
+    assert run.safe is not None
+    assert run.last is not None
+    known = _REACHES.get(run.last)
+    if known is not None:
+        return known
+    frames = session.frames
+    parts = [0.0, *(frame.step.part for frame in run.frames if frame.step is not None)]
+    end = float(np.clip(1.15 * run.safe.fraction, 1.0, FARTHEST_SHOWN))
+    limit = min(run.safe.fraction, end)
+    fractions = np.unique([*parts, *np.linspace(0.0, end, SAMPLES), limit])
+    lowest = [_lowest(frames, parts, float(at)) for at in fractions]
+    found = _REACHES[run.last] = Reach(fractions, np.array(lowest), run.safe)
+    return found
+
+
+def _lowest(frames: Sequence[StepFrame], parts: Sequence[float], at: float) -> float:
+    """Return the lowest quality at a fraction of the motion, between or beyond the frames."""
+    if at in parts:
+        return frames[parts.index(at)].quality.min
+    ends = list(pairwise(parts))
+    k = next((k for k, (_, end) in enumerate(ends) if at < end), len(ends) - 1)
+    (low, high), first, undeformed = ends[k], frames[k].mesh.points, frames[0].mesh
+    points = first + (at - low) / (high - low) * (frames[k + 1].mesh.points - first)
+    return quality(undeformed.with_points(points), undeformed, frames[-1].quality.metric).min
+
+
+TYPED_TIP = (
+    "All cells are proved valid so far if the displacement of that run is scaled. A new run in one "
+    "step gives the same for translations, if control nodes and support radius stay the same; "
+    "rotations and several steps leave the straight paths, so run it to be sure."
+)
+
+
+def typed_words(session: Session) -> str:
+    """Return how far the motion in the panel may go, by the run that is shown; "" if unknown."""
+    run = session.run_shown
+    safe = run.safe if run is not None else None
+    if run is None or safe is None or safe.fraction == 0:
+        return ""
+    case = session.case.change(motions=run.case.motions)
+    factor = factor_of(session.case.motions, run.case.motions)
+    if factor is None or result_settings(case) != result_settings(run.case):
+        return ""
+    more = " or more" * (safe.cell is None)
+    part = "" if factor == 1 else f" ({100 * factor:.3g} % of its motion)"
+    return f"By {run.label}{part}, it {reach_words(safe.fraction / factor)}{more}."
