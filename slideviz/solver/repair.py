@@ -7,7 +7,7 @@ copies do. Here a boundary with the role internal is one to slide on: its nodes 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from math import nan
 
@@ -210,33 +210,34 @@ def mend(
     number = np.arange(len(now.cells)) if cells is None else cells
     mended, before = now.with_points(sealed(points)), sealed(now.points[moved])
     bad = number[done.bad_before], number[done.bad_after]
-    unmendable, warnings = _unmendable(now, done, number)
+    unmendable, warnings = _unmendable(done, number)
     return MeshRepair(mended, *bad, moved, before, done.largest_move, unmendable, warnings)
 
 
 def _unmendable(
-    mesh: Mesh, done: Repaired, number: IntArray
+    done: Repaired, number: IntArray
 ) -> tuple[tuple[tuple[int, str], ...], tuple[str, ...]]:
     """Return the cells that no motion of free nodes mends, with reasons, and a warning of them.
 
     ``number`` (m,): numbers of the cells that were repaired.
     """
-    found, names = [], dict[str, None]()
-    for one in done.impossible:
-        on = [m.name for m in mesh.markers if np.isin(one.nodes, m.nodes).any()]
-        names |= dict.fromkeys(on)
-        where = f"on {' and '.join(on)}" if on else "in place"
-        found.append((int(number[one.cell]), f"its nodes that fold it are held {where}"))
-    if not found:
+    if not done.impossible:
         return (), ()
-    first = ", ".join(str(cell) for cell, _ in found[:5]) + " ..." * (len(found) > 5)
-    held = f"on {', '.join(names)}" if names else "in place"
-    sentence = (
-        f"{counted(len(found), 'cell')} cannot be mended ({first}): the nodes that fold them are "
-        f"held {held}, so that no motion of the others helps; let that boundary slide, move it "
-        "less, or mend its mesh"
+
+    def held(names: Iterable[str]) -> str:
+        return f"held on {' and '.join(names)}" if names else "held"
+
+    found = tuple(
+        (int(number[one.cell]), f"its nodes are {held(one.boundaries)}") for one in done.impossible
     )
-    return tuple(found), (sentence,)
+    first = ", ".join(str(cell) for cell, _ in found[:5]) + " ..." * (len(found) > 5)
+    names = dict.fromkeys(name for one in done.impossible for name in one.boundaries)
+    sentence = (
+        f"{counted(len(found), 'cell')} cannot be mended ({first}): the nodes that make them bad "
+        f"are {held(names)}, so that no motion of the others helps; let that boundary slide, move "
+        "it less, or mend its mesh"
+    )
+    return found, (sentence,)
 
 
 def repair_case(case: Case) -> Case:
