@@ -31,6 +31,9 @@ from slideviz.terms import SkewMetric
 RINGS = 3, 5, 8, 13, 21
 """Rings of cells around bad ones; a patch that fails grows to the next."""
 
+FEW = 5000
+"""Most cells of a patch that grows to the last two."""
+
 ROUNDS, VAIN = 40, 10
 """Most outer rounds of a patch, and those in a row that may mend nothing."""
 
@@ -213,6 +216,8 @@ def _mend_patches(work: _Work, bad: NDArray[np.bool_], rings: int, points: Float
     """Mend all patches; write the points (n, d)."""
     patches, free = find_patches(work.mesh.cells, work.freedom, bad, rings)
     for number, cells in enumerate(patches):
+        if rings > RINGS[2] and len(cells) > FEW:
+            continue
 
         def numbered(fraction: float, number: int = number) -> None:
             work.report((number + fraction) / len(patches))
