@@ -45,7 +45,7 @@ def with_inverted(run, count):
 def test_it_tells_the_end_and_the_inverted_cells(run):
     assert end_message(replace(run, frames=())) == "Ready."
     assert end_message(run) == "Done."
-    assert end_message(with_inverted(run, 1)) == "Done: 1 inverted cell"
+    assert end_message(with_inverted(run, 1)) == "Done: 1 inverted cell."
     assert inverted_words(with_inverted(run, 12)) == "12 inverted cells"
     stopped = replace(run, frames=run.frames[:1])
     assert end_message(stopped) == "Stopped after step 1 of 2."
