@@ -1,8 +1,10 @@
 """``python -m tools.study.real SU2_TESTCASES``: radial basis functions beside linear elasticity.
 
 Prints a table, in Markdown, of the lowest and the mean quality on meshes of SU2's test cases, one
-step each, all other boundaries held. The meshes are not part of this project: the argument is the
-folder TestCases of SU2's repository, or one with the same files whose names have ``_`` for ``/``.
+step each, all other boundaries held. With ``--repair`` after the folder, it prints the cells that
+are inverted before and after repair instead, for parts of the motions that fold at most 300 cells.
+The meshes are not part of this project: the argument is the folder TestCases of SU2's repository,
+or one with the same files whose names have ``_`` for ``/``.
 """
 
 from __future__ import annotations
@@ -45,6 +47,8 @@ ROWS = (
     Row(_STAGE, ("wall3", "wall4"), 2, 0.125, True),
 )
 METHODS: tuple[Method, ...] = ("rbf", "elastic")
+FOLDED = 300
+"""Most cells that a motion may fold whose cells are repaired."""
 
 
 def main(folder: Path) -> None:
@@ -68,6 +72,46 @@ def main(folder: Path) -> None:
             f"{'with' if has_layers else 'without'} layers: mean higher {mean} : {elastic_mean}, "
             f"lowest higher {low} : {elastic_low} (radial basis functions : elasticity)"
         )
+
+
+def repaired(folder: Path) -> None:
+    """Print the cells inverted before and after repair of each mesh and motion that folds some."""
+    for row in ROWS:
+        path = folder / row.file
+        path = path if path.exists() else folder / row.file.replace("/", "_")
+        mesh = sv.read(path, zone=row.zone)
+        for kind in range(3):
+            found = folding(mesh, row, kind)
+            if found is None:
+                say(f"| {row.file}, zone {row.zone} | motion {kind} folds no 1 to {FOLDED} cells |")
+                continue
+            case, before = found
+            *_, last = sv.deform(case.change(repair="yes"), mesh)
+            after = sv.quality(last.mesh, mesh)
+            why = "; ".join(last.warnings)
+            motion = type(case.motions[0]).__name__.lower()
+            say(
+                f"| {row.file}, zone {row.zone} | {motion} | {len(mesh.cells)} | {before} | "
+                f"{after.inverted} | {after.min:.3f} | {why} |"
+            )
+
+
+def folding(mesh: sv.Mesh, row: Row, kind: int) -> tuple[sv.Case, int] | None:
+    """Return a case that folds at most `FOLDED` cells, and how many; None if none is found."""
+    low, high, part = 0.0, np.inf, row.part
+    roles: dict[str, Role] = dict.fromkeys(row.body, "moving")
+    for _ in range(9):
+        case = sv.Case(roles=roles, motions=(motions(mesh, row._replace(part=part))[kind],))
+        try:
+            *_, last = sv.deform(case, mesh)
+            inverted = sv.quality(last.mesh, mesh).inverted
+        except SlidevizError:
+            inverted = len(mesh.cells) + FOLDED
+        if 0 < inverted <= FOLDED:
+            return case, inverted
+        low, high = (low, part) if inverted else (part, high)
+        part = 2.0 * part if np.isinf(high) else (low + high) / 2.0
+    return None
 
 
 def motions(mesh: sv.Mesh, row: Row) -> tuple[Motion, ...]:
@@ -108,4 +152,4 @@ def say(text: str) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    (repaired if "--repair" in sys.argv else main)(Path(sys.argv[1]))
