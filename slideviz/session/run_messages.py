@@ -59,7 +59,7 @@ def end_message(run: Run) -> str:
     bad = "; ".join(filter(None, (inverted_words(run), limits_words(run), heights)))
     if step.index < step.total:
         return f"Stopped after step {step.index} of {step.total}" + (f": {bad}." if bad else ".")
-    done, reach = bad or repair_words(run), ""
+    done, reach = "; ".join(filter(None, (bad, repair_words(run)))), ""
     if run.safe is not None and run.safe.fraction > 0:
         reach = f"the motion {reach_words(run.safe.fraction)}"
         if run.safe.cell is None:

@@ -44,8 +44,6 @@ def remedies(
     found, roles = [], set(case.roles.values())
     if case.method != "rbf":
         found.append(Remedy("METHOD= rbf", "radial basis functions as the method"))
-    if folded and case.repair == "no" and not pitch:
-        found.append(Remedy("REPAIR= YES", "repair, in the menu Run"))
     if layers:
         given = case.reduction or Reduction()
         yes = "DATA_REDUCTION= YES with " if given.auto else ""
@@ -74,6 +72,8 @@ def remedies(
         found.append(Remedy("PERIODIC_MODE= moving", "periodicity with moving vertices"))
     if case.steps:
         found.append(Remedy("more STEPS, or STEPS= auto", "more steps, or automatic steps"))
+    if folded and case.repair == "no" and not pitch:
+        found.append(Remedy("REPAIR= YES", "repair, in the menu Run"))
     if not pitch:
         found.append(Remedy(*["a smaller motion"] * 2))
     return tuple(found)
