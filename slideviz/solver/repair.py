@@ -12,6 +12,7 @@ from dataclasses import replace
 from math import nan
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slideviz.argument_types import check_types
 from slideviz.case.check import key_problems, raise_all, unknown_markers
@@ -241,19 +242,14 @@ def _unmendable(
 
 
 def repair_case(case: Case) -> Case:
-    """Return the case in which the nodes slide that repair lets slide.
-
-    Internal boundaries are sliding ones. Without a sliding method, others stay.
-    """
-    roles, periodic = dict(case.roles), case.periodic
-    if "internal" not in roles.values():
+    """Return the case in which internal boundaries are ones to slide on."""
+    if "internal" not in case.roles.values():
         return case
-    if case.sliding == "none":
-        held = {"sliding"} | ({"periodic"} if periodic in ("none", "periodic") else set())
-        roles = {name: "fixed" if role in held else role for name, role in roles.items()}
-        periodic = "none" if "periodic" in held else periodic
-    roles = {name: "sliding" if role == "internal" else role for name, role in roles.items()}
-    return case.change(roles=roles, periodic=periodic, sliding="ps", relax="no", layers="no")
+    roles: dict[str, Role] = {
+        name: "sliding" if role == "internal" else role for name, role in case.roles.items()
+    }
+    way = "ps" if case.sliding == "none" else case.sliding
+    return case.change(roles=roles, sliding=way, relax="no", layers="no")
 
 
 def still_setup(case: Case, mesh: Mesh, points: FloatArray) -> Setup:
@@ -276,7 +272,9 @@ def find_freedom(case: Case, mesh: Mesh, points: FloatArray, setup: Setup | None
         held[shell_of(mesh)] = True
         return Freedom.within(mesh.dim, held)
     sliding = repair_case(case)
-    known = setup.known if setup is not None else np.empty(0, np.int64)
+    # What stays is as in the run, where without a sliding method all other boundaries do.
+    classes = find_domain(case, mesh).classes if setup is None else setup.classes
+    known = np.concatenate([classes.moving, classes.fixed])
     if setup is None or sliding is not case:
         setup = still_setup(sliding, mesh, points)
     held = np.concatenate([known, setup.known, _unmarked(mesh, setup.boundary.facets)])
@@ -289,36 +287,69 @@ def find_freedom(case: Case, mesh: Mesh, points: FloatArray, setup: Setup | None
     body = elastic_body(mesh, frame, setup.axis)
     problem = problem_at(setup, coords, coords[setup.known])
 
+    slides = np.zeros(len(points), bool)
+    slides[setup.classes.sliding] = True
+    # A run takes nodes of internal boundaries off these: they move in planes beside their surface,
+    # whose normals are those before (facets beside a boundary that moved away have others).
+    inner = slides & _only_on(mesh, case.markers_with("internal"))
+    before = setup.constraints(setup.coords)[1]
+
     def maps_at(coords: FloatArray) -> tuple[IntArray, FloatArray, np.ndarray]:
         nodes, normals = setup.constraints(coords)
+        normals = np.where(inner[nodes][:, None], before, normals)
         there = replace(problem, coords=coords, normal_nodes=nodes, normals=normals)
         given = conditions(there, body, held, np.zeros((len(held), mesh.dim)))
         return given.place, given.turn, given.plain
 
     place, turn, plain = maps_at(coords)
     bound = np.flatnonzero((place >= 0) & ~plain)
-    slides = np.zeros(len(points), bool)
-    slides[setup.classes.sliding] = True
     if not (setup.tracks.curved or frame.cylindrical):  # an arc about the axis is straight there
         return Freedom(sealed(place), bound, turn[bound], bound[:0])
     curved = np.flatnonzero(slides & (place >= 0))
-    return Freedom(
-        sealed(place), bound, turn[bound], curved, _projection(setup, points, coords, maps_at)
-    )
+    project = _projection(setup, points, coords, inner, maps_at)
+    return Freedom(sealed(place), bound, turn[bound], curved, project)
+
+
+def _only_on(mesh: Mesh, names: Sequence[str]) -> NDArray[np.bool_]:
+    """Return a mask (n,) of the nodes that are on boundaries of these names, and on no others."""
+    mask = np.zeros(len(mesh.points), bool)
+    for inside in (True, False):
+        for marker in mesh.markers:
+            if (marker.name in names) == inside:
+                mask[marker.nodes] = inside
+    return mask
+
+
+def _orthonormal(nodes: IntArray, normals: FloatArray, count: int) -> list[FloatArray]:
+    """Return arrays (n, d) of the first, second... normals of each node, made orthogonal; or 0."""
+    order = np.argsort(nodes, kind="stable")
+    place = np.arange(len(nodes)) - np.searchsorted(nodes[order], nodes[order])
+    out: list[FloatArray] = []
+    for k in range(place.max(initial=-1) + 1):
+        rows, at = np.zeros((count, normals.shape[1])), order[place == k]
+        rows[nodes[at]] = normals[at]
+        for other in out:
+            rows -= other * (other * rows).sum(axis=1, keepdims=True)
+        length = np.linalg.norm(rows, axis=1, keepdims=True)
+        out.append(np.divide(rows, length, out=np.zeros_like(rows), where=length > 1e-9))
+    return out
 
 
 def _projection(
     setup: Setup,
     at: FloatArray,
     start: FloatArray,
+    inner: NDArray[np.bool_],
     maps_at: Callable[[FloatArray], tuple[IntArray, FloatArray, np.ndarray]],
 ) -> Callable[[IntArray, FloatArray], tuple[FloatArray, FloatArray]]:
     """Return the function that puts sliding nodes back on their boundary (`Freedom.project`).
 
     ``at``, ``start`` (n, d): points and coordinates before the repair.
+    ``inner`` (n,): nodes that move in the planes of their normals before, wherever they are.
     ``maps_at``: returns the maps at coordinates.
     """
     frame, representative = setup.frame, setup.classes.representative
+    normals = _orthonormal(*setup.constraints(setup.coords), len(at))
 
     def project(nodes: IntArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         one = representative[nodes]
@@ -326,6 +357,9 @@ def _projection(
         free = frame.coords(points[own]) - start[nodes[own]]
         slid = np.zeros_like(start)
         slid[nodes[own]] = setup.project(start, nodes[own], free)
+        for rows in normals:
+            free = free - rows[nodes[own]] * (rows[nodes[own]] * free).sum(axis=1, keepdims=True)
+        slid[nodes[own]] = np.where(inner[nodes[own], None], free, slid[nodes[own]])
         now = start.copy()
         now[nodes] += slid[one]
         # A node in its place keeps its bits.

@@ -133,11 +133,43 @@ def test_nodes_off_their_wall_are_put_back_with_their_images():
 
 
 def test_internal_boundaries_slide_and_without_a_sliding_method_others_stay():
+    mesh = builders.passage((2, 4, 4), 40.0)
     roles = {"hub": "internal", "inflow": "sliding", "per1": "periodic", "per2": "periodic"}
-    held = repair_case(sv.Case(roles=roles))
-    assert held.roles == {"hub": "sliding", "inflow": "fixed", "per1": "fixed", "per2": "fixed"}
-    free = repair_case(sv.Case(roles=roles, sliding="ds", periodic="moving"))
-    assert free.roles == roles | {"hub": "sliding"}
+    case = sv.Case(roles=roles, periodic_type="rotational", sliding="none", periodic="none")
+    assert repair_case(case).roles == roles | {"hub": "sliding"}
+    freedom = find_freedom(case, mesh, mesh.points)
+    free = freedom.place >= 0
+    others = np.unique(np.concatenate([m.nodes for m in mesh.markers if m.name != "hub"]))
+    assert not free[others].any()
+    hub = np.setdiff1d(mesh.marker("hub").nodes, others)
+    assert free[hub].all()
+    assert np.isin(hub, freedom.bound).all()
+    sides = find_freedom(case.change(sliding="ds", periodic="moving"), mesh, mesh.points)
+    assert (
+        sides.place[np.setdiff1d(mesh.marker("per1").nodes, mesh.marker("hub").nodes)] >= 0
+    ).any()
+
+
+def test_nodes_that_a_run_took_off_an_internal_boundary_keep_their_distance_from_it():
+    mesh = builders.passage((2, 6, 6), 40.0)
+    case = sv.Case(
+        roles={"hub": "internal", "blade": "moving", "per1": "periodic", "per2": "periodic"},
+        periodic_type="rotational",
+        sliding="none",
+        periodic="none",
+    )
+    hub = mesh.marker("hub").nodes
+    off = np.array(mesh.points)
+    off[hub, :2] *= 1.0 + 0.02 * np.sin(40 * off[hub, 2:])
+    freedom = find_freedom(case, mesh, off)
+    nodes = freedom.curved[np.isin(freedom.curved, hub)]
+    there = off[nodes] + np.random.default_rng(1).normal(0, 0.01, (len(nodes), 3))
+    points, maps = freedom.project(nodes, there)
+    radius = np.linalg.norm(off[nodes, :2], axis=1)
+    np.testing.assert_allclose(np.linalg.norm(points[:, :2], axis=1), radius, rtol=1e-12)
+    radial = points[:, :2] / radius[:, None]
+    np.testing.assert_allclose(np.einsum("ki,kij->kj", radial, maps[:, :2]), 0.0, atol=1e-9)
+    assert np.array_equal(freedom.project(nodes, off[nodes])[0], off[nodes])
 
 
 def test_outer_sides_without_a_boundary_stay():
