@@ -17,6 +17,7 @@ from slideviz.case.model import Case, Rotate, Scale, Translate
 from slideviz.design.checks import warn_of_condition, warn_of_error_estimate
 from slideviz.design.frozen.solve import full_factor
 from slideviz.errors import ConditionWarning, DeformError, Note, ToleranceWarning
+from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.reduction import Reduction
 from slideviz.samples.table import sample
 from slideviz.solver.stepping import _doubt_warning, _dropped_warning
@@ -112,7 +113,7 @@ def test_a_small_error_is_a_note(error_estimate, little):
 @pytest.mark.parametrize(("count", "total"), [(1, 1), (2, 1), (1, 2)])
 def test_nodes_without_control_are_counted(count, total):
     solution: Any = SimpleNamespace(dropped=np.arange(count), dropped_error=1.0)
-    setup: Any = SimpleNamespace(basis=SimpleNamespace(kernel="wendland-c2"))
+    setup: Any = SimpleNamespace(basis=Basis(1.0))
     (said,) = _dropped_warning(setup, solution, 1, total, thin())
     assert said.startswith("from step 1 on, ") == (total > 1)
     assert ("boundary node 0 at" in said) == (count == 1)
