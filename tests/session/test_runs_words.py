@@ -190,6 +190,7 @@ def test_every_setting_that_changes_a_result_tells_runs_apart(key):
         method=key.method or "rbf",
         reduction=Reduction(0.25, multilevel=True),
         layers="keep",
+        repair="yes",
     )
     runs = runs_of(base, key.put(base, other_value(key, base)))
     first, second = (f"{run_words(run)}: {summary(run, runs)}" for run in runs)

@@ -130,6 +130,7 @@ def test_each_change_that_can_be_undone_has_words():
         "remove_section": "removing a section",
         "replace_motion": "motion",
         "replace_section": "section",
+        "scale_motions": "scaled motion",
         "set_case": "settings",
         "set_role": "role",
         "set_view": "view",

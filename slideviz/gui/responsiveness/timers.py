@@ -30,7 +30,9 @@ NUMPY_THREADS = 1
 The GUI thread multiplies matrices, too; on a busy machine the threads of BLAS wait for each other:
 0.14 s instead of 3 ms for the points of a large mesh.
 """
-GARBAGE_MS = 200  # least time between two garbage collections: one blocks the window for some ms
+GARBAGE_MS = 200
+"""Least time between two garbage collections, as one blocks the window for some ms."""
+
 GARBAGE_OBJECTS = 2000
 """Least number of objects made since the last garbage collection for another one."""
 
@@ -74,11 +76,14 @@ COUNTING_MS = 300
 """Delay from a repeated error to showing its count, as each one repaints the whole window."""
 
 # Plots and tables --------------------------------------------------------------------------
-REST_MS = 200  # least time between two drawings of a plot or table while steps are played
+REST_MS = 200
+"""Least time between two drawings of a plot or table while steps are played."""
+
 REST_TIMES, MOST_REST = 4.0, 4
 """Pause of a plot relative to the time its drawing took; and its limit, in units of `REST_MS`."""
 
-LOOK_MS = 8  # interval at which a finished plot is polled for: half the time of a screen's frame
+LOOK_MS = 8
+"""Interval at which a finished plot is polled for: half the time of a screen's frame."""
 
 # After what the user does ------------------------------------------------------------------
 SELECTING_MS = 120
@@ -96,7 +101,9 @@ ROWS_MS = 250
 INTERSECTION_MS = 200
 """Delay from the last change of the case to the job that checks boundaries for intersections."""
 
-AUTOSAVE_MS = 5000  # delay from the first unsaved change to writing the session
+AUTOSAVE_MS = 5000
+"""Delay from the first unsaved change to writing the session."""
+
 READ_MS = 100
 """Interval at which a run that was asked for at the start checks whether its file is read."""
 
