@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import slideviz as sv
 from slideviz.mesh.jacobians import VALID
 from slideviz.mesh.model import Cells
 from slideviz.mesh.orientation import reference_of
@@ -15,6 +16,7 @@ from slideviz.mesh.repair.freedom import Freedom
 from slideviz.mesh.repair.lift import lift_energy
 from slideviz.mesh.repair.patches import Patch
 from slideviz.mesh.repair.repair import repair
+from slideviz.samples.table import sample
 from slideviz.system.threads import core_limit
 from tests.builders import grid
 
@@ -324,3 +326,19 @@ def test_boundary_layers_keep_their_heights(dim):
     assert result.points[first, 1] / heights[1] == pytest.approx(1, abs=0.1)
     same = np.setdiff1d(first, result.moved)
     assert np.array_equal(result.points[same], mesh.points[same])
+
+
+def test_a_lift_shortens_no_edge_to_raise_the_quality():
+    """Size-skew does not see short edges: without the energy of shape one falls to 8e-7."""
+    made = sample("square", 25)
+    case = made.case.change(sliding="none", periodic="none", steps=1)
+    *_, last = sv.deform(case, made.mesh)
+    done = sv.repair(last.mesh, made.mesh, below=0.3)
+    assert len(done.cells) > 50
+    assert not len(done.left)
+
+    def shortest(mesh):
+        corners = mesh.points[mesh.cells.by_type[9][1]]
+        return np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).min()
+
+    assert shortest(done.mesh) > 0.3 * shortest(last.mesh)

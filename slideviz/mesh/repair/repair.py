@@ -34,6 +34,9 @@ RINGS = 3, 5, 8, 13, 21
 FEW = 5000
 """Most cells of a patch that grows to the last two."""
 
+POOR = 2
+"""Number of sizes that are tried for patches whose cells are all proved, but some too low."""
+
 ROUNDS, VAIN = 40, 10
 """Most outer rounds of a patch, and those in a row that may mend nothing."""
 
@@ -44,6 +47,9 @@ a cell is folded, when none is, and in the last descent, which brings cells near
 LIFTS, LIFTED, BETA, GAIN = 40, 1e-3, 1.01, 0.003
 """Of a round that lifts the worst: most iterations, the epsilon of the preconditioner, the limit
 over the largest 1 / quality, and the least relative gain, of which two rounds may bring less."""
+
+SHAPE = 10.0
+"""Weight of the energy of shape beside that of the lift, which does not see short edges."""
 
 FLAT_SIDE = 1e-6
 """Sine of the angle between the normals of a side's corners, up to which it is flat. In a flat side
@@ -153,8 +159,9 @@ def repair(
             now = mesh.with_points(points)
             settings = freedom, sums, signs, metric, below, staged, hopeless, pool
             _mend_patches(_Work(now, reference, *settings), bad, rings, points)
-            after = _bad(quality(mesh.with_points(points), reference, metric), below)
-            bad = bad & after
+            found = quality(mesh.with_points(points), reference, metric)
+            after = _bad(found, below)
+            bad &= after if stage + 1 < POOR else found.status != VALID
     way = np.linalg.norm(points - mesh.points, axis=1)
     return Repaired(
         points=sealed(points),
@@ -387,16 +394,17 @@ class _Mending:
                 bound = self._longest(patch, edges, direction)  # noqa: B023
                 return min(bound, patch.margin(unknowns, direction, self.signs))
 
+            def raised(unknowns: FloatArray) -> tuple[float, FloatArray]:
+                """Return what falls where the worst cells rise, and no edge gets short."""
+                cells = self.signs, self.sums, sized, work.metric
+                total, slopes = lift_energy(patch, unknowns, *cells, beta)  # noqa: B023
+                if np.isfinite(total):
+                    energy, pull = patch.energy(unknowns, LIFTED)
+                    total, slopes = total + SHAPE * energy, slopes + SHAPE * pull
+                return total, slopes
+
             found = descend(
-                lambda unknowns: lift_energy(
-                    patch,
-                    unknowns,
-                    self.signs,
-                    self.sums,
-                    sized,
-                    work.metric,
-                    beta,  # noqa: B023
-                ),
+                raised,
                 patch.still,
                 lambda gradient: np.einsum("bij,bj->bi", inverse, gradient),  # noqa: B023
                 longest,
